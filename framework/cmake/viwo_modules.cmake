@@ -1,0 +1,47 @@
+# viwo_add_module(NAME SOURCES a.cpp ... LINKS target ...)
+# A module of the framework: static library viwo_NAME (alias viwo::NAME) with its headers in include/.
+# Without sources it is header-only.
+function(viwo_add_module name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  set(target viwo_${name})
+  if(ARG_SOURCES)
+    add_library(${target} STATIC ${ARG_SOURCES})
+    target_include_directories(${target} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR}/include)
+    target_compile_options(${target} PRIVATE ${VIWO_WARNINGS})
+    target_link_libraries(${target} PUBLIC ${ARG_LINKS} PRIVATE ${ARG_PRIVATE_LINKS})
+  else()
+    add_library(${target} INTERFACE)
+    target_include_directories(${target} INTERFACE ${CMAKE_CURRENT_SOURCE_DIR}/include)
+    target_link_libraries(${target} INTERFACE ${ARG_LINKS})
+  endif()
+  add_library(viwo::${name} ALIAS ${target})
+endfunction()
+
+# viwo_add_test(NAME SOURCES a.cpp ... LINKS target ... LABELS label ... DEPENDS target ...)
+# A GoogleTest executable, each of its tests known to ctest. Plugins of this build are found through
+# VIWO_TEST_PLUGIN_DIR, real recordings through VIWO_TEST_SHARED_DIR (which may not exist).
+function(viwo_add_test name)
+  if(NOT VIWO_BUILD_TESTS)
+    return()
+  endif()
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINKS;LABELS;DEPENDS" ${ARGN})
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS unit)
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_compile_options(${name} PRIVATE ${VIWO_WARNINGS})
+  target_compile_definitions(${name} PRIVATE
+    VIWO_TEST_PLUGIN_DIR="${VIWO_PLUGIN_OUTPUT_DIR}"
+    VIWO_TEST_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+    VIWO_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
+    VIWO_TEST_SHARED_DIR="${PROJECT_SOURCE_DIR}/../shared")
+  target_link_libraries(${name} PRIVATE ${ARG_LINKS} GTest::gtest_main GTest::gmock)
+  if(ARG_DEPENDS)
+    add_dependencies(${name} ${ARG_DEPENDS})
+  endif()
+  gtest_discover_tests(${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
+    PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()

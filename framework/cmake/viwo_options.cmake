@@ -1,0 +1,31 @@
+# Options of the build; what must be the same in host and plugins goes through viwo_api's interface.
+option(VIWO_BUILD_TESTS "Build the tests" ON)
+option(VIWO_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark)" ON)
+option(VIWO_WERROR "Warnings are errors" OFF)
+set(VIWO_ARCH "native" CACHE STRING
+    "Instruction set of host and plugins, as for -march (native, x86-64-v3, ...); empty: the compiler's default")
+set(VIWO_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize: address,undefined or thread")
+
+set(VIWO_ABI_FLAGS "")
+if(VIWO_ARCH)
+  list(APPEND VIWO_ABI_FLAGS -march=${VIWO_ARCH})
+endif()
+if(VIWO_SANITIZE)
+  list(APPEND VIWO_ABI_FLAGS -fsanitize=${VIWO_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${VIWO_SANITIZE})
+endif()
+
+set(VIWO_WARNINGS -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
+# GCC 12 warns falsely: about its own AVX-512 headers when Eigen is inlined, and about std::string
+# (bug 105651).
+list(APPEND VIWO_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>
+     $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized>)
+if(VIWO_WERROR)
+  list(APPEND VIWO_WARNINGS -Werror)
+endif()
+
+find_program(VIWO_CCACHE ccache)
+if(VIWO_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${VIWO_CCACHE})
+endif()

@@ -1,0 +1,50 @@
+// Checks a section of a configuration against a table of parameters (viwo/api/params.hpp).
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "viwo/api/params.hpp"
+#include "viwo/config/errors.hpp"
+#include "viwo/config/node.hpp"
+
+namespace viwo::config {
+
+/// What the reader needs from its caller.
+struct ReadContext {
+  /// Builds the nested model of a kKinematics parameter from its section at `path`; nullptr with
+  /// entries in Errors if that fails. Whoever makes the model owns it. Needed only for tables that
+  /// have such a parameter.
+  std::function<const KinematicModel*(const Node& section, const std::string& path, Errors&)>
+      make_kinematics;
+};
+
+/// Reads the parameters in `specs` from a section (a map, or null for "all defaults").
+///
+/// `where` is the position for what is missing. `what` names the section in messages: its path, or
+/// "path (type)". Keys in `other_keys` are left to the caller; every other key that is not in the
+/// table is an error. Paths become absolute: relative ones are relative to the folder of the file
+/// in which the value is written, or to the current folder if it does not come from a file.
+///
+/// All that is wrong goes into `errors`; then the set is incomplete and must not be used. Throws
+/// std::logic_error when the table itself is wrong, e.g. a fallback that violates its own bounds.
+ParamSet read_params(const Node& map, const Mark& where, std::string_view what,
+                     std::span<const ParamSpec> specs, std::span<const std::string_view> other_keys,
+                     const ReadContext& context, Errors& errors);
+
+/// Throws std::logic_error when a table is wrong: a name missing or twice, a null text, a fallback
+/// that its own row refuses (kKinematics: that is not a section).
+void check_specs(std::span<const ParamSpec> specs);
+
+/// Writes checked values back: a section that read_params accepts and that gives the same values.
+/// `write_kinematics` gives the section of a nested model.
+Node write_params(std::span<const ParamSpec> specs, const ParamSet& params,
+                  const std::function<Node(const KinematicModel&)>& write_kinematics = {});
+
+/// A YAML template of a section: "key: default  # unit, bounds, choices: help", one line per
+/// parameter; required ones have no value.
+std::string describe_params(std::span<const ParamSpec> specs);
+
+}  // namespace viwo::config

@@ -1,0 +1,23 @@
+// YAML text to Node and back.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "viwo/config/node.hpp"
+
+namespace viwo::config {
+
+/// Reads one YAML document. Anchors, aliases and merge keys are expanded. Throws viwo::InputError
+/// with file:line:column for syntax errors, duplicate keys, keys that are not text, and values that
+/// contain themselves; with the file for one that is missing or cannot be read.
+Node load_file(const std::filesystem::path& file);
+
+/// The same for a text; `origin` stands for the file in positions.
+Node parse(std::string_view text, const std::string& origin);
+
+/// YAML that parses back to the same tree. Lists of scalars are written on one line.
+std::string to_yaml(const Node& node);
+
+}  // namespace viwo::config

@@ -1,0 +1,59 @@
+#include <algorithm>
+
+#include <yaml-cpp/yaml.h>
+
+#include "viwo/config/yaml.hpp"
+
+namespace viwo::config {
+namespace {
+
+/// Plain text that a reader would take for something else than this text.
+bool needs_quotes(const std::string& text) {
+  return text.empty() || text == "<<" || text == "~" || text == "null" || text == "Null" ||
+         text == "NULL";
+}
+
+void emit_text(YAML::Emitter& out, const std::string& text, bool quoted) {
+  if (quoted || needs_quotes(text)) out << YAML::DoubleQuoted;
+  out << text;
+}
+
+void emit(YAML::Emitter& out, const Node& node) {
+  switch (node.kind()) {
+    case Node::Kind::kNull:
+      out << YAML::Null;
+      return;
+    case Node::Kind::kScalar:
+      emit_text(out, node.scalar(), node.quoted());
+      return;
+    case Node::Kind::kList: {
+      const bool flat = std::all_of(node.items().begin(), node.items().end(), [](const Node& item) {
+        return item.is_scalar() || item.is_null();
+      });
+      out << (flat ? YAML::Flow : YAML::Block) << YAML::BeginSeq;
+      for (const Node& item : node.items()) emit(out, item);
+      out << YAML::EndSeq;
+      return;
+    }
+    case Node::Kind::kMap:
+      out << (node.entries().empty() ? YAML::Flow : YAML::Block) << YAML::BeginMap;
+      for (const Node::Entry& entry : node.entries()) {
+        out << YAML::Key;
+        emit_text(out, entry.key, false);
+        out << YAML::Value;
+        emit(out, entry.value);
+      }
+      out << YAML::EndMap;
+      return;
+  }
+}
+
+}  // namespace
+
+std::string to_yaml(const Node& node) {
+  YAML::Emitter out;
+  emit(out, node);
+  return std::string(out.c_str(), out.size()) + "\n";
+}
+
+}  // namespace viwo::config

@@ -1,0 +1,210 @@
+// YAML text to trees and back, with positions.
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "viwo/api/status.hpp"
+#include "viwo/config/yaml.hpp"
+
+namespace viwo::config {
+namespace {
+
+std::string parse_error(std::string_view text) {
+  try {
+    parse(text, "f.yaml");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Yaml, KnowsWhereEveryKeyAndValueIsWritten) {
+  const Node root = parse("a: 1\nb:\n  c: [x, y]\n  d:\n", "f.yaml");
+  EXPECT_EQ(root.find("a")->mark().text(), "f.yaml:1:4");
+  EXPECT_EQ(root.find_entry("b")->key_mark.text(), "f.yaml:2:1");
+  EXPECT_EQ(root.at_path("b.c.1")->mark().text(), "f.yaml:3:10");
+  EXPECT_EQ(root.at_path("b.c.1")->scalar(), "y");
+  EXPECT_TRUE(root.at_path("b.d")->is_null());
+  EXPECT_EQ(root.at_path("b.d")->mark().text(), "f.yaml:4:3");
+  EXPECT_EQ(root.at_path("b.c.2"), nullptr);
+  EXPECT_EQ(root.at_path("b.e.f"), nullptr);
+  EXPECT_EQ(root.at_path(""), &root);
+}
+
+TEST(Yaml, KeepsTheOrderOfKeys) {
+  const Node root = parse("z: 1\na: 2\nm: 3\n", "f.yaml");
+  ASSERT_EQ(root.entries().size(), 3u);
+  EXPECT_EQ(root.entries()[0].key, "z");
+  EXPECT_EQ(root.entries()[2].key, "m");
+}
+
+TEST(Yaml, TellsQuotedNullFromNull) {
+  const Node root = parse("a: null\nb: \"null\"\nc: ''\nd: ~\n", "f.yaml");
+  EXPECT_TRUE(root.find("a")->is_null());
+  EXPECT_EQ(root.find("b")->scalar(), "null");
+  EXPECT_EQ(root.find("c")->scalar(), "");
+  EXPECT_TRUE(root.find("d")->is_null());
+}
+
+TEST(Yaml, ExpandsAliasesAsCopies) {
+  Node root = parse("base: &b {r: 1}\nuse: *b\n", "f.yaml");
+  EXPECT_EQ(root.at_path("use.r")->scalar(), "1");
+  EXPECT_EQ(root.at_path("use.r")->mark().text(), "f.yaml:1:14");
+  root.find("use")->set("r", Node::scalar_of("2"));
+  EXPECT_EQ(root.at_path("base.r")->scalar(), "1");
+}
+
+TEST(Yaml, MergesBelowExplicitKeysAndInOrder) {
+  const Node root =
+      parse("a: &a {r: 1, s: 1, t: 1}\nb: &b {s: 2, u: 2}\nc: {<<: [*b, *a], t: 3}\n", "f.yaml");
+  const Node& c = *root.find("c");
+  EXPECT_EQ(c, parse("t: 3\ns: 2\nu: 2\nr: 1\n", ""));
+}
+
+TEST(Yaml, RefusesToMergeWhatIsNotASection) {
+  EXPECT_EQ(parse_error("a: &a 1\nb:\n  <<: *a\n"),
+            "f.yaml:3:3  '<<' needs a section or a list of sections");
+}
+
+TEST(Yaml, RefusesDuplicateKeys) {
+  EXPECT_EQ(parse_error("a:\n  x: 1\n  y: 2\n  x: 3\n"),
+            "f.yaml:4:3  key 'x' appears twice (first at f.yaml:2:3)");
+}
+
+TEST(Yaml, RefusesKeysThatAreNotText) {
+  EXPECT_EQ(parse_error("[1, 2]: 3\n"), "f.yaml:1:1  a key must be text");
+}
+
+TEST(Yaml, ReportsASyntaxErrorWithItsPosition) {
+  EXPECT_EQ(parse_error("a: 1\nb: [1, 2\nc: 3\n").substr(0, 31), "f.yaml:3:2  not valid YAML: end");
+  // Newer versions of yaml-cpp add the name.
+  EXPECT_THAT(
+      parse_error("a: *nowhere\n"),
+      ::testing::StartsWith("f.yaml:1:4  not valid YAML: the referenced anchor is not defined"));
+}
+
+TEST(Yaml, RefusesASecondDocument) {
+  EXPECT_EQ(parse_error("---\na: 1\n---\nb: 2\n"),
+            "f.yaml:4:1  a second YAML document: only one is allowed");
+}
+
+TEST(Yaml, RefusesAliasesThatExplode) {
+  std::string text = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 10; ++i) {
+    const std::string last = std::string("*a").append(std::to_string(i - 1));
+    const std::string key = std::string("a").append(std::to_string(i));
+    text.append(key).append(": &").append(key).append(" [").append(last);
+    for (int k = 1; k < 10; ++k) text.append(", ").append(last);
+    text.append("]\n");
+  }
+  EXPECT_THAT(parse_error(text), ::testing::EndsWith("  too large (aliases of aliases?)"));
+}
+
+TEST(Yaml, RefusesDeepNesting) {
+  EXPECT_THAT(parse_error(std::string(200, '[') + std::string(200, ']')),
+              ::testing::EndsWith("  nested too deeply (does an alias contain itself?)"));
+  EXPECT_THAT(parse_error(std::string(100000, '[')), ::testing::HasSubstr("not valid YAML"));
+}
+
+TEST(Yaml, RefusesBinaryText) {
+  EXPECT_EQ(parse_error(std::string_view("a: 1\0", 5)), "f.yaml  is not a text file");
+}
+
+TEST(Yaml, ReadsNothingAsNull) {
+  EXPECT_TRUE(parse("", "f.yaml").is_null());
+  EXPECT_TRUE(parse("# only a comment\n", "f.yaml").is_null());
+}
+
+TEST(Yaml, SaysWhichFileIsMissing) {
+  try {
+    load_file("/no/such/file.yaml");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "/no/such/file.yaml  no such file");
+  }
+}
+
+TEST(Yaml, SaysThatAFolderIsNotAFile) {
+  const auto folder = std::filesystem::temp_directory_path();
+  try {
+    load_file(folder);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.what(), folder.string() + "  is a folder, not a file");
+  }
+}
+
+TEST(Yaml, LoadsAFile) {
+  const auto file = std::filesystem::temp_directory_path() / "viwo_test_yaml_load.yaml";
+  std::ofstream(file) << "a:\r\n  b: 1\r\n";
+  const Node root = load_file(file);
+  EXPECT_EQ(root.at_path("a.b")->scalar(), "1");
+  EXPECT_EQ(root.at_path("a.b")->mark().text(), file.string() + ":2:6");
+  std::filesystem::remove(file);
+}
+
+TEST(Yaml, WritesListsOfScalarsOnOneLine) {
+  const Node root = parse("r:\n  - 1\n  - 2\nw:\n  - a: 1\n  - [2, 3]\ne: {}\nf: []\n", "");
+  EXPECT_EQ(to_yaml(root), "r: [1, 2]\nw:\n  - a: 1\n  - [2, 3]\ne: {}\nf: []\n");
+}
+
+TEST(Yaml, RoundTripsAwkwardTexts) {
+  Node root = Node::empty_map();
+  const std::vector<std::string> texts = {
+      "",       " ",       "null",         "~",        "Null",        "true",
+      "1e-3",   "a: b",    "# no comment", "- item",   "[x",          "{y}",
+      "*alias", "&anchor", "!tag",         "%dir",     "a\nb\n",      "tab\there",
+      "\"q\"",  "it's",    "@at",          "`",        "| ",          "> ",
+      "---",    "...",     "x #y",         "\xc3\xa9", "back\\slash", ":",
+      "-",      "?",       "<<",           "a,b",      "\r\n",        " lead",
+      "trail ", "a:",      "\x01"};
+  Node list = Node::list_of();
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    root.set(std::string("k").append(std::to_string(i)), Node::scalar_of(texts[i]));
+    if (!texts[i].empty()) root.set(texts[i], Node::scalar_of("key"));
+    list.items().push_back(Node::scalar_of(texts[i]));
+  }
+  list.items().push_back(Node::null());
+  root.set("list", list);
+  EXPECT_EQ(parse(to_yaml(root), "f.yaml"), root) << to_yaml(root);
+}
+
+Node random_node(std::mt19937_64& random, int depth) {
+  static const std::vector<std::string> kTexts = {"a", "0.5", "", "null", "x y", "{", "a: b", "\n"};
+  const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random() % n); };
+  switch (pick(depth > 3 ? 2 : 4)) {
+    case 0:
+      return Node::null();
+    case 1:
+      return Node::scalar_of(kTexts[pick(kTexts.size())], {}, pick(2) == 0);
+    case 2: {
+      Node list = Node::list_of();
+      for (std::size_t n = pick(4); n > 0; --n) {
+        list.items().push_back(random_node(random, depth + 1));
+      }
+      return list;
+    }
+    default: {
+      Node map = Node::empty_map();
+      for (std::size_t n = pick(4); n > 0; --n) {
+        map.set(std::string("k").append(std::to_string(n)), random_node(random, depth + 1));
+      }
+      return map;
+    }
+  }
+}
+
+TEST(Yaml, RoundTripsRandomTrees) {
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 2000; ++i) {
+    const Node node = random_node(random, 0);
+    const std::string text = to_yaml(node);
+    ASSERT_EQ(parse(text, "f.yaml"), node) << text;
+  }
+}
+
+}  // namespace
+}  // namespace viwo::config

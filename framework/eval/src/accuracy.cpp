@@ -1,0 +1,174 @@
+#include "viwo/eval/accuracy.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <string>
+
+#include "viwo/api/measurement.hpp"
+#include "viwo/api/status.hpp"
+#include "viwo/eval/association.hpp"
+#include "viwo/eval/statistics.hpp"
+
+namespace viwo::eval {
+
+namespace {
+
+constexpr double kDegPerRad = 180. / std::numbers::pi;
+
+/// Path lengths are sums of many steps: an end point may miss its length by rounding, not by a
+/// step.
+constexpr double kLengthTolerance = 1e-9;
+
+/// Shortest text that reads back to the same number: "10", "2.5".
+std::string text(double value) {
+  std::array<char, 32> buffer{};
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
+  return {buffer.data(), end};
+}
+
+void check(const Options& options) {
+  if (options.segment_stride < 1) throw InputError("segment_stride must be at least 1");
+  if (!(options.max_reference_gap_s > 0.)) throw InputError("max_reference_gap_s must be positive");
+  for (const double length_m : options.segment_lengths_m) {
+    if (!(length_m > 0.) || !std::isfinite(length_m)) {
+      throw InputError("segment length " + text(length_m) + " m must be positive and finite");
+    }
+  }
+}
+
+double position_error_m(const PosePair& pair) {
+  return (pair.estimate.p_BinW - pair.reference.p_BinW).norm();
+}
+
+double angle_error_deg(const PosePair& pair) {
+  return pair.reference.q_BtoW.angularDistance(pair.estimate.q_BtoW) * kDegPerRad;
+}
+
+std::vector<PosePair> transformed(const std::vector<PosePair>& pairs,
+                                  const RigidTransform& T_EtoR) {
+  std::vector<PosePair> result = pairs;
+  for (PosePair& pair : result) pair.estimate = T_EtoR * pair.estimate;
+  return result;
+}
+
+std::vector<double> reference_path_m(const std::vector<PosePair>& pairs) {
+  std::vector<double> path(pairs.size(), 0.);
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    path[i] = path[i - 1] + (pairs[i].reference.p_BinW - pairs[i - 1].reference.p_BinW).norm();
+  }
+  return path;
+}
+
+/// Pose `to` as seen from pose `from`.
+StampedPose relative(const StampedPose& from, const StampedPose& to) {
+  const Eigen::Quaterniond q_WtoB = from.q_BtoW.conjugate();
+  return {to.t_ns, q_WtoB * (to.p_BinW - from.p_BinW), q_WtoB * to.q_BtoW};
+}
+
+SegmentErrors segment_errors(const std::vector<PosePair>& pairs, const std::vector<double>& path_m,
+                             double length_m, int stride) {
+  std::vector<double> errors_m;
+  std::vector<double> errors_deg;
+  std::size_t end = 0;
+  for (std::size_t begin = 0; begin < pairs.size(); begin += static_cast<std::size_t>(stride)) {
+    const double wanted = length_m * (1. - kLengthTolerance);
+    while (end < pairs.size() && path_m[end] - path_m[begin] < wanted) ++end;
+    if (end == pairs.size()) break;
+    const PosePair motion{relative(pairs[begin].reference, pairs[end].reference),
+                          relative(pairs[begin].estimate, pairs[end].estimate)};
+    errors_m.push_back(position_error_m(motion));
+    errors_deg.push_back(angle_error_deg(motion));
+  }
+  return {length_m,         static_cast<std::int64_t>(errors_m.size()),
+          mean(errors_m),   root_mean_square(errors_m),
+          mean(errors_deg), root_mean_square(errors_deg)};
+}
+
+ErrorSeries error_series(const std::vector<PosePair>& pairs, const std::vector<double>& path_m) {
+  ErrorSeries series;
+  series.path_length_m = path_m;
+  double previous_rad = 0.;
+  for (const PosePair& pair : pairs) {
+    series.t_s.push_back(seconds_between(pairs.front().estimate.t_ns, pair.estimate.t_ns));
+    series.position_error_m.push_back(position_error_m(pair));
+    const double error_rad = yaw(pair.estimate.q_BtoW) - yaw(pair.reference.q_BtoW);
+    // The branch nearest to the previous error: a drift beyond half a turn stays a drift.
+    previous_rad += std::remainder(error_rad - previous_rad, 2. * std::numbers::pi);
+    series.yaw_error_deg.push_back(previous_rad * kDegPerRad);
+  }
+  return series;
+}
+
+nlohmann::json number_or_null(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
+
+}  // namespace
+
+Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate, const Options& options) {
+  check(options);
+  const Association common = associate(reference, estimate, options.max_reference_gap_s);
+  const std::vector<double> path_m = reference_path_m(common.pairs);
+
+  Accuracy result;
+  result.alignment = options.alignment;
+  result.n_poses = static_cast<std::int64_t>(common.pairs.size());
+  result.n_outside = common.n_outside;
+  result.n_in_gap = common.n_in_gap;
+  result.duration_s =
+      seconds_between(common.pairs.front().estimate.t_ns, common.pairs.back().estimate.t_ns);
+  result.path_length_m = path_m.back();
+
+  std::vector<double> errors_m;
+  std::vector<double> errors_deg;
+  for (const PosePair& pair : transformed(common.pairs, align(common.pairs, options.alignment))) {
+    errors_m.push_back(position_error_m(pair));
+    errors_deg.push_back(angle_error_deg(pair));
+  }
+  result.ate_m = root_mean_square(errors_m);
+  result.ate_deg = root_mean_square(errors_deg);
+
+  for (const double length_m : options.segment_lengths_m) {
+    result.rpe.push_back(segment_errors(common.pairs, path_m, length_m, options.segment_stride));
+  }
+
+  const std::vector<PosePair> from_start =
+      transformed(common.pairs, align(common.pairs, Alignment::kStart));
+  result.series = error_series(from_start, path_m);
+  result.end_m = position_error_m(from_start.back());
+  result.end_deg = angle_error_deg(from_start.back());
+  result.end_yaw_deg = result.series.yaw_error_deg.back();
+  return result;
+}
+
+nlohmann::json to_json(const Accuracy& accuracy) {
+  nlohmann::json rpe = nlohmann::json::object();
+  for (const SegmentErrors& errors : accuracy.rpe) {
+    nlohmann::json& entry = rpe[text(errors.length_m)];
+    if (errors.count == 0) continue;
+    entry = {{"m", number_or_null(errors.mean_m)},
+             {"deg", number_or_null(errors.mean_deg)},
+             {"rmse_m", number_or_null(errors.rmse_m)},
+             {"rmse_deg", number_or_null(errors.rmse_deg)},
+             {"count", errors.count}};
+  }
+  return {{"alignment", name(accuracy.alignment)},
+          {"poses", accuracy.n_poses},
+          {"poses_outside_reference", accuracy.n_outside},
+          {"poses_in_reference_gap", accuracy.n_in_gap},
+          {"duration_s", number_or_null(accuracy.duration_s)},
+          {"path_length_m", number_or_null(accuracy.path_length_m)},
+          {"ate_m", number_or_null(accuracy.ate_m)},
+          {"ate_deg", number_or_null(accuracy.ate_deg)},
+          {"rpe", std::move(rpe)},
+          {"end",
+           {{"m", number_or_null(accuracy.end_m)},
+            {"deg", number_or_null(accuracy.end_deg)},
+            {"yaw_deg", number_or_null(accuracy.end_yaw_deg)}}}};
+}
+
+}  // namespace viwo::eval

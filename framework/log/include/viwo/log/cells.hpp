@@ -1,0 +1,39 @@
+// From what encoders print to samples that stand for an interval of time (see EncoderSample).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "viwo/api/measurement.hpp"
+
+namespace viwo::log {
+
+/// One reading of encoders as it stands in a log.
+struct EncoderReading {
+  std::int64_t t_ns = 0;
+  int n_drive = 0;
+  int n_steer = 0;
+  /// Rotation rates [rad/s] or multi-turn angles [rad], as the log has it.
+  std::array<double, kMaxDrives> drive{};
+  std::array<double, kMaxSteers> steer_rad{};
+};
+
+/// Sets begin and end of samples that hold rates at their stamps, in time order: the mid-points
+/// between stamps; the first cell begins and the last one ends at its own stamp. A spacing longer
+/// than `max_gap_s` leaves a hole: the cells at its sides reach into it by half of the median
+/// spacing, or to its middle if that is nearer.
+void make_cells(std::vector<EncoderSample>& rates, double max_gap_s);
+
+/// Samples from multi-turn drive angles at increasing stamps: the cell reaches from one stamp to
+/// the next, the drive rate is the difference of the angles by its length, which is exact in the
+/// mean, and the steering angle is the mean of both ends (the shorter way round).
+///
+/// With `stride` n >= 1 every n-th reading is used: longer cells, less noise from the resolution of
+/// the angles. No cell reaches over a spacing longer than `max_gap_s`; counting starts again behind
+/// it, and readings before it that do not fill a cell are dropped, as at the end.
+std::vector<EncoderSample> cells_from_angles(std::span<const EncoderReading> angles,
+                                             double max_gap_s, int stride = 1);
+
+}  // namespace viwo::log

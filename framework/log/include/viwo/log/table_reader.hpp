@@ -1,0 +1,53 @@
+// Tables in text files: one header line, fields separated by ',' or ';'.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "viwo/log/text_reader.hpp"
+
+namespace viwo::log {
+
+/// Reads row by row. The header may begin with '#' as in EuRoC files; the separator is ';' if the
+/// header has one and ',' otherwise; empty lines are skipped. Wrong rows are an InputError
+/// "file:line  what".
+class TableReader {
+ public:
+  explicit TableReader(const std::filesystem::path& file);
+
+  const std::vector<std::string>& columns() const { return columns_; }  ///< "name" or "name [unit]"
+  bool has_column(std::string_view name) const { return find(name).has_value(); }
+
+  /// Column of that exact name; InputError with the nearest spelling when there is none.
+  std::size_t column(std::string_view name) const;
+  /// Column "name [unit]", or "name" where the file gives no unit; InputError for another unit.
+  std::size_t column(std::string_view name, std::string_view unit) const;
+
+  /// Goes to the next row; false at the end. InputError for a wrong number of fields.
+  bool next();
+
+  std::string_view text(std::size_t column) const { return fields_[column]; }
+  /// NaN and infinite values are numbers here: the caller counts them.
+  double number(std::size_t column) const;
+  std::int64_t integer(std::size_t column) const;
+  /// An integer in nanoseconds within +-4e18, so that differences of stamps cannot overflow.
+  std::int64_t stamp_ns(std::size_t column) const;
+
+  const TextReader& reader() const { return reader_; }
+  /// Throws InputError "file:line  column 'name': text".
+  [[noreturn]] void fail(std::size_t column, const std::string& text) const;
+
+ private:
+  std::optional<std::size_t> find(std::string_view name) const;
+
+  TextReader reader_;
+  char separator_ = ',';
+  std::vector<std::string> columns_;
+  std::vector<std::string_view> fields_;
+};
+
+}  // namespace viwo::log

@@ -1,0 +1,35 @@
+// Numbers and short texts as they stand in log files.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace viwo::log {
+
+/// Without blanks and tabs at both ends.
+std::string_view trim(std::string_view text);
+
+/// The whole text as a number ("nan" and "inf" included); nothing when it is not one.
+std::optional<double> parse_number(std::string_view text);
+std::optional<std::int64_t> parse_integer(std::string_view text);
+
+/// Decimal seconds, with or without exponent, as nanoseconds: exact, not through a double; digits
+/// below the nanosecond are rounded. Nothing when it is not a number or beyond +-4e18 ns.
+std::optional<std::int64_t> parse_seconds_ns(std::string_view text);
+
+/// Shortest text that reads back to the same bits.
+void append_number(std::string& out, double value);
+void append_number(std::string& out, std::int64_t value);
+std::string number_text(double value);
+
+/// For messages: in quotes, control characters replaced, cut after 40 characters.
+std::string quoted(std::string_view text);
+
+/// " - did you mean 'x'?" for the candidate at an edit distance of at most 2, otherwise
+/// " - there are: a, b, c".
+std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates);
+
+}  // namespace viwo::log

@@ -1,0 +1,50 @@
+// Lines of a text file, plain or gzipped, with their numbers for error messages.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace viwo::log {
+
+/// Reads line by line. Everything that can be wrong with the file is an InputError
+/// "file:line  what"; the file name is printed as it was given.
+class TextReader {
+ public:
+  /// Opens a plain or gzipped file; InputError when it cannot be read or is a folder.
+  explicit TextReader(const std::filesystem::path& file);
+  ~TextReader();
+  TextReader(const TextReader&) = delete;
+  TextReader& operator=(const TextReader&) = delete;
+
+  /// The next line without its line ending, valid until the next call; false at the end. InputError
+  /// for an empty file, a truncated or corrupt gzip stream and a line of more than 1 MiB.
+  bool next(std::string_view& line);
+
+  const std::filesystem::path& file() const { return file_; }
+  std::int64_t line_number() const { return line_; }  ///< of the line read last, from 1
+  std::string where() const;  ///< "name:line" of the line read last, without folders
+
+  /// Throws InputError "file:line  text" for the line read last.
+  [[noreturn]] void fail(const std::string& text) const;
+
+ private:
+  struct Closer {
+    void operator()(void* handle) const;
+  };
+
+  /// Reads more into the buffer, behind what is not consumed yet; false at the end of the file.
+  bool fill();
+
+  std::filesystem::path file_;
+  std::unique_ptr<void, Closer> handle_;  ///< zlib's gzFile, which also reads plain text
+  std::vector<char> buffer_;
+  std::size_t begin_ = 0;  ///< first byte not consumed
+  std::size_t end_ = 0;    ///< behind the last byte read
+  std::int64_t line_ = 0;
+};
+
+}  // namespace viwo::log

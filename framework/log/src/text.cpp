@@ -1,0 +1,155 @@
+#include "viwo/log/text.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdlib>
+#include <numeric>
+
+namespace viwo::log {
+namespace {
+
+constexpr std::int64_t kMaxStamp = 4'000'000'000'000'000'000;
+
+template <class T>
+std::optional<T> parse_whole(std::string_view text) {
+  text = trim(text);
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  T value{};
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (result.ec != std::errc{} || result.ptr != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+template <class T>
+void append_whole(std::string& out, T value) {
+  std::array<char, 32> digits{};
+  const auto result = std::to_chars(digits.data(), digits.data() + digits.size(), value);
+  out.append(digits.data(), result.ptr);
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// A decimal number taken apart: value = 0.digits * 10^point, no leading zeros.
+struct Decimal {
+  bool negative = false;
+  std::string digits;
+  std::int64_t point = 0;
+};
+
+std::optional<Decimal> take_apart(std::string_view text) {
+  Decimal out;
+  if (!text.empty() && (text[0] == '-' || text[0] == '+')) {
+    out.negative = text[0] == '-';
+    text.remove_prefix(1);
+  }
+  const std::size_t exponent_at = text.find_first_of("eE");
+  const std::string_view mantissa = text.substr(0, exponent_at);
+  std::int64_t exponent = 0;
+  if (exponent_at != std::string_view::npos) {
+    const auto parsed = parse_whole<std::int64_t>(text.substr(exponent_at + 1));
+    if (!parsed || std::abs(*parsed) > 1000) return std::nullopt;
+    exponent = *parsed;
+  }
+  const std::size_t dot = mantissa.find('.');
+  const std::string_view whole = mantissa.substr(0, dot);
+  const std::string_view fraction =
+      dot == std::string_view::npos ? std::string_view{} : mantissa.substr(dot + 1);
+  out.digits.append(whole).append(fraction);
+  if (out.digits.empty() || !std::all_of(out.digits.begin(), out.digits.end(), is_digit)) {
+    return std::nullopt;
+  }
+  const std::size_t zeros = std::min(out.digits.find_first_not_of('0'), out.digits.size());
+  out.digits.erase(0, zeros);
+  out.point = static_cast<std::int64_t>(whole.size()) - static_cast<std::int64_t>(zeros) + exponent;
+  return out;
+}
+
+/// Edit distance with transpositions of neighbours (optimal string alignment).
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  std::iota(last.begin(), last.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t change = a[i - 1] == b[j - 1] ? 0 : 1;
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + change});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+        row[j] = std::min(row[j], before[j - 2] + 1);
+      }
+    }
+    std::swap(before, last);
+    std::swap(last, row);
+  }
+  return last[b.size()];
+}
+
+}  // namespace
+
+std::string_view trim(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
+std::optional<double> parse_number(std::string_view text) { return parse_whole<double>(text); }
+
+std::optional<std::int64_t> parse_integer(std::string_view text) {
+  return parse_whole<std::int64_t>(text);
+}
+
+std::optional<std::int64_t> parse_seconds_ns(std::string_view text) {
+  const auto decimal = take_apart(trim(text));
+  if (!decimal) return std::nullopt;
+  const std::int64_t places = decimal->point + 9;  // digits of the number in nanoseconds
+  if (decimal->digits.empty() || places < 0) return 0;
+  if (places > 19) return std::nullopt;
+  const auto kept = static_cast<std::size_t>(places);
+  std::string nanoseconds(1, '0');
+  nanoseconds += decimal->digits.substr(0, kept);
+  nanoseconds.resize(kept + 1, '0');
+  const auto value = parse_integer(nanoseconds);
+  if (!value || *value > kMaxStamp) return std::nullopt;
+  const bool round_up = decimal->digits.size() > kept && decimal->digits[kept] >= '5';
+  const std::int64_t rounded = *value + (round_up ? 1 : 0);
+  return decimal->negative ? -rounded : rounded;
+}
+
+void append_number(std::string& out, double value) { append_whole(out, value); }
+void append_number(std::string& out, std::int64_t value) { append_whole(out, value); }
+
+std::string number_text(double value) {
+  std::string out;
+  append_number(out, value);
+  return out;
+}
+
+std::string quoted(std::string_view text) {
+  constexpr std::size_t kLongest = 40;
+  std::string out = "'";
+  for (const char c : text.substr(0, kLongest)) {
+    out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
+  }
+  return out + (text.size() > kLongest ? "...'" : "'");
+}
+
+std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates) {
+  const std::string* nearest = nullptr;
+  std::size_t nearest_distance = 3;
+  for (const std::string& candidate : candidates) {
+    const std::size_t distance = edit_distance(name, candidate);
+    if (distance < nearest_distance) {
+      nearest = &candidate;
+      nearest_distance = distance;
+    }
+  }
+  if (nearest != nullptr) return " - did you mean '" + *nearest + "'?";
+  std::string list = " - there are: ";
+  for (const std::string& candidate : candidates) {
+    if (&candidate != &candidates.front()) list += ", ";
+    list += candidate;
+  }
+  return list;
+}
+
+}  // namespace viwo::log

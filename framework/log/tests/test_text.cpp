@@ -1,0 +1,203 @@
+// Lines, numbers and tables.
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include <gmock/gmock.h>
+
+#include "support.hpp"
+#include "viwo/log/table_reader.hpp"
+#include "viwo/log/text.hpp"
+#include "viwo/log/text_reader.hpp"
+#include "viwo/log/text_writer.hpp"
+
+namespace viwo::log {
+namespace {
+
+using ::testing::ElementsAre;
+
+class TextReaderTest : public InFolder {};
+class TableReaderTest : public InFolder {};
+class TextWriterTest : public InFolder {};
+
+std::vector<std::string> lines_of(const std::filesystem::path& file) {
+  TextReader reader(file);
+  std::vector<std::string> lines;
+  for (std::string_view line; reader.next(line);) lines.emplace_back(line);
+  return lines;
+}
+
+/// Text that does not compress, of about `size` bytes.
+std::string noise_text(std::size_t size) {
+  std::mt19937_64 random(7);
+  std::string text;
+  while (text.size() < size) text += std::to_string(random()) + "\n";
+  return text;
+}
+
+TEST_F(TextReaderTest, ReadsLinesWithAndWithoutEnding) {
+  EXPECT_THAT(lines_of(write("a", "one\n\ntwo\r\nthree")), ElementsAre("one", "", "two", "three"));
+  EXPECT_THAT(lines_of(write("b", "\xEF\xBB\xBFone\n")), ElementsAre("one"));
+}
+
+TEST_F(TextReaderTest, ReadsTheSameFromPlainAndGzippedFilesOfManyBlocks) {
+  const std::string text = noise_text(500'000);
+  const auto plain = lines_of(write("plain", text));
+  EXPECT_EQ(plain.size(), static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')));
+  std::string joined;
+  for (const std::string& line : plain) joined += line + "\n";
+  EXPECT_EQ(joined, text);
+  EXPECT_EQ(lines_of(write_gz("packed", text)), plain);
+}
+
+TEST_F(TextReaderTest, RefusesATruncatedGzipAtTheLineWhereItEnds) {
+  const std::string bytes = content(write_gz("whole.gz", noise_text(300'000)));
+  for (const std::size_t size : {bytes.size() / 2, bytes.size() - 1, bytes.size() - 8}) {
+    const auto file = write("cut.gz", bytes.substr(0, size));
+    std::int64_t last = 0;
+    const std::string message = message_of([&] {
+      TextReader reader(file);
+      for (std::string_view line; reader.next(line);) last = reader.line_number();
+    });
+    EXPECT_EQ(message, file.string() + ":" + std::to_string(last + 1) +
+                           "  the gzip data end early: the file is truncated");
+  }
+}
+
+TEST_F(TextReaderTest, RefusesAGzipWithAFlippedBit) {
+  std::string bytes = content(write_gz("whole.gz", noise_text(300'000)));
+  bytes[bytes.size() - 7] = static_cast<char>(bytes[bytes.size() - 7] ^ 1);  // in the checksum
+  const auto file = write("bad.gz", bytes);
+  const std::string message = message_of([&] { lines_of(file); });
+  EXPECT_NE(message.find("  the gzip data are corrupt: "), std::string::npos) << message;
+  EXPECT_NE(message.find("incorrect data check"), std::string::npos) << message;
+}
+
+TEST_F(TextReaderTest, RefusesWhatIsNoReadableTextFile) {
+  const auto empty = write("empty", "");
+  EXPECT_EQ(message_of([&] { lines_of(empty); }), empty.string() + ":1  the file is empty");
+  const auto none = folder_ / "none";
+  EXPECT_EQ(message_of([&] { lines_of(none); }),
+            none.string() + "  cannot be read: No such file or directory");
+  EXPECT_EQ(message_of([&] { lines_of(folder_); }), folder_.string() + "  is a folder, not a file");
+  const auto wide = write("wide", std::string(2'000'000, 'x'));
+  EXPECT_EQ(message_of([&] { lines_of(wide); }),
+            wide.string() + ":1  a line of more than 1 MiB: not a text log");
+}
+
+TEST(Numbers, ParseOnlyWhenTheWholeTextIsOne) {
+  EXPECT_EQ(parse_number(" 1.5e3\t"), 1500.);
+  EXPECT_EQ(parse_number("+2"), 2.);
+  EXPECT_EQ(parse_number("-.5"), -.5);
+  EXPECT_TRUE(std::isnan(parse_number("nan").value()));
+  EXPECT_TRUE(std::isinf(parse_number("-inf").value()));
+  for (const char* text : {"", " ", "1,5", "1.5m", "+-1", "0x10", "1e999", "--1"}) {
+    EXPECT_EQ(parse_number(text), std::nullopt) << text;
+  }
+  EXPECT_EQ(parse_integer("-12"), -12);
+  for (const char* text : {"", "1.0", "9223372036854775808", "1e3"}) {
+    EXPECT_EQ(parse_integer(text), std::nullopt) << text;
+  }
+}
+
+TEST(Numbers, SecondsBecomeNanosecondsExactly) {
+  EXPECT_EQ(parse_seconds_ns("1403636579.763555527"), 1403636579763555527);
+  EXPECT_EQ(parse_seconds_ns("1.403636579763555527e+09"), 1403636579763555527);
+  EXPECT_EQ(parse_seconds_ns("0.000000001"), 1);
+  EXPECT_EQ(parse_seconds_ns("1e-9"), 1);
+  EXPECT_EQ(parse_seconds_ns("-2.5"), -2'500'000'000);
+  EXPECT_EQ(parse_seconds_ns("7"), 7'000'000'000);
+  EXPECT_EQ(parse_seconds_ns(".5"), 500'000'000);
+  EXPECT_EQ(parse_seconds_ns("0.0000000005"), 1);  // half a nanosecond is rounded up
+  EXPECT_EQ(parse_seconds_ns("0.00000000049"), 0);
+  EXPECT_EQ(parse_seconds_ns("0"), 0);
+  for (const char* text : {"", ".", "-", "1.2.3", "nan", "5e9", "1e", "12:30"}) {
+    EXPECT_EQ(parse_seconds_ns(text), std::nullopt) << text;
+  }
+}
+
+TEST(Numbers, WrittenTextReadsBackToTheSameBits) {
+  std::mt19937_64 random(11);
+  for (int i = 0; i < 10'000; ++i) {
+    const std::uint64_t bits = random();
+    double value = 0.;
+    std::memcpy(&value, &bits, sizeof value);
+    // Subnormal numbers are refused when read: no sensor has them.
+    if (!std::isnormal(value)) continue;
+    EXPECT_EQ(parse_number(number_text(value)), value);
+  }
+  EXPECT_EQ(number_text(0.1), "0.1");
+  EXPECT_TRUE(std::signbit(parse_number(number_text(-0.)).value()));
+}
+
+TEST(Suggestions, NameTheNearestSpellingOrAll) {
+  const std::vector<std::string> names = {"drive_1", "drive_2", "steer"};
+  EXPECT_EQ(did_you_mean("driev_1", names), " - did you mean 'drive_1'?");
+  EXPECT_EQ(did_you_mean("ster", names), " - did you mean 'steer'?");
+  EXPECT_EQ(did_you_mean("wheel", names), " - there are: drive_1, drive_2, steer");
+}
+
+TEST_F(TableReaderTest, ReadsEitherSeparatorAndAHeaderBehindAHash) {
+  TableReader commas(write("a.csv", "#timestamp [ns], x [m],label\n12, -1.5 ,abc\n\n13,nan,\n"));
+  EXPECT_THAT(commas.columns(), ElementsAre("timestamp [ns]", "x [m]", "label"));
+  ASSERT_TRUE(commas.next());
+  EXPECT_EQ(commas.stamp_ns(commas.column("timestamp [ns]")), 12);
+  EXPECT_EQ(commas.number(commas.column("x", "m")), -1.5);
+  EXPECT_EQ(commas.text(commas.column("label", "any")), "abc");
+  ASSERT_TRUE(commas.next());
+  EXPECT_TRUE(std::isnan(commas.number(1)));
+  EXPECT_EQ(commas.reader().where(), "a.csv:4");
+  EXPECT_FALSE(commas.next());
+  TableReader semicolons(write("b.csv", "a;b\n1,5;[2, 3]\n"));
+  ASSERT_TRUE(semicolons.next());
+  EXPECT_EQ(semicolons.text(1), "[2, 3]");
+}
+
+TEST_F(TableReaderTest, SaysFileLineAndColumnOfWhatIsWrong) {
+  const auto file =
+      write("t.csv", "t,drive_1 [rpm]\n1,2\n1\n1,2,3\n1,abc\n1.5,2\n" +
+                         std::string("4000000000000000001,\x01") + std::string(50, 'y') + "\n");
+  const std::string at = file.string() + ":";
+  TableReader table(file);
+  EXPECT_EQ(message_of([&] { table.column("tt"); }), at + "1  no column 'tt' - did you mean 't'?");
+  EXPECT_EQ(message_of([&] { table.column("drive_1", "rad/s"); }),
+            at + "1  column 'drive_1 [rpm]' has another unit than 'drive_1 [rad/s]'");
+  EXPECT_EQ(message_of([&] { table.column("steer_1", "rad"); }),
+            at + "1  no column 'steer_1 [rad]' - there are: t, drive_1 [rpm]");
+  ASSERT_TRUE(table.next());
+  EXPECT_EQ(message_of([&] { table.next(); }), at + "3  1 field where the header has 2");
+  EXPECT_EQ(message_of([&] { table.next(); }), at + "4  3 fields where the header has 2");
+  ASSERT_TRUE(table.next());
+  EXPECT_EQ(message_of([&] { table.number(1); }),
+            at + "5  column 'drive_1 [rpm]': 'abc' is not a number");
+  ASSERT_TRUE(table.next());
+  EXPECT_EQ(message_of([&] { table.stamp_ns(0); }), at + "6  column 't': '1.5' is not an integer");
+  ASSERT_TRUE(table.next());
+  EXPECT_EQ(message_of([&] { table.stamp_ns(0); }),
+            at + "7  column 't': '4000000000000000001' is no stamp in nanoseconds");
+  EXPECT_EQ(message_of([&] { table.number(1); }),
+            at + "7  column 'drive_1 [rpm]': '?" + std::string(39, 'y') + "...' is not a number");
+}
+
+TEST_F(TableReaderTest, RefusesAHeaderWithAmbiguousColumns) {
+  const auto twice = write("twice.csv", "a,b,a\n");
+  EXPECT_EQ(message_of([&] { TableReader{twice}; }),
+            twice.string() + ":1  the header has the column 'a' twice");
+  const auto nameless = write("nameless.csv", "a,,b\n");
+  EXPECT_EQ(message_of([&] { TableReader{nameless}; }),
+            nameless.string() + ":1  the header has a column without a name");
+}
+
+TEST_F(TextWriterTest, ReportsAFullDiskAndAMissingFolder) {
+  EXPECT_EQ(message_of<std::runtime_error>([] {
+              TextWriter out("/dev/full");
+              out << "text";
+              out.close();
+            }),
+            "/dev/full  cannot be written: No space left on device");
+  EXPECT_EQ(message_of<std::runtime_error>([&] { TextWriter{folder_ / "none" / "a"}; }),
+            (folder_ / "none" / "a").string() + "  cannot be written: No such file or directory");
+}
+
+}  // namespace
+}  // namespace viwo::log

@@ -1,0 +1,22 @@
+// What the host offers to a plugin. The only way back into the host.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace viwo {
+
+enum class LogLevel : std::uint8_t { kInfo, kWarning };
+
+/// Valid as long as the plugin object lives. Seeds differ per plugin instance and are reproducible.
+struct HostServices {
+  void* host = nullptr;
+  void (*log_text)(void* host, LogLevel level, const char* text, std::uint64_t size) = nullptr;
+  std::uint64_t seed = 0;  ///< seed for this instance's random numbers
+
+  void log(LogLevel level, std::string_view text) const {
+    if (log_text != nullptr) log_text(host, level, text.data(), text.size());
+  }
+};
+
+}  // namespace viwo

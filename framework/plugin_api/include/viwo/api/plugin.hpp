@@ -1,0 +1,116 @@
+// Registration of a plugin: one line, VIWO_REGISTER(...), per shared library.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <exception>
+#include <iterator>
+#include <string_view>
+
+#include "viwo/api/build_record.hpp"
+#include "viwo/api/export.hpp"
+#include "viwo/api/host_services.hpp"
+#include "viwo/api/kinematic_model.hpp"
+#include "viwo/api/params.hpp"
+#include "viwo/api/sensor.hpp"
+#include "viwo/api/status.hpp"
+
+namespace viwo {
+
+/// What went wrong in create(), copied out of the plugin as text: no exception object ever leaves
+/// it.
+struct ErrorText {
+  enum Cause : std::int32_t { kNone, kInput, kParam, kFailure };
+  std::int32_t cause = kNone;
+  std::array<char, 64> key{};  ///< the parameter, with kParam
+  std::array<char, 1024> text{};
+};
+
+/// Plain C data, append-only, at the symbol `viwo_plugin` of a plugin's library. The host checks
+/// struct_size and api_version before it reads on.
+struct PluginDescriptor {
+  std::uint32_t struct_size;
+  std::uint32_t api_version;
+  const char* build_record;
+  const char* kind;  ///< "kinematics", "sensor"
+  const char* name;  ///< what a configuration writes as `type:`
+  const char* version;
+  const char* summary;
+  const char* license;
+  const ParamSpec* params;
+  std::uint32_t n_params;
+  /// Returns the interface pointer (KinematicModel*, Sensor*) as void*, or nullptr with `error`.
+  void* (*create)(const ParamSet* params, const HostServices* services, ErrorText* error) noexcept;
+  void (*destroy)(void* object) noexcept;
+};
+
+namespace detail {
+
+template <class Interface>
+struct PluginKind;
+template <>
+struct PluginKind<KinematicModel> {
+  static constexpr const char* kName = "kinematics";
+};
+template <>
+struct PluginKind<Sensor> {
+  static constexpr const char* kName = "sensor";
+};
+
+template <std::size_t N>
+void copy_text(std::string_view from, std::array<char, N>& to) {
+  const std::size_t size = from.size() < N - 1 ? from.size() : N - 1;
+  std::memcpy(to.data(), from.data(), size);
+  to[size] = '\0';
+}
+
+template <class Interface, class Implementation>
+void* create_plugin(const ParamSet* params, const HostServices* services,
+                    ErrorText* error) noexcept {
+  try {
+    return static_cast<Interface*>(new Implementation(*params, *services));
+  } catch (const ParamError& failure) {
+    error->cause = ErrorText::kParam;
+    copy_text(failure.key(), error->key);
+    copy_text(failure.what(), error->text);
+  } catch (const InputError& failure) {
+    error->cause = ErrorText::kInput;
+    copy_text(failure.what(), error->text);
+  } catch (const std::exception& failure) {
+    error->cause = ErrorText::kFailure;
+    copy_text(failure.what(), error->text);
+  } catch (...) {
+    error->cause = ErrorText::kFailure;
+    copy_text("threw something that is not a std::exception", error->text);
+  }
+  return nullptr;
+}
+
+template <class Interface>
+void destroy_plugin(void* object) noexcept {
+  delete static_cast<Interface*>(object);
+}
+
+}  // namespace detail
+}  // namespace viwo
+
+/// Registers the one plugin of a library. Interface: KinematicModel or Sensor; Implementation: a
+/// class derived from it with a constructor (const ParamSet&, const HostServices&); params: a
+/// constexpr array of ParamSpec. The symbol is strong: a second registration does not link.
+#define VIWO_REGISTER(Interface, Implementation, plugin_name, plugin_version, plugin_summary, \
+                      plugin_license, plugin_params)                                          \
+  extern "C" VIWO_API const ::viwo::PluginDescriptor viwo_plugin;                             \
+  extern "C" const ::viwo::PluginDescriptor viwo_plugin = {                                   \
+      sizeof(::viwo::PluginDescriptor),                                                       \
+      ::viwo::kApiVersion,                                                                    \
+      ::viwo::kBuildRecord.text.data(),                                                       \
+      ::viwo::detail::PluginKind<Interface>::kName,                                           \
+      plugin_name,                                                                            \
+      plugin_version,                                                                         \
+      plugin_summary,                                                                         \
+      plugin_license,                                                                         \
+      std::data(plugin_params),                                                               \
+      static_cast<std::uint32_t>(std::size(plugin_params)),                                   \
+      &::viwo::detail::create_plugin<Interface, Implementation>,                              \
+      &::viwo::detail::destroy_plugin<Interface>}

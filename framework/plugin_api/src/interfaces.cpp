@@ -1,0 +1,26 @@
+// Key functions of the interfaces: one vtable and one typeinfo for the whole process, here.
+#include "viwo/api/kinematic_model.hpp"
+#include "viwo/api/sensor.hpp"
+#include "viwo/api/status.hpp"
+
+namespace viwo {
+
+InputError::InputError(const std::string& text) : std::runtime_error(text) {}
+InputError::~InputError() = default;
+
+ParamError::ParamError(std::string key, const std::string& text)
+    : InputError(text), key_(std::move(key)) {}
+ParamError::~ParamError() = default;
+
+KinematicModel::~KinematicModel() = default;
+
+Status KinematicModel::inverse(const Twist& /*xi*/, const Intrinsics& /*x_WI*/,
+                               const RowVector& /*slip*/, EncoderSample& /*y*/) const {
+  return Status::kUnsupported;
+}
+
+Sensor::~Sensor() = default;
+
+void Sensor::rejections(std::vector<RejectionCount>& /*out*/) const {}
+
+}  // namespace viwo

@@ -1,0 +1,145 @@
+#include "library.hpp"
+
+#include <cfenv>
+#include <limits>
+#include <mutex>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include <boost/dll/runtime_symbol_info.hpp>
+
+#include "plugin_file.hpp"
+#include "viwo/config/params.hpp"
+#include "viwo/plugin_host/build_record_check.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr const char* kSymbol = "viwo_plugin";
+
+/// How this thread computes: rounding, and whether tiny results become zero.
+struct FloatingPointMode {
+  int rounding = std::fegetround();
+  bool keeps_subnormals = true;
+
+  FloatingPointMode() {
+    volatile double smallest_normal = std::numeric_limits<double>::min();
+    volatile double half = smallest_normal / 2.;
+    keeps_subnormals = half > 0.;
+  }
+  bool operator==(const FloatingPointMode&) const = default;
+};
+
+/// Libraries linked with -ffast-math change the mode of the thread that loads them.
+class KeepFloatingPointMode {
+ public:
+  KeepFloatingPointMode() = default;
+  ~KeepFloatingPointMode() { std::fesetenv(&environment_); }
+  KeepFloatingPointMode(const KeepFloatingPointMode&) = delete;
+  KeepFloatingPointMode& operator=(const KeepFloatingPointMode&) = delete;
+
+  bool is_changed() const { return !(mode_ == FloatingPointMode()); }
+
+ private:
+  static std::fenv_t current() {
+    std::fenv_t environment;
+    std::fegetenv(&environment);
+    return environment;
+  }
+
+  // In this order: finding out the mode raises floating-point flags.
+  std::fenv_t environment_ = current();
+  FloatingPointMode mode_;
+};
+
+}  // namespace
+
+Library::Library(const std::filesystem::path& file) {
+  const auto differences = compare_build_records(api_build_record(), read_build_record(file));
+  if (!differences.empty()) throw PluginRefused(file, explain(differences));
+  load(file);
+  find_descriptor(file);
+  check_descriptor(file);
+  const PluginDescriptor& d = *descriptor_;
+  info_ = {d.kind, d.name, d.version, d.summary, d.license, file, {d.params, d.n_params}};
+}
+
+void Library::load(const std::filesystem::path& file) {
+  const KeepFloatingPointMode keep;
+  try {
+    library_.load(std::filesystem::canonical(file),
+                  boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local);
+  } catch (const std::system_error& error) {
+    throw PluginRefused(file, std::string("cannot be loaded: ") + error.what() +
+                                  "\n  -> link what is missing; viwo_add_plugin() shows undefined "
+                                  "symbols when it links");
+  }
+  if (keep.is_changed()) {
+    throw PluginRefused(file,
+                        "changes the floating-point mode of the process when it is loaded - link "
+                        "it without -ffast-math and -Ofast");
+  }
+}
+
+void Library::find_descriptor(const std::filesystem::path& file) {
+  const std::string remedy = " - add VIWO_REGISTER(...) to one of its sources";
+  if (!library_.has(kSymbol)) {
+    throw PluginRefused(file, "registers no plugin (it has no symbol 'viwo_plugin')" + remedy);
+  }
+  descriptor_ = &library_.get<const PluginDescriptor>(kSymbol);
+  std::error_code error;
+  const std::filesystem::path location = boost::dll::symbol_location_ptr(descriptor_, error);
+  if (!error && std::filesystem::equivalent(location, file, error)) return;
+  throw PluginRefused(file, "registers no plugin: the symbol 'viwo_plugin' it sees is that of " +
+                                location.string() + remedy +
+                                ", and do not link one plugin to another");
+}
+
+void Library::check_descriptor(const std::filesystem::path& file) const {
+  const PluginDescriptor& d = *descriptor_;
+  if (d.struct_size < sizeof(PluginDescriptor)) {
+    throw PluginRefused(
+        file, "has a descriptor of " + std::to_string(d.struct_size) + " bytes, this host needs " +
+                  std::to_string(sizeof(PluginDescriptor)) + " - rebuild it against this viwo");
+  }
+  if (d.api_version != kApiVersion) {
+    throw PluginRefused(file, "is for version " + std::to_string(d.api_version) +
+                                  " of the plugin API, this host has version " +
+                                  std::to_string(kApiVersion) + " - rebuild it against this viwo");
+  }
+  for (const char* text : {d.kind, d.name, d.version, d.summary, d.license}) {
+    if (text == nullptr) {
+      throw PluginRefused(file, "has a descriptor with a null text - use VIWO_REGISTER(...)");
+    }
+  }
+  if (d.create == nullptr || d.destroy == nullptr || (d.params == nullptr && d.n_params > 0)) {
+    throw PluginRefused(file, "has a descriptor with a null pointer - use VIWO_REGISTER(...)");
+  }
+  const auto expected = parse_file_name(file);
+  if (!expected || expected->kind != d.kind || expected->name != d.name) {
+    throw PluginRefused(file, "registers '" + std::string(d.name) + "' of kind '" + d.kind +
+                                  "' - its file must be named " + make_file_name(d.kind, d.name));
+  }
+  try {
+    config::check_specs({d.params, d.n_params});
+  } catch (const std::logic_error& error) {
+    throw PluginRefused(file, std::string("has a wrong parameter table: ") + error.what());
+  }
+  for (const ParamSpec& spec : std::span(d.params, d.n_params)) {
+    if (std::string_view(spec.name) == "type") {
+      throw PluginRefused(file,
+                          "has a wrong parameter table: 'type' is taken, it names the plugin");
+    }
+  }
+}
+
+void keep_until_exit(std::shared_ptr<const Library> library) {
+  static std::mutex mutex;
+  // Never destroyed: objects of static storage may still use a plugin while the process exits.
+  static auto& kept = *new std::vector<std::shared_ptr<const Library>>();
+  const std::lock_guard lock(mutex);
+  kept.push_back(std::move(library));
+}
+
+}  // namespace viwo

@@ -1,0 +1,36 @@
+// A plugin's library that passed every check.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include <boost/dll/shared_library.hpp>
+
+#include "viwo/api/plugin.hpp"
+#include "viwo/plugin_host/plugin_info.hpp"
+
+namespace viwo {
+
+class Library {
+ public:
+  /// Compares the build record, loads the file, checks its descriptor. Throws PluginRefused.
+  explicit Library(const std::filesystem::path& file);
+
+  const PluginInfo& info() const { return info_; }
+  const PluginDescriptor& descriptor() const { return *descriptor_; }
+
+ private:
+  void load(const std::filesystem::path& file);
+  void find_descriptor(const std::filesystem::path& file);
+  void check_descriptor(const std::filesystem::path& file) const;
+
+  boost::dll::shared_library library_;
+  const PluginDescriptor* descriptor_ = nullptr;
+  PluginInfo info_;
+};
+
+/// Keeps a library loaded until the process exits, whatever becomes of registries and objects:
+/// vtables, texts and exception types of a plugin may be in use anywhere.
+void keep_until_exit(std::shared_ptr<const Library> library);
+
+}  // namespace viwo

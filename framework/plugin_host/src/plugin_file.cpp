@@ -1,0 +1,114 @@
+#include "plugin_file.hpp"
+
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+#include <system_error>
+
+#include <link.h>
+
+#include "viwo/plugin_host/plugin_info.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr std::string_view kPrefix = "libviwo_";
+constexpr std::string_view kSuffix = ".so";
+
+using ElfHeader = ElfW(Ehdr);
+using ElfSegment = ElfW(Phdr);
+
+template <class T>
+T copy_at(const std::string& bytes, std::size_t offset) {
+  T value;
+  std::memcpy(&value, bytes.data() + offset, sizeof(T));
+  return value;
+}
+
+/// The machine that this program is built for.
+std::uint16_t own_machine() {
+  ElfHeader header{};
+  std::ifstream("/proc/self/exe", std::ios::binary)
+      .read(reinterpret_cast<char*>(&header), sizeof(header));
+  return header.e_machine;
+}
+
+bool fits(std::uint64_t offset, std::uint64_t size, std::uint64_t total) {
+  return offset <= total && size <= total - offset;
+}
+
+void check_elf(const std::filesystem::path& file, const std::string& bytes) {
+  if (bytes.size() < EI_NIDENT || std::memcmp(bytes.data(), ELFMAG, SELFMAG) != 0) {
+    throw PluginRefused(file, "is not a shared library - a plugin is built with viwo_add_plugin()");
+  }
+  const char elf_class = sizeof(void*) == 8 ? ELFCLASS64 : ELFCLASS32;
+  const std::string truncated = "is truncated - copy or build it again";
+  if (bytes[EI_CLASS] != elf_class) {
+    throw PluginRefused(file, "is built for another processor - rebuild it on this machine");
+  }
+  if (bytes.size() < sizeof(ElfHeader)) throw PluginRefused(file, truncated);
+  const auto header = copy_at<ElfHeader>(bytes, 0);
+  if (header.e_machine != own_machine()) {
+    throw PluginRefused(file, "is built for another processor - rebuild it on this machine");
+  }
+  if (header.e_type != ET_DYN) {
+    throw PluginRefused(file,
+                        "is not a shared library but an object file or a program - a plugin "
+                        "is built with viwo_add_plugin()");
+  }
+  if (header.e_phentsize != sizeof(ElfSegment) ||
+      !fits(header.e_phoff, std::uint64_t{header.e_phnum} * sizeof(ElfSegment), bytes.size())) {
+    throw PluginRefused(file, truncated);
+  }
+  for (std::size_t i = 0; i < header.e_phnum; ++i) {
+    const auto segment = copy_at<ElfSegment>(bytes, header.e_phoff + i * sizeof(ElfSegment));
+    if (segment.p_type == PT_LOAD && !fits(segment.p_offset, segment.p_filesz, bytes.size())) {
+      throw PluginRefused(file, truncated);
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<PluginFileName> parse_file_name(const std::filesystem::path& file) {
+  const std::string text = file.filename().string();
+  std::string_view rest = text;
+  if (!rest.starts_with(kPrefix) || !rest.ends_with(kSuffix)) return std::nullopt;
+  rest.remove_prefix(kPrefix.size());
+  if (rest.size() < kSuffix.size()) return std::nullopt;
+  rest.remove_suffix(kSuffix.size());
+  const std::size_t bar = rest.find('_');
+  if (bar == std::string_view::npos || bar == 0 || bar + 1 == rest.size()) return std::nullopt;
+  return PluginFileName{std::string(rest.substr(0, bar)), std::string(rest.substr(bar + 1))};
+}
+
+std::string make_file_name(const std::string& kind, const std::string& name) {
+  return std::string(kPrefix) + kind + "_" + name + std::string(kSuffix);
+}
+
+std::string read_library_bytes(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (status.type() == std::filesystem::file_type::not_found) {
+    throw PluginRefused(file, "no such file");
+  }
+  if (std::filesystem::is_directory(status)) {
+    throw PluginRefused(file, "is a folder, not a shared library");
+  }
+  if (!std::filesystem::is_regular_file(status)) {
+    throw PluginRefused(file, "is not a regular file");
+  }
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) {
+    throw PluginRefused(
+        file, std::string("cannot be read: ") + std::strerror(errno) + " - check its permissions");
+  }
+  std::string bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  check_elf(file, bytes);
+  return bytes;
+}
+
+}  // namespace viwo

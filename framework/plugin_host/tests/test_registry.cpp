@@ -1,0 +1,317 @@
+// Finding plugins, and refusing what does not fit: every message, and that the host goes on.
+#include <cfenv>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "support.hpp"
+#include "viwo/api/plugin.hpp"
+#include "viwo/plugin_host/build_record_check.hpp"
+#include "viwo/plugin_host/registry.hpp"
+
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
+
+namespace viwo {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Registry : public FolderTest {
+ protected:
+  /// The reason for which a file is refused; the host then still loads a good one.
+  static std::string reason(const fs::path& file) {
+    PluginRegistry registry({kBadPlugins});
+    std::string text = "not refused";
+    try {
+      registry.check(file);
+    } catch (const PluginRefused& refused) {
+      EXPECT_EQ(refused.file(), file);
+      EXPECT_EQ(refused.what(), "refusing " + file.string() + ": " + refused.reason());
+      text = refused.reason();
+    }
+    EXPECT_EQ(registry.find("kinematics", "moody").name, "moody");
+    return text;
+  }
+
+  static fs::path bad(const std::string& name) {
+    return kBadPlugins / ("libviwo_kinematics_" + name + ".so");
+  }
+
+  /// A copy of the good plugin with some of its bytes replaced.
+  fs::path doctored(const std::string& from, const std::string& to) const {
+    EXPECT_EQ(from.size(), to.size());
+    return write("libviwo_kinematics_moody.so", replaced(read_bytes(bad("moody")), from, to));
+  }
+};
+
+TEST_F(Registry, LoadsAPluginAndKnowsAboutIt) {
+  PluginRegistry registry({kBadPlugins});
+  const PluginInfo info = registry.find("kinematics", "moody");
+  EXPECT_EQ(info.kind, "kinematics");
+  EXPECT_EQ(info.name, "moody");
+  EXPECT_EQ(info.version, "1.2.0");
+  EXPECT_EQ(info.summary, "one wheel");
+  EXPECT_EQ(info.license, "Apache-2.0");
+  EXPECT_EQ(info.file, bad("moody"));
+  ASSERT_EQ(info.params.size(), 2u);
+  EXPECT_STREQ(info.params[0].name, "radius_m");
+}
+
+TEST_F(Registry, KeepsTextsOfAPluginValidAfterItIsGone) {
+  PluginInfo info;
+  {
+    PluginRegistry registry({kBadPlugins});
+    info = registry.find("sensor", "ticks");
+  }
+  ASSERT_EQ(info.params.size(), 3u);
+  EXPECT_STREQ(info.params[1].fallback, "{type: moody}");
+}
+
+TEST_F(Registry, SuggestsTheNearestName) {
+  PluginRegistry registry({folder_, "/no/such/folder"});
+  write("libviwo_kinematics_four_wis_wid.so", "");
+  write("libviwo_kinematics_differential.so", "");
+  write("libviwo_sensor_asl_log.so", "");
+  const std::string searched =
+      " (searched " + folder_.string() + ", /no/such/folder [no such folder])";
+  EXPECT_EQ(error_of([&] { registry.find("kinematics", "four_wsi_wid"); }),
+            "no kinematics plugin 'four_wsi_wid' - did you mean 'four_wis_wid'?" + searched);
+  EXPECT_EQ(error_of([&] { registry.find("kinematics", "asl_log"); }),
+            "no kinematics plugin 'asl_log' - known: differential, four_wis_wid" + searched);
+  EXPECT_EQ(error_of([&] { registry.find("update", "x"); }), "no update plugin 'x'" + searched);
+  EXPECT_EQ(error_of([] { PluginRegistry({}).find("update", "x"); }),
+            "no update plugin 'x' (no folder to search)");
+}
+
+TEST_F(Registry, RefusesTwoFilesForOnePlugin) {
+  const auto a = write("a/libviwo_kinematics_moody.so", read_bytes(bad("moody")));
+  const auto b = write("b/libviwo_kinematics_moody.so", "not even a library");
+  PluginRegistry registry({folder_ / "a", folder_ / "b", kBadPlugins});
+  EXPECT_EQ(error_of([&] { registry.find("kinematics", "moody"); }),
+            "two files for the kinematics plugin 'moody': " + a.string() + " and " + b.string() +
+                " - remove one, or its folder from the search path");
+  EXPECT_EQ(registry.find("sensor", "ticks").name, "ticks") << "others are not affected";
+}
+
+TEST_F(Registry, AcceptsTheSameFileFoundTwice) {
+  fs::create_symlink(bad("moody"), folder_ / "libviwo_kinematics_moody.so");
+  PluginRegistry registry({kBadPlugins, kBadPlugins, folder_});
+  EXPECT_EQ(registry.find("kinematics", "moody").file, bad("moody"));
+}
+
+TEST_F(Registry, SearchesCommandLineThenEnvironmentThenInstallation) {
+  const char* old = std::getenv("VIWO_PLUGIN_PATH");
+  const std::string saved = old != nullptr ? old : "";
+  ::setenv("VIWO_PLUGIN_PATH", ":/env/a::/env/b", 1);
+  const auto folders = PluginRegistry::default_search_path({folder_});
+  ::unsetenv("VIWO_PLUGIN_PATH");
+  if (old != nullptr) ::setenv("VIWO_PLUGIN_PATH", saved.c_str(), 1);
+  ASSERT_EQ(folders.size(), 4u);
+  EXPECT_EQ(folders[0], folder_);
+  EXPECT_EQ(folders[1], "/env/a");
+  EXPECT_EQ(folders[2], "/env/b");
+  EXPECT_EQ(folders[3],
+            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v1");
+  EXPECT_EQ(error_of([] { PluginRegistry::default_search_path({"/no/such"}); }),
+            "--plugin-path /no/such: no such folder");
+}
+
+TEST_F(Registry, ListsEveryLibraryWithItsReason) {
+  PluginRegistry registry({kBadPlugins, folder_});
+  write("libfoo.so", "text");
+  write("readme.txt", "text");
+  std::map<std::string, std::string> reasons;
+  for (const PluginListing& listing : registry.list()) {
+    EXPECT_EQ(listing.info.has_value(), listing.refusal.empty());
+    reasons[listing.file.filename().string()] =
+        listing.info ? "ok " + listing.info->name : listing.refusal.substr(0, 18);
+  }
+  const std::map<std::string, std::string> expected = {
+      {"libfoo.so", "is not a shared li"},
+      {"libviwo_kinematics_bad_default.so", "has a wrong parame"},
+      {"libviwo_kinematics_fast_math.so", "is built different"},
+      {"libviwo_kinematics_gives_nothing.so", "ok gives_nothing"},
+      {"libviwo_kinematics_links_another.so", "registers no plugi"},
+      {"libviwo_kinematics_misnamed.so", "registers 'moody' "},
+      {"libviwo_kinematics_moody.so", "ok moody"},
+      {"libviwo_kinematics_no_record.so", "has no build recor"},
+      {"libviwo_kinematics_null_create.so", "has a descriptor w"},
+      {"libviwo_kinematics_null_text.so", "has a descriptor w"},
+      {"libviwo_kinematics_sets_mode.so", "changes the floati"},
+      {"libviwo_kinematics_short_struct.so", "has a descriptor o"},
+      {"libviwo_kinematics_takes_type.so", "has a wrong parame"},
+      {"libviwo_kinematics_undefined.so", "cannot be loaded: "},
+      {"libviwo_kinematics_unregistered.so", "registers no plugi"},
+      {"libviwo_kinematics_wrong_api.so", "is for version 7 o"},
+      {"libviwo_sensor_ticks.so", "ok ticks"}};
+  EXPECT_EQ(reasons, expected);
+}
+
+TEST_F(Registry, RefusesAFolder) {
+  fs::create_directory(folder_ / "libviwo_kinematics_x.so");
+  EXPECT_EQ(reason(folder_ / "libviwo_kinematics_x.so"), "is a folder, not a shared library");
+}
+
+TEST_F(Registry, RefusesAFileThatIsNotThere) {
+  EXPECT_EQ(reason(folder_ / "libviwo_kinematics_x.so"), "no such file");
+}
+
+TEST_F(Registry, RefusesAFileItMayNotRead) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may read everything";
+  const auto file = write("libviwo_kinematics_x.so", "");
+  fs::permissions(file, fs::perms::none);
+  EXPECT_EQ(reason(file), "cannot be read: Permission denied - check its permissions");
+}
+
+TEST_F(Registry, RefusesATextFile) {
+  EXPECT_EQ(reason(write("libviwo_kinematics_x.so", "#include <viwo/api/plugin.hpp>\n")),
+            "is not a shared library - a plugin is built with viwo_add_plugin()");
+  EXPECT_EQ(reason(write("libviwo_kinematics_y.so", "")),
+            "is not a shared library - a plugin is built with viwo_add_plugin()");
+}
+
+TEST_F(Registry, RefusesATruncatedLibraryAtAnyLength) {
+  const std::string bytes = read_bytes(bad("moody"));
+  const std::string expected = "is truncated - copy or build it again";
+  for (const std::size_t size : {std::size_t{20}, std::size_t{70}, bytes.size() / 4}) {
+    EXPECT_EQ(reason(write("libviwo_kinematics_moody.so", bytes.substr(0, size))), expected)
+        << size;
+  }
+}
+
+TEST_F(Registry, RefusesALibraryForAnotherProcessor) {
+  std::string bytes = read_bytes(bad("moody"));
+  bytes[18] = static_cast<char>(bytes[18] ^ 0x40);  // e_machine
+  EXPECT_EQ(reason(write("libviwo_kinematics_moody.so", bytes)),
+            "is built for another processor - rebuild it on this machine");
+}
+
+TEST_F(Registry, RefusesAProgram) {
+  std::string bytes = read_bytes(bad("moody"));
+  bytes[16] = 2;  // e_type = ET_EXEC
+  EXPECT_EQ(reason(write("libviwo_kinematics_moody.so", bytes)),
+            "is not a shared library but an object file or a program - a plugin is built with "
+            "viwo_add_plugin()");
+}
+
+TEST_F(Registry, RefusesALibraryWithoutARecord) {
+  EXPECT_EQ(reason(bad("no_record")),
+            "has no build record, so it is not a plugin of viwo - register it with "
+            "VIWO_REGISTER() and build it with viwo_add_plugin()");
+}
+
+TEST_F(Registry, RefusesAnotherApiInTheRecord) {
+  EXPECT_EQ(reason(doctored("{api=1;", "{api=0;")),
+            "is built differently from this host\n"
+            "  api: host 1, plugin 0\n"
+            "  -> it is for another version of the plugin API: rebuild it against this viwo");
+}
+
+TEST_F(Registry, RefusesAnotherAlignment) {
+  const std::string align = "eigen_max_align=" + std::to_string(EIGEN_MAX_ALIGN_BYTES) + ";";
+  EXPECT_EQ(reason(doctored(align, "eigen_max_align=99;")),
+            "is built differently from this host\n"
+            "  eigen_max_align: host " +
+                std::to_string(EIGEN_MAX_ALIGN_BYTES) +
+                ", plugin 99\n"
+                "  -> the instruction sets differ: rebuild it with viwo_add_plugin() of this viwo, "
+                "without -march or -mavx of its own");
+}
+
+TEST_F(Registry, RefusesFastMath) {
+  EXPECT_EQ(reason(bad("fast_math")),
+            "is built differently from this host\n"
+            "  fast_math: host 0, plugin 1\n"
+            "  -> rebuild it without -ffast-math and -Ofast: they change the arithmetic of the "
+            "whole process");
+}
+
+TEST_F(Registry, RefusesAChangeOfTheFloatingPointModeAndUndoesIt) {
+  const int rounding = std::fegetround();
+#if defined(__SSE__)
+  const unsigned before = _mm_getcsr();
+#endif
+  EXPECT_EQ(reason(bad("sets_mode")),
+            "changes the floating-point mode of the process when it is loaded - link it without "
+            "-ffast-math and -Ofast");
+  EXPECT_EQ(std::fegetround(), rounding);
+#if defined(__SSE__)
+  EXPECT_EQ(_mm_getcsr(), before);
+#endif
+}
+
+#if defined(__SSE__)
+TEST_F(Registry, LeavesMxcsrAloneWhenItLoadsAGoodPlugin) {
+  const auto file = write("libviwo_kinematics_moody.so", read_bytes(bad("moody")));
+  const unsigned before = _mm_getcsr();
+  PluginRegistry({folder_}).check(file);
+  EXPECT_EQ(_mm_getcsr(), before);
+}
+#endif
+
+TEST_F(Registry, RefusesUndefinedSymbols) {
+  EXPECT_EQ(reason(bad("undefined")).substr(0, 18), "cannot be loaded: ");
+  EXPECT_NE(reason(bad("undefined")).find("undefined symbol: viwo_function_of_no_library"),
+            std::string::npos);
+  EXPECT_TRUE(reason(bad("undefined"))
+                  .ends_with("\n  -> link what is missing; viwo_add_plugin() shows undefined "
+                             "symbols when it links"));
+}
+
+TEST_F(Registry, RefusesALibraryThatRegistersNothing) {
+  EXPECT_EQ(reason(bad("unregistered")),
+            "registers no plugin (it has no symbol 'viwo_plugin') - add VIWO_REGISTER(...) to one "
+            "of its sources");
+}
+
+TEST_F(Registry, RefusesTheRegistrationOfAnotherLibrary) {
+  EXPECT_EQ(reason(bad("links_another")),
+            "registers no plugin: the symbol 'viwo_plugin' it sees is that of " +
+                fs::canonical(bad("moody")).string() +
+                " - add VIWO_REGISTER(...) to one of its sources, and do not link one plugin to "
+                "another");
+}
+
+TEST_F(Registry, RefusesAShortDescriptor) {
+  EXPECT_EQ(reason(bad("short_struct")), "has a descriptor of 16 bytes, this host needs " +
+                                             std::to_string(sizeof(PluginDescriptor)) +
+                                             " - rebuild it against this viwo");
+}
+
+TEST_F(Registry, RefusesAnotherApiInTheDescriptor) {
+  EXPECT_EQ(reason(bad("wrong_api")),
+            "is for version 7 of the plugin API, this host has version 1 - rebuild it against this "
+            "viwo");
+}
+
+TEST_F(Registry, RefusesNullPointersInTheDescriptor) {
+  EXPECT_EQ(reason(bad("null_text")), "has a descriptor with a null text - use VIWO_REGISTER(...)");
+  EXPECT_EQ(reason(bad("null_create")),
+            "has a descriptor with a null pointer - use VIWO_REGISTER(...)");
+}
+
+TEST_F(Registry, RefusesAnotherNameThanThatOfTheFile) {
+  const std::string expected =
+      "registers 'moody' of kind 'kinematics' - its file must be named libviwo_kinematics_moody.so";
+  EXPECT_EQ(reason(bad("misnamed")), expected);
+  const std::string bytes = read_bytes(bad("moody"));
+  EXPECT_EQ(reason(write("libviwo_sensor_moody.so", bytes)), expected);
+  EXPECT_EQ(reason(write("moody.so", bytes)), expected);
+  fs::create_symlink(bad("moody"), folder_ / "libviwo_kinematics_alias.so");
+  EXPECT_EQ(reason(folder_ / "libviwo_kinematics_alias.so"), expected);
+}
+
+TEST_F(Registry, RefusesAWrongParameterTable) {
+  EXPECT_EQ(reason(bad("bad_default")),
+            "has a wrong parameter table: default of 'r_m'  r_m: -1 violates r_m >= 0");
+  EXPECT_EQ(reason(bad("takes_type")),
+            "has a wrong parameter table: 'type' is taken, it names the plugin");
+}
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,139 @@
+#include "viwo/sim/planar_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "viwo/api/status.hpp"
+#include "viwo/math/se2.hpp"
+
+namespace viwo::sim {
+namespace {
+
+constexpr double kFirstZeroOfJ0 = 2.404825557695773;
+// Frequencies without a common multiple within an experiment, so that no pattern repeats.
+constexpr double kDirectionHz = 0.11;
+constexpr double kYawRateHz = 0.07;
+constexpr double kSpeedHz = 0.043;
+constexpr double kDirectionSwing = 1.5;  // rad
+
+double wave(double hz, double t) { return std::sin(2. * M_PI * hz * t); }
+
+Twist along(double speed, double direction, double omega) {
+  return {speed * std::cos(direction), speed * std::sin(direction), omega};
+}
+
+}  // namespace
+
+struct PlanarMotion::Entry {
+  const char* name;
+  Profile profile;
+};
+
+const std::vector<PlanarMotion::Entry>& PlanarMotion::entries() {
+  static const std::vector<Entry> kEntries = {
+      {"icr_sweep",
+       [](double t, const MotionOptions& o) {
+         return along(o.speed_m_per_s * (1. + 0.3 * wave(kSpeedHz, t)),
+                      kDirectionSwing * wave(kDirectionHz, t),
+                      o.yaw_rate_rad_per_s * wave(kYawRateHz, t));
+       }},
+      {"straight", [](double, const MotionOptions& o) { return Twist(o.speed_m_per_s, 0., 0.); }},
+      {"lateral", [](double, const MotionOptions& o) { return Twist(0., o.speed_m_per_s, 0.); }},
+      {"circle",
+       [](double, const MotionOptions& o) {
+         return Twist(o.speed_m_per_s, 0., o.yaw_rate_rad_per_s);
+       }},
+      {"stationary", [](double, const MotionOptions&) { return Twist(0., 0., 0.); }},
+      {"figure_eight",
+       [](double t, const MotionOptions& o) {
+         return Twist(o.speed_m_per_s, 0.,
+                      o.yaw_rate_rad_per_s * wave(1. / figure_eight_period_s(o), t));
+       }},
+      {"crab_varying",
+       [](double t, const MotionOptions& o) {
+         return along(o.speed_m_per_s, kDirectionSwing * wave(kDirectionHz, t), 0.);
+       }},
+      {"spin", [](double, const MotionOptions& o) { return Twist(0., 0., o.yaw_rate_rad_per_s); }},
+      {"constant_steering",
+       [](double t, const MotionOptions& o) -> Twist {
+         return (1. + 0.5 * wave(kDirectionHz, t)) *
+                Twist(o.speed_m_per_s, 0., o.yaw_rate_rad_per_s);
+       }},
+  };
+  return kEntries;
+}
+
+const std::vector<std::string>& PlanarMotion::names() {
+  static const std::vector<std::string> kNames = [] {
+    std::vector<std::string> out;
+    for (const Entry& entry : entries()) out.emplace_back(entry.name);
+    return out;
+  }();
+  return kNames;
+}
+
+PlanarMotion::PlanarMotion(std::string_view name, const MotionOptions& options)
+    : name_(name), options_(options) {
+  for (const Entry& entry : entries()) {
+    if (name == entry.name) profile_ = entry.profile;
+  }
+  if (profile_ != nullptr) return;
+  std::string text = "no motion '" + name_ + "' - there are:";
+  for (const std::string& known : names()) text += (text.back() == ':' ? " " : ", ") + known;
+  throw InputError(text);
+}
+
+double PlanarMotion::progress(double t) const {
+  if (options_.ramp_s <= 0.) return t;
+  const double u = std::clamp(t / options_.ramp_s, 0., 1.);
+  // Integral of the ramp u^3 (10 - 15 u + 6 u^2) of twist().
+  const double within = u * u * u * u * (2.5 + u * (u - 3.));
+  return options_.ramp_s * within + std::max(t - options_.ramp_s, 0.);
+}
+
+Twist PlanarMotion::twist(double t) const {
+  double ramp = 1.;
+  if (options_.ramp_s > 0.) {
+    const double u = std::clamp(t / options_.ramp_s, 0., 1.);
+    ramp = u * u * u * (10. + u * (6. * u - 15.));
+  }
+  return ramp * profile_(progress(t), options_);
+}
+
+double figure_eight_period_s(const MotionOptions& options) {
+  return 2. * M_PI * kFirstZeroOfJ0 / options.yaw_rate_rad_per_s;
+}
+
+PoseIntegrator::PoseIntegrator(const PlanarMotion& motion, double max_step_s)
+    : motion_(motion), max_step_s_(max_step_s) {
+  if (!(max_step_s > 0.)) throw std::logic_error("max_step_s must be positive");
+}
+
+void PoseIntegrator::step(double h) {
+  static const double kGauss = std::sqrt(3.) / 6.;
+  const Twist a = motion_.twist(t_ + (0.5 - kGauss) * h);
+  const Twist b = motion_.twist(t_ + (0.5 + kGauss) * h);
+  // Body twists act from the right, which gives the commutator [a, b] its positive sign.
+  const Eigen::Vector2d commutator = J2() * (a[2] * b.head<2>() - b[2] * a.head<2>());
+  const double theta = 0.5 * h * (a[2] + b[2]);
+  const Eigen::Vector2d rho =
+      0.5 * h * (a.head<2>() + b.head<2>()) + 0.5 * kGauss * h * h * commutator;
+  Eigen::Vector3d arc;
+  arc << theta, sinc(0.5 * theta).value * (R2(0.5 * theta) * rho);
+  g_ = compose(g_, arc);
+}
+
+const Eigen::Vector3d& PoseIntegrator::advance_to(double t) {
+  if (t < t_) throw std::logic_error("poses must be asked for in time order");
+  const double from = t_;
+  const double n = std::ceil((t - from) / max_step_s_);
+  for (double i = 0.; i < n; i += 1.) {
+    t_ = from + (t - from) * (i / n);
+    step((t - from) / n);
+  }
+  t_ = t;
+  return g_;
+}
+
+}  // namespace viwo::sim

@@ -1,0 +1,36 @@
+#include "viwo/sim/random.hpp"
+
+#include <cmath>
+
+namespace viwo::sim {
+namespace {
+
+/// SplitMix64's output function: neighbouring seeds give unrelated values.
+std::uint64_t mix(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15ULL;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
+  return x ^ (x >> 31);
+}
+
+}  // namespace
+
+RandomStream::RandomStream(std::uint64_t seed, Stream purpose)
+    : engine_(mix(mix(seed) + static_cast<std::uint64_t>(purpose))) {}
+
+double RandomStream::uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
+
+double RandomStream::gaussian() {
+  if (has_spare_) {
+    has_spare_ = false;
+    return spare_;
+  }
+  // Box-Muller; 1 - u is in (0, 1], so the logarithm is finite.
+  const double radius = std::sqrt(-2. * std::log(1. - uniform()));
+  const double angle = 2. * M_PI * uniform();
+  spare_ = radius * std::sin(angle);
+  has_spare_ = true;
+  return radius * std::cos(angle);
+}
+
+}  // namespace viwo::sim

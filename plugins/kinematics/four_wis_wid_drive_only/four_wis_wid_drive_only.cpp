@@ -1,0 +1,81 @@
+// Reduced model of a base with N >= 2 steered and driven wheels: the rolling row of every wheel
+// only. Equations: model.md beside this file.
+#include <cmath>
+
+#include "swerve_base.hpp"
+#include "viwo/api/plugin.hpp"
+
+namespace viwo {
+namespace {
+
+class FourWisWidDriveOnly final : public swerve::SwerveBase {
+ public:
+  FourWisWidDriveOnly(const ParamSet& params, const HostServices& /*services*/)
+      : SwerveBase(params) {}
+
+  void describe(ModelDescription& out) const override {
+    describe_wheels(swerve::RowsPerWheel::kDriveOnly, out);
+  }
+
+  Status rows(const EncoderSample& sample, const Intrinsics& x_WI, bool /*A_is_current*/,
+              RowSystem& out) const override {
+    for (int j = 0; j < n(); ++j) {
+      const auto channel = static_cast<std::size_t>(j);
+      const double delta = sample.steer_rad[channel] - x_WI[delta_o(j)];
+      const double c = std::cos(delta);
+      const double s = std::sin(delta);
+      out.A.row(j) << c, s, x_WI[x(j)] * s - x_WI[y(j)] * c;  // (D-1)
+      out.b[j] = x_WI[r(j)] * sample.drive_rad_per_s[channel];
+      out.kept[channel] = x_WI[x(j)] * c + x_WI[y(j)] * s;  // third entry of dA/d delta (D-2)
+    }
+    return Status::kOk;
+  }
+
+  void intrinsic_derivatives(const EncoderSample& /*sample*/, const Intrinsics& x_WI,
+                             const RowSystem& rows, const RowVector& b, const Twist& xi,
+                             const RowVector& e, IntrinsicDerivatives& out) const override {
+    for (int j = 0; j < n(); ++j) {
+      const double c = rows.A(j, 0);
+      const double s = rows.A(j, 1);
+      const Eigen::Vector3d turned = turned_row(rows, j);
+      out.J(j, r(j)) = b[j] / x_WI[r(j)];  // (D-3)
+      out.J(j, x(j)) = -xi.z() * s;        // (D-4)
+      out.J(j, y(j)) = xi.z() * c;
+      out.J(j, delta_o(j)) = turned.dot(xi);  // (D-5)
+      out.DtE.col(r(j)).setZero();
+      out.DtE.col(x(j)) << 0., 0., s * e[j];
+      out.DtE.col(y(j)) << 0., 0., -c * e[j];
+      out.DtE.col(delta_o(j)) = -turned * e[j];
+    }
+  }
+
+  void noise_derivatives(const EncoderSample& /*sample*/, const Intrinsics& x_WI,
+                         const RowSystem& rows, const RowVector& /*b*/, const Twist& xi,
+                         const RowVector& e, NoiseDerivatives& out) const override {
+    for (int j = 0; j < n(); ++j) {
+      const Eigen::Vector3d turned = turned_row(rows, j);
+      out.J(j, j) = x_WI[r(j)];  // (D-6) drive
+      out.DtE.col(j).setZero();
+      out.J(j, n() + j) = -turned.dot(xi);  // steering
+      out.DtE.col(n() + j) = turned * e[j];
+    }
+  }
+
+ protected:
+  Eigen::Vector2d contact_slip(const RowVector& /*slip*/, int /*j*/) const override {
+    return Eigen::Vector2d::Zero();  // the rows know of no slip
+  }
+
+ private:
+  /// dA_j/d delta_j (D-2): the rolling row turned by a quarter.
+  static Eigen::Vector3d turned_row(const RowSystem& rows, int j) {
+    return {-rows.A(j, 1), rows.A(j, 0), rows.kept[static_cast<std::size_t>(j)]};
+  }
+};
+
+VIWO_REGISTER(KinematicModel, FourWisWidDriveOnly, "four_wis_wid_drive_only", "1.0.0",
+              "N >= 2 steered and driven wheels (swerve), rolling rows only", "Apache-2.0",
+              swerve::kParams);
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,117 @@
+#include "swerve_base.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <span>
+#include <string>
+
+namespace viwo::swerve {
+namespace {
+
+/// Appends `values`, repeated if there is one for all wheels.
+void append(const char* key, std::span<const double> values, int n, std::vector<double>& out) {
+  if (values.size() != 1 && values.size() != static_cast<std::size_t>(n)) {
+    throw ParamError(key, "has " + std::to_string(values.size()) + " values for " +
+                              std::to_string(n) + " wheels (x_m has " + std::to_string(n) + ")");
+  }
+  for (int j = 0; j < n; ++j)
+    out.push_back(values[values.size() == 1 ? 0 : static_cast<std::size_t>(j)]);
+}
+
+}  // namespace
+
+SwerveBase::SwerveBase(const ParamSet& params)
+    : prior_sigma_radius_m_(params.number("prior_sigma_radius_m")),
+      prior_sigma_position_m_(params.number("prior_sigma_position_m")),
+      prior_sigma_steer_offset_rad_(params.number("prior_sigma_steer_offset_rad")),
+      sigma_drive_rad_per_s_(params.number("sigma_drive_rad_per_s")),
+      sigma_steer_rad_(params.number("sigma_steer_rad")),
+      sigma_lateral_m_per_s_(params.number("sigma_lateral_m_per_s")) {
+  const auto x_m = params.numbers("x_m");
+  const auto y_m = params.numbers("y_m");
+  n_ = static_cast<int>(x_m.size());
+  if (n_ < 2 || n_ > kMaxDrives) {
+    throw ParamError("x_m", "has " + std::to_string(n_) + " wheels, this model takes 2 to " +
+                                std::to_string(kMaxDrives));
+  }
+  if (y_m.size() != x_m.size()) {
+    throw ParamError("y_m", "has " + std::to_string(y_m.size()) + " values, x_m has " +
+                                std::to_string(x_m.size()) + ": one per wheel in each");
+  }
+  bool apart = false;
+  for (std::size_t j = 1; j < x_m.size(); ++j) apart |= x_m[j] != x_m[0] || y_m[j] != y_m[0];
+  if (!apart) throw ParamError("x_m", "all wheels are at the same place: no yaw rate can be told");
+  append("radius_m", params.numbers("radius_m"), n_, nominal_);
+  nominal_.insert(nominal_.end(), x_m.begin(), x_m.end());
+  nominal_.insert(nominal_.end(), y_m.begin(), y_m.end());
+  append("steer_offset_rad", params.numbers("steer_offset_rad"), n_, nominal_);
+}
+
+void SwerveBase::describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& out) const {
+  const int k = static_cast<int>(rows_per_wheel);
+  out.n_drive = n_;
+  out.n_steer = n_;
+  out.n_rows = k * n_;
+  out.noise_block = k;
+  struct Group {
+    const char* name;
+    const char* unit;
+    double prior_sigma;
+    bool holds_gauge;
+  };
+  const Group groups[] = {{"r_", "m", prior_sigma_radius_m_, false},
+                          {"x_", "m", prior_sigma_position_m_, true},
+                          {"y_", "m", prior_sigma_position_m_, true},
+                          {"delta_o", "rad", prior_sigma_steer_offset_rad_, true}};
+  for (const Group& group : groups) {
+    for (int j = 0; j < n_; ++j) {
+      out.intrinsics.push_back({.name = group.name + std::to_string(j + 1),
+                                .unit = group.unit,
+                                .nominal = nominal_[out.intrinsics.size()],
+                                .prior_sigma = group.prior_sigma,
+                                .gauge_fixed = group.holds_gauge && j == 0,
+                                .rows = {k * j, k}});
+    }
+  }
+  for (int j = 0; j < n_; ++j) {
+    out.noises.push_back({NoiseKind::kDrive, j, sigma_drive_rad_per_s_, {k * j, k}});
+  }
+  for (int j = 0; j < n_; ++j) {
+    out.noises.push_back({NoiseKind::kSteer, j, sigma_steer_rad_, {k * j, k}});
+  }
+  if (rows_per_wheel == RowsPerWheel::kDriveOnly) return;
+  for (int j = 0; j < n_; ++j) {
+    out.noises.push_back({NoiseKind::kSlip, j, sigma_lateral_m_per_s_, {k * j, k}});
+  }
+}
+
+Status SwerveBase::inverse(const Twist& xi, const Intrinsics& x_WI, const RowVector& slip,
+                           EncoderSample& sample) const {
+  sample.n_drive = n_;
+  sample.n_steer = n_;
+  for (int j = 0; j < n_; ++j) {
+    const auto channel = static_cast<std::size_t>(j);
+    const Eigen::Vector2d u =
+        Eigen::Vector2d(xi.x() - x_WI[y(j)] * xi.z(), xi.y() + x_WI[x(j)] * xi.z()) +
+        contact_slip(slip, j);
+    double v = u.norm();
+    // A wheel at rest keeps its direction; otherwise it turns by at most a quarter, rolling
+    // backwards where that is the shorter way.
+    if (v > 1e-9) {
+      double turn =
+          std::remainder(std::atan2(u.y(), u.x()) + x_WI[delta_o(j)] - sample.steer_rad[channel],
+                         2. * std::numbers::pi);
+      if (std::abs(turn) > std::numbers::pi / 2. + 1e-9) {
+        turn -= std::copysign(std::numbers::pi, turn);
+        v = -v;
+      }
+      sample.steer_rad[channel] += turn;
+    } else {
+      v = 0.;
+    }
+    sample.drive_rad_per_s[channel] = v / x_WI[r(j)];
+  }
+  return Status::kOk;
+}
+
+}  // namespace viwo::swerve

@@ -1,0 +1,115 @@
+// What the models of a base with N steered and driven wheels share: parameters, the order of the
+// intrinsics x_WI = [r_1..r_N, x_1..x_N, y_1..y_N, delta_o1..delta_oN], inverse kinematics.
+// Wheel j steers by delta_j = delta_mj - delta_oj and rolls with v_j = r_j omega_j along
+// d_j = [cos delta_j, sin delta_j]^T.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "viwo/api/kinematic_model.hpp"
+#include "viwo/api/params.hpp"
+
+namespace viwo::swerve {
+
+inline constexpr std::array kParams{
+    ParamSpec{.name = "x_m",
+              .type = ParamType::kNumbers,
+              .unit = "m",
+              .help = "wheel contact points along x (forward) in O, one per wheel"},
+    ParamSpec{.name = "y_m",
+              .type = ParamType::kNumbers,
+              .unit = "m",
+              .help = "wheel contact points along y (left) in O, one per wheel"},
+    ParamSpec{.name = "radius_m",
+              .type = ParamType::kNumbers,
+              .unit = "m",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "wheel radii, one for all or one per wheel"},
+    ParamSpec{.name = "steer_offset_rad",
+              .type = ParamType::kNumbers,
+              .unit = "rad",
+              .fallback = "[0]",
+              .help =
+                  "reading of the steering encoder when the wheel points along x, one for all or "
+                  "one per wheel"},
+    ParamSpec{.name = "prior_sigma_radius_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0.0003",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "how well the radii are known"},
+    ParamSpec{.name = "prior_sigma_position_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0.002",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "how well each coordinate of a contact point is known"},
+    ParamSpec{.name = "prior_sigma_steer_offset_rad",
+              .type = ParamType::kNumber,
+              .unit = "rad",
+              .fallback = "0.01",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "how well the steering offsets are known"},
+    ParamSpec{.name = "sigma_drive_rad_per_s",
+              .type = ParamType::kNumber,
+              .unit = "rad/s",
+              .fallback = "0.001",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "noise of a drive rate, per sample"},
+    ParamSpec{.name = "sigma_steer_rad",
+              .type = ParamType::kNumber,
+              .unit = "rad",
+              .fallback = "0.001",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "noise of a steering angle, per sample"},
+    ParamSpec{
+        .name = "sigma_lateral_m_per_s",
+        .type = ParamType::kNumber,
+        .unit = "m/s",
+        .fallback = "0.001",
+        .min = 0.,
+        .min_exclusive = true,
+        .help = "sideways velocity of a contact point, per sample (unused by drive-only models)"},
+};
+
+/// Rows that one wheel contributes, for filling in the description.
+enum class RowsPerWheel : int { kDriveOnly = 1, kDriveAndLateral = 2 };
+
+/// Base of the swerve models: everything but the rows.
+class SwerveBase : public KinematicModel {
+ public:
+  Status inverse(const Twist& xi, const Intrinsics& x_WI, const RowVector& slip,
+                 EncoderSample& y) const override;
+
+ protected:
+  /// Throws ParamError when the lists do not agree in length or there are fewer than two wheels.
+  explicit SwerveBase(const ParamSet& params);
+
+  /// Intrinsics, encoder noises, counts; rows per wheel decide the row ranges. Wheel 1's position
+  /// and steering offset hold the gauge (model.md, section 4).
+  void describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& out) const;
+
+  /// The slip of wheel j as a velocity in O, from the model's slip rows.
+  virtual Eigen::Vector2d contact_slip(const RowVector& slip, int j) const = 0;
+
+  int n() const { return n_; }
+  int r(int j) const { return j; }
+  int x(int j) const { return n_ + j; }
+  int y(int j) const { return 2 * n_ + j; }
+  int delta_o(int j) const { return 3 * n_ + j; }
+
+ private:
+  int n_ = 0;
+  std::vector<double> nominal_;
+  double prior_sigma_radius_m_, prior_sigma_position_m_, prior_sigma_steer_offset_rad_;
+  double sigma_drive_rad_per_s_, sigma_steer_rad_, sigma_lateral_m_per_s_;
+};
+
+}  // namespace viwo::swerve

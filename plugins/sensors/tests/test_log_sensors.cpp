@@ -1,0 +1,117 @@
+// The sensors that play logs back: parameters, data, errors at construction.
+#include "support.hpp"
+
+namespace viwo {
+namespace {
+
+class LogSensors : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(::testing::TempDir()) / "viwo_log_sensors";
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return (folder_ / name).string();
+  }
+
+  std::filesystem::path folder_;
+};
+
+constexpr const char* kJoints =
+    ".header.stamp.secs;.header.stamp.nsecs;time;.name;.position;.velocity\n"
+    "1;0;1970/01/01/00:00:03;['s', 'd'];(0.5, 10.0);(0, 7)\n"
+    "1;100000000;1970/01/01/00:00:03.2;['s', 'd'];(0.7, 11.0);(0, 8)\n"
+    "1;200000000;1970/01/01/00:00:03.3;['s', 'd'];(0.7, 12.5);(0, 9)\n";
+
+TEST_F(LogSensors, AslEncodersYieldRatesAndReportWhatWasDropped) {
+  const auto path = write("data.csv", "timestamp_ns,drive_1 [rad/s]\n0,1\n10,2\n10,3\n20,4\n");
+  const auto sensor =
+      make_sensor("{type: asl_encoders, path: " + path + ", max_rejected_fraction: 0.3}");
+  const auto samples = only<EncoderSample>(play(*sensor));
+  ASSERT_EQ(samples.size(), 3U);
+  EXPECT_EQ(samples[2].drive_rad_per_s[0], 4.);
+  EXPECT_EQ(samples[1].begin_ns, 5);
+  std::vector<RejectionCount> rejections;
+  sensor->rejections(rejections);
+  ASSERT_EQ(rejections.size(), 1U);
+  EXPECT_EQ(rejections[0].reason, "stamp not after the previous one");
+  EXPECT_EQ(rejections[0].first, "data.csv:4");
+}
+
+TEST_F(LogSensors, AslEncodersTakeAnglesWithAStride) {
+  const auto path =
+      write("data.csv", "timestamp_ns,drive_1 [rad]\n0,0\n100000000,1\n200000000,4\n");
+  const auto samples = play_only<EncoderSample>(
+      "{type: asl_encoders, drive_input: angle, "
+      "stride: 2, path: " +
+      path + "}");
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].drive_rad_per_s[0], 20.);
+  EXPECT_EQ(error_of("{type: asl_encoders, stride: 2, path: " + path + "}"),
+            "test.yaml:1:30  sensor.stride: a stride needs drive_input: angle (rates between the "
+            "used readings would be lost)");
+}
+
+TEST_F(LogSensors, ABrokenLogFailsAtConstruction) {
+  const auto path = write("data.csv", "timestamp_ns,drive_1\n0,1\n10,two\n");
+  const std::string error = error_of("{type: asl_encoders, path: " + path + "}");
+  EXPECT_NE(error.find(path + ":3  column 'drive_1': 'two' is not a number"), std::string::npos)
+      << error;
+}
+
+TEST_F(LogSensors, AslPoseYieldsPositionAndQuaternion) {
+  const auto path = write("data.csv",
+                          "#timestamp,p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],"
+                          "q_RS_y [],q_RS_z []\n5,1,2,3,0.8,0,0,0.6\n");
+  const auto samples = play_only<PoseSample>("{type: asl_pose, path: " + path + "}");
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].p_BinW_m, (std::array{1., 2., 3.}));
+  EXPECT_EQ(samples[0].q_BtoW_xyzw, (std::array{0., 0., 0.6, 0.8}));
+}
+
+TEST_F(LogSensors, RosTextEncodersDifferencePositionsByDefault) {
+  const auto path = write("odom.csv", kJoints);
+  const auto samples = play_only<EncoderSample>(
+      "{type: ros_text_encoders, drive: [d], steer: [s], path: " + path + "}");
+  ASSERT_EQ(samples.size(), 2U);
+  EXPECT_NEAR(samples[0].drive_rad_per_s[0], 10., 1e-12);
+  EXPECT_NEAR(samples[1].drive_rad_per_s[0], 15., 1e-12);
+  EXPECT_NEAR(samples[0].steer_rad[0], 0.6, 1e-15);
+  EXPECT_EQ(samples[0].t_ns, 1'050'000'000);
+}
+
+TEST_F(LogSensors, RosTextEncodersTakeVelocitiesAndTheReceptionClock) {
+  const auto path = write("odom.csv", kJoints);
+  const auto samples = play_only<EncoderSample>(
+      "{type: ros_text_encoders, drive: d, drive_input: velocity, clock: reception, path: " + path +
+      "}");
+  ASSERT_EQ(samples.size(), 3U);
+  EXPECT_EQ(samples[1].drive_rad_per_s[0], 8.);
+  EXPECT_EQ(samples[1].n_steer, 0);
+  EXPECT_EQ(samples[1].t_ns, (7LL * 3600 + 3) * 1'000'000'000 + 200'000'000);  // 7 h behind UTC
+}
+
+TEST_F(LogSensors, AnUnknownJointIsReportedWhereItIsWritten) {
+  const auto path = write("odom.csv", kJoints);
+  EXPECT_EQ(error_of("{type: ros_text_encoders, drive: [x], path: " + path + "}"),
+            "test.yaml:1:34  sensor.drive: no joint 'x' in " + path + " - did you mean 's'?");
+}
+
+TEST_F(LogSensors, RosTextPoseYieldsPoses) {
+  const auto path = write("abs.csv",
+                          ".header.stamp.secs;.header.stamp.nsecs;.pose.position.x;"
+                          ".pose.position.y;.pose.position.z;.pose.orientation.x;"
+                          ".pose.orientation.y;.pose.orientation.z;.pose.orientation.w\n"
+                          "1;5;1;2;3;0;0;0.6;0.8\n");
+  const auto samples = play_only<PoseSample>("{type: ros_text_pose, path: " + path + "}");
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].t_ns, 1'000'000'005);
+  EXPECT_EQ(samples[0].q_BtoW_xyzw, (std::array{0., 0., 0.6, 0.8}));
+}
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,81 @@
+// A good plugin (a base with one drive channel that sees v_x), as long as its mood is fine.
+#include <array>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include "viwo/api/plugin.hpp"
+
+namespace {
+
+using namespace viwo;
+
+constexpr std::array<ParamSpec, 2> kParams = {{
+    {.name = "radius_m",
+     .type = ParamType::kNumber,
+     .unit = "m",
+     .fallback = "0.1",
+     .min = 0.,
+     .min_exclusive = true,
+     .help = "wheel radius"},
+    {.name = "mood",
+     .type = ParamType::kString,
+     .fallback = "fine",
+     .choices = "fine|param|input|std|int|bad_alloc|rows_std|rows_int|rows_input",
+     .help = "what is thrown, and where"},
+}};
+
+class Moody final : public KinematicModel {
+ public:
+  Moody(const ParamSet& params, const HostServices&)
+      : radius_(params.number("radius_m")), mood_(params.text("mood")) {
+    if (mood_ == "param") throw ParamError("radius_m", "is too round");
+    if (mood_ == "input") throw InputError("wheels.csv:3: not a wheel");
+    if (mood_ == "std") throw std::runtime_error("out of sorts");
+    if (mood_ == "int") throw 42;
+    if (mood_ == "bad_alloc") throw std::bad_alloc();
+  }
+
+  void describe(ModelDescription& out) const override {
+    out.n_drive = 1;
+    out.n_rows = 1;
+    out.intrinsics = {{.name = "r",
+                       .unit = "m",
+                       .nominal = radius_,
+                       .prior_sigma = 0.01,
+                       .gauge_fixed = false,
+                       .rows = {0, 1}}};
+    out.noises = {{.kind = NoiseKind::kDrive, .channel = 0, .sigma = 0.01, .rows = {0, 1}}};
+  }
+
+  Status rows(const EncoderSample& y, const Intrinsics& x_WI, bool, RowSystem& out) const override {
+    if (mood_ == "rows_std") throw std::out_of_range("no such row");
+    if (mood_ == "rows_int") throw 7;
+    if (mood_ == "rows_input") throw InputError("the sample is wrong");
+    out.A = Eigen::RowVector3d(1., 0., 0.);
+    out.b = RowVector::Constant(1, x_WI[0] * y.drive_rad_per_s[0]);
+    return Status::kOk;
+  }
+
+  void intrinsic_derivatives(const EncoderSample&, const Intrinsics& x_WI, const RowSystem&,
+                             const RowVector& b, const Twist&, const RowVector&,
+                             IntrinsicDerivatives& out) const override {
+    out.J(0, 0) = b[0] / x_WI[0];
+    out.DtE.setZero();
+  }
+
+  void noise_derivatives(const EncoderSample&, const Intrinsics& x_WI, const RowSystem&,
+                         const RowVector&, const Twist&, const RowVector&,
+                         NoiseDerivatives& out) const override {
+    out.J(0, 0) = x_WI[0];
+    out.DtE.setZero();
+  }
+
+ private:
+  double radius_;
+  std::string mood_;
+};
+
+}  // namespace
+
+VIWO_REGISTER(KinematicModel, Moody, "moody", "1.2.0", "one wheel", "Apache-2.0", kParams);
