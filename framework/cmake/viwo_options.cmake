@@ -11,7 +11,8 @@ if(VIWO_ARCH)
   list(APPEND VIWO_ABI_FLAGS -march=${VIWO_ARCH})
 endif()
 if(VIWO_SANITIZE)
-  list(APPEND VIWO_ABI_FLAGS -fsanitize=${VIWO_SANITIZE} -fno-omit-frame-pointer)
+  list(APPEND VIWO_ABI_FLAGS -fsanitize=${VIWO_SANITIZE} -fno-sanitize-recover=all
+       -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${VIWO_SANITIZE})
 endif()
 

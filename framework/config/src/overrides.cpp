@@ -120,7 +120,10 @@ void merge(Node& base, const Node& overrides) {
     if (!entry.value.is_map()) {
       slot = entry.value;
     } else {
-      if (!slot.is_map()) slot = Node::empty_map(entry.value.mark());
+      // A section that names its type is complete: parameters of another type do not fit it.
+      if (!slot.is_map() || entry.value.find("type") != nullptr) {
+        slot = Node::empty_map(entry.value.mark());
+      }
       merge(slot, entry.value);
     }
     mark_key(base, entry.key, entry.key_mark);

@@ -19,6 +19,12 @@ std::string error_of(F&& f) {
   return "no error";
 }
 
+TEST(Merge, ReplacesASectionByOneThatNamesItsType) {
+  Node base = parse("k: {type: a, p: 1}\nother: {type: a, p: 1}", "base.yaml");
+  merge(base, parse("k: {type: b, q: 2}\nother.type: b", "v.yaml"));
+  EXPECT_EQ(to_yaml(base), to_yaml(parse("k: {type: b, q: 2}\nother: {type: b, p: 1}", "w.yaml")));
+}
+
 TEST(Errors, AreSortedByPositionAndThrownTogether) {
   Errors errors;
   EXPECT_NO_THROW(errors.throw_if_any());

@@ -135,7 +135,7 @@ class Differential final : public KinematicModel {
     for (int i = 0; i < n_drive(); ++i) {
       out.J(i, side(i)) = b[i] / x_WI[side(i)];  // (DD-3)
       out.J(i, 2) = -0.5 * sign(i) * xi.z();     // (DD-4)
-      out.DtE(2, 2) += 0.5 * sign(i) * e[i];
+      out.DtE(2, 2) += 0.5 * sign(i) * e[i];     // (DD-6)
     }
   }
 
@@ -156,7 +156,7 @@ class Differential final : public KinematicModel {
     sample.n_drive = n;
     sample.n_steer = 0;
     for (int i = 0; i < n; ++i) {
-      const double v = xi.x() + sign(i) * 0.5 * x_WI[2] * xi.z() + slip[i];
+      const double v = xi.x() + sign(i) * 0.5 * x_WI[2] * xi.z() + slip[i];  // (DD-7)
       sample.drive_rad_per_s[channels_[static_cast<std::size_t>(i)]] = v / x_WI[side(i)];
     }
     return Status::kOk;

@@ -34,6 +34,10 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
   void intrinsic_derivatives(const EncoderSample& /*sample*/, const Intrinsics& x_WI,
                              const RowSystem& rows, const RowVector& b, const Twist& xi,
                              const RowVector& e, IntrinsicDerivatives& out) const override {
+    // A wheel that had measured what the twist predicts would point along its contact velocity: at
+    // the fitted signal nothing moves with the offset. The measured direction would leave v n_delta
+    // there, noise, and with it information about offsets that rolling rows do not have (W-9).
+    const bool fitted = &b != &rows.b;
     for (int j = 0; j < n(); ++j) {
       const double c = rows.A(j, 0);
       const double s = rows.A(j, 1);
@@ -41,8 +45,8 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
       out.J(j, r(j)) = b[j] / x_WI[r(j)];  // (D-3)
       out.J(j, x(j)) = -xi.z() * s;        // (D-4)
       out.J(j, y(j)) = xi.z() * c;
-      out.J(j, delta_o(j)) = turned.dot(xi);  // (D-5)
-      out.DtE.col(r(j)).setZero();
+      out.J(j, delta_o(j)) = fitted ? 0. : turned.dot(xi);  // (D-5)
+      out.DtE.col(r(j)).setZero();                          // (D-7)
       out.DtE.col(x(j)) << 0., 0., s * e[j];
       out.DtE.col(y(j)) << 0., 0., -c * e[j];
       out.DtE.col(delta_o(j)) = -turned * e[j];

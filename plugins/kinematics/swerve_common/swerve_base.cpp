@@ -69,7 +69,7 @@ void SwerveBase::describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& 
                                 .unit = group.unit,
                                 .nominal = nominal_[out.intrinsics.size()],
                                 .prior_sigma = group.prior_sigma,
-                                .gauge_fixed = group.holds_gauge && j == 0,
+                                .gauge_fixed = group.holds_gauge && j == 0,  // (S-11)
                                 .rows = {k * j, k}});
     }
   }
@@ -91,7 +91,7 @@ Status SwerveBase::inverse(const Twist& xi, const Intrinsics& x_WI, const RowVec
   sample.n_steer = n_;
   for (int j = 0; j < n_; ++j) {
     const auto channel = static_cast<std::size_t>(j);
-    const Eigen::Vector2d u =
+    const Eigen::Vector2d u =  // (S-9)
         Eigen::Vector2d(xi.x() - x_WI[y(j)] * xi.z(), xi.y() + x_WI[x(j)] * xi.z()) +
         contact_slip(slip, j);
     double v = u.norm();

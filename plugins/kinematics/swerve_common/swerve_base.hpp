@@ -1,7 +1,7 @@
 // What the models of a base with N steered and driven wheels share: parameters, the order of the
 // intrinsics x_WI = [r_1..r_N, x_1..x_N, y_1..y_N, delta_o1..delta_oN], inverse kinematics.
 // Wheel j steers by delta_j = delta_mj - delta_oj and rolls with v_j = r_j omega_j along
-// d_j = [cos delta_j, sin delta_j]^T.
+// d_j = [cos delta_j, sin delta_j]^T (four_wis_wid/model.md, S-1).
 #pragma once
 
 #include <array>
@@ -93,7 +93,7 @@ class SwerveBase : public KinematicModel {
   explicit SwerveBase(const ParamSet& params);
 
   /// Intrinsics, encoder noises, counts; rows per wheel decide the row ranges. Wheel 1's position
-  /// and steering offset hold the gauge (model.md, section 4).
+  /// and steering offset hold the gauge (four_wis_wid/model.md, S-11).
   void describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& out) const;
 
   /// The slip of wheel j as a velocity in O, from the model's slip rows.

@@ -18,8 +18,8 @@ void set_path(Node& root, std::string_view path, const Node& value, const Mark& 
 void set_path(Node& root, std::string_view path, const Node& value);
 
 /// Applies a map of overrides: a key may be a dotted path, a map is merged into the map it meets,
-/// everything else replaces. Throws viwo::InputError like set_path, and if `overrides` is neither a
-/// map nor null.
+/// everything else replaces. A map with the key `type` replaces, too: it is a complete section.
+/// Throws viwo::InputError like set_path, and if `overrides` is neither a map nor null.
 void merge(Node& base, const Node& overrides);
 
 /// What "path.to.key=VALUE" says.

@@ -63,4 +63,14 @@ inline Eigen::Vector3d between(const Eigen::Vector3d& a, const Eigen::Vector3d& 
   return g;
 }
 
+/// Logarithm of SE(2): the constant twist [theta, v_x, v_y] that reaches g in unit time; theta is
+/// wrapped to (-pi, pi].
+inline Eigen::Vector3d log_se2(const Eigen::Vector3d& g) {
+  const double theta = wrap_angle(g[0]);
+  // p = rho R(theta/2) v with rho = sinc(theta/2) (closed form of the constant-twist arc).
+  Eigen::Vector3d twist;
+  twist << theta, R2(-0.5 * theta) * g.tail<2>() / sinc(0.5 * theta).value;
+  return twist;
+}
+
 }  // namespace viwo

@@ -120,8 +120,8 @@ class AutoKinematics : public KinematicModel {
     for (auto& row : out.rows) row.fill(Dual(0., Gradient::Zero()));
     out.b.fill(Dual(0., Gradient::Zero()));
     derived().template auto_rows<Dual>(std::span<const Dual>(drive.data(), n_drive),
-                                  std::span<const Dual>(steer.data(), n_steer),
-                                  std::span<const Dual>(x.data(), n), out);
+                                       std::span<const Dual>(steer.data(), n_steer),
+                                       std::span<const Dual>(x.data(), n), out);
     return out;
   }
 

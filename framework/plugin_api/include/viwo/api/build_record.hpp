@@ -10,9 +10,9 @@
 #include <cstddef>
 #include <string_view>
 
-#include "viwo/api/export.hpp"
-
 #include <Eigen/Core>
+
+#include "viwo/api/export.hpp"
 
 namespace viwo {
 

@@ -1,4 +1,6 @@
 // A kinematic model as the framework uses it: the plugin's object with its checked description.
+// Its rows (W-1) give the twist by least squares (W-2), as far as their rank goes (W-3).
+// Equations: docs/math/wheel_odometry.md.
 #pragma once
 
 #include <memory>

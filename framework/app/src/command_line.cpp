@@ -1,0 +1,133 @@
+#include "command_line.hpp"
+
+#include <iostream>
+#include <sstream>
+
+#include "viwo/api/status.hpp"
+#include "viwo/config/suggest.hpp"
+
+namespace viwo::app {
+namespace {
+
+namespace po = boost::program_options;
+
+/// Every option of any command, by name.
+void add_option(const std::string& name, po::options_description& options) {
+  auto add = options.add_options();
+  if (name == "out") {
+    add("out,o", po::value<std::string>()->value_name("DIR"), "folder for the results");
+  } else if (name == "out!") {
+    add("out,o", po::value<std::string>()->value_name("DIR")->required(), "folder for the log");
+  } else if (name == "seed") {
+    add("seed", po::value<std::uint64_t>()->value_name("N"), "overrules the configured seed");
+  } else if (name == "seeds") {
+    add("seeds", po::value<int>()->value_name("N"), "overrules the configured number of seeds");
+  } else if (name == "jobs") {
+    add("jobs,j", po::value<int>()->value_name("N"), "runs in parallel (default: one per core)");
+  } else if (name == "set") {
+    add("set", po::value<std::vector<std::string>>()->composing()->value_name("KEY=VALUE"),
+        "overrides a value of the run configuration, e.g. --set odometry.epoch_s=0.05");
+  } else if (name == "keep-runs") {
+    add("keep-runs", "one folder with all files for each run");
+  } else if (name == "reference") {
+    add("reference", po::value<std::string>()->value_name("A.tum")->required(), "true trajectory");
+  } else if (name == "estimate") {
+    add("estimate", po::value<std::string>()->value_name("B.tum")->required(),
+        "trajectory to evaluate");
+  } else if (name == "align") {
+    add("align", po::value<std::string>()->value_name("MODE")->default_value("yaw_position"),
+        "alignment for the ATE: none, start, yaw_position or se3");
+  }
+}
+
+po::options_description options_of(const Command& command) {
+  po::options_description options("Options");
+  std::istringstream names(command.options);
+  for (std::string name; names >> name;) add_option(name, options);
+  options.add_options()("plugin-path",
+                        po::value<std::vector<std::string>>()->composing()->value_name("DIR"),
+                        "folder with plugins, searched first (then VIWO_PLUGIN_PATH)");
+  options.add_options()("help,h", "this text");
+  return options;
+}
+
+[[noreturn]] void refuse(const Command& command, const std::string& text) {
+  throw InputError(std::string("viwo ") + command.name + ": " + text + " (see viwo " +
+                   command.name + " --help)");
+}
+
+/// Converts what Boost found wrong into a message with the nearest option.
+[[noreturn]] void refuse(const Command& command, const po::options_description& options,
+                         const po::error& error) {
+  std::string text = error.what();
+  if (const auto* unknown = dynamic_cast<const po::unknown_option*>(&error)) {
+    std::vector<std::string> names;
+    for (const auto& option : options.options()) names.push_back("--" + option->long_name());
+    text += config::did_you_mean(unknown->get_option_name(), names);
+  }
+  refuse(command, text);
+}
+
+Arguments arguments_of(const po::variables_map& values) {
+  Arguments arguments;
+  const auto texts = [&](const char* name) {
+    return values.contains(name) ? values[name].as<std::vector<std::string>>()
+                                 : std::vector<std::string>{};
+  };
+  const auto text = [&](const char* name) {
+    return values.contains(name) ? values[name].as<std::string>() : std::string();
+  };
+  arguments.positional = texts("positional");
+  arguments.assignments = texts("set");
+  for (const std::string& folder : texts("plugin-path")) arguments.plugin_path.emplace_back(folder);
+  if (values.contains("out")) arguments.out = text("out");
+  if (values.contains("seed")) arguments.seed = values["seed"].as<std::uint64_t>();
+  if (values.contains("seeds")) arguments.seeds = values["seeds"].as<int>();
+  if (values.contains("jobs")) arguments.jobs = values["jobs"].as<int>();
+  arguments.keep_runs = values.contains("keep-runs");
+  arguments.reference = text("reference");
+  arguments.estimate = text("estimate");
+  arguments.align = text("align");
+  return arguments;
+}
+
+}  // namespace
+
+std::optional<Arguments> parse(const Command& command, const std::vector<std::string>& words) {
+  const po::options_description options = options_of(command);
+  for (const std::string& word : words) {
+    if (word != "--help" && word != "-h") continue;
+    std::cout << "Usage: viwo " << command.usage << "\n\n" << command.summary << "\n\n" << options;
+    return std::nullopt;
+  }
+  po::options_description all;
+  all.add(options).add_options()("positional", po::value<std::vector<std::string>>());
+  po::positional_options_description positional;
+  positional.add("positional", -1);
+  po::variables_map values;
+  try {
+    namespace style = po::command_line_style;
+    po::store(po::command_line_parser(words)
+                  .options(all)
+                  .positional(positional)
+                  .style(style::unix_style & ~style::allow_guessing)
+                  .run(),
+              values);
+    po::notify(values);
+  } catch (const po::error& error) {
+    refuse(command, options, error);
+  }
+  Arguments arguments = arguments_of(values);
+  const auto given = static_cast<int>(arguments.positional.size());
+  if (command.n_positional >= 0 ? given != command.n_positional : given < 1) {
+    refuse(command, std::string("usage: viwo ") + command.usage);
+  }
+  if (arguments.jobs < 0) refuse(command, "--jobs must not be negative");
+  return arguments;
+}
+
+PluginRegistry make_registry(const Arguments& arguments) {
+  return PluginRegistry(PluginRegistry::default_search_path(arguments.plugin_path));
+}
+
+}  // namespace viwo::app

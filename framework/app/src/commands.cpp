@@ -1,0 +1,106 @@
+// The commands that run something.
+#include <iostream>
+
+#include "command_line.hpp"
+#include "viwo/eval/accuracy.hpp"
+#include "viwo/experiment/calibrate.hpp"
+#include "viwo/experiment/experiment.hpp"
+#include "viwo/experiment/output.hpp"
+#include "viwo/experiment/simulate.hpp"
+#include "viwo/log/tum.hpp"
+
+namespace viwo::app {
+namespace {
+
+using namespace experiment;
+
+/// The folder asked for, or results/<name of the configuration file>.
+std::filesystem::path out_folder(const Arguments& arguments) {
+  if (arguments.out) return *arguments.out;
+  return std::filesystem::path("results") / std::filesystem::path(arguments.positional[0]).stem();
+}
+
+RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
+  const config::Node configuration =
+      resolve_placeholders(load_run_configuration(arguments.positional[0], arguments.assignments));
+  return read_run(configuration, plugins, arguments.seed);
+}
+
+}  // namespace
+
+int run_command(const Arguments& arguments) {
+  PluginRegistry plugins = make_registry(arguments);
+  RunSetup setup = read_run_of(arguments, plugins);
+  const RunResult result = run_odometry(setup, collect(setup));
+  const auto folder = out_folder(arguments);
+  write_run(folder, setup, result);
+  std::cout << describe(result) << "report: " << (folder / "report.html").string() << "\n";
+  return result.status == RunStatus::kOk ? 0 : 1;
+}
+
+int experiment_command(const Arguments& arguments) {
+  PluginRegistry plugins = make_registry(arguments);
+  ExperimentOptions options;
+  options.jobs = arguments.jobs;
+  options.seeds = arguments.seeds;
+  options.keep_runs = arguments.keep_runs;
+  options.assignments = arguments.assignments;
+  const ExperimentSetup setup = read_experiment(arguments.positional[0], options);
+  const auto folder = out_folder(arguments);
+  const ExperimentResult result = run_experiment(setup, options, plugins, folder);
+  write_experiment(folder, result);
+  std::cout << describe(result) << "\n"
+            << result.runs.size() << " runs in " << significant(result.wall_s, 3)
+            << " s; report: " << (folder / "report.html").string() << "\n";
+  for (const ExperimentRun& run : result.runs) {
+    if (run.result.status == RunStatus::kFailed) return 1;
+  }
+  return 0;
+}
+
+int calibrate_command(const Arguments& arguments) {
+  PluginRegistry plugins = make_registry(arguments);
+  const CalibrationSetup setup =
+      read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
+  const CalibrationResult result = calibrate(setup);
+  const auto folder = out_folder(arguments);
+  write_calibration(folder, result);
+  std::cout << describe(result) << "\ncalibration: " << (folder / "calibration.yaml").string()
+            << "\nreport: " << (folder / "report.html").string() << "\n";
+  return result.all.converged ? 0 : 1;
+}
+
+int simulate_command(const Arguments& arguments) {
+  PluginRegistry plugins = make_registry(arguments);
+  RunSetup setup = read_run_of(arguments, plugins);
+  const SimulateResult result = write_log(setup, *arguments.out);
+  std::cout << result.encoder_samples << " encoder samples and " << result.reference_poses
+            << " reference poses in " << arguments.out->string() << "\n";
+  return 0;
+}
+
+int evaluate_command(const Arguments& arguments) {
+  eval::Options options;
+  bool known = false;
+  for (const auto mode : {eval::Alignment::kNone, eval::Alignment::kStart,
+                          eval::Alignment::kYawPosition, eval::Alignment::kSe3}) {
+    if (arguments.align != eval::name(mode)) continue;
+    options.alignment = mode;
+    known = true;
+  }
+  if (!known) {
+    throw InputError("--align " + arguments.align + ": known are none, start, yaw_position, se3");
+  }
+  const Trajectory reference = log::read_tum(arguments.reference);
+  const Trajectory estimate = log::read_tum(arguments.estimate);
+  const eval::Accuracy accuracy = eval::evaluate(reference, estimate, options);
+  const std::string text = eval::to_json(accuracy).dump(2) + "\n";
+  std::cout << text;
+  if (arguments.out) {
+    make_folder(*arguments.out);
+    write_text(*arguments.out / "evaluation.json", text);
+  }
+  return 0;
+}
+
+}  // namespace viwo::app

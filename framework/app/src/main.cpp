@@ -1,0 +1,87 @@
+// viwo: visual-inertial-wheel odometry from the command line.
+// Exit codes: 0 done; 1 the run failed or diverged; 2 the input is wrong.
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "command_line.hpp"
+#include "viwo/api/status.hpp"
+#include "viwo/config/suggest.hpp"
+#include "viwo/plugin_host/build_record_check.hpp"
+
+namespace viwo::app {
+namespace {
+
+constexpr Command kCommands[] = {
+    {"run", "run CONFIG [--out DIR] [--seed N] [--set KEY=VALUE]...",
+     "Runs one configuration and writes trajectory, summary.json and report.html.", "out seed set",
+     1, run_command},
+    {"experiment", "experiment EXPERIMENT [--out DIR] [--jobs N] [--seeds N] [--set KEY=VALUE]...",
+     "Runs variants x recordings x seeds side by side and writes tables and report.html.",
+     "out jobs seeds set keep-runs", 1, experiment_command},
+    {"calibrate", "calibrate CONFIG [--out DIR] [--set KEY=VALUE]...",
+     "Estimates the wheel intrinsics from encoder logs and a reference trajectory.", "out set", 1,
+     calibrate_command},
+    {"simulate", "simulate CONFIG --out DIR [--seed N] [--set KEY=VALUE]...",
+     "Writes what the sensors of a configuration yield as a log folder.", "out! seed set", 1,
+     simulate_command},
+    {"evaluate", "evaluate --reference A.tum --estimate B.tum [--align MODE] [--out DIR]",
+     "Compares two trajectories (ATE, RPE, end error).", "reference estimate align out", 0,
+     evaluate_command},
+    {"plugins", "plugins list | describe NAME | check FILE",
+     "Lists the plugins that are found, the parameters of one, or why a file is refused.", "", -1,
+     plugins_command}};
+
+void print_help() {
+  std::cout << "viwo " VIWO_VERSION " - visual-inertial-wheel odometry\n\nUsage:\n";
+  for (const Command& command : kCommands) {
+    std::cout << "  viwo " << command.usage << "\n      " << command.summary << "\n";
+  }
+  std::cout << "  viwo --version | --help, and --help for each command\n\n"
+               "Exit codes: 0 done; 1 the run failed or diverged; 2 the input is wrong.\n";
+}
+
+int dispatch(const std::vector<std::string>& words) {
+  if (words.empty()) {
+    print_help();
+    return 2;
+  }
+  if (words[0] == "--help" || words[0] == "-h") {
+    print_help();
+    return 0;
+  }
+  if (words[0] == "--version") {
+    std::cout << "viwo " VIWO_VERSION "\n";
+    return 0;
+  }
+  for (const Command& command : kCommands) {
+    if (words[0] != command.name) continue;
+    const auto arguments = parse(command, {words.begin() + 1, words.end()});
+    return arguments ? command.run(*arguments) : 0;
+  }
+  std::vector<std::string> names;
+  for (const Command& command : kCommands) names.emplace_back(command.name);
+  throw InputError("viwo: unknown command '" + words[0] + "'" +
+                   config::did_you_mean(words[0], names));
+}
+
+}  // namespace
+}  // namespace viwo::app
+
+int main(int argc, char** argv) {
+  try {
+    if (!viwo::host_record_is_consistent()) {
+      std::cerr << "viwo was built differently from its libviwo_api.so: rebuild both\n";
+      return 1;
+    }
+    return viwo::app::dispatch({argv + 1, argv + argc});
+  } catch (const viwo::InputError& error) {
+    std::cerr << error.what() << "\n";
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << "\n";
+    return 1;
+  }
+}

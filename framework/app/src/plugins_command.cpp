@@ -1,0 +1,63 @@
+// viwo plugins list | describe NAME | check FILE
+#include <iostream>
+
+#include "command_line.hpp"
+#include "viwo/config/params.hpp"
+#include "viwo/config/suggest.hpp"
+
+namespace viwo::app {
+namespace {
+
+void print_line(const PluginInfo& info) {
+  std::cout << info.kind << "  " << info.name << "  " << info.version << "  " << info.summary
+            << "\n    " << info.file.string() << "\n";
+}
+
+int list(PluginRegistry& plugins) {
+  bool refused = false;
+  for (const PluginListing& listing : plugins.list()) {
+    if (listing.info) print_line(*listing.info);
+    refused |= !listing.info;
+  }
+  if (!refused) return 0;
+  std::cout << "\nrefused:\n";
+  for (const PluginListing& listing : plugins.list()) {
+    if (!listing.info) std::cout << listing.file.string() << "\n    " << listing.refusal << "\n";
+  }
+  return 0;
+}
+
+int describe(PluginRegistry& plugins, const std::string& name) {
+  std::vector<std::string> names;
+  bool found = false;
+  for (const PluginListing& listing : plugins.list()) {
+    if (!listing.info) continue;
+    names.push_back(listing.info->name);
+    if (listing.info->name != name) continue;
+    found = true;
+    const PluginInfo& info = *listing.info;
+    std::cout << "# " << info.kind << " " << info.name << " " << info.version << " ("
+              << info.license << "): " << info.summary << "\n# " << info.file.string()
+              << "\ntype: " << info.name << "\n"
+              << config::describe_params(info.params);
+  }
+  if (!found) throw InputError("no plugin '" + name + "'" + config::did_you_mean(name, names));
+  return 0;
+}
+
+}  // namespace
+
+int plugins_command(const Arguments& arguments) {
+  PluginRegistry plugins = make_registry(arguments);
+  const std::string& what = arguments.positional[0];
+  const std::size_t n = arguments.positional.size();
+  if (what == "list" && n == 1) return list(plugins);
+  if (what == "describe" && n == 2) return describe(plugins, arguments.positional[1]);
+  if (what == "check" && n == 2) {
+    print_line(plugins.check(arguments.positional[1]));
+    return 0;
+  }
+  throw InputError("usage: viwo plugins list | describe NAME | check FILE");
+}
+
+}  // namespace viwo::app

@@ -1,0 +1,39 @@
+// Configuration of a run, an experiment or a calibration: files, overrides, placeholders.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "viwo/config/node.hpp"
+
+namespace viwo::experiment {
+
+/// One element of the axis that an experiment or a calibration runs over: a recording, a simulated
+/// motion. Its labels are placeholders ({recording}, {motion}, ...) of the base configuration.
+struct Recording {
+  std::string name;
+  std::map<std::string, std::string> labels;
+};
+
+/// A run configuration, with `--set` assignments ("path.to.key=VALUE") applied. Placeholders are
+/// still in it. Throws InputError.
+config::Node load_run_configuration(const std::filesystem::path& file,
+                                    const std::vector<std::string>& assignments);
+
+/// Replaces the placeholders of a run configuration: those of its section `placeholders`, overruled
+/// by `labels`. Throws InputError for one that has no value.
+config::Node resolve_placeholders(const config::Node& run,
+                                  const std::map<std::string, std::string>& labels = {});
+
+/// The list `recordings` (names, numbers or maps of labels) or `motions` (names) of an experiment
+/// or a calibration; one element without labels if there is neither. Throws InputError.
+std::vector<Recording> read_recordings(const config::Node& section);
+
+/// The run configuration that an experiment or a calibration is based on: its file `base` (relative
+/// to its folder), its section `set` of overrides, then `assignments`. Throws InputError.
+config::Node load_base(const config::Node& configuration,
+                       const std::vector<std::string>& assignments);
+
+}  // namespace viwo::experiment

@@ -1,0 +1,88 @@
+// One run: sensors in, wheel odometry through a kinematic model, trajectory and its accuracy out.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viwo/config/node.hpp"
+#include "viwo/eval/accuracy.hpp"
+#include "viwo/math/trajectory.hpp"
+#include "viwo/plugin_host/registry.hpp"
+#include "viwo/wheel/preintegration.hpp"
+
+namespace viwo::experiment {
+
+/// Where the reference body B is on the base: pose [x_m, y_m, yaw_rad] of O in B.
+using PlanarExtrinsics = Eigen::Vector3d;
+
+/// A run configuration that has been read and checked, its plugins loaded and its model ready.
+struct RunSetup {
+  std::string name;
+  std::uint64_t seed = 1;
+  Loaded<KinematicModel> kinematics;
+  std::shared_ptr<const WheelModel> model;
+  Intrinsics x_WI;   ///< to run with: nominal, or from a calibration file
+  Intrinsics sigma;  ///< how well they are known; 0 where the gauge holds an entry
+  PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
+  std::vector<std::pair<std::string, Loaded<Sensor>>> sensors;
+  PreintegrationOptions preintegration;
+  double epoch_s = 0.1;
+  double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
+  double reference_max_gap_s = 0.5;
+  eval::Options evaluation;
+  config::Node resolved;  ///< all of it, with defaults: a valid run configuration
+};
+
+/// Reads a run configuration without placeholders. `seed` overrules the configured one. Throws
+/// InputError with everything that is wrong in it.
+RunSetup read_run(const config::Node& run, PluginRegistry& plugins,
+                  std::optional<std::uint64_t> seed = {});
+
+/// What the sensors of a run gave.
+struct RunData {
+  std::string wheels_name;             ///< sensor that gave the encoder samples
+  std::vector<EncoderSample> samples;  ///< in time order
+  Trajectory reference;                ///< planar; empty if there is none
+  std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor
+};
+
+/// Reads all sensors to their end. Throws InputError when no sensor or more than one gives encoder
+/// samples (or a reference), when channels do not fit the model, or when a sensor's input is
+/// broken.
+RunData collect(RunSetup& setup);
+
+struct StageTime {
+  double mean_ms = 0.;
+  double p95_ms = 0.;
+  double max_ms = 0.;
+};
+
+enum class RunStatus { kOk, kDiverged, kFailed };
+const char* name(RunStatus status);
+
+struct RunResult {
+  RunStatus status = RunStatus::kOk;
+  std::string cause;  ///< of a run that is not ok
+  std::int64_t epochs = 0;
+  double duration_s = 0.;
+  double wall_s = 0.;    ///< of the odometry, without reading
+  Trajectory estimate;   ///< of the reference body B
+  Trajectory reference;  ///< planar
+  std::optional<eval::Accuracy> accuracy;
+  double nees_planar =
+      std::numeric_limits<double>::quiet_NaN();  ///< mean over epochs, 3 = consistent
+  PreintegratedPose total;  ///< from the first to the last epoch, without the parity information
+  std::vector<std::pair<double, double>> epoch_ms;  ///< time since start [s], time spent [ms]
+  StageTime preintegration_ms;
+  std::vector<std::pair<std::string, RejectionCount>> rejections;
+};
+
+/// Integrates the wheels from the first to the last common instant, starting at the reference pose
+/// (or at the origin), and evaluates. Throws PluginFailure when the model misbehaves.
+RunResult run_odometry(const RunSetup& setup, const RunData& data);
+
+}  // namespace viwo::experiment

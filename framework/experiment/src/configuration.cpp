@@ -1,0 +1,119 @@
+#include "viwo/experiment/configuration.hpp"
+
+#include <set>
+
+#include "viwo/config/overrides.hpp"
+#include "viwo/config/yaml.hpp"
+
+namespace viwo::experiment {
+namespace {
+
+using config::Node;
+
+const std::string& scalar(const Node& node, const std::string& what) {
+  if (!node.is_scalar()) config::fail(node.mark(), what + " must be a single value");
+  return node.scalar();
+}
+
+Recording read_recording(const Node& item) {
+  Recording recording;
+  if (item.is_scalar()) {
+    recording.name = item.scalar();
+    recording.labels["recording"] = item.scalar();
+    return recording;
+  }
+  if (!item.is_map()) {
+    config::fail(item.mark(),
+                 "a recording is a name or a section of labels, such as "
+                 "{recording: 1, motion: forward}");
+  }
+  for (const auto& entry : item.entries()) {
+    recording.labels[entry.key] = scalar(entry.value, "label '" + entry.key + "'");
+  }
+  for (const char* key : {"name", "recording", "motion"}) {
+    const auto found = recording.labels.find(key);
+    if (found == recording.labels.end()) continue;
+    recording.name = found->second;
+    return recording;
+  }
+  config::fail(item.mark(),
+               "this recording has none of 'name', 'recording' and 'motion' to be "
+               "called by");
+}
+
+void apply(Node& run, const std::vector<std::string>& assignments) {
+  for (const std::string& text : assignments) {
+    const config::Assignment assignment = config::parse_assignment(text);
+    config::set_path(run, assignment.path, assignment.value);
+  }
+}
+
+}  // namespace
+
+Node load_run_configuration(const std::filesystem::path& file,
+                            const std::vector<std::string>& assignments) {
+  Node run = config::load_file(file);
+  if (!run.is_map()) config::fail(run.mark(), "a run configuration is a section of keys");
+  apply(run, assignments);
+  return run;
+}
+
+Node resolve_placeholders(const Node& run, const std::map<std::string, std::string>& labels) {
+  std::map<std::string, std::string> values;
+  if (const Node* defaults = run.find("placeholders")) {
+    if (!defaults->is_map() && !defaults->is_null()) {
+      config::fail(defaults->mark(), "'placeholders' is a section of names and their values");
+    }
+    for (const auto& entry : defaults->entries()) {
+      values[entry.key] = scalar(entry.value, "placeholder '" + entry.key + "'");
+    }
+  }
+  for (const auto& [name, value] : labels) values[name] = value;
+  Node resolved = run;
+  auto& entries = resolved.entries();
+  std::erase_if(entries, [](const Node::Entry& entry) { return entry.key == "placeholders"; });
+  config::Errors errors;
+  config::substitute(resolved, values, errors);
+  errors.throw_if_any();
+  return resolved;
+}
+
+std::vector<Recording> read_recordings(const Node& section) {
+  const Node* recordings = section.find("recordings");
+  const Node* motions = section.find("motions");
+  if (recordings != nullptr && motions != nullptr) {
+    config::fail(motions->mark(), "give either 'recordings' or 'motions', not both");
+  }
+  const Node* list = recordings != nullptr ? recordings : motions;
+  if (list == nullptr) return {Recording{}};
+  if (!list->is_list() || list->items().empty()) {
+    config::fail(list->mark(), "this must be a list with at least one element");
+  }
+  std::vector<Recording> result;
+  std::set<std::string> names;
+  for (const Node& item : list->items()) {
+    Recording recording = read_recording(item);
+    if (list == motions) {
+      if (!item.is_scalar()) config::fail(item.mark(), "a motion is a name");
+      recording.labels = {{"motion", recording.name}};
+    }
+    if (!names.insert(recording.name).second) {
+      config::fail(item.mark(), "'" + recording.name + "' is in this list twice");
+    }
+    result.push_back(std::move(recording));
+  }
+  return result;
+}
+
+Node load_base(const Node& configuration, const std::vector<std::string>& assignments) {
+  const Node* base = configuration.find("base");
+  if (base == nullptr) config::fail(configuration.mark(), "required key 'base' is missing");
+  const std::filesystem::path file =
+      std::filesystem::path(base->mark().file).parent_path() / scalar(*base, "'base'");
+  Node run = load_run_configuration(file.lexically_normal(), {});
+  if (const Node* overrides = configuration.find("set")) config::merge(run, *overrides);
+  apply(run, assignments);
+  return run;
+}
+
+}  // namespace viwo::experiment

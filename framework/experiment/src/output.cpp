@@ -1,0 +1,75 @@
+#include "viwo/experiment/output.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+#include <system_error>
+
+namespace viwo::experiment {
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    throw std::runtime_error("cannot create the folder " + folder.string() + ": " +
+                             error.message());
+  }
+}
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (!out) throw std::runtime_error("cannot write " + file.string() + " (is the disk full?)");
+}
+
+nlohmann::json number_or_null(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
+}
+
+std::string significant(double value, int digits) {
+  if (!std::isfinite(value)) return "-";
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.*g", digits, value);
+  return text.data();
+}
+
+namespace {
+
+/// Every k-th index so that at most `max_points` remain, and the last.
+template <class F>
+void thinned(std::size_t size, std::size_t max_points, const F& take) {
+  const std::size_t step = std::max<std::size_t>(1, (size + max_points - 1) / max_points);
+  for (std::size_t i = 0; i < size; i += step) take(i);
+  if (size > 0 && (size - 1) % step != 0) take(size - 1);
+}
+
+}  // namespace
+
+report::Series trajectory_series(const std::string& name, const Trajectory& trajectory,
+                                 std::size_t max_points) {
+  report::Series series;
+  series.name = name;
+  series.group = name;
+  thinned(trajectory.size(), max_points, [&](std::size_t i) {
+    series.x.push_back(trajectory[i].p_BinW.x());
+    series.y.push_back(trajectory[i].p_BinW.y());
+  });
+  return series;
+}
+
+report::Series error_series(const std::string& name, const eval::Accuracy& accuracy,
+                            std::size_t max_points) {
+  report::Series series;
+  series.name = name;
+  series.group = name;
+  thinned(accuracy.series.path_length_m.size(), max_points, [&](std::size_t i) {
+    series.x.push_back(accuracy.series.path_length_m[i]);
+    series.y.push_back(1e3 * accuracy.series.position_error_m[i]);
+  });
+  return series;
+}
+
+}  // namespace viwo::experiment

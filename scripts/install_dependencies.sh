@@ -1,0 +1,87 @@
+#!/bin/bash
+# install_dependencies.sh [--tests]
+# Installs with apt what building viwo needs and this machine lacks; nothing when all is there.
+# --tests adds what only the tests use. Never asks a question.
+set -euo pipefail
+
+missing=()
+
+# need_command PACKAGE COMMAND...: one of the commands must be there, wherever it comes from.
+need_command() {
+  local package=$1 command
+  shift
+  for command in "$@"; do
+    if command -v "$command" > /dev/null; then return; fi
+  done
+  missing+=("$package")
+}
+
+need_package() {
+  local status
+  status=$(dpkg-query -W -f '${db:Status-Status}' "$1" 2> /dev/null || true)
+  if [ "$status" != installed ]; then missing+=("$1"); fi
+}
+
+if ! command -v apt-get > /dev/null || ! command -v dpkg-query > /dev/null; then
+  echo "This is not a Debian or Ubuntu system: install the dependencies listed in DEVELOPERS.md" \
+    "yourself. Going on with what is here."
+  exit 0
+fi
+
+need_command g++ c++
+need_command cmake cmake
+need_command git git
+need_command ninja-build ninja
+need_command ccache ccache
+need_command python3 python3
+# Of Debian or of anybody else: two installations of npm on one machine do not go together.
+need_command npm npm
+for package in ca-certificates libeigen3-dev libboost-dev libboost-program-options-dev \
+  libyaml-cpp-dev libtbb-dev nlohmann-json3-dev libceres-dev zlib1g-dev libgtest-dev \
+  libgmock-dev libbenchmark-dev; do
+  need_package "$package"
+done
+
+optional=()
+if [ "${1:-}" = --tests ]; then
+  required=("${missing[@]}")
+  missing=()
+  need_command clang-format-14 clang-format-14
+  # On Ubuntu Chromium is a snap, which cannot be had in a container: the test is skipped there.
+  if ! grep -qsx 'ID=ubuntu' /etc/os-release; then
+    need_command chromium chromium chromium-browser google-chrome
+  fi
+  optional=("${missing[@]}")
+  missing=("${required[@]}")
+fi
+
+if [ ${#missing[@]} -eq 0 ] && [ ${#optional[@]} -eq 0 ]; then
+  echo "All dependencies are installed."
+  exit 0
+fi
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo > /dev/null; then
+    echo "Missing: ${missing[*]} ${optional[*]}" >&2
+    echo "Neither root nor sudo: ask an administrator to run apt-get install with these." >&2
+    if [ ${#missing[@]} -eq 0 ]; then exit 0; fi
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -y -q)
+
+echo "Installing with apt: ${missing[*]} ${optional[*]}"
+"${apt[@]}" update < /dev/null
+# What only single tests use, and this release may not have; those tests are then skipped.
+for package in "${optional[@]}"; do
+  if apt-cache show "$package" > /dev/null 2>&1; then
+    missing+=("$package")
+  else
+    echo "There is no package $package here: the test that uses it is skipped."
+  fi
+done
+if [ ${#missing[@]} -gt 0 ]; then
+  "${apt[@]}" install --no-install-recommends "${missing[@]}" < /dev/null
+fi
