@@ -1,0 +1,145 @@
+// Batch calibration of simulated robots: the truth comes out, with honest sigmas, and what the data
+// cannot determine is named.
+#include <filesystem>
+#include <fstream>
+
+#include <Eigen/Dense>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "simulated.hpp"
+#include "viwo/eval/consistency.hpp"
+#include "viwo/experiment/calibrate.hpp"
+#include "viwo/sim/encoder_simulator.hpp"
+
+namespace viwo {
+namespace {
+
+using namespace experiment;
+using testing::registry;
+using testing::simulated;
+
+CalibrationSetup setup_of(const std::vector<std::string>& motions, std::uint64_t seed,
+                          const std::vector<std::string>& assignments = {}) {
+  CalibrationSetup setup;
+  setup.name = "test";
+  setup.options.segment_s = 2.;
+  setup.options.estimate_extrinsics = true;
+  for (const std::string& motion : motions) {
+    auto all = assignments;
+    all.emplace_back("sensors.simulator0.true_intrinsics_scale=1");
+    all.emplace_back("odometry.twist=noise_weighted");
+    RunSetup run = read_run(simulated(motion, all), registry(), seed);
+    RunData data = collect(run);
+    setup.recordings.push_back({{motion, {{"motion", motion}}}, std::move(run), std::move(data)});
+  }
+  return setup;
+}
+
+CalibrationEstimate fit_all(const CalibrationSetup& setup) {
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < setup.recordings.size(); ++i) all.push_back(i);
+  return fit(setup, all);
+}
+
+/// True intrinsics of the simulated robot: the sensor's seed is 1000 times the run's.
+Intrinsics truth_of(const CalibrationSetup& setup, std::uint64_t seed) {
+  return sim::perturbed_intrinsics(setup.recordings[0].setup.model->description(), 1., 1000 * seed);
+}
+
+TEST(Calibrate, FindsTheTrueIntrinsicsWithHonestSigmas) {
+  const int seeds = 12;
+  double sum = 0.;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const auto setup = setup_of({"icr_sweep", "figure_eight"}, seed);
+    const auto estimate = fit_all(setup);
+    const Intrinsics truth = truth_of(setup, seed);
+    const Intrinsics prior = setup.recordings[0].setup.model->prior_sigma();
+    EXPECT_TRUE(estimate.converged);
+    EXPECT_TRUE(estimate.undetermined.empty());
+    for (int i = 0; i < 16; ++i) {
+      if (prior[i] == 0.) {
+        EXPECT_EQ(estimate.x_WI[i], truth[i]) << "held";
+        EXPECT_EQ(estimate.sigma[i], 0.);
+        continue;
+      }
+      EXPECT_LT(estimate.sigma[i], 0.1 * prior[i]) << i;
+      const double normalised = (estimate.x_WI[i] - truth[i]) / estimate.sigma[i];
+      EXPECT_LT(std::abs(normalised), 6.) << i << " seed " << seed;
+      sum += normalised * normalised;
+      ++count;
+    }
+    EXPECT_LT(estimate.extrinsics.head<2>().norm(), 1e-3);
+    EXPECT_LT(std::abs(estimate.extrinsics[2]), 1e-3);
+  }
+  // Mean squared error over sigma: 1 if the sigmas are right. The entries of a run are correlated,
+  // so the bounds are wider than those of `count` independent numbers, but far from any factor
+  // of 4.
+  EXPECT_GT(sum / count, 0.5);
+  EXPECT_LT(sum / count, 2.);
+}
+
+TEST(Calibrate, FindsTheClockOffset) {
+  auto setup = setup_of({"icr_sweep"}, 1, {"sensors.simulator0.time_offset_s=0.013"});
+  setup.options.clock_offset_sigma_s = 0.05;
+  const auto estimate = fit_all(setup);
+  EXPECT_NEAR(estimate.clock_offset_s[0], 0.013, 1e-3);
+}
+
+/// Share of the null directions that lies in the intrinsics whose name starts with `prefix`.
+std::set<std::string> undetermined_names(const CalibrationEstimate& estimate, double ratio) {
+  std::set<std::string> names;
+  for (const auto& direction : estimate.undetermined) {
+    if (direction.sigma_ratio < ratio) continue;
+    for (const auto& [name, weight] : direction.weights) {
+      if (std::abs(weight) > 0.3) names.insert(name);
+    }
+  }
+  return names;
+}
+
+TEST(Calibrate, NamesThePositionsThatAStraightDriveCannotTell) {
+  const auto estimate = fit_all(setup_of({"straight"}, 1));
+  EXPECT_EQ(estimate.undetermined.size(), 6u) << "the positions of three wheels";
+  for (const std::string& name : undetermined_names(estimate, 0.9)) {
+    EXPECT_TRUE(name[0] == 'x' || name[0] == 'y') << name;
+  }
+}
+
+TEST(Calibrate, NamesTheSteeringOffsetsThatRollingRowsCannotTell) {
+  const auto redundant = fit_all(setup_of({"straight", "figure_eight"}, 1));
+  const auto drive_only = fit_all(
+      setup_of({"straight", "figure_eight"}, 1, {"kinematics.type=four_wis_wid_drive_only"}));
+  EXPECT_TRUE(redundant.undetermined.empty());
+  EXPECT_THAT(undetermined_names(drive_only, 0.7),
+              ::testing::IsSupersetOf({"delta_o2", "delta_o3", "delta_o4"}));
+}
+
+TEST(Calibrate, ReadsItsFileLeavesOutAndWritesACalibrationThatARunIncludes) {
+  const auto folder = std::filesystem::path(::testing::TempDir()) / "viwo_calibrate";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "run.yaml")
+      << config::to_yaml(simulated("'{motion}'", {"sensors.simulator0.true_intrinsics_scale=1"}));
+  std::ofstream(folder / "calibration.yaml")
+      << "calibration: test\nbase: run.yaml\nset: {odometry.twist: noise_weighted}\n"
+         "leave_out_by: motion\nreport_by: [motion]\nsegment_s: 2\nestimate_extrinsics: true\n"
+         "motions: [icr_sweep, figure_eight]\n";
+  const auto setup = read_calibration_setup(folder / "calibration.yaml", {}, registry());
+  const auto result = calibrate(setup);
+  ASSERT_EQ(result.left_out.size(), 2u);
+  for (const ValidationRun& run : result.left_out) {
+    EXPECT_LT(run.calibrated.accuracy->end_m, 0.1 * run.nominal.accuracy->end_m);
+  }
+  write_calibration(folder / "out", result);
+  const auto included = testing::run(simulated(
+      "circle", {"sensors.simulator0.true_intrinsics_scale=1",
+                 "kinematics.calibration=" + (folder / "out" / "calibration.yaml").string()}));
+  const auto nominal =
+      testing::run(simulated("circle", {"sensors.simulator0.true_intrinsics_scale=1"}));
+  EXPECT_LT(included.accuracy->end_m, 0.1 * nominal.accuracy->end_m);
+}
+
+}  // namespace
+}  // namespace viwo
