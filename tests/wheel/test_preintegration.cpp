@@ -217,6 +217,15 @@ TEST(Preintegration, HasTheCovarianceOfManyNoisyRunsWhereCutSamplesDominate) {
   EXPECT_LT(nees, limit.high);
 }
 
+TEST(Preintegration, HasTheCovarianceOfTwoPiecesThatBorrowFromEachOther) {
+  const int runs = 4000;
+  const Bounds limit = bounds(runs);
+  const double nees = mean_nees(swerve("four_wis_wid", kSmallSwerveNoise), false, 1., 506'000'000,
+                                514'000'000, runs);
+  EXPECT_GT(nees, limit.low);
+  EXPECT_LT(nees, limit.high);
+}
+
 TEST(Preintegration, FailsTheSameTestWithTwiceOrHalfTheStatedNoise) {
   const int runs = 200;
   const Bounds limit = bounds(runs);

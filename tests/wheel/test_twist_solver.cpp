@@ -83,26 +83,29 @@ TEST_P(EveryModel, GivesBackTheTwistOfASlipFreeSample) {
 }
 
 TEST_P(EveryModel, HasTheSensitivityOfCentralDifferences) {
-  for (const Case& c : cases()) {
-    EncoderSample y;
-    follow(*model_, c.xi, y);
-    y = disturbed(y);
-    TwistSolver solver(model_, {.rank_tolerance = 1e-9});
-    const auto twist_of = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+  for (const bool weighted : {false, true}) {
+    for (const Case& c : cases()) {
+      EncoderSample y;
+      follow(*model_, c.xi, y);
+      y = disturbed(y);
+      TwistSolver solver(model_, {.noise_weighted = weighted, .rank_tolerance = 1e-9});
+      const auto twist_of = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+        TwistSolution solution;
+        solver.set_intrinsics(x);
+        solver.solve(y, solution);
+        return solution.xi;
+      };
+      const Eigen::MatrixXd numeric = central_difference(twist_of, model_->nominal(), 1e-5);
       TwistSolution solution;
-      solver.set_intrinsics(x);
-      solver.solve(y, solution);
-      return solution.xi;
-    };
-    const Eigen::MatrixXd numeric = central_difference(twist_of, model_->nominal(), 1e-5);
-    TwistSolution solution;
-    solver.set_intrinsics(model_->nominal());
-    ASSERT_EQ(solver.solve(y, solution), Status::kOk);
-    if (GetParam().find("left_drives") != std::string::npos || model_->n_rows() > 3) {
-      EXPECT_GT(solution.e.norm(), 1e-4) << c.name << ": the case does not test the residual term";
+      solver.set_intrinsics(model_->nominal());
+      ASSERT_EQ(solver.solve(y, solution), Status::kOk);
+      if (GetParam().find("left_drives") != std::string::npos || model_->n_rows() > 3) {
+        EXPECT_GT(solution.e.norm(), 1e-4)
+            << c.name << ": the case does not test the residual term";
+      }
+      EXPECT_EQ(jacobian_mismatch(solution.J_xi_WI, numeric, intrinsic_names(*model_), 1e-5), "")
+          << c.name;
     }
-    EXPECT_EQ(jacobian_mismatch(solution.J_xi_WI, numeric, intrinsic_names(*model_), 1e-5), "")
-        << c.name;
   }
 }
 
@@ -257,7 +260,7 @@ TEST(FourWisWid, HasAConstantNormalMatrixWhateverTheSteering) {
     if (c.name == std::string("rest")) first = M;
     EXPECT_EQ(M, first) << c.name;
   }
-  // model.md: [[N I2, N J pbar], [.., sum |p|^2]].
+  // (S-10): [[N I2, N J pbar], [.., sum |p|^2]].
   const Intrinsics x = model->nominal();
   const Eigen::Vector2d mean(x.segment<4>(4).mean(), x.segment<4>(8).mean());
   EXPECT_NEAR(first(0, 0), 4., 1e-15);
@@ -293,7 +296,7 @@ TEST(FourWisWid, HasTheTwistAndResidualOfThePapersWheelFrameRows) {
 
 TEST(FourWisWid, CannotTellTheCommonScaleFromTheParityResidual) {
   // Both scale directions, all radii and all positions, must be free of information, exactly, also
-  // for samples that do not fit (model.md, section 3: else an errors-in-variables pull).
+  // for samples that do not fit (W-9: else an errors-in-variables pull).
   const auto model = load_model(swerve("four_wis_wid"));
   std::mt19937_64 rng(7);
   TwistSolver solver(model, {});

@@ -1,5 +1,7 @@
 #include "command_line.hpp"
 
+#include <cstdint>
+#include <cstdlib>
 #include <iostream>
 #include <sstream>
 
@@ -19,7 +21,7 @@ void add_option(const std::string& name, po::options_description& options) {
   } else if (name == "out!") {
     add("out,o", po::value<std::string>()->value_name("DIR")->required(), "folder for the log");
   } else if (name == "seed") {
-    add("seed", po::value<std::uint64_t>()->value_name("N"), "overrules the configured seed");
+    add("seed", po::value<std::int64_t>()->value_name("N"), "overrules the configured seed");
   } else if (name == "seeds") {
     add("seeds", po::value<int>()->value_name("N"), "overrules the configured number of seeds");
   } else if (name == "jobs") {
@@ -68,6 +70,39 @@ po::options_description options_of(const Command& command) {
   refuse(command, text);
 }
 
+/// What Boost accepts, but no command can do. (Boost itself would read a negative number into an
+/// unsigned one.)
+void check_ranges(const Command& command, const po::variables_map& values) {
+  if (values.contains("seed") && values["seed"].as<std::int64_t>() < 0) {
+    refuse(command, "--seed must not be negative");
+  }
+  if (values.contains("seeds") && values["seeds"].as<int>() < 1) {
+    refuse(command, "--seeds must be at least 1");
+  }
+  if (values.contains("jobs") && values["jobs"].as<int>() < 0) {
+    refuse(command, "--jobs must not be negative");
+  }
+  if (values.contains("out") && values["out"].as<std::string>().empty()) {
+    refuse(command, "--out needs the name of a folder");
+  }
+}
+
+void check_positional(const Command& command, const std::vector<std::string>& given) {
+  const auto n = static_cast<int>(given.size());
+  if (n < std::abs(command.n_positional)) {
+    // The usage reads "run CONFIG [--out DIR] ...": its second word is what is missing.
+    std::istringstream usage(command.usage);
+    std::string what;
+    usage >> what >> what;
+    if (command.n_positional < 0) what = "what to do";
+    refuse(command, what + " is missing - usage: viwo " + command.usage);
+  }
+  if (command.n_positional >= 0 && n > command.n_positional) {
+    refuse(command, "what is '" + given[static_cast<std::size_t>(command.n_positional)] +
+                        "'? - usage: viwo " + command.usage);
+  }
+}
+
 Arguments arguments_of(const po::variables_map& values) {
   Arguments arguments;
   const auto texts = [&](const char* name) {
@@ -81,7 +116,9 @@ Arguments arguments_of(const po::variables_map& values) {
   arguments.assignments = texts("set");
   for (const std::string& folder : texts("plugin-path")) arguments.plugin_path.emplace_back(folder);
   if (values.contains("out")) arguments.out = text("out");
-  if (values.contains("seed")) arguments.seed = values["seed"].as<std::uint64_t>();
+  if (values.contains("seed")) {
+    arguments.seed = static_cast<std::uint64_t>(values["seed"].as<std::int64_t>());
+  }
   if (values.contains("seeds")) arguments.seeds = values["seeds"].as<int>();
   if (values.contains("jobs")) arguments.jobs = values["jobs"].as<int>();
   arguments.keep_runs = values.contains("keep-runs");
@@ -117,12 +154,9 @@ std::optional<Arguments> parse(const Command& command, const std::vector<std::st
   } catch (const po::error& error) {
     refuse(command, options, error);
   }
+  check_ranges(command, values);
   Arguments arguments = arguments_of(values);
-  const auto given = static_cast<int>(arguments.positional.size());
-  if (command.n_positional >= 0 ? given != command.n_positional : given < 1) {
-    refuse(command, std::string("usage: viwo ") + command.usage);
-  }
-  if (arguments.jobs < 0) refuse(command, "--jobs must not be negative");
+  check_positional(command, arguments.positional);
   return arguments;
 }
 

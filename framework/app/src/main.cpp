@@ -61,7 +61,7 @@ int dispatch(const std::vector<std::string>& words) {
     const auto arguments = parse(command, {words.begin() + 1, words.end()});
     return arguments ? command.run(*arguments) : 0;
   }
-  std::vector<std::string> names;
+  std::vector<std::string> names{"--help", "--version"};
   for (const Command& command : kCommands) names.emplace_back(command.name);
   throw InputError("viwo: unknown command '" + words[0] + "'" +
                    config::did_you_mean(words[0], names));

@@ -1,4 +1,5 @@
 // viwo plugins list | describe NAME | check FILE
+#include <algorithm>
 #include <iostream>
 
 #include "command_line.hpp"
@@ -57,7 +58,11 @@ int plugins_command(const Arguments& arguments) {
     print_line(plugins.check(arguments.positional[1]));
     return 0;
   }
-  throw InputError("usage: viwo plugins list | describe NAME | check FILE");
+  const std::vector<std::string> verbs{"list", "describe", "check"};
+  if (std::find(verbs.begin(), verbs.end(), what) == verbs.end()) {
+    throw InputError("viwo plugins: unknown '" + what + "'" + config::did_you_mean(what, verbs));
+  }
+  throw InputError("viwo plugins: usage: viwo plugins list | describe NAME | check FILE");
 }
 
 }  // namespace viwo::app

@@ -9,6 +9,14 @@ namespace {
 
 constexpr std::size_t kFar = 3;
 
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// Digits number things: r_5 is no misspelling of r_1.
+std::size_t change_cost(char a, char b) {
+  if (a == b) return 0;
+  return is_digit(a) && is_digit(b) ? 2 : 1;
+}
+
 /// Optimal string alignment distance.
 std::size_t distance(std::string_view a, std::string_view b) {
   if (std::max(a.size(), b.size()) - std::min(a.size(), b.size()) >= kFar) return kFar;
@@ -17,7 +25,7 @@ std::size_t distance(std::string_view a, std::string_view b) {
   for (std::size_t j = 0; j <= b.size(); ++j) d[0][j] = j;
   for (std::size_t i = 1; i <= a.size(); ++i) {
     for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t change = a[i - 1] == b[j - 1] ? 0 : 1;
+      const std::size_t change = change_cost(a[i - 1], b[j - 1]);
       d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + change});
       if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
         d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
@@ -34,7 +42,8 @@ std::string nearest(std::string_view name, std::span<const std::string> candidat
   std::size_t best_distance = kFar;
   for (const std::string& candidate : candidates) {
     const std::size_t d = distance(name, candidate);
-    if (d >= best_distance || d >= std::max(name.size(), candidate.size())) continue;
+    // Half of a word replaced is another word.
+    if (d >= best_distance || 2 * d >= std::max(name.size(), candidate.size())) continue;
     best = candidate;
     best_distance = d;
   }

@@ -126,6 +126,8 @@ TEST(Suggestions, CountSwapsAsOneEdit) {
   EXPECT_EQ(nearest("dif_driv", known), "diff_drive");
   EXPECT_EQ(nearest("di_driv", known), "");
   EXPECT_EQ(nearest("x", known), "") << "a complete replacement is no misspelling";
+  EXPECT_EQ(nearest("base", std::vector<std::string>{"name"}), "") << "half of it replaced";
+  EXPECT_EQ(nearest("r_5", std::vector<std::string>{"r_1"}), "") << "another number is no slip";
   EXPECT_EQ(nearest("abd", std::vector<std::string>{"abe", "abc"}), "abe");
 }
 

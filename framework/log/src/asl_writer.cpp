@@ -1,6 +1,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/asl.hpp"
@@ -39,8 +40,17 @@ void check_is_ours(const fs::path& folder) {
   }
 }
 
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) {
+    throw std::runtime_error("cannot create the folder " + folder.string() + ": " +
+                             error.message());
+  }
+}
+
 TextWriter open_table(const fs::path& folder, const char* table) {
-  fs::create_directories(folder / table);
+  make_folder(folder / table);
   return TextWriter(folder / table / kData);
 }
 
@@ -96,7 +106,7 @@ AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>(
   if (fs::exists(folder) && !fs::is_directory(folder)) {
     throw InputError(folder.string() + "  is a file, not a folder");
   }
-  fs::create_directories(folder);
+  make_folder(folder);
   check_is_ours(folder);
   // A table that the new log does not have must not stay behind.
   fs::remove_all(folder / kWheels);

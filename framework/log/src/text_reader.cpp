@@ -64,7 +64,11 @@ bool TextReader::fill() {
   ++line_;
   if (error == Z_BUF_ERROR) fail("the gzip data end early: the file is truncated");
   if (error == Z_ERRNO) fail(std::string("cannot be read: ") + std::strerror(errno));
-  fail(std::string("the gzip data are corrupt: ") + text);
+  // zlib puts the name of the file before its text; it is said already.
+  std::string_view reason = text;
+  const std::string prefix = file_.string() + ": ";
+  if (reason.starts_with(prefix)) reason.remove_prefix(prefix.size());
+  fail("the gzip data are corrupt: " + std::string(reason));
 }
 
 bool TextReader::next(std::string_view& line) {

@@ -119,7 +119,7 @@ Loaded<Interface> PluginRegistry::make(const Node& section, const std::string& p
     return static_cast<const KinematicModel*>(models.back().object.get());
   };
   std::vector<std::string_view> keys(other_keys.begin(), other_keys.end());
-  keys.push_back("type");
+  keys.emplace_back("type");
   const std::size_t errors_before = errors.size();
   instance->params = config::read_params(section, section.mark(), path + " (" + info.name + ")",
                                          info.params, keys, context, errors);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "pieces.hpp"
 #include "viwo/math/chi2.hpp"
 #include "viwo/math/se2.hpp"
 
@@ -41,11 +42,54 @@ EncoderSample cut(std::span<const EncoderSample> samples, std::size_t k, std::in
   return mixed;
 }
 
+/// P <- Phi_tr P Phi_tr^T (W-7), P symmetric: the yaw moves the end by [-dy, dx].
+void carry(double dx, double dy, Eigen::Matrix3d& P) {
+  const double tt = P(0, 0), tx = P(0, 1), ty = P(0, 2);
+  P(0, 1) = P(1, 0) = tx - dy * tt;
+  P(0, 2) = P(2, 0) = ty + dx * tt;
+  P(1, 1) -= dy * (tx + P(0, 1));
+  P(2, 2) += dx * (ty + P(0, 2));
+  P(1, 2) = P(2, 1) = P(1, 2) - dy * ty + dx * P(0, 1);
+}
+
+/// J_g <- Phi_tr J_g + Phi_xi J_xi (W-7).
+void carry_jacobian(double dx, double dy, const Eigen::Matrix3d& Phi_xi,
+                    const IntrinsicJacobian& J_xi, IntrinsicJacobian& J_g) {
+  in_pieces(static_cast<int>(J_g.cols()), [&](int first, auto width) {
+    constexpr int kWidth = decltype(width)::value;
+    using Piece = Eigen::Matrix<double, 1, kWidth>;
+    const Piece v_x = J_xi.row(0).segment<kWidth>(first);
+    const Piece v_y = J_xi.row(1).segment<kWidth>(first);
+    const Piece omega = J_xi.row(2).segment<kWidth>(first);
+    const Piece theta = J_g.row(0).segment<kWidth>(first);
+    J_g.row(0).segment<kWidth>(first) += Phi_xi(0, 2) * omega;
+    J_g.row(1).segment<kWidth>(first) +=
+        Phi_xi(1, 0) * v_x + Phi_xi(1, 1) * v_y + Phi_xi(1, 2) * omega - dy * theta;
+    J_g.row(2).segment<kWidth>(first) +=
+        Phi_xi(2, 0) * v_x + Phi_xi(2, 1) * v_y + Phi_xi(2, 2) * omega + dx * theta;
+  });
+}
+
+/// P <- P + variance G Q G^T, all symmetric but G.
+void add_noise(const Eigen::Matrix3d& G, const Eigen::Matrix3d& Q, double variance,
+               Eigen::Matrix3d& P) {
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d GQ = variance * (Q * G.row(i).transpose());
+    for (int j = 0; j <= i; ++j) {
+      P(i, j) += GQ.dot(G.row(j));
+      P(j, i) = P(i, j);
+    }
+  }
+}
+
 }  // namespace
 
 void PreintegratedPose::reset(int n_intrinsics) {
-  *this = PreintegratedPose{};
+  g.setZero();
   J_g_WI.setZero(3, n_intrinsics);
+  P_g.setZero();
+  duration_s = path_length_m = bridged_s = 0.;
+  samples = gated = rejected = rank_deficient = 0;
   parity.reset(n_intrinsics);
 }
 
@@ -78,10 +122,7 @@ void append(PreintegratedPose& total, const PreintegratedPose& next) {
 
 Preintegrator::Preintegrator(std::shared_ptr<const WheelModel> model,
                              const PreintegrationOptions& options)
-    : options_(options), solver_(std::move(model), options.twist) {
-  solution_.J_xi_WI.setZero(3, solver_.model().n_intrinsics());
-  believed_ = solution_;
-}
+    : options_(options), solver_(std::move(model), options.twist) {}
 
 bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64_t begin_ns,
                               std::int64_t end_ns, PreintegratedPose& out) {
@@ -91,7 +132,8 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   const auto first = std::partition_point(samples.begin(), samples.end(), after_begin);
   std::int64_t reached_ns = begin_ns;
   bool covered = true;
-  double previous_weight = 0.;  // share of this sample that went into the piece before
+  // The piece before: how much of its own sample and of the one after went into it.
+  double previous_own = 0., previous_next = 0.;
   for (auto k = static_cast<std::size_t>(first - samples.begin());
        k < samples.size() && samples[k].begin_ns < end_ns; ++k) {
     const EncoderSample& sample = samples[k];
@@ -104,22 +146,26 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
         add_piece(blend(samples[k - 1], sample, 0.5), dt, {}, out);
         out.bridged_s += dt;
         --out.samples;
-        previous_weight = 0.;
+        previous_own = previous_next = 0.;
       }
     }
     const std::int64_t from_ns = std::max(sample.begin_ns, begin_ns);
     const std::int64_t to_ns = std::min(sample.end_ns, end_ns);
     const double dt = seconds_between(from_ns, to_ns);
     if (from_ns == sample.begin_ns && to_ns == sample.end_ns) {
-      add_piece(sample, dt, {1., previous_weight}, out);
-      previous_weight = 0.;
+      add_piece(sample, dt, {1., previous_next}, out);
+      previous_own = 1.;
+      previous_next = 0.;
     } else {
       double weight = 0.;
       const EncoderSample piece = cut(samples, k, from_ns, to_ns, weight);
       const double share = std::abs(weight);
-      const double with_previous = previous_weight * (1. - share) + (weight < 0. ? share : 0.);
-      add_piece(piece, dt, {(1. - share) * (1. - share) + share * share, with_previous}, out);
-      previous_weight = weight > 0. ? share : 0.;
+      const double own = 1. - share;
+      const double before = weight < 0. ? share : 0.;
+      add_piece(piece, dt, {own * own + share * share, previous_next * own + previous_own * before},
+                out);
+      previous_own = own;
+      previous_next = weight > 0. ? share : 0.;
     }
     reached_ns = to_ns;
   }
@@ -129,7 +175,8 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
 void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise noise,
                               PreintegratedPose& out) {
   ++out.samples;
-  if (solver_.solve(y, solution_) != Status::kOk) {
+  TwistSolution& solution = solutions_[1 - believed_];
+  if (solver_.solve(y, solution) != Status::kOk) {
     ++out.rejected;
     bridge(dt, nullptr, out);
     return;
@@ -145,7 +192,7 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
       }
       if (!(chi2 <= parity_gate_)) {
         ++out.gated;
-        bridge(dt, &solution_.xi, out);
+        bridge(dt, &solution, out);
         return;
       }
     }
@@ -154,23 +201,23 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
     if (options_.parity && dof > 0)
       solver_.add_parity(cell > 0. ? std::min(dt / cell, 1.) : 1., out.parity);
   }
-  if (solution_.rank_deficient) ++out.rank_deficient;
-  step(solution_, dt, noise, out);
-  std::swap(believed_, solution_);
+  if (solution.rank_deficient) ++out.rank_deficient;
+  step(solution, dt, noise, out);
+  believed_ = 1 - believed_;  // solution becomes the one believed last
   has_believed_ = true;
 }
 
-void Preintegrator::bridge(double dt, const Twist* unbelieved, PreintegratedPose& out) {
+void Preintegrator::bridge(double dt, const TwistSolution* unbelieved, PreintegratedPose& out) {
   out.bridged_s += dt;
   if (!has_believed_) {
     // Nothing to bridge from yet: take what there is rather than stand still.
-    if (unbelieved != nullptr) step(solution_, dt, {}, out);
+    if (unbelieved != nullptr) step(*unbelieved, dt, {}, out);
     return;
   }
-  TwistSolution held = believed_;
+  TwistSolution held = solutions_[believed_];
   if (unbelieved != nullptr) {
     // The truth lies somewhere between the twist before and the one not believed.
-    const Eigen::Vector3d difference = *unbelieved - believed_.xi;
+    const Eigen::Vector3d difference = unbelieved->xi - held.xi;
     held.P_xi += difference * difference.transpose();
   }
   step(held, dt, {}, out);
@@ -196,33 +243,16 @@ void Preintegrator::step(const TwistSolution& solution, double dt, PieceNoise no
   gain << 0., 0., dt, rho * c, -rho * n, rho_prime * vx - 0.5 * dt * dy, rho * n, rho * c,
       rho_prime * vy + 0.5 * dt * dx;
 
-  const int n_x = static_cast<int>(out.J_g_WI.cols());
-  double* J_theta = out.J_g_WI.data();
-  double* J_x = J_theta + n_x;
-  double* J_y = J_x + n_x;
-  const double* Jv = solution.J_xi_WI.data();
-  for (int k = 0; k < n_x; ++k) {
-    const double a = Jv[k], b = Jv[n_x + k], w = Jv[2 * n_x + k];
-    J_x[k] += -dy * J_theta[k] + gain(1, 0) * a + gain(1, 1) * b + gain(1, 2) * w;
-    J_y[k] += dx * J_theta[k] + gain(2, 0) * a + gain(2, 1) * b + gain(2, 2) * w;
-    J_theta[k] += dt * w;
-  }
-
-  // P <- F P F^T + G Q G^T with F = I + [0; J [dx dy]^T] e_1^T, plus the cross terms of a piece
-  // that shares a reading with the one before.
-  Eigen::Matrix3d& P = out.P_g;
-  P.row(1) -= dy * P.row(0);
-  P.row(2) += dx * P.row(0);
-  P.col(1) -= dy * P.col(0);
-  P.col(2) += dx * P.col(0);
-  const Eigen::Matrix3d GQ = gain * solution.P_xi;
-  P.noalias() += noise.variance * GQ * gain.transpose();
+  carry_jacobian(dx, dy, gain, solution.J_xi_WI, out.J_g_WI);
+  carry(dx, dy, out.P_g);
+  add_noise(gain, solution.P_xi, noise.variance, out.P_g);
   if (noise.with_previous != 0.) {
+    // The piece shares a reading with the one before.
     Eigen::Matrix3d carried = last_gain_;
     carried.row(1) -= dy * last_gain_.row(0);
     carried.row(2) += dx * last_gain_.row(0);
-    const Eigen::Matrix3d cross = noise.with_previous * carried * GQ.transpose();
-    P += cross + cross.transpose();
+    const Eigen::Matrix3d cross = noise.with_previous * carried * solution.P_xi * gain.transpose();
+    out.P_g += cross + cross.transpose();
   }
   last_gain_ = gain;
 
@@ -230,7 +260,7 @@ void Preintegrator::step(const TwistSolution& solution, double dt, PieceNoise no
   out.g[1] += dx;
   out.g[2] += dy;
   out.duration_s += dt;
-  out.path_length_m += dt * std::hypot(solution.xi[0], solution.xi[1]);
+  out.path_length_m += dt * std::sqrt(vx * vx + vy * vy);
 }
 
 }  // namespace viwo

@@ -1,11 +1,15 @@
 #include "viwo/wheel/twist_solver.hpp"
 
+#include <array>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+
+#include "pieces.hpp"
 
 namespace viwo {
 namespace {
@@ -19,39 +23,90 @@ struct NormalInverse {
   int rank = 3;
 };
 
-/// Inverse of M = A^T W A where its columns are independent to `tolerance`, otherwise the
-/// pseudo-inverse. Velocities are scaled alike, the yaw rate to the same size, so that the smallest
-/// singular value of rolling rows is about the spread of the wheel directions.
-NormalInverse invert_normal_matrix(const Eigen::Matrix3d& M, double tolerance) {
+/// The pseudo-inverse of (W-3): velocities are scaled alike, the yaw rate to the same size.
+NormalInverse pseudo_invert(const Eigen::Matrix3d& M, double tolerance) {
   const double velocity = std::sqrt(2. / (M(0, 0) + M(1, 1)));
   const Eigen::Vector3d scale(velocity, velocity, M(2, 2) > 0. ? 1. / std::sqrt(M(2, 2)) : 1.);
   const Eigen::Matrix3d Ms = scale.asDiagonal() * M * scale.asDiagonal();
-  NormalInverse result;
-  // The scaled matrix has trace 3, so the product of its two larger eigenvalues is at most 9/4 and
-  // det/(9/4) is a lower bound of the smallest: mostly enough, without an eigenvalue solver.
-  if (Ms.determinant() > 2.25 * tolerance * tolerance * 3.) {
-    result.inverse = scale.asDiagonal() * Ms.inverse() * scale.asDiagonal();
-    result.missing.setZero();
-    return result;
-  }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(Ms);
   const double smallest = tolerance * tolerance * eigen.eigenvalues()[2];
-  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d missing = Eigen::Matrix3d::Zero();
-  result.rank = 0;
+  NormalInverse result{Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero(), 0};
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d n = eigen.eigenvectors().col(i);
     if (eigen.eigenvalues()[i] > smallest) {
-      inverse += n * n.transpose() / eigen.eigenvalues()[i];
+      result.inverse += n * n.transpose() / eigen.eigenvalues()[i];
       ++result.rank;
     } else {
-      missing += n * n.transpose();
+      result.missing += n * n.transpose();
     }
   }
-  result.inverse = scale.asDiagonal() * inverse * scale.asDiagonal();
+  result.inverse = (scale.asDiagonal() * result.inverse * scale.asDiagonal()).eval();
   const Eigen::Vector3d unit = scale / velocity;  // in units of xi per m/s of the rows
-  result.missing = unit.asDiagonal() * missing * unit.asDiagonal();
+  result.missing = (unit.asDiagonal() * result.missing * unit.asDiagonal()).eval();
   return result;
+}
+
+/// Inverse of M = A^T W A where its columns are independent to `tolerance`, otherwise the
+/// pseudo-inverse.
+NormalInverse invert_normal_matrix(const Eigen::Matrix3d& M, double tolerance) {
+  // Scaled as in (W-3), M has trace 3, so the product of its two larger eigenvalues is at most 9/4
+  // and det/(9/4) is a lower bound of the smallest: mostly enough, without an eigenvalue solver.
+  const double half_trace = 0.5 * (M(0, 0) + M(1, 1));
+  const double per_scaled = half_trace * half_trace * M(2, 2);  // det M / det of the scaled M
+  NormalInverse result;
+  double determinant = 0.;
+  bool invertible = false;
+  M.computeInverseAndDetWithCheck(result.inverse, determinant, invertible,
+                                  6.75 * tolerance * tolerance * per_scaled);
+  if (!invertible) return pseudo_invert(M, tolerance);
+  result.missing.setZero();
+  return result;
+}
+
+/// Sum of outer products a b^T of vectors of three in four lanes, column by column in registers.
+class OuterProducts {
+ public:
+  void add(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
+    column0_ += b[0] * a;
+    column1_ += b[1] * a;
+    column2_ += b[2] * a;
+  }
+  Eigen::Matrix3d sum() const {
+    Eigen::Matrix3d sum;
+    sum.col(0) = column0_.head<3>();
+    sum.col(1) = column1_.head<3>();
+    sum.col(2) = column2_.head<3>();
+    return sum;
+  }
+
+ private:
+  Eigen::Vector4d column0_ = Eigen::Vector4d::Zero();
+  Eigen::Vector4d column1_ = Eigen::Vector4d::Zero();
+  Eigen::Vector4d column2_ = Eigen::Vector4d::Zero();
+};
+
+/// A noise block: of a size known at compile time, or within bounds.
+template <int kSize>
+constexpr int kMaxBlock = kSize == Eigen::Dynamic ? kMaxRows : kSize;
+template <int kSize>
+using BlockMatrix =
+    Eigen::Matrix<double, kSize, kSize, Eigen::ColMajor, kMaxBlock<kSize>, kMaxBlock<kSize>>;
+
+template <int kSize>
+BlockMatrix<kSize> invert_block(const BlockMatrix<kSize>& R) {
+  if constexpr (kSize == Eigen::Dynamic) {
+    return R.llt().solve(BlockMatrix<kSize>::Identity(R.rows(), R.rows()));
+  } else {
+    return R.inverse();
+  }
+}
+
+/// Calls f with the size of the noise blocks known at compile time, if it is a usual one.
+template <class F>
+void with_block_size(int size, F&& f) {
+  if (size == 1) return f(std::integral_constant<int, 1>{});
+  if (size == 2) return f(std::integral_constant<int, 2>{});
+  f(std::integral_constant<int, Eigen::Dynamic>{});
 }
 
 }  // namespace
@@ -69,38 +124,42 @@ TwistSolver::TwistSolver(std::shared_ptr<const WheelModel> model, const TwistOpt
   const int m = d.n_rows;
   const int n = model_->n_intrinsics();
   const int q = model_->n_noises();
-  rows_.A.setZero(m, 3);
-  rows_.b.setZero(m);
-  e_.setZero(m);
-  e_w_.setZero(m);
-  b_fit_.setZero(m);
-  plain_.A_plus.setZero(3, m);
-  weighted_.A_plus.setZero(3, m);
-  for (IntrinsicDerivatives* by_x : {&by_x_, &by_x_fit_}) {
-    by_x->J.setZero(m, n);
-    by_x->DtE.setZero(3, n);
+  for (RowSystem* rows : {&rows_, &nominal_rows_}) {
+    rows->A.setZero(m, 3);
+    rows->b.setZero(m);
   }
-  WJ_.setZero(m, n);
+  nominal_ = model_->nominal();
+  for (Fit* fit : {&plain_, &weighted_}) {
+    fit->WA.setZero(4, m);
+    fit->b.setZero(m);
+    fit->e.setZero(m);
+  }
+  A_plus_.setZero(4, m);
+  We_.setZero(m);
+  by_x_.J.setZero(m, n);
+  by_x_.DtE.setZero(3, n);
   by_n_.J.setZero(m, q);
   by_n_.DtE.setZero(3, q);
-  R_.setZero(d.noise_block, m);
-  W_.setZero(d.noise_block, m);
+  WJ_.setZero();
+  const int size = d.noise_block;
+  const auto whole_blocks = [size](RowRange rows) {
+    const int first = rows.first / size * size;
+    const int end = (rows.first + rows.count + size - 1) / size * size;
+    return RowRange{first, end - first};
+  };
+  for (const IntrinsicSpec& spec : d.intrinsics) intrinsic_rows_.push_back(whole_blocks(spec.rows));
+  block_noises_.resize(static_cast<std::size_t>(m / size));
   variance_.resize(q);
-  for (int i = 0; i < q; ++i) {
-    const double sigma = d.noises[static_cast<std::size_t>(i)].sigma;
-    variance_[i] = sigma * sigma;
-  }
-  const int s = d.noise_block;
-  block_columns_.resize(static_cast<std::size_t>(m / s));
-  for (int k = 0; k < n; ++k) {
-    const RowRange range = d.intrinsics[static_cast<std::size_t>(k)].rows;
-    for (int b = range.first / s; b * s < range.first + range.count; ++b) {
-      const int first = std::max(range.first - b * s, 0);
-      const int last = std::min(range.first + range.count - b * s, s);
-      block_columns_[static_cast<std::size_t>(b)].push_back({k, first, last - first});
+  for (const NoiseSpec& spec : d.noises) {
+    const int k = static_cast<int>(noise_rows_.size());
+    variance_[k] = spec.sigma * spec.sigma;
+    const RowRange rows = whole_blocks(spec.rows);
+    noise_rows_.push_back(rows);
+    for (int b = rows.first / size; b * size < rows.first + rows.count; ++b) {
+      block_noises_[static_cast<std::size_t>(b)].push_back(k);
     }
   }
-  set_intrinsics(model_->nominal());
+  set_intrinsics(nominal_);
 }
 
 void TwistSolver::set_intrinsics(const Intrinsics& x_WI) {
@@ -109,69 +168,49 @@ void TwistSolver::set_intrinsics(const Intrinsics& x_WI) {
 }
 
 Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
-  const ModelDescription& d = model_->description();
   const KinematicModel& model = model_->model();
-  y_ = y;
-  if (model.rows(y_, x_WI_, A_is_current_, rows_) != Status::kOk) return Status::kRejected;
-  solve_plain();
-  model.noise_derivatives(y_, x_WI_, rows_, rows_.b, xi_, e_, by_n_);
-  if (options_.noise_weighted) solve_weighted();
-  const Gain& gain = options_.noise_weighted ? weighted_ : plain_;
-  out.rank_deficient = gain.rank < 3;
-  if (!xi_.allFinite()) return Status::kRejected;
-  out.xi = xi_;
-  out.e = e_;
-
-  // Master identity (W-4): d xi = A+ d(b - A xi) + (A^T W A)^-1 dA^T W e. With weights, W e takes
-  // the place of e: the weights are a choice of the estimator and are held.
-  RowVector We = e_;
+  y_ = &y;
+  if (model.rows(y, x_WI_, A_is_current_, rows_) != Status::kOk) return Status::kRejected;
+  fit_plain();
   if (options_.noise_weighted) {
-    const int s = d.noise_block;
-    for (int i = 0; i < d.n_rows; i += s) {
-      We.segment(i, s).noalias() = W_.middleCols(i, s) * e_.segment(i, s);
-    }
+    // The weights are those of the nominal intrinsics: they do not move with x_WI, so that the
+    // master identity below is the whole derivative.
+    model.rows(y, nominal_, nominal_A_is_current_, nominal_rows_);
+    nominal_A_is_current_ = model_->description().constant_A;
+    model.noise_derivatives(y, nominal_, nominal_rows_, nominal_rows_.b, nominal_twist(), plain_.e,
+                            by_n_);
+    fit_weighted(options_.rank_tolerance);
+    set_gain(weighted_);
+  } else {
+    model.noise_derivatives(y, x_WI_, rows_, rows_.b, plain_.xi, plain_.e, by_n_);
   }
-  model.intrinsic_derivatives(y_, x_WI_, rows_, rows_.b, xi_, We, by_x_);
-  const int n = model_->n_intrinsics();
-  out.J_xi_WI.resize(3, n);
-  for (int k = 0; k < n; ++k) {
-    const RowRange range = d.intrinsics[static_cast<std::size_t>(k)].rows;
-    Eigen::Vector3d column = gain.M_inv * by_x_.DtE.col(k);
-    for (int i = range.first; i < range.first + range.count; ++i) {
-      column += gain.A_plus.col(i) * by_x_.J(i, k);
-    }
-    out.J_xi_WI(0, k) = column[0];
-    out.J_xi_WI(1, k) = column[1];
-    out.J_xi_WI(2, k) = column[2];
+  const Fit& fit = options_.noise_weighted ? weighted_ : plain_;
+  if (!fit.xi.allFinite()) return Status::kRejected;
+  out.xi = fit.xi;
+  out.e = fit.e;
+  out.rank_deficient = fit.rank < 3;
+  // With weights, W e takes the place of e in (W-4).
+  model.intrinsic_derivatives(y, x_WI_, rows_, rows_.b, fit.xi,
+                              options_.noise_weighted ? We_ : fit.e, by_x_);
+  with_block_size(model_->description().noise_block, [&](auto size) {
+    constexpr int kSize = decltype(size)::value;
+    twist_jacobian<kSize>(fit, out.J_xi_WI);
+    if (!options_.noise_weighted) twist_covariance<kSize>(fit, out.P_xi);
+  });
+  // (W-5) with A+ = (A^T W A)^-1 A^T W and R = W^-1.
+  if (options_.noise_weighted) out.P_xi = fit.M_inv.topRows<3>();
+  if (out.rank_deficient) {
+    const double sigma = options_.unobserved_sigma_m_per_s;
+    out.P_xi += sigma * sigma * fit.missing;
   }
-  // Covariance (W-5): every noise source through the same identity.
-  Eigen::Matrix3d P = gain.P_missing;
-  for (int k = 0; k < model_->n_noises(); ++k) {
-    const RowRange range = d.noises[static_cast<std::size_t>(k)].rows;
-    Eigen::Vector3d g = Eigen::Vector3d::Zero();
-    for (int i = range.first; i < range.first + range.count; ++i) {
-      g += gain.A_plus.col(i) * by_n_.J(i, k);
-    }
-    if (!d.constant_A && !options_.noise_weighted) g += gain.M_inv * by_n_.DtE.col(k);
-    P += (variance_[k] * g) * g.transpose();
-  }
-  out.P_xi = P;
   return Status::kOk;
 }
 
-void TwistSolver::factor(const Eigen::Matrix3d& M, Gain& gain) const {
-  const NormalInverse normal = invert_normal_matrix(M, options_.rank_tolerance);
-  gain.M_inv = normal.inverse;
-  gain.rank = normal.rank;
-  const double sigma = options_.unobserved_sigma_m_per_s;
-  gain.P_missing = sigma * sigma * normal.missing;
-}
-
-void TwistSolver::solve_plain() {
+void TwistSolver::fit_plain() {
   if (!A_is_current_) {
-    const Eigen::Matrix3d M = rows_.A.transpose() * rows_.A;
-    factor(M, plain_);
-    plain_.A_plus.noalias() = plain_.M_inv * rows_.A.transpose();
+    plain_.WA.topRows<3>() = rows_.A.transpose();
+    factor(rows_.A.transpose() * rows_.A, options_.rank_tolerance, plain_);
+    set_gain(plain_);
     A_is_current_ = model_->description().constant_A;
     if (A_is_current_ && plain_.rank < 3) {
       throw InputError(
@@ -179,153 +218,199 @@ void TwistSolver::solve_plain() {
           "(are all wheels at one place?)");
     }
   }
-  const int m = model_->n_rows();
-  xi_.setZero();
-  for (int i = 0; i < m; ++i) xi_ += plain_.A_plus.col(i) * rows_.b[i];
-  for (int i = 0; i < m; ++i) {
-    e_[i] = rows_.b[i] - (rows_.A(i, 0) * xi_[0] + rows_.A(i, 1) * xi_[1] + rows_.A(i, 2) * xi_[2]);
-  }
+  solve(plain_);
 }
 
-void TwistSolver::solve_weighted() {
-  // The noise of some models depends on the twist; that of the unweighted fit is close enough.
-  row_weights();
-  const int s = model_->description().noise_block;
-  const int m = model_->n_rows();
-  Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < m; i += s) {
-    weighted_.A_plus.middleCols(i, s).noalias() =
-        rows_.A.middleRows(i, s).transpose() * W_.middleCols(i, s);
-    M += weighted_.A_plus.middleCols(i, s) * rows_.A.middleRows(i, s);
-  }
-  factor(M, weighted_);
-  xi_.setZero();
-  for (int i = 0; i < m; ++i) {
-    weighted_.A_plus.col(i) = (weighted_.M_inv * weighted_.A_plus.col(i)).eval();
-    xi_ += weighted_.A_plus.col(i) * rows_.b[i];
-  }
-  e_.noalias() = rows_.b - rows_.A * xi_;
+/// Plain twist at the nominal intrinsics, on which the noise of some models depends; noise through
+/// a constant A does not.
+Twist TwistSolver::nominal_twist() const {
+  if (model_->description().constant_A) return plain_.xi;
+  const RowMatrix& A = nominal_rows_.A;
+  const Eigen::Vector3d Atb = A.transpose() * nominal_rows_.b;
+  return invert_normal_matrix(A.transpose() * A, options_.rank_tolerance).inverse * Atb;
 }
 
-void TwistSolver::row_weights() {
-  const ModelDescription& d = model_->description();
-  const int s = d.noise_block;
-  R_.setZero();
-  for (int k = 0; k < model_->n_noises(); ++k) {
-    const RowRange range = d.noises[static_cast<std::size_t>(k)].rows;
-    for (int i = range.first; i < range.first + range.count; ++i) {
-      const int block = i / s * s;
-      const double scaled = variance_[k] * by_n_.J(i, k);
-      const int last = std::min(range.first + range.count, block + s);
-      for (int l = std::max(range.first, block); l < last; ++l) {
-        R_(l - block, i) += scaled * by_n_.J(l, k);
+void TwistSolver::fit_weighted(double rank_tolerance) {
+  Eigen::Matrix3d M;
+  with_block_size(model_->description().noise_block,
+                  [&](auto size) { M = weigh_rows<decltype(size)::value>(); });
+  factor(M, rank_tolerance, weighted_);
+  solve(weighted_);
+  double chi2 = 0.;
+  for (int i = 0; i < model_->n_rows(); ++i) {
+    const double* w = weighted_.WA.col(i).data();
+    const double We =
+        w[3] - w[0] * weighted_.xi[0] - w[1] * weighted_.xi[1] - w[2] * weighted_.xi[2];
+    chi2 += We * weighted_.e[i];
+    We_[i] = We;
+  }
+  weighted_chi2_ = chi2;
+}
+
+/// R and W = R^-1 block by block, W A and in its fourth lane W b; returns A^T W A.
+template <int kSize>
+Eigen::Matrix3d TwistSolver::weigh_rows() {
+  const int size = block_size<kSize>();
+  OuterProducts AtWA;
+  int i0 = 0;
+  for (const std::vector<int>& noises : block_noises_) {
+    BlockMatrix<kSize> R = BlockMatrix<kSize>::Zero(size, size);
+    for (const int k : noises) {
+      const double* J = &by_n_.J(i0, k);
+      for (int i = 0; i < size; ++i) {
+        for (int l = 0; l < size; ++l) R(l, i) += variance_[k] * J[i] * J[l];
       }
     }
-  }
-  for (int i = 0; i < d.n_rows; i += s) {
-    if (s == 1) {
-      W_(0, i) = 1. / R_(0, i);
-    } else if (s == 2) {
-      W_.middleCols<2>(i).topRows<2>() = R_.block<2, 2>(0, i).inverse();
-    } else {
-      using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxRows,
-                                  kMaxRows>;
-      const Eigen::LLT<Block> factor(R_.middleCols(i, s));
-      W_.middleCols(i, s) = factor.solve(Block::Identity(s, s));
+    const BlockMatrix<kSize> W = invert_block<kSize>(R);
+    W_.block<kSize, kSize>(0, i0, size, size) = W;
+    for (int i = 0; i < size; ++i) {
+      Lanes w = W(i, 0) * row(i0);
+      for (int l = 1; l < size; ++l) w += W(i, l) * row(i0 + l);
+      weighted_.WA.col(i0 + i) = w;
+      AtWA.add(w, row(i0 + i));
     }
+    i0 += size;
   }
+  return AtWA.sum();
+}
+
+void TwistSolver::factor(const Eigen::Matrix3d& M, double rank_tolerance, Fit& fit) const {
+  const NormalInverse normal = invert_normal_matrix(M, rank_tolerance);
+  fit.M_inv << normal.inverse, Eigen::RowVector3d::Zero();
+  fit.missing = normal.missing;
+  fit.rank = normal.rank;
+}
+
+/// Twist and residual (W-2).
+void TwistSolver::solve(Fit& fit) const {
+  fit.xi = least_squares(fit, rows_.b);
+  set_residual(fit);
+  if (model_->description().constant_A) return;
+  // Such rows may be badly conditioned; fitting the residual once more gets the digits back.
+  fit.xi += least_squares(fit, fit.e);
+  set_residual(fit);
+}
+
+/// (A^T W A)^-1 A^T W b.
+Twist TwistSolver::least_squares(const Fit& fit, const RowVector& b) const {
+  const int m = model_->n_rows();
+  Lanes AtWb = Lanes::Zero();
+  for (int i = 0; i < m; ++i) AtWb += fit.WA.col(i) * b[i];
+  return (fit.M_inv * AtWb.head<3>()).head<3>();
+}
+
+void TwistSolver::set_residual(Fit& fit) const {
+  in_pieces(model_->n_rows(), [&](int first, auto width) {
+    constexpr int kWidth = decltype(width)::value;
+    fit.b.segment<kWidth>(first) = rows_.A.middleRows<kWidth>(first) * fit.xi;
+    fit.e.segment<kWidth>(first) = rows_.b.segment<kWidth>(first) - fit.b.segment<kWidth>(first);
+  });
+}
+
+void TwistSolver::set_gain(const Fit& fit) {
+  for (int i = 0; i < model_->n_rows(); ++i) {
+    A_plus_.col(i) = fit.M_inv * fit.WA.col(i).head<3>();
+  }
+}
+
+/// Derivative of the twist by the intrinsics: the master identity (W-4).
+template <int kSize>
+void TwistSolver::twist_jacobian(const Fit& fit, IntrinsicJacobian& J_xi_WI) const {
+  const int n = model_->n_intrinsics();
+  J_xi_WI.resize(3, n);
+  for (int k = 0; k < n; ++k) {
+    const RowRange rows = intrinsic_rows_[static_cast<std::size_t>(k)];
+    const Lanes column =
+        sum_rows<kSize>(A_plus_, &by_x_.J(0, k), rows) + fit.M_inv * by_x_.DtE.col(k);
+    for (int c = 0; c < 3; ++c) J_xi_WI(c, k) = column[c];
+  }
+}
+
+/// Covariance of the twist (W-5): every noise source through the same identity.
+template <int kSize>
+void TwistSolver::twist_covariance(const Fit& fit, Eigen::Matrix3d& P_xi) const {
+  const bool constant_A = model_->description().constant_A;
+  const int q = model_->n_noises();
+  OuterProducts P;
+  for (int k = 0; k < q; ++k) {
+    const RowRange rows = noise_rows_[static_cast<std::size_t>(k)];
+    Lanes g = sum_rows<kSize>(A_plus_, &by_n_.J(0, k), rows);
+    if (!constant_A) g += fit.M_inv * by_n_.DtE.col(k);
+    P.add(variance_[k] * g, g);
+  }
+  P_xi = P.sum();
 }
 
 double TwistSolver::parity_chi2() {
-  const ModelDescription& d = model_->description();
-  const int s = d.noise_block;
-  const int m = d.n_rows;
-  if (!options_.noise_weighted) row_weights();
-  M_w_.setZero();
-  Eigen::Vector3d AtWb = Eigen::Vector3d::Zero();
-  for (int i = 0; i < m; i += s) {
-    for (int k = 0; k < s; ++k) {
-      Eigen::Vector3d WA = Eigen::Vector3d::Zero();  // row k of W A in this block
-      double Wb = 0.;
-      for (int l = 0; l < s; ++l) {
-        WA += W_(k, i + l) * rows_.A.row(i + l).transpose();
-        Wb += W_(k, i + l) * rows_.b[i + l];
-      }
-      M_w_ += WA * rows_.A.row(i + k);
-      AtWb += Wb * rows_.A.row(i + k).transpose();
-    }
-  }
-  const NormalInverse normal = invert_normal_matrix(M_w_, kParityRankTolerance);
-  M_w_ = normal.inverse;
-  parity_rank_ = normal.rank;
-  xi_w_ = M_w_ * AtWb;
-  double chi2 = 0.;
-  for (int i = 0; i < m; ++i) {
-    b_fit_[i] = rows_.A.row(i).dot(xi_w_);
-    e_w_[i] = rows_.b[i] - b_fit_[i];
-  }
-  for (int i = 0; i < m; i += s) {
-    for (int k = 0; k < s; ++k) {
-      for (int l = 0; l < s; ++l) chi2 += e_w_[i + k] * W_(k, i + l) * e_w_[i + l];
-    }
-  }
-  return chi2;
+  if (!options_.noise_weighted || weighted_.rank < 3) fit_weighted(kParityRankTolerance);
+  return weighted_chi2_;
 }
 
 void TwistSolver::add_parity(double weight, ParityInformation& out) {
-  const ModelDescription& d = model_->description();
-  const int s = d.noise_block;
-  const int n = model_->n_intrinsics();
-  model_->model().intrinsic_derivatives(y_, x_WI_, rows_, b_fit_, xi_w_, e_w_, by_x_fit_);
-  const RowJacobian& J = by_x_fit_.J;
-
-  // Lambda = J^T W J - V^T (A^T W A)^-1 V with V = A^T W J; eta = J^T W e (W-10). A column of J
-  // meets only the columns of its own noise blocks.
-  IntrinsicJacobian V(3, n);
-  V.setZero();
-  double chi2 = 0.;
-  for (std::size_t b = 0; b < block_columns_.size(); ++b) {
-    const int i0 = static_cast<int>(b) * s;
-    RowVector We(s);
-    for (int k = 0; k < s; ++k) {
-      We[k] = 0.;
-      for (int l = 0; l < s; ++l) We[k] += W_(k, i0 + l) * e_w_[i0 + l];
-      chi2 += We[k] * e_w_[i0 + k];
-    }
-    for (const BlockColumn& column : block_columns_[b]) {
-      const int k = column.column;
-      for (int i = 0; i < s; ++i) {
-        double WJ = 0.;
-        for (int l = column.first; l < column.first + column.count; ++l) {
-          WJ += W_(i, i0 + l) * J(i0 + l, k);
-        }
-        WJ_(i0 + i, k) = WJ;
-        for (int c = 0; c < 3; ++c) V(c, k) += rows_.A(i0 + i, c) * WJ;
-      }
-      for (int l = column.first; l < column.first + column.count; ++l) {
-        out.eta[k] += weight * J(i0 + l, k) * We[l];
-      }
-      for (const BlockColumn& other : block_columns_[b]) {
-        if (other.column > k) break;  // in ascending order; the upper triangle suffices
-        double sum = 0.;
-        for (int l = other.first; l < other.first + other.count; ++l) {
-          sum += J(i0 + l, other.column) * WJ_(i0 + l, k);
-        }
-        out.Lambda(other.column, k) += weight * sum;
-        if (other.column != k) out.Lambda(k, other.column) += weight * sum;
-      }
-    }
-  }
-  IntrinsicJacobian Z(3, n);
-  Z.noalias() = M_w_ * V;
-  for (int k = 0; k < n; ++k) {
-    const double z0 = weight * Z(0, k), z1 = weight * Z(1, k), z2 = weight * Z(2, k);
-    double* column = out.Lambda.col(k).data();
-    const double* v = V.data();
-    for (int l = 0; l < n; ++l) column[l] -= z0 * v[l] + z1 * v[n + l] + z2 * v[2 * n + l];
-  }
-  out.chi2 += weight * chi2;
+  model_->model().intrinsic_derivatives(*y_, x_WI_, rows_, weighted_.b, weighted_.xi, weighted_.e,
+                                        by_x_);
+  with_block_size(model_->description().noise_block, [&](auto size) {
+    constexpr int kSize = decltype(size)::value;
+    weigh_jacobian<kSize>();
+    add_information<kSize>(weight, out);
+  });
+  out.chi2 += weight * weighted_chi2_;
   out.dof += parity_dof();
+}
+
+/// W J: of each column the rows of the noise blocks that it touches.
+template <int kSize>
+void TwistSolver::weigh_jacobian() {
+  const int size = block_size<kSize>();
+  const int n = model_->n_intrinsics();
+  for (int k = 0; k < n; ++k) {
+    const RowRange rows = intrinsic_rows_[static_cast<std::size_t>(k)];
+    const double* J = by_x_.J.col(k).data();
+    for (int i0 = rows.first; i0 < rows.first + rows.count; i0 += size) {
+      for (int i = i0; i < i0 + size; ++i) {
+        double WJ = 0.;
+        for (int l = 0; l < size; ++l) WJ += W_(l, i) * J[i0 + l];
+        WJ_(i, k) = WJ;
+      }
+    }
+  }
+}
+
+/// (W-10) as Lambda += J^T G with G = W J - W A (A^T W A)^-1 V, V = A^T W J; eta += J^T W e.
+template <int kSize>
+void TwistSolver::add_information(double weight, ParityInformation& out) const {
+  const int size = block_size<kSize>();
+  const int m = model_->n_rows();
+  const int n = model_->n_intrinsics();
+  Eigen::Matrix<double, 4, kMaxRows> U;  // (A^T W A)^-1 A^T W
+  for (int i = 0; i < m; ++i) U.col(i) = weighted_.M_inv * weighted_.WA.col(i).head<3>();
+  in_pieces(n, [&](int first, auto width) {
+    constexpr int kWidth = decltype(width)::value;
+    using Piece = Eigen::Matrix<double, kWidth, 1>;
+    Piece v0 = Piece::Zero(), v1 = Piece::Zero(), v2 = Piece::Zero(), eta = Piece::Zero();
+    for (int i = 0; i < m; ++i) {
+      const Piece WJ = weight * WJ_.row(i).segment<kWidth>(first);
+      v0 += rows_.A(i, 0) * WJ;
+      v1 += rows_.A(i, 1) * WJ;
+      v2 += rows_.A(i, 2) * WJ;
+      eta += weighted_.e[i] * WJ;
+    }
+    out.eta.segment<kWidth>(first) += eta;
+    std::array<Piece, kMaxRows> G;  // its rows, of these columns
+    for (int i = 0; i < m; ++i) {
+      G[static_cast<std::size_t>(i)] = weight * WJ_.row(i).segment<kWidth>(first).transpose() -
+                                       (U(0, i) * v0 + U(1, i) * v1 + U(2, i) * v2);
+    }
+    for (int k = 0; k < n; ++k) {
+      const RowRange rows = intrinsic_rows_[static_cast<std::size_t>(k)];
+      const double* J = by_x_.J.col(k).data();
+      Piece sum = out.Lambda.col(k).segment<kWidth>(first);
+      for (int i0 = rows.first; i0 < rows.first + rows.count; i0 += size) {
+        for (int i = i0; i < i0 + size; ++i) sum += J[i] * G[static_cast<std::size_t>(i)];
+      }
+      out.Lambda.col(k).segment<kWidth>(first) = sum;
+    }
+  });
 }
 
 }  // namespace viwo

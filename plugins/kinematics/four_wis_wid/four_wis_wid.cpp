@@ -14,14 +14,14 @@ class FourWisWid final : public swerve::SwerveBase {
 
   void describe(ModelDescription& out) const override {
     describe_wheels(swerve::RowsPerWheel::kDriveAndLateral, out);
-    out.constant_A = true;
+    out.constant_A = true;  // (S-10)
   }
 
   Status rows(const EncoderSample& sample, const Intrinsics& x_WI, bool A_is_current,
               RowSystem& out) const override {
     for (int j = 0; j < n(); ++j) {
       const auto channel = static_cast<std::size_t>(j);
-      const double delta = sample.steer_rad[channel] - x_WI[delta_o(j)];
+      const double delta = sample.steer_rad[channel] - x_WI[delta_o(j)];  // (S-1)
       const double v = x_WI[r(j)] * sample.drive_rad_per_s[channel];
       const double c = std::cos(delta);
       const double s = std::sin(delta);
@@ -46,16 +46,12 @@ class FourWisWid final : public swerve::SwerveBase {
       const double per_r = 1. / x_WI[r(j)];
       out.J(i, r(j)) = b[i] * per_r;  // (S-4)
       out.J(i + 1, r(j)) = b[i + 1] * per_r;
-      out.J(i, x(j)) = 0.;  // (S-5)
-      out.J(i + 1, x(j)) = -omega;
+      out.J(i + 1, x(j)) = -omega;  // (S-5)
       out.J(i, y(j)) = omega;
-      out.J(i + 1, y(j)) = 0.;
       out.J(i, delta_o(j)) = b[i + 1];  // (S-6)
       out.J(i + 1, delta_o(j)) = -b[i];
-      out.DtE.col(r(j)).setZero();
-      out.DtE.col(x(j)) << 0., 0., e[i + 1];  // (S-7)
-      out.DtE.col(y(j)) << 0., 0., -e[i];
-      out.DtE.col(delta_o(j)).setZero();
+      out.DtE(2, x(j)) = e[i + 1];  // (S-7)
+      out.DtE(2, y(j)) = -e[i];
     }
   }
 
@@ -74,12 +70,11 @@ class FourWisWid final : public swerve::SwerveBase {
       out.J(i, 2 * n() + j) = -s;  // lateral slip
       out.J(i + 1, 2 * n() + j) = c;
     }
-    out.DtE.setZero();
   }
 
  protected:
   Eigen::Vector2d contact_slip(const RowVector& slip, int j) const override {
-    // b - A xi = slip with b the velocity that the encoders tell.
+    // (S-9): b - A xi = slip with b the velocity that the encoders tell.
     return slip.segment<2>(2 * j);
   }
 };

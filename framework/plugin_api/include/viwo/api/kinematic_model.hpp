@@ -83,8 +83,8 @@ struct RowSystem {
   std::array<double, 4 * kMaxDrives> kept{};  ///< the model's own, e.g. cosines and sines
 };
 
-/// Derivatives of the rows by the intrinsics. Only the declared row ranges of J are written and
-/// read.
+/// Derivatives of the rows by the intrinsics. Only the declared row ranges of J are written; the
+/// rest stays zero.
 struct IntrinsicDerivatives {
   RowJacobian J;          ///< m x n: d(b - A xi)/d x_WI
   TwistRowsJacobian DtE;  ///< 3 x n: column k is (dA/dx_k)^T e
@@ -97,7 +97,9 @@ struct NoiseDerivatives {
 };
 
 /// A wheeled base. Every call is const and may run concurrently on one object; results depend on
-/// the arguments alone. Outputs belong to the host and are already sized (J: m x n or m x q).
+/// the arguments alone. Outputs belong to the host and are already sized (J: m x n or m x q); they
+/// start as zeros and keep what the last call wrote, so an entry that is always zero need not be
+/// written.
 class VIWO_API KinematicModel {
  public:
   virtual ~KinematicModel();

@@ -3,6 +3,8 @@
 // Equations: docs/math/wheel_odometry.md.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -67,15 +69,15 @@ class Preintegrator {
     double with_previous = 0.;
   };
   void add_piece(const EncoderSample& y, double dt, PieceNoise noise, PreintegratedPose& out);
-  void bridge(double dt, const Twist* unbelieved, PreintegratedPose& out);
+  void bridge(double dt, const TwistSolution* unbelieved, PreintegratedPose& out);
   void step(const TwistSolution& solution, double dt, PieceNoise noise, PreintegratedPose& out);
 
   PreintegrationOptions options_;
   TwistSolver solver_;
   double parity_gate_ = 0.;
   int parity_gate_dof_ = 0;
-  TwistSolution solution_;
-  TwistSolution believed_;  // the last one that passed
+  std::array<TwistSolution, 2> solutions_;  // of this sample, and the last one that passed
+  std::size_t believed_ = 0;                // index of the latter
   bool has_believed_ = false;
   Eigen::Matrix3d last_gain_;  // d g / d xi of the last piece, for correlated neighbours
 };

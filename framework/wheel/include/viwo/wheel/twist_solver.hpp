@@ -22,8 +22,8 @@ struct TwistOptions {
   /// then independent.
   bool noise_weighted = false;
   /// Smallest ratio of the singular values of A (yaw rate scaled to the size of the velocities)
-  /// that counts as full rank. For rolling rows it is about the spread of the wheel directions in rad; below it the
-  /// velocity that the rows cannot tell is taken as zero.
+  /// that counts as full rank. For rolling rows it is about the spread of the wheel directions in
+  /// rad; below it the velocity that the rows cannot tell is taken as zero.
   double rank_tolerance = 0.01;
   /// Standard deviation of what the rows cannot tell, per unit of the scaled twist [m/s].
   double unobserved_sigma_m_per_s = 0.1;
@@ -64,59 +64,93 @@ class TwistSolver {
   void set_intrinsics(const Intrinsics& x_WI);
 
   /// Twist, residual, sensitivity and covariance. kRejected: the model refuses the sample or the
-  /// result is not finite.
+  /// result is not finite. Keeps a reference to `y` for the calls about the sample last solved.
   Status solve(const EncoderSample& y, TwistSolution& out);
 
   /// For the sample last solved: whitened squared parity residual (chi-square with n_rows - 3
   /// degrees of freedom for white noise of the stated size), and what add_parity() needs.
   double parity_chi2();
-  int parity_dof() const { return model_->n_rows() - parity_rank_; }
+  int parity_dof() const { return model_->n_rows() - weighted_.rank; }
 
   /// Adds `weight` times the sample last solved (after parity_chi2()). The Jacobian is that at the
   /// fitted signal (W-9).
   void add_parity(double weight, ParityInformation& out);
 
  private:
-  /// Maps from rows to the twist: plain or weighted least squares.
-  struct Gain {
-    Eigen::Matrix3d M_inv;      // (A^T W A)^-1, or its pseudo-inverse
-    Eigen::Matrix3d P_missing;  // covariance of what a rank-deficient sample cannot tell
-    Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxRows> A_plus;
+  // What has three entries gets a fourth lane, so that it is one register; the lane holds zero or
+  // what is said. Everything below is sized at run time within compile-time bounds.
+  using Lanes = Eigen::Vector4d;
+  using RowLanes = Eigen::Matrix<double, 4, Eigen::Dynamic, Eigen::ColMajor, 4, kMaxRows>;
+
+  /// Least squares of the rows (W-2), W = I or the inverse of the row noise.
+  struct Fit {
+    RowLanes WA;                        // column i: row i of W A; with noise weights W b below
+    Eigen::Matrix<double, 4, 3> M_inv;  // (A^T W A)^-1, or its pseudo-inverse (W-3)
+    Eigen::Matrix3d missing;            // sum of n n^T over the directions that A cannot tell
     int rank = 3;
+    Twist xi;
+    RowVector b, e;  // A xi, and what it leaves of the measured b
   };
 
-  void solve_plain();
-  void solve_weighted();
-  void factor(const Eigen::Matrix3d& M, Gain& gain) const;
-  void row_weights();
+  void fit_plain();
+  void fit_weighted(double rank_tolerance);
+  Twist nominal_twist() const;
+  template <int kSize>
+  Eigen::Matrix3d weigh_rows();
+  void factor(const Eigen::Matrix3d& M, double rank_tolerance, Fit& fit) const;
+  void solve(Fit& fit) const;
+  Twist least_squares(const Fit& fit, const RowVector& b) const;
+  void set_residual(Fit& fit) const;
+  void set_gain(const Fit& fit);
+  template <int kSize>
+  void twist_jacobian(const Fit& fit, IntrinsicJacobian& J_xi_WI) const;
+  template <int kSize>
+  void twist_covariance(const Fit& fit, Eigen::Matrix3d& P_xi) const;
+  template <int kSize>
+  void weigh_jacobian();
+  template <int kSize>
+  void add_information(double weight, ParityInformation& out) const;
+
+  /// kSize if that is known, else what the model says.
+  template <int kSize>
+  int block_size() const {
+    return kSize == Eigen::Dynamic ? model_->description().noise_block : kSize;
+  }
+  /// Row i of A, and b in the fourth lane.
+  Lanes row(int i) const { return {rows_.A(i, 0), rows_.A(i, 1), rows_.A(i, 2), rows_.b[i]}; }
+  /// Sum of map.col(i) J[i] over whole blocks of rows.
+  template <int kSize>
+  Lanes sum_rows(const RowLanes& map, const double* J, RowRange rows) const {
+    const int size = block_size<kSize>();
+    Lanes sum = Lanes::Zero();
+    for (int i0 = rows.first; i0 < rows.first + rows.count; i0 += size) {
+      for (int i = i0; i < i0 + size; ++i) sum += J[i] * map.col(i);
+    }
+    return sum;
+  }
 
   std::shared_ptr<const WheelModel> model_;
   TwistOptions options_;
+  std::vector<RowRange> intrinsic_rows_, noise_rows_;  // widened to whole noise blocks
+  std::vector<std::vector<int>> block_noises_;         // sources that enter each noise block
+  NoiseVector variance_;
   Intrinsics x_WI_;
-  bool A_is_current_ = false;  // A in rows_ and plain_ are those of x_WI_, for any sample
+  bool A_is_current_ = false;  // A in rows_, and the gain of the plain fit, are those of x_WI_
 
-  EncoderSample y_;
-  Twist xi_;
-  RowSystem rows_;
-  RowVector e_;
-  Gain plain_, weighted_;
+  Intrinsics nominal_;
+  bool nominal_A_is_current_ = false;  // A in nominal_rows_ is that of nominal_
+
+  const EncoderSample* y_ = nullptr;
+  RowSystem rows_, nominal_rows_;
+  Fit plain_, weighted_;
+  RowLanes A_plus_;                              // column i: what row i gives to the twist
+  Eigen::Matrix<double, kMaxRows, kMaxRows> W_;  // block by block: rows i.. begin at (0, i)
+  RowVector We_;                                 // of the weighted fit
+  double weighted_chi2_ = 0.;
   IntrinsicDerivatives by_x_;
   NoiseDerivatives by_n_;
-  NoiseVector variance_;
-  // Row noise covariance and its inverse, block by block (block b at column b * size).
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxRows, kMaxRows> R_, W_;
-
-  // Fitted solution for the parity residual.
-  Twist xi_w_;
-  RowVector e_w_, b_fit_;
-  Eigen::Matrix3d M_w_;
-  int parity_rank_ = 3;
-  IntrinsicDerivatives by_x_fit_;
-  RowJacobian WJ_;
-  struct BlockColumn {
-    int column, first, count;  // first: row inside the block
-  };
-  std::vector<std::vector<BlockColumn>> block_columns_;
+  // W J of the parity residual; only what the noise blocks of a column touch is ever written.
+  Eigen::Matrix<double, kMaxRows, kMaxIntrinsics, Eigen::RowMajor> WJ_;
 };
 
 }  // namespace viwo

@@ -1,0 +1,208 @@
+// Results: files, reproducibility, and what happens when they cannot be written. Also: every
+// configuration that is delivered loads.
+#include <algorithm>
+#include <set>
+#include <sstream>
+
+#include "support.hpp"
+
+namespace viwo {
+namespace {
+
+namespace fs = std::filesystem;
+
+using ResultsTest = CommandLineTest;
+
+const std::string kConfigs = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/";
+
+std::vector<std::string> fields_of(const std::string& line) {
+  std::vector<std::string> fields;
+  std::istringstream text(line);
+  for (std::string field; std::getline(text, field, ',');) fields.push_back(field);
+  return fields;
+}
+
+/// runs.csv without the columns that tell how long something took.
+std::string without_wall_clock(const std::string& csv) {
+  std::istringstream text(csv);
+  std::string line, result;
+  std::vector<std::string> header;
+  while (std::getline(text, line)) {
+    const std::vector<std::string> fields = fields_of(line);
+    if (header.empty()) header = fields;
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+      const std::string& name = header.at(i);
+      if (name.find("wall") != std::string::npos || name.find("realtime") != std::string::npos ||
+          name.find("_ms") != std::string::npos || name.find("rss") != std::string::npos) {
+        continue;
+      }
+      result += fields[i] + ",";
+    }
+    result += "\n";
+  }
+  return result;
+}
+
+TEST_F(ResultsTest, AreTheFilesOfTheContract) {
+  write("run.yaml", kRun);
+  const Outcome outcome = expect_done({"run", "run.yaml", "--out", "out"});
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_EQ(outcome.out.find("status ok\n"), 0U) << outcome.out;
+  std::set<std::string> files;
+  for (const auto& entry : fs::directory_iterator(at("out"))) {
+    files.insert(entry.path().filename().string());
+  }
+  EXPECT_EQ(files, (std::set<std::string>{"config.resolved.yaml", "trajectory.tum", "reference.tum",
+                                          "calibration.csv", "timing.csv", "summary.json",
+                                          "report.html"}));
+  const nlohmann::json json = summary();
+  EXPECT_EQ(json.at("status"), "ok");
+  EXPECT_EQ(json.at("seed"), 1);
+  EXPECT_DOUBLE_EQ(json.at("duration_s").get<double>(), 5.);
+  for (const char* key : {"epochs", "wall_s", "accuracy", "calibration", "updates", "timing_ms",
+                          "realtime_factor", "peak_rss_mb"}) {
+    EXPECT_TRUE(json.contains(key)) << key;
+  }
+}
+
+TEST_F(ResultsTest, GoToAFolderNamedAfterTheConfigurationByDefault) {
+  write("run.yaml", kRun);
+  expect_done({"run", "run.yaml"});
+  EXPECT_TRUE(fs::exists(at("results/run/report.html")));
+}
+
+TEST_F(ResultsTest, AreTheSameForTheSameSeedAndOthersForAnother) {
+  write("run.yaml", kRun);
+  for (const auto& [folder, seed] : {std::pair{"a", "7"}, {"b", "7"}, {"c", "8"}}) {
+    expect_done({"run", "run.yaml", "--out", folder, "--seed", seed});
+  }
+  EXPECT_EQ(read("a/trajectory.tum"), read("b/trajectory.tum"));
+  EXPECT_NE(read("a/trajectory.tum"), read("c/trajectory.tum"));
+  EXPECT_EQ(summary("c").at("seed"), 8);
+}
+
+TEST_F(ResultsTest, HoldTheConfigurationThatReproducesThem) {
+  write("run.yaml", kRun);
+  expect_done({"run", "run.yaml", "--out", "a", "--seed", "7", "--set", "odometry.epoch_s=0.25"});
+  expect_done({"run", "a/config.resolved.yaml", "--out", "b"});
+  EXPECT_EQ(read("a/trajectory.tum"), read("b/trajectory.tum"));
+  EXPECT_EQ(read("a/config.resolved.yaml"), read("b/config.resolved.yaml"));
+}
+
+TEST_F(ResultsTest, OfAnExperimentDoNotDependOnTheNumberOfJobs) {
+  write("run.yaml", replaced(kRun, "motion: circle", "motion: \"{motion}\""));
+  write("e.yaml",
+        "experiment: e\nbase: run.yaml\nseeds: 3\nmotions: [circle, straight, icr_sweep]\n"
+        "variants:\n  redundant:\n  drive: {kinematics.type: four_wis_wid_drive_only}\n");
+  expect_done({"experiment", "e.yaml", "--out", "one", "--jobs", "1"});
+  expect_done({"experiment", "e.yaml", "--out", "two", "--jobs", "2"});
+  const std::string one = without_wall_clock(read("one/runs.csv"));
+  EXPECT_EQ(one, without_wall_clock(read("two/runs.csv")));
+  EXPECT_EQ(std::count(one.begin(), one.end(), '\n'), 1 + 2 * 3 * 3);
+  // What is left after the wall clock is taken out still tells runs apart.
+  std::istringstream rows(one);
+  std::set<std::string> different;
+  for (std::string row; std::getline(rows, row);) different.insert(row);
+  EXPECT_EQ(different.size(), 1U + 2 * 3 * 3);
+}
+
+TEST_F(ResultsTest, OfEachRunAreKeptOnRequest) {
+  write("run.yaml", kRun);
+  write("e.yaml", "experiment: e\nbase: run.yaml\nvariants:\n  a:\n  b:\n");
+  expect_done({"experiment", "e.yaml", "--out", "out", "--keep-runs", "--seeds", "2"});
+  for (const char* run : {"a_1", "a_2", "b_1", "b_2"}) {
+    EXPECT_TRUE(fs::exists(at("out/runs") / run / "trajectory.tum")) << run;
+  }
+  EXPECT_EQ(read("out/runs/a_1/trajectory.tum"), read("out/runs/b_1/trajectory.tum"));
+}
+
+TEST_F(ResultsTest, ThatCannotBeWrittenAreAFailure) {
+  write("run.yaml", kRun);
+  const auto fail = [&](const std::string& out, const std::string& message) {
+    const Outcome outcome = viwo({"run", "run.yaml", "--out", out});
+    EXPECT_EQ(outcome.code, 1) << out;
+    EXPECT_EQ(outcome.err, message + "\n");
+  };
+  fail("run.yaml", "cannot create the folder run.yaml: Not a directory");
+  fail("run.yaml/sub", "cannot create the folder run.yaml/sub: Not a directory");
+  fs::create_directories(at("blocked/report.html"));
+  fail("blocked", "cannot write report 'blocked/report.html': Is a directory");
+}
+
+TEST_F(ResultsTest, AreAFailureOnAFullDisk) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  write("run.yaml", kRun);
+  for (const char* file :
+       {"config.resolved.yaml", "trajectory.tum", "summary.json", "report.html"}) {
+    fs::remove_all(at("full"));
+    fs::create_directory(at("full"));
+    fs::create_symlink("/dev/full", at("full") / file);
+    const Outcome outcome = viwo({"run", "run.yaml", "--out", "full"});
+    EXPECT_EQ(outcome.code, 1) << file;
+    EXPECT_NE(outcome.err.find(std::string("full/") + file), std::string::npos) << outcome.err;
+    EXPECT_EQ(outcome.out, "") << "claims success";
+  }
+}
+
+TEST_F(ResultsTest, AreWrittenForARunThatDiverges) {
+  write("run.yaml", kRun);
+  expect_done({"simulate", "run.yaml", "--out", "log"});
+  std::string text = read("log/wheels0/data.csv");
+  const std::size_t row = text.find("\n1000000000,") + 1;
+  ASSERT_NE(row, 0U);
+  const std::size_t field = text.find(',', row) + 1;
+  text.replace(field, text.find(',', field) - field, "1e308");
+  write("log/wheels0/data.csv", text);
+  const std::string robot = kRun.substr(kRun.find("      type: four_wis_wid"));
+  write("log.yaml", "sensors:\n  wheels0: {type: asl_encoders, path: log/wheels0}\nkinematics:\n" +
+                        robot.substr(0, robot.find("    duration_s")));
+  const Outcome outcome = viwo({"run", "log.yaml", "--out", "out"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(outcome.out.find("status diverged: "), 0U) << outcome.out;
+  EXPECT_EQ(summary().at("status"), "diverged");
+  EXPECT_TRUE(fs::exists(at("out/report.html")));
+}
+
+TEST_F(ResultsTest, OfTheDeliveredSimulatedConfigurations) {
+  expect_done({"run", kConfigs + "runs/simulated_swerve.yaml", "--out", "run"});
+  EXPECT_EQ(summary("run").at("status"), "ok");
+  expect_done({"experiment", kConfigs + "experiments/demo.yaml", "--seeds", "1", "--out", "demo"});
+  const nlohmann::json variants = summary("demo").at("variants");
+  for (const char* variant : {"drive_only", "redundant", "redundant_weighted"}) {
+    EXPECT_TRUE(variants.contains(variant)) << variant;
+  }
+  expect_done({"calibrate", kConfigs + "calibrations/simulated_swerve.yaml", "--out", "calibrated",
+               "--set", "sensors.simulator0.duration_s=20"});
+  EXPECT_TRUE(fs::exists(at("calibrated/calibration.yaml")));
+}
+
+TEST_F(ResultsTest, OfTheDeliveredConfigurationsForTheRecordings) {
+  const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/4wis4wid";
+  if (!fs::exists(data)) GTEST_SKIP() << "the recordings are not here";
+  const std::string set = "placeholders.data=" + fs::canonical(data).string();
+  expect_done({"run", kConfigs + "runs/recording.yaml", "--out", "run", "--set", set});
+  for (const char* name : {"nominal_dead_reckoning", "three_models"}) {
+    expect_done(
+        {"experiment", kConfigs + "experiments/" + name + ".yaml", "--out", name, "--set", set});
+  }
+  expect_done({"calibrate", kConfigs + "calibrations/recordings.yaml", "--out", "calibrated",
+               "--set", set});
+}
+
+TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
+  std::set<std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(kConfigs)) {
+    if (entry.path().extension() == ".yaml") {
+      files.insert(fs::relative(entry.path(), kConfigs).string());
+    }
+  }
+  EXPECT_EQ(files, (std::set<std::string>{
+                       "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
+                       "experiments/demo.yaml", "experiments/nominal_dead_reckoning.yaml",
+                       "experiments/three_models.yaml", "runs/recording.yaml",
+                       "runs/simulated_swerve.yaml"}))
+      << "name the new file in a test above";
+}
+
+}  // namespace
+}  // namespace viwo
