@@ -128,9 +128,11 @@ TEST(Placeholders, ComeFromTheLabelsThenFromTheRunItself) {
   EXPECT_EQ(resolve_placeholders(run, {{"b", "7"}}).find("x")->scalar(), "1/7");
   EXPECT_EQ(resolve_placeholders(run).find("x")->scalar(), "1/2");
   EXPECT_EQ(error_of([&] {
-              resolve_placeholders(config::parse("x: '{aa}'\nplaceholders: {a: 1}\n", "run.yaml"));
+              resolve_placeholders(
+                  config::parse("x: '{recordng}'\nplaceholders: {recording: 1}\n", "run.yaml"));
             }),
-            "run.yaml:1:4  unknown placeholder '{aa}' in '{aa}' - did you mean 'a'?");
+            "run.yaml:1:4  unknown placeholder '{recordng}' in '{recordng}' - did you mean "
+            "'recording'?");
 }
 
 }  // namespace

@@ -42,8 +42,9 @@ std::string nearest(std::string_view name, std::span<const std::string> candidat
   std::size_t best_distance = kFar;
   for (const std::string& candidate : candidates) {
     const std::size_t d = distance(name, candidate);
-    // Half of a word replaced is another word.
-    if (d >= best_distance || 2 * d >= std::max(name.size(), candidate.size())) continue;
+    // Two slips in a short word make another word, one slip in a single letter too.
+    const std::size_t size = std::max(name.size(), candidate.size());
+    if (d >= best_distance || (d == 1 ? size < 2 : 2 * d >= size)) continue;
     best = candidate;
     best_distance = d;
   }

@@ -127,7 +127,7 @@ Preintegrator::Preintegrator(std::shared_ptr<const WheelModel> model,
 bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64_t begin_ns,
                               std::int64_t end_ns, PreintegratedPose& out) {
   out.reset(solver_.model().n_intrinsics());
-  has_believed_ = false;
+  if (begin_ns != reached_ns_) has_believed_ = false;
   const auto after_begin = [&](const EncoderSample& sample) { return sample.end_ns <= begin_ns; };
   const auto first = std::partition_point(samples.begin(), samples.end(), after_begin);
   std::int64_t reached_ns = begin_ns;
@@ -169,6 +169,7 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
     }
     reached_ns = to_ns;
   }
+  reached_ns_ = reached_ns;
   return covered && reached_ns >= end_ns && out.samples > 0;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -58,7 +59,8 @@ class Preintegrator {
   /// Motion from begin_ns to end_ns in the wheel clock. The samples that the ends fall into are cut
   /// there, with the readings interpolated to the middle of the piece; holes between cells are
   /// bridged with the mean of their neighbours. Returns false, with the part that is covered, when
-  /// the samples do not reach over the whole interval.
+  /// the samples do not reach over the whole interval. What is not believed at the start of an
+  /// interval that continues the one before is bridged from there.
   bool integrate(std::span<const EncoderSample> samples, std::int64_t begin_ns, std::int64_t end_ns,
                  PreintegratedPose& out);
 
@@ -79,6 +81,7 @@ class Preintegrator {
   std::array<TwistSolution, 2> solutions_;  // of this sample, and the last one that passed
   std::size_t believed_ = 0;                // index of the latter
   bool has_believed_ = false;
+  std::int64_t reached_ns_ = std::numeric_limits<std::int64_t>::min();  // end of the last interval
   Eigen::Matrix3d last_gain_;  // d g / d xi of the last piece, for correlated neighbours
 };
 
