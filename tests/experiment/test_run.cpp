@@ -38,7 +38,7 @@ TEST(RunConfiguration, ReportsEverythingThatIsWrongAtOnce) {
   EXPECT_THAT(text,
               HasSubstr("run.yaml:2:19  odometry.twist: unknown value 'weighted' - known: auto, "
                         "plain, noise_weighted"));
-  EXPECT_THAT(text, HasSubstr("odometry.epoch_s: -1 violates epoch_s > 0"));
+  EXPECT_THAT(text, HasSubstr("odometry.epoch_s: -1 violates epoch_s >= 0.001"));
   EXPECT_THAT(text, HasSubstr("did you mean 'planar_simulator'?"));
 }
 
@@ -48,7 +48,8 @@ TEST(RunConfiguration, NamesBothCountsWhenTheRobotHasOtherWheels) {
                  "radius_m: 0.0255}"});
   auto setup = read_run(run, registry());
   EXPECT_EQ(error_of([&] { collect(setup); }),
-            "sensors.simulator0 has 4 drive and 4 steering channels, but the kinematic model has 3 "
+            "--set kinematics  sensors.simulator0 has 4 drive and 4 steering channels, but the "
+            "kinematic model has 3 "
             "driven and 3 steered wheels");
 }
 
@@ -57,7 +58,8 @@ TEST(RunConfiguration, TakesEncoderSamplesFromOneSensor) {
   run.find("sensors")->set("other", *run.at_path("sensors.simulator0"));
   auto setup = read_run(run, registry());
   EXPECT_EQ(error_of([&] { collect(setup); }),
-            "both 'simulator0' and 'other' give encoder samples: a run takes them from one sensor");
+            "run.yaml:2:3  both 'simulator0' and 'other' give encoder samples: a run takes them "
+            "from one sensor");
 }
 
 TEST(RunConfiguration, ItsResolvedFormIsAConfigurationWithTheSameResult) {

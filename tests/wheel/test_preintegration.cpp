@@ -301,6 +301,38 @@ TEST(Preintegration, BridgesAHoleAndSaysHowLong) {
   EXPECT_LT((holed.g - whole.g).norm(), 1e-4);
 }
 
+TEST(Preintegration, BridgesIntervalsThatBeginOrLieInAHole) {
+  const auto model = load_model(swerve("four_wis_wid"));
+  auto samples = sample_motion(*model, wavy, 1., 100.);
+  samples.erase(samples.begin() + 40, samples.begin() + 60);
+  Preintegrator preintegrator(model, {});
+  PreintegratedPose whole, total, part;
+  ASSERT_TRUE(preintegrator.integrate(samples, 0, kSecond, whole));
+  total.reset(16);
+  for (int k = 0; k < 20; ++k) {
+    ASSERT_TRUE(preintegrator.integrate(samples, k * kSecond / 20, (k + 1) * kSecond / 20, part));
+    append(total, part);
+  }
+  EXPECT_NEAR(total.bridged_s, 0.2, 1e-12);
+  EXPECT_NEAR(total.duration_s, 1., 1e-12);
+  EXPECT_EQ(total.samples, 80);
+  EXPECT_LT((total.g - whole.g).norm(), 1e-12);
+}
+
+TEST(Preintegration, CountsEverySampleOnceOverIntervalsThatCutThem) {
+  const auto model = load_model(swerve("four_wis_wid"));
+  const auto samples = sample_motion(*model, wavy, 1., 100.);
+  Preintegrator preintegrator(model, {});
+  PreintegratedPose part;
+  std::int64_t count = 0;
+  for (int k = 0; k < 30; ++k) {
+    const auto at = [](int i) { return static_cast<std::int64_t>(i) * kSecond / 30; };
+    ASSERT_TRUE(preintegrator.integrate(samples, at(k), at(k + 1), part));
+    count += part.samples;
+  }
+  EXPECT_EQ(count, 100);
+}
+
 TEST(Preintegration, DoesNotBelieveASlippingWheel) {
   const auto model = load_model(swerve("four_wis_wid"));
   const auto clean = sample_motion(*model, wavy, 1., 100.);

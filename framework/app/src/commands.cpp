@@ -53,7 +53,7 @@ int experiment_command(const Arguments& arguments) {
             << result.runs.size() << " runs in " << significant(result.wall_s, 3)
             << " s; report: " << (folder / "report.html").string() << "\n";
   for (const ExperimentRun& run : result.runs) {
-    if (run.result.status == RunStatus::kFailed) return 1;
+    if (run.result.status != RunStatus::kOk) return 1;
   }
   return 0;
 }

@@ -131,9 +131,9 @@ report::Table parameter_table(const CalibrationResult& result) {
   report::Table table;
   table.columns = {{"parameter"},
                    {"unit"},
-                   {"nominal", {report::NumberFormat::Style::kFixed, 5}},
-                   {"estimate", {report::NumberFormat::Style::kFixed, 5}},
-                   {"sigma", {report::NumberFormat::Style::kFixed, 5}},
+                   {"nominal", {report::NumberFormat::Style::kSignificant, 6}},
+                   {"estimate", {report::NumberFormat::Style::kSignificant, 6}},
+                   {"sigma", {report::NumberFormat::Style::kSignificant, 3}},
                    {"change / prior sigma", {report::NumberFormat::Style::kFixed, 2}}};
   const auto& specs = model_of(result).description().intrinsics;
   for (std::size_t i = 0; i < specs.size(); ++i) {

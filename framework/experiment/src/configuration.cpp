@@ -97,12 +97,25 @@ std::vector<Recording> read_recordings(const Node& section) {
       if (!item.is_scalar()) config::fail(item.mark(), "a motion is a name");
       recording.labels = {{"motion", recording.name}};
     }
+    require_file_name(recording.name, item.mark());
     if (!names.insert(recording.name).second) {
       config::fail(item.mark(), "'" + recording.name + "' is in this list twice");
     }
     result.push_back(std::move(recording));
   }
   return result;
+}
+
+void require_file_name(const std::string& name, const config::Mark& mark) {
+  constexpr std::string_view kAllowed =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+.";
+  if (!name.empty() && name.front() != '.' &&
+      name.find_first_not_of(kAllowed) == std::string::npos) {
+    return;
+  }
+  config::fail(mark, "'" + name +
+                         "' must be usable as a file name: letters, digits, '_', '-', '+' "
+                         "and '.'");
 }
 
 Node load_base(const Node& configuration, const std::vector<std::string>& assignments) {

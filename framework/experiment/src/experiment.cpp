@@ -45,6 +45,7 @@ void read_variants(const Node& file, ExperimentSetup& setup) {
       config::fail(entry.value.mark(),
                    "variant '" + entry.key + "' must be a section of overrides");
     }
+    require_file_name(entry.key, entry.key_mark);
     setup.variants.push_back({entry.key, entry.value});
   }
 }

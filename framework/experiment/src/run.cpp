@@ -56,8 +56,7 @@ constexpr std::array kOdometryParams{
               .type = ParamType::kNumber,
               .unit = "s",
               .fallback = "0.1",
-              .min = 0.,
-              .min_exclusive = true,
+              .min = 0.001,
               .help = "time between two poses of the estimate"},
     ParamSpec{.name = "reference_time_offset_s",
               .type = ParamType::kNumber,
@@ -99,6 +98,7 @@ void read_sensors(const Node& run, PluginRegistry& plugins, RunSetup& setup,
                "'sensors' must be a section that names at least one sensor");
     return;
   }
+  setup.sensors_mark = sensors->mark();
   Node resolved = Node::empty_map(sensors->mark());
   std::uint64_t index = 0;
   for (const auto& entry : sensors->entries()) {
@@ -118,6 +118,7 @@ void read_kinematics(const Node& run, PluginRegistry& plugins, RunSetup& setup,
     errors.add(run.mark(), "'kinematics' is missing: the section of the kinematic model");
     return;
   }
+  setup.kinematics_mark = section->mark();
   constexpr std::string_view kHostKeys[] = {"calibration"};
   setup.kinematics = plugins.make_kinematics(*section, "kinematics", errors, kHostKeys);
   if (!setup.kinematics.object) return;
@@ -206,14 +207,28 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
   return setup;
 }
 
+namespace {
+
+/// The model's complaint about the channels of a sensor, at the position of the model.
+void require_channels(const RunSetup& setup, const EncoderSample& sample,
+                      const std::string& sensor) {
+  try {
+    setup.model->require_channels(sample, "sensors." + sensor);
+  } catch (const InputError& error) {
+    config::fail(setup.kinematics_mark, error.what());
+  }
+}
+
+}  // namespace
+
 RunData collect(RunSetup& setup) {
   RunData data;
   std::string reference_name;
-  const auto claim = [](std::string& owner, const std::string& sensor, const char* what) {
+  const auto claim = [&setup](std::string& owner, const std::string& sensor, const char* what) {
     if (owner.empty()) owner = sensor;
     if (owner != sensor) {
-      throw InputError("both '" + owner + "' and '" + sensor + "' give " + what +
-                       ": a run takes them from one sensor");
+      config::fail(setup.sensors_mark, "both '" + owner + "' and '" + sensor + "' give " + what +
+                                           ": a run takes them from one sensor");
     }
   };
   for (auto& [name, sensor] : setup.sensors) {
@@ -222,7 +237,7 @@ RunData collect(RunSetup& setup) {
       while (sensor.object->next(measurement) == Status::kOk) {
         if (const auto* encoders = std::get_if<EncoderSample>(&measurement)) {
           claim(data.wheels_name, name, "encoder samples");
-          if (data.samples.empty()) setup.model->require_channels(*encoders, "sensors." + name);
+          if (data.samples.empty()) require_channels(setup, *encoders, name);
           data.samples.push_back(*encoders);
         } else if (const auto* pose = std::get_if<PoseSample>(&measurement)) {
           claim(reference_name, name, "reference poses");
@@ -240,7 +255,7 @@ RunData collect(RunSetup& setup) {
     });
   }
   if (data.samples.empty()) {
-    throw InputError("no sensor of this run gave encoder samples");
+    config::fail(setup.sensors_mark, "no sensor of this run gave encoder samples");
   }
   return data;
 }
@@ -370,6 +385,10 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   result.wall_s = wall.count();
   result.duration_s = seconds_between(stamps.front(), stamps.back());
   result.preintegration_ms = stage_time(result.epoch_ms);
+  if (result.status == RunStatus::kOk && result.total.rejected >= result.total.samples) {
+    result.status = RunStatus::kFailed;
+    result.cause = "none of the encoder samples could be used";
+  }
   if (result.status == RunStatus::kOk && !data.reference.empty()) {
     result.accuracy = eval::evaluate(data.reference, result.estimate, setup.evaluation);
     result.nees_planar = nees.mean();

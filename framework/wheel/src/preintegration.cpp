@@ -134,19 +134,23 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   bool covered = true;
   // The piece before: how much of its own sample and of the one after went into it.
   double previous_own = 0., previous_next = 0.;
-  for (auto k = static_cast<std::size_t>(first - samples.begin());
-       k < samples.size() && samples[k].begin_ns < end_ns; ++k) {
+  // A hole between cells: the mean of its neighbours, a piece of its own.
+  const auto bridge_hole = [&](std::size_t next, std::int64_t until_ns) {
+    const double dt = seconds_between(reached_ns, until_ns);
+    add_piece(blend(samples[next - 1], samples[next], 0.5), dt, {}, out);
+    out.bridged_s += dt;
+    --out.samples;
+    previous_own = previous_next = 0.;
+    reached_ns = until_ns;
+  };
+  auto k = static_cast<std::size_t>(first - samples.begin());
+  for (; k < samples.size() && samples[k].begin_ns < end_ns; ++k) {
     const EncoderSample& sample = samples[k];
     if (sample.begin_ns > reached_ns) {
-      if (out.samples == 0) {
-        covered = false;
+      if (k > 0) {
+        bridge_hole(k, sample.begin_ns);
       } else {
-        // A hole: the mean of its neighbours, a piece of its own.
-        const double dt = seconds_between(reached_ns, sample.begin_ns);
-        add_piece(blend(samples[k - 1], sample, 0.5), dt, {}, out);
-        out.bridged_s += dt;
-        --out.samples;
-        previous_own = previous_next = 0.;
+        covered = false;
       }
     }
     const std::int64_t from_ns = std::max(sample.begin_ns, begin_ns);
@@ -166,11 +170,14 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
                 out);
       previous_own = own;
       previous_next = weight > 0. ? share : 0.;
+      // A sample that is cut counts where its stamp is.
+      if (sample.t_ns < from_ns || sample.t_ns >= to_ns) --out.samples;
     }
     reached_ns = to_ns;
   }
+  if (reached_ns < end_ns && k > 0 && k < samples.size()) bridge_hole(k, end_ns);
   reached_ns_ = reached_ns;
-  return covered && reached_ns >= end_ns && out.samples > 0;
+  return covered && reached_ns >= end_ns;
 }
 
 void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise noise,

@@ -36,4 +36,8 @@ std::vector<Recording> read_recordings(const config::Node& section);
 config::Node load_base(const config::Node& configuration,
                        const std::vector<std::string>& assignments);
 
+/// Throws InputError unless `name` can be a file name: letters, digits, '_', '-', '+', '.', not
+/// first.
+void require_file_name(const std::string& name, const config::Mark& mark);
+
 }  // namespace viwo::experiment

@@ -34,6 +34,7 @@ struct RunSetup {
   double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
   double reference_max_gap_s = 0.5;
   eval::Options evaluation;
+  config::Mark kinematics_mark, sensors_mark;  ///< where the sections are written
   config::Node resolved;  ///< all of it, with defaults: a valid run configuration
 };
 

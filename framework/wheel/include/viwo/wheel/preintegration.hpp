@@ -35,7 +35,7 @@ struct PreintegratedPose {
   double duration_s = 0.;     ///< time integrated
   double path_length_m = 0.;  ///< integral of the speed of O
   double bridged_s = 0.;      ///< part without believable samples, bridged from the neighbours
-  std::int64_t samples = 0;   ///< samples used (a cut sample counts in both intervals)
+  std::int64_t samples = 0;   ///< samples whose stamp lies in the interval
   std::int64_t gated = 0;     ///< samples not believed for their parity residual
   std::int64_t rejected = 0;  ///< samples that the model or the solver refused
   std::int64_t rank_deficient = 0;  ///< samples whose rows do not tell the whole twist
