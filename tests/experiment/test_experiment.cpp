@@ -115,6 +115,13 @@ TEST_F(ExperimentFile, SaysWhatIsWrongWithItsAxes) {
   EXPECT_EQ(error(head + "recordings: [{repetition: 1}]\nvariants: {a: }\n"),
             "experiment.yaml:3:14  this recording has none of 'name', 'recording' and 'motion' to "
             "be called by");
+  EXPECT_EQ(error(head + "report_by: [motoin]\nmotions: [circle]\nvariants: {a: }\n"),
+            "experiment.yaml:3:12  report_by: no recording has the label 'motoin' - did you mean "
+            "'motion'?");
+  EXPECT_EQ(
+      error(head + "variants: {../a: }\n"),
+      "experiment.yaml:3:12  '../a' must be usable as a file name: letters, digits, '_', '-', "
+      "'+' and '.'");
   EXPECT_EQ(error(head + "variants: {a: 5}\n"),
             "experiment.yaml:3:15  variant 'a' must be a section of overrides");
   EXPECT_EQ(

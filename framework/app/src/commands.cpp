@@ -31,8 +31,10 @@ RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
 int run_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
-  const RunResult result = run_odometry(setup, collect(setup));
+  const RunData data = collect(setup);
   const auto folder = out_folder(arguments);
+  make_folder(folder);  // whether results can be written shows before the work
+  const RunResult result = run_odometry(setup, data);
   write_run(folder, setup, result);
   std::cout << describe(result) << "report: " << (folder / "report.html").string() << "\n";
   return result.status == RunStatus::kOk ? 0 : 1;
@@ -62,8 +64,9 @@ int calibrate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   const CalibrationSetup setup =
       read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
-  const CalibrationResult result = calibrate(setup);
   const auto folder = out_folder(arguments);
+  make_folder(folder);
+  const CalibrationResult result = calibrate(setup);
   write_calibration(folder, result);
   std::cout << describe(result) << "\ncalibration: " << (folder / "calibration.yaml").string()
             << "\nreport: " << (folder / "report.html").string() << "\n";

@@ -93,10 +93,13 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   const auto report_by = params.texts("report_by");
   setup.report_by.assign(report_by.begin(), report_by.end());
   const Node base = load_base(file, assignments);
-  for (const Recording& recording : read_recordings(file)) {
+  const std::vector<Recording> recordings = read_recordings(file);
+  require_labels(setup.report_by, recordings, file, "report_by");
+  for (const Recording& recording : recordings) {
     if (!setup.leave_out_by.empty() && !recording.labels.contains(setup.leave_out_by)) {
-      throw InputError(path.string() + ": recording '" + recording.name + "' has no label '" +
-                       setup.leave_out_by + "', by which leave_out_by divides them");
+      config::fail(file.find("leave_out_by")->mark(), "recording '" + recording.name +
+                                                          "' has no label '" + setup.leave_out_by +
+                                                          "', by which leave_out_by divides them");
     }
     RunSetup run = read_run(resolve_placeholders(base, recording.labels), plugins);
     RunData data = collect(run);

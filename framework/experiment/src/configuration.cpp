@@ -3,6 +3,7 @@
 #include <set>
 
 #include "viwo/config/overrides.hpp"
+#include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
 
 namespace viwo::experiment {
@@ -104,6 +105,23 @@ std::vector<Recording> read_recordings(const Node& section) {
     result.push_back(std::move(recording));
   }
   return result;
+}
+
+void require_labels(const std::vector<std::string>& labels,
+                    const std::vector<Recording>& recordings, const Node& configuration,
+                    const char* key) {
+  std::set<std::string> known;
+  for (const Recording& recording : recordings) {
+    for (const auto& [label, value] : recording.labels) known.insert(label);
+  }
+  const std::vector<std::string> candidates(known.begin(), known.end());
+  for (const std::string& label : labels) {
+    if (known.contains(label)) continue;
+    const Node* where = configuration.find(key);
+    config::fail(where != nullptr ? where->mark() : configuration.mark(),
+                 std::string(key) + ": no recording has the label '" + label + "'" +
+                     config::did_you_mean(label, candidates));
+  }
 }
 
 void require_file_name(const std::string& name, const config::Mark& mark) {

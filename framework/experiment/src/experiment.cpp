@@ -98,6 +98,7 @@ ExperimentSetup read_experiment(const std::filesystem::path& path,
   setup.report_by.assign(report_by.begin(), report_by.end());
   setup.base = load_base(file, options.assignments);
   setup.recordings = read_recordings(file);
+  require_labels(setup.report_by, setup.recordings, file, "report_by");
   read_variants(file, setup);
   return setup;
 }
@@ -118,6 +119,8 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
       }
     }
   }
+  // Whether results can be written shows before the work, too.
+  if (!folder.empty()) make_folder(folder);
   const auto begin = std::chrono::steady_clock::now();
   const int jobs = options.jobs > 0 ? options.jobs : tbb::this_task_arena::max_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,

@@ -36,6 +36,11 @@ std::vector<Recording> read_recordings(const config::Node& section);
 config::Node load_base(const config::Node& configuration,
                        const std::vector<std::string>& assignments);
 
+/// Throws InputError at `key` of `configuration` when no recording has one of the labels.
+void require_labels(const std::vector<std::string>& labels,
+                    const std::vector<Recording>& recordings, const config::Node& configuration,
+                    const char* key);
+
 /// Throws InputError unless `name` can be a file name: letters, digits, '_', '-', '+', '.', not
 /// first.
 void require_file_name(const std::string& name, const config::Mark& mark);
