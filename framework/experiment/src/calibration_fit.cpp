@@ -146,9 +146,7 @@ class Fit {
   CalibrationPoint point(std::size_t k) const { return prior_.point(shared_.data(), clock_[k]); }
 
   void set_noise() {
-    for (std::size_t k = 0; k < problems_.size(); ++k) {
-      problems_[k]->set_noise(estimate_.noise);
-    }
+    for (const auto& problem : problems_) problem->set_noise(estimate_.noise);
   }
 
   void solve() {

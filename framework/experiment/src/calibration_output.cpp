@@ -262,7 +262,7 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
                             {}};
   document.sections.push_back({"Parameters", {parameter_table(result)}});
   for (const auto& direction : estimate.undetermined) {
-    document.sections.back().blocks.push_back(report::Paragraph{
+    document.sections.back().blocks.emplace_back(report::Paragraph{
         "Not determined by the data (sigma is " + significant(direction.sigma_ratio, 2) +
             " of the prior's): " + direction_text(direction),
         report::Paragraph::Tone::kNote});

@@ -237,11 +237,11 @@ void write_experiment(const std::filesystem::path& folder, const ExperimentResul
                                 std::to_string(result.setup.seeds) + " seeds",
                             {{"Summary", {}}}};
   for (const Group& group : groups_of(result)) {
-    document.sections[0].blocks.push_back(table_of(result, group));
+    document.sections[0].blocks.emplace_back(table_of(result, group));
   }
   for (const ExperimentRun& run : result.runs) {
     if (run.result.status == RunStatus::kOk) continue;
-    document.sections[0].blocks.push_back(
+    document.sections[0].blocks.emplace_back(
         report::Paragraph{result.setup.variants[run.variant].name + " " +
                               result.setup.recordings[run.recording].name + ": " + run.result.cause,
                           report::Paragraph::Tone::kWarning});

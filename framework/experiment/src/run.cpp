@@ -231,7 +231,9 @@ RunData collect(RunSetup& setup) {
                                            ": a run takes them from one sensor");
     }
   };
-  for (auto& [name, sensor] : setup.sensors) {
+  for (auto& entry : setup.sensors) {
+    const std::string& name = entry.first;
+    const Loaded<Sensor>& sensor = entry.second;
     guarded(sensor.info, "next", [&] {
       Measurement measurement;
       while (sensor.object->next(measurement) == Status::kOk) {

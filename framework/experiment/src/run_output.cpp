@@ -67,7 +67,7 @@ report::Document document_of(const RunSetup& setup, const RunResult& result) {
   }
   document.sections.push_back({"Result", {facts}});
   for (const std::string& line : describe_rejections(result)) {
-    document.sections.back().blocks.push_back(Paragraph{line, Paragraph::Tone::kWarning});
+    document.sections.back().blocks.emplace_back(Paragraph{line, Paragraph::Tone::kWarning});
   }
   Plot top{"Trajectory, seen from above", "x [m]", "y [m]"};
   top.equal_axes = true;
@@ -82,7 +82,7 @@ report::Document document_of(const RunSetup& setup, const RunResult& result) {
     Plot error{"Position error", "path length [m]", "error [mm]"};
     error.half_width = true;
     error.series.push_back(error_series("estimate", *result.accuracy));
-    document.sections.back().blocks.push_back(error);
+    document.sections.back().blocks.emplace_back(error);
   }
   document.sections.push_back(
       {"Configuration", {Paragraph{"The resolved configuration is in config.resolved.yaml."}}});

@@ -9,7 +9,8 @@ namespace viwo::experiment {
 SimulateResult write_log(RunSetup& setup, const std::filesystem::path& folder) {
   // Read first: a sensor whose input is wrong must leave nothing behind.
   std::vector<Measurement> measurements;
-  for (auto& [name, sensor] : setup.sensors) {
+  for (auto& entry : setup.sensors) {
+    const Loaded<Sensor>& sensor = entry.second;
     guarded(sensor.info, "next", [&] {
       Measurement measurement;
       while (sensor.object->next(measurement) == Status::kOk) measurements.push_back(measurement);
