@@ -4,7 +4,8 @@
 #include <stdexcept>
 
 #include <Eigen/Cholesky>
-#include <boost/math/distributions/chi_squared.hpp>
+
+#include "viwo/math/chi2.hpp"
 
 namespace viwo::eval {
 
@@ -21,7 +22,7 @@ double nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& cov) {
 double chi2_quantile(double p, double dof) {
   if (!(p >= 0. && p < 1.)) throw std::invalid_argument("chi2_quantile: p must be in [0, 1)");
   if (!(dof > 0.)) throw std::invalid_argument("chi2_quantile: dof must be positive");
-  return boost::math::quantile(boost::math::chi_squared(dof), p);
+  return viwo::chi2_quantile(p, dof);
 }
 
 NeesBounds mean_nees_bounds(int dof, int runs, double confidence) {

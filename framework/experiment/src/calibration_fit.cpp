@@ -52,14 +52,11 @@ struct Prior {
   }
 };
 
-enum class Kind { kPose, kParity };
-
-/// Residuals of one kind of one recording, for the solver.
+/// Residuals of one recording, poses over parity, for the solver.
 class RecordingCost final : public ceres::CostFunction {
  public:
-  RecordingCost(RecordingProblem& problem, const Prior& prior, Kind kind)
-      : problem_(problem), prior_(prior), kind_(kind) {
-    set_num_residuals(kind == Kind::kPose ? problem.n_pose() : problem.n_parity());
+  RecordingCost(RecordingProblem& problem, const Prior& prior) : problem_(problem), prior_(prior) {
+    set_num_residuals(problem.n_pose() + problem.n_parity());
     *mutable_parameter_block_sizes() = {prior.n_shared(), 1};
   }
 
@@ -67,13 +64,14 @@ class RecordingCost final : public ceres::CostFunction {
                 double** jacobians) const override {
     RecordingResiduals at;
     problem_.evaluate(prior_.point(parameters[0], parameters[1][0]), jacobians != nullptr, at);
-    const Eigen::VectorXd& r = kind_ == Kind::kPose ? at.pose : at.parity;
-    Eigen::Map<Eigen::VectorXd>(residuals, r.size()) = r;
+    Eigen::Map<Eigen::VectorXd> r(residuals, num_residuals());
+    r << at.pose, at.parity;
     if (jacobians == nullptr) return r.allFinite();
-    const Eigen::MatrixXd J =
-        (kind_ == Kind::kPose ? at.J_pose : at.J_parity) * prior_.scale().asDiagonal();
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const int n = prior_.n_shared();
+    Eigen::MatrixXd J(r.size(), n + 1);
+    J << at.J_pose, at.J_parity;
+    J *= prior_.scale().asDiagonal();
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     if (jacobians[0] != nullptr) {
       Eigen::Map<RowMajor>(jacobians[0], r.size(), n) = J.leftCols(n);
     }
@@ -84,7 +82,6 @@ class RecordingCost final : public ceres::CostFunction {
  private:
   RecordingProblem& problem_;
   const Prior& prior_;
-  Kind kind_;
 };
 
 /// The prior of scaled unknowns: r = u.
@@ -152,12 +149,8 @@ class Fit {
   void solve() {
     ceres::Problem problem;
     for (std::size_t k = 0; k < problems_.size(); ++k) {
-      problem.AddResidualBlock(new RecordingCost(*problems_[k], prior_, Kind::kPose), nullptr,
-                               shared_.data(), &clock_[k]);
-      if (setup_.options.parity) {
-        problem.AddResidualBlock(new RecordingCost(*problems_[k], prior_, Kind::kParity), nullptr,
-                                 shared_.data(), &clock_[k]);
-      }
+      problem.AddResidualBlock(new RecordingCost(*problems_[k], prior_), nullptr, shared_.data(),
+                               &clock_[k]);
       problem.AddResidualBlock(new PriorCost(1), nullptr, &clock_[k]);
     }
     problem.AddResidualBlock(new PriorCost(prior_.n_shared()), nullptr, shared_.data());

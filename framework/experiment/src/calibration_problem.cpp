@@ -73,9 +73,6 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
   }
   if (ends.size() < 2) throw InputError(where + ": the reference has gaps at all segment ends");
   for (std::size_t k = 1; k < ends.size(); ++k) {
-    const auto planar = [](const StampedPose& pose) {
-      return Eigen::Vector3d(yaw(pose), pose.p_BinW.x(), pose.p_BinW.y());
-    };
     reference_.push_back(between(planar(ends[k - 1]), planar(ends[k])));
   }
   for (auto* segments : {&segments_, &later_, &earlier_}) segments->resize(reference_.size());

@@ -17,8 +17,9 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// A number of a run that tables show; NaN where a run has none.
 struct Metric {
-  const char* key;      ///< in summary.json and runs.csv
+  const char* key;      ///< in summary.json and runs.csv, in SI units
   const char* heading;  ///< of a table
+  double table_scale;   ///< from SI to the unit of the table
   double (*of)(const RunResult&);
 };
 
@@ -31,19 +32,19 @@ double rpe(const RunResult& run, double length_m, bool degrees) {
 }
 
 const Metric kMetrics[] = {
-    {"end_m", "end [mm]",
-     [](const RunResult& r) { return r.accuracy ? 1e3 * r.accuracy->end_m : kNan; }},
-    {"end_yaw_abs_rad", "end yaw [rad]",
+    {"end_m", "end [mm]", 1e3,
+     [](const RunResult& r) { return r.accuracy ? r.accuracy->end_m : kNan; }},
+    {"end_yaw_abs_rad", "end yaw [rad]", 1.,
      [](const RunResult& r) {
        return r.accuracy ? std::abs(r.accuracy->end_yaw_deg) * M_PI / 180. : kNan;
      }},
-    {"ate_m", "ATE [mm]",
-     [](const RunResult& r) { return r.accuracy ? 1e3 * r.accuracy->ate_m : kNan; }},
-    {"ate_deg", "ATE [deg]",
+    {"ate_m", "ATE [mm]", 1e3,
+     [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_m : kNan; }},
+    {"ate_deg", "ATE [deg]", 1.,
      [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_deg : kNan; }},
-    {"rpe_10_m", "RPE 10 m [mm]", [](const RunResult& r) { return 1e3 * rpe(r, 10., false); }},
-    {"rpe_10_deg", "RPE 10 m [deg]", [](const RunResult& r) { return rpe(r, 10., true); }},
-    {"nees_planar", "NEES (3)", [](const RunResult& r) { return r.nees_planar; }},
+    {"rpe_10_m", "RPE 10 m [mm]", 1e3, [](const RunResult& r) { return rpe(r, 10., false); }},
+    {"rpe_10_deg", "RPE 10 m [deg]", 1., [](const RunResult& r) { return rpe(r, 10., true); }},
+    {"nees_planar", "NEES (3)", 1., [](const RunResult& r) { return r.nees_planar; }},
 };
 
 using Filter = std::function<bool(const ExperimentRun&)>;
@@ -58,6 +59,12 @@ std::vector<double> values_of(const ExperimentResult& result, std::size_t varian
     if (std::isfinite(value)) values.push_back(value);
   }
   return values;
+}
+
+/// Mean in the unit of the table.
+double table_mean(const ExperimentResult& result, std::size_t variant, const Metric& metric,
+                  const Filter& passes) {
+  return metric.table_scale * eval::mean(values_of(result, variant, metric, passes));
 }
 
 struct Group {
@@ -131,13 +138,11 @@ json summary_of(const ExperimentResult& result) {
     entry["nees_pose_median"] = nullptr;
     entry["calibration"] = json::object();
     for (const Metric& metric : kMetrics) {
-      // Tables are in mm, files in SI units.
-      const double scale = std::string_view(metric.key).ends_with("_m") ? 1e-3 : 1.;
       const auto values = values_of(result, v, metric, all);
       entry["metrics"][metric.key] = {
-          {"mean", number_or_null(scale * eval::mean(values))},
-          {"median", number_or_null(scale * eval::median(values))},
-          {"std", number_or_null(scale * eval::sample_standard_deviation(values))}};
+          {"mean", number_or_null(eval::mean(values))},
+          {"median", number_or_null(eval::median(values))},
+          {"std", number_or_null(eval::sample_standard_deviation(values))}};
     }
     variants[result.setup.variants[v].name] = entry;
   }
@@ -157,9 +162,8 @@ std::string runs_csv(const ExperimentResult& result) {
         << ',' << run.result.total.samples << ',' << run.result.total.rank_deficient << ','
         << run.result.total.gated;
     for (const Metric& metric : kMetrics) {
-      const double scale = std::string_view(metric.key).ends_with("_m") ? 1e-3 : 1.;
       csv << ',';
-      if (const double value = scale * metric.of(run.result); std::isfinite(value)) csv << value;
+      if (const double value = metric.of(run.result); std::isfinite(value)) csv << value;
     }
     csv << '\n';
   }
@@ -185,7 +189,7 @@ report::Table table_of(const ExperimentResult& result, const Group& group) {
     row.emplace_back(static_cast<double>(count_not_ok(result, v)));
     for (const Metric& metric : kMetrics) {
       if (!has_values(result, metric)) continue;
-      row.emplace_back(eval::mean(values_of(result, v, metric, group.passes)));
+      row.emplace_back(table_mean(result, v, metric, group.passes));
     }
     table.rows.push_back(std::move(row));
   }
@@ -272,7 +276,7 @@ std::string describe(const ExperimentResult& result) {
       cell(std::to_string(count_not_ok(result, v)), 6);
       for (const Metric& metric : kMetrics) {
         if (!has_values(result, metric)) continue;
-        cell(significant(eval::mean(values_of(result, v, metric, group.passes)), 4), 14);
+        cell(significant(table_mean(result, v, metric, group.passes), 4), 14);
       }
       out << "\n";
     }

@@ -32,6 +32,11 @@ inline double yaw(const Eigen::Quaterniond& q_BtoW) {
 
 inline double yaw(const StampedPose& pose) { return yaw(pose.q_BtoW); }
 
+/// [yaw, x, y] of B in W, as in se2.hpp.
+inline Eigen::Vector3d planar(const StampedPose& pose) {
+  return {yaw(pose), pose.p_BinW.x(), pose.p_BinW.y()};
+}
+
 /// The pose at `t_ns`: linear in position, slerp in orientation. Nothing outside of the trajectory,
 /// and nothing between two poses that are more than `max_gap_s` apart.
 inline std::optional<StampedPose> interpolate(const Trajectory& trajectory, std::int64_t t_ns,

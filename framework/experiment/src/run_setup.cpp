@@ -1,0 +1,189 @@
+// Reading a run configuration.
+#include <array>
+
+#include "calibration_file.hpp"
+#include "viwo/config/params.hpp"
+#include "viwo/experiment/run.hpp"
+
+namespace viwo::experiment {
+namespace {
+
+using config::Node;
+
+constexpr std::array kRunParams{
+    ParamSpec{.name = "name",
+              .type = ParamType::kString,
+              .fallback = "run",
+              .help = "what tables and pages call this run"},
+    ParamSpec{.name = "seed",
+              .type = ParamType::kInt,
+              .fallback = "1",
+              .min = 0.,
+              .help = "seed of everything random"},
+};
+
+constexpr std::array kOdometryParams{
+    ParamSpec{.name = "twist",
+              .type = ParamType::kString,
+              .fallback = "auto",
+              .choices = "auto|plain|noise_weighted",
+              .help = "rows of the model weighted equally or by their noise; auto: as the "
+                      "calibration file was fitted, plain without one"},
+    ParamSpec{.name = "rank_tolerance",
+              .type = ParamType::kNumber,
+              .fallback = "0.01",
+              .min = 0.,
+              .max = 1.,
+              .min_exclusive = true,
+              .help = "rows whose directions spread less [rad] do not tell the velocity across"},
+    ParamSpec{.name = "parity_gate_probability",
+              .type = ParamType::kNumber,
+              .fallback = "0",
+              .min = 0.,
+              .max = 0.5,
+              .help = "samples whose parity residual is less likely than this are not believed; 0: "
+                      "no gate"},
+    ParamSpec{.name = "epoch_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0.1",
+              .min = 0.001,
+              .help = "time between two poses of the estimate"},
+    ParamSpec{.name = "reference_time_offset_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0",
+              .min = -10.,
+              .max = 10.,
+              .help = "t_reference = t_wheel + offset"},
+};
+
+constexpr std::array kEvaluationParams{
+    ParamSpec{.name = "segment_lengths_m",
+              .type = ParamType::kNumbers,
+              .unit = "m",
+              .fallback = "[10, 25]",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "path lengths of the relative pose error"},
+    ParamSpec{.name = "reference_max_gap_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0.5",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "longest gap of the reference that is interpolated over"},
+};
+
+/// The section `key`, or an empty one at the position of the whole.
+Node section_or_empty(const Node& run, const char* key) {
+  const Node* section = run.find(key);
+  return section != nullptr ? *section : Node::empty_map(run.mark());
+}
+
+void read_sensors(const Node& run, PluginRegistry& plugins, RunSetup& setup,
+                  config::Errors& errors) {
+  const Node* sensors = run.find("sensors");
+  if (sensors == nullptr || !sensors->is_map() || sensors->entries().empty()) {
+    errors.add(sensors != nullptr ? sensors->mark() : run.mark(),
+               "'sensors' must be a section that names at least one sensor");
+    return;
+  }
+  setup.sensors_mark = sensors->mark();
+  Node resolved = Node::empty_map(sensors->mark());
+  std::uint64_t index = 0;
+  for (const auto& entry : sensors->entries()) {
+    // Sensors of one run have seeds of their own; the same sensor keeps its own in every variant.
+    const std::uint64_t seed = setup.seed * 1000 + index++;
+    auto loaded = plugins.make_sensor(entry.value, "sensors." + entry.key, seed, errors);
+    resolved.set(entry.key, loaded.resolved, entry.key_mark);
+    if (loaded.object) setup.sensors.emplace_back(entry.key, std::move(loaded));
+  }
+  setup.resolved.set("sensors", resolved);
+}
+
+void read_kinematics(const Node& run, PluginRegistry& plugins, RunSetup& setup,
+                     config::Errors& errors) {
+  const Node* section = run.find("kinematics");
+  if (section == nullptr) {
+    errors.add(run.mark(), "'kinematics' is missing: the section of the kinematic model");
+    return;
+  }
+  setup.kinematics_mark = section->mark();
+  constexpr std::string_view kHostKeys[] = {"calibration"};
+  setup.kinematics = plugins.make_kinematics(*section, "kinematics", errors, kHostKeys);
+  if (!setup.kinematics.object) return;
+  setup.model = guarded(setup.kinematics.info, "describe", [&] {
+    return std::make_shared<const WheelModel>(setup.kinematics.object);
+  });
+  setup.x_WI = setup.model->nominal();
+  setup.sigma = setup.model->prior_sigma();
+  Node resolved = setup.kinematics.resolved;
+  if (const Node* file = section->find("calibration")) {
+    if (!file->is_scalar()) {
+      errors.add(file->mark(), "kinematics.calibration must be the path of a calibration.yaml");
+      return;
+    }
+    const auto path = std::filesystem::absolute(
+        std::filesystem::path(file->mark().line > 0 ? file->mark().file : "").parent_path() /
+        file->scalar());
+    const CalibrationFile calibration =
+        read_calibration(path, *setup.model, setup.kinematics.info.name);
+    setup.x_WI = calibration.x_WI;
+    setup.sigma = calibration.sigma;
+    setup.extrinsics = calibration.extrinsics;
+    setup.preintegration.twist.noise_weighted = calibration.twist == "noise_weighted";
+    resolved.set("calibration", Node::scalar_of(path.lexically_normal().string()));
+  }
+  setup.resolved.set("kinematics", resolved);
+}
+
+void read_options(const Node& run, RunSetup& setup, config::Errors& errors) {
+  const Node odometry = section_or_empty(run, "odometry");
+  const Node evaluation = section_or_empty(run, "evaluation");
+  const std::size_t before = errors.size();
+  const ParamSet o =
+      config::read_params(odometry, odometry.mark(), "odometry", kOdometryParams, {}, {}, errors);
+  const ParamSet e = config::read_params(evaluation, evaluation.mark(), "evaluation",
+                                         kEvaluationParams, {}, {}, errors);
+  if (errors.size() > before) return;
+  if (o.text("twist") != "auto") {
+    setup.preintegration.twist.noise_weighted = o.text("twist") == "noise_weighted";
+  }
+  setup.preintegration.twist.rank_tolerance = o.number("rank_tolerance");
+  setup.preintegration.parity_gate_probability = o.number("parity_gate_probability");
+  setup.preintegration.parity = false;
+  setup.epoch_s = o.number("epoch_s");
+  setup.reference_time_offset_s = o.number("reference_time_offset_s");
+  const auto lengths = e.numbers("segment_lengths_m");
+  setup.evaluation.segment_lengths_m.assign(lengths.begin(), lengths.end());
+  setup.evaluation.max_reference_gap_s = e.number("reference_max_gap_s");
+  setup.reference_max_gap_s = e.number("reference_max_gap_s");
+  setup.resolved.set("odometry", config::write_params(kOdometryParams, o));
+  setup.resolved.set("evaluation", config::write_params(kEvaluationParams, e));
+}
+
+}  // namespace
+
+RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed) {
+  RunSetup setup;
+  config::Errors errors;
+  constexpr std::string_view kSections[] = {"sensors", "kinematics", "odometry", "evaluation"};
+  const ParamSet top =
+      config::read_params(run, run.mark(), "run", kRunParams, kSections, {}, errors);
+  if (errors.empty()) {
+    setup.name = top.text("name");
+    setup.seed = seed.value_or(static_cast<std::uint64_t>(top.integer("seed")));
+    setup.resolved = config::write_params(kRunParams, top);
+    setup.resolved.set("seed", Node::scalar_of(std::to_string(setup.seed)));
+  } else {
+    setup.resolved = Node::empty_map();
+  }
+  read_kinematics(run, plugins, setup, errors);
+  read_options(run, setup, errors);
+  read_sensors(run, plugins, setup, errors);
+  errors.throw_if_any();
+  return setup;
+}
+
+}  // namespace viwo::experiment
