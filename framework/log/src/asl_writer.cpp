@@ -65,6 +65,10 @@ struct AslWriter::Tables {
 
   void write(const EncoderSample& sample);
   void write(const PoseSample& pose);
+  template <class Other>
+  void write(const Other&) {
+    throw std::logic_error("this kind of measurement has no table yet");
+  }
 };
 
 void AslWriter::Tables::write(const EncoderSample& sample) {

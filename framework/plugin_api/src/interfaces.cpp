@@ -2,6 +2,7 @@
 #include "viwo/api/kinematic_model.hpp"
 #include "viwo/api/sensor.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/api/update.hpp"
 
 namespace viwo {
 
@@ -19,8 +20,16 @@ Status KinematicModel::inverse(const Twist& /*xi*/, const Intrinsics& /*x_WI*/,
   return Status::kUnsupported;
 }
 
+Status KinematicModel::move_frame(const Eigen::Vector3d& /*g*/, Intrinsics& /*x_WI*/) const {
+  return Status::kUnsupported;
+}
+
 Sensor::~Sensor() = default;
 
 void Sensor::rejections(std::vector<RejectionCount>& /*out*/) const {}
+
+Update::~Update() = default;
+
+void Update::rejections(std::vector<RejectionCount>& /*out*/) const {}
 
 }  // namespace viwo

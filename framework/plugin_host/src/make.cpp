@@ -156,4 +156,10 @@ Loaded<Sensor> PluginRegistry::make_sensor(const Node& section, const std::strin
   return make<Sensor>(section, path, seed, other_keys, errors);
 }
 
+Loaded<Update> PluginRegistry::make_update(const Node& section, const std::string& path,
+                                           Errors& errors,
+                                           std::span<const std::string_view> other_keys) {
+  return make<Update>(section, path, 0, other_keys, errors);
+}
+
 }  // namespace viwo

@@ -135,6 +135,11 @@ class VIWO_API KinematicModel {
   /// like that.
   virtual Status inverse(const Twist& xi, const Intrinsics& x_WI, const RowVector& slip,
                          EncoderSample& y) const;
+
+  /// Rewrites the intrinsics of a base for another odometry frame O' on it. `g` = [yaw, x, y] is
+  /// the pose of O' in O. Evaluation needs it to compare an estimate, made with the gauge entries
+  /// held, with a truth in which they differ. kUnsupported: the frame is fixed by the model itself.
+  virtual Status move_frame(const Eigen::Vector3d& g, Intrinsics& x_WI) const;
 };
 
 }  // namespace viwo

@@ -1,10 +1,12 @@
-// Measurements: what sensors yield. Plain data of fixed size; times are integer nanoseconds so that
-// a log plays back to the same bits.
+// Measurements: what sensors yield. Plain data; times are integer nanoseconds so that a log plays
+// back to the same bits.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <variant>
+#include <vector>
 
 namespace viwo {
 
@@ -35,6 +37,28 @@ struct EncoderSample {
   std::array<double, kMaxSteers> steer_rad{};  ///< steering angles, counter-clockwise positive
 };
 
+/// One reading of an inertial measurement unit.
+struct ImuSample {
+  std::int64_t t_ns = 0;                   ///< stamp in the IMU clock, the clock of the filter
+  std::array<double, 3> gyro_rad_per_s{};  ///< angular rate of I in I
+  std::array<double, 3> accel_m_per_s2{};  ///< specific force in I: R_GtoI (a_I + [0 0 g])
+};
+
+/// One point of an image. The same `id` in later images, and in other cameras, is the same
+/// landmark.
+struct FeaturePoint {
+  std::int64_t id = 0;
+  double u_px = 0.;  ///< to the right, as measured (with distortion)
+  double v_px = 0.;  ///< down
+};
+
+/// All tracked points of one image.
+struct FeatureSample {
+  std::int64_t t_ns = 0;             ///< stamp in the IMU clock
+  int camera = 0;                    ///< index in the configuration's list of cameras
+  std::vector<FeaturePoint> points;  ///< ids are unique within a sample
+};
+
 /// A pose from a reference system (motion capture, simulator truth): body B in world W.
 struct PoseSample {
   std::int64_t t_ns = 0;                              ///< stamp in the clock of the reference
@@ -42,8 +66,27 @@ struct PoseSample {
   std::array<double, 4> q_BtoW_xyzw{0., 0., 0., 1.};  ///< Hamilton quaternion, unit norm
 };
 
+/// The whole inertial state from a reference system: true pose of I in G, velocity and biases.
+struct StateSample {
+  std::int64_t t_ns = 0;                              ///< stamp in the IMU clock
+  std::array<double, 4> q_ItoG_xyzw{0., 0., 0., 1.};  ///< Hamilton quaternion, unit norm
+  std::array<double, 3> p_IinG_m{};
+  std::array<double, 3> v_IinG_m_per_s{};
+  std::array<double, 3> gyro_bias_rad_per_s{};
+  std::array<double, 3> accel_bias_m_per_s2{};
+};
+
+/// True value of one calibration parameter, from a simulator. Names are those of the estimate:
+/// "r_1", "p_IinO_x", "t_OtoI", ... (docs/conventions.md).
+struct CalibrationSample {
+  std::int64_t t_ns = 0;
+  std::string name;
+  double value = 0.;
+};
+
 /// One timestamped datum of any sensor.
-using Measurement = std::variant<EncoderSample, PoseSample>;
+using Measurement = std::variant<EncoderSample, PoseSample, ImuSample, FeatureSample, StateSample,
+                                 CalibrationSample>;
 
 inline std::int64_t stamp_ns(const Measurement& measurement) {
   return std::visit([](const auto& sample) { return sample.t_ns; }, measurement);

@@ -15,6 +15,7 @@
 #include "viwo/api/params.hpp"
 #include "viwo/api/sensor.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/api/update.hpp"
 
 namespace viwo {
 
@@ -33,14 +34,15 @@ struct PluginDescriptor {
   std::uint32_t struct_size;
   std::uint32_t api_version;
   const char* build_record;
-  const char* kind;  ///< "kinematics", "sensor"
+  const char* kind;  ///< "kinematics", "sensor", "update"
   const char* name;  ///< what a configuration writes as `type:`
   const char* version;
   const char* summary;
   const char* license;
   const ParamSpec* params;
   std::uint32_t n_params;
-  /// Returns the interface pointer (KinematicModel*, Sensor*) as void*, or nullptr with `error`.
+  /// Returns the interface pointer (KinematicModel*, Sensor*, Update*) as void*, or nullptr with
+  /// `error`.
   void* (*create)(const ParamSet* params, const HostServices* services, ErrorText* error) noexcept;
   void (*destroy)(void* object) noexcept;
 };
@@ -56,6 +58,10 @@ struct PluginKind<KinematicModel> {
 template <>
 struct PluginKind<Sensor> {
   static constexpr const char* kName = "sensor";
+};
+template <>
+struct PluginKind<Update> {
+  static constexpr const char* kName = "update";
 };
 
 template <std::size_t N>
@@ -95,9 +101,10 @@ void destroy_plugin(void* object) noexcept {
 }  // namespace detail
 }  // namespace viwo
 
-/// Registers the one plugin of a library. Interface: KinematicModel or Sensor; Implementation: a
-/// class derived from it with a constructor (const ParamSet&, const HostServices&); params: a
-/// constexpr array of ParamSpec. The symbol is strong: a second registration does not link.
+/// Registers the one plugin of a library. Interface: KinematicModel, Sensor or Update;
+/// Implementation: a class derived from it with a constructor (const ParamSet&, const
+/// HostServices&); params: a constexpr array of ParamSpec. The symbol is strong: a second
+/// registration does not link.
 #define VIWO_REGISTER(Interface, Implementation, plugin_name, plugin_version, plugin_summary, \
                       plugin_license, plugin_params)                                          \
   extern "C" VIWO_API const ::viwo::PluginDescriptor viwo_plugin;                             \

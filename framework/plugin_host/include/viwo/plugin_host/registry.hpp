@@ -17,6 +17,7 @@
 #include "viwo/api/kinematic_model.hpp"
 #include "viwo/api/params.hpp"
 #include "viwo/api/sensor.hpp"
+#include "viwo/api/update.hpp"
 #include "viwo/config/errors.hpp"
 #include "viwo/config/node.hpp"
 #include "viwo/plugin_host/plugin_info.hpp"
@@ -81,6 +82,11 @@ class PluginRegistry {
   /// The same for a sensor; `seed` is for its random numbers.
   Loaded<Sensor> make_sensor(const config::Node& section, const std::string& path,
                              std::uint64_t seed, config::Errors& errors,
+                             std::span<const std::string_view> other_keys = {});
+
+  /// The same for an update.
+  Loaded<Update> make_update(const config::Node& section, const std::string& path,
+                             config::Errors& errors,
                              std::span<const std::string_view> other_keys = {});
 
  private:

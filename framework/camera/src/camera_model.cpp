@@ -1,0 +1,150 @@
+#include "viwo/camera/camera_model.hpp"
+
+#include <cmath>
+
+namespace viwo {
+namespace {
+
+/// Distorted point of the plane z = 1, as a function of p_C, with derivatives by p_C and by the
+/// four distortion coefficients.
+struct Distorted {
+  Eigen::Vector2d xy;
+  Eigen::Matrix<double, 2, 3> J_point;
+  Eigen::Matrix<double, 2, 4> J_coefficients;
+};
+
+bool distort_radtan(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out) {
+  if (!(p_C.z() > 1e-9)) return false;
+  const double k1 = camera.intrinsics[4], k2 = camera.intrinsics[5];
+  const double p1 = camera.intrinsics[6], p2 = camera.intrinsics[7];
+  const double inverse_z = 1. / p_C.z();
+  const double x = p_C.x() * inverse_z, y = p_C.y() * inverse_z;
+  const double r2 = x * x + y * y;
+  const double radial = 1. + r2 * (k1 + r2 * k2);
+  const double radial_slope = 2. * (k1 + 2. * k2 * r2);  // d radial / d x = radial_slope * x
+  if (!(radial + r2 * radial_slope > 0.)) return false;  // folds back
+  out.xy << x * radial + 2. * p1 * x * y + p2 * (r2 + 2. * x * x),
+      y * radial + p1 * (r2 + 2. * y * y) + 2. * p2 * x * y;
+  Eigen::Matrix2d J;
+  J << radial + x * x * radial_slope + 2. * p1 * y + 6. * p2 * x,
+      x * y * radial_slope + 2. * p1 * x + 2. * p2 * y,
+      x * y * radial_slope + 2. * p1 * x + 2. * p2 * y,
+      radial + y * y * radial_slope + 6. * p1 * y + 2. * p2 * x;
+  out.J_point.leftCols<2>() = J * inverse_z;
+  out.J_point.col(2) = -inverse_z * (J.col(0) * x + J.col(1) * y);
+  out.J_coefficients << x * r2, x * r2 * r2, 2. * x * y, r2 + 2. * x * x,  //
+      y * r2, y * r2 * r2, r2 + 2. * y * y, 2. * x * y;
+  return true;
+}
+
+bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out) {
+  const double k1 = camera.intrinsics[4], k2 = camera.intrinsics[5];
+  const double k3 = camera.intrinsics[6], k4 = camera.intrinsics[7];
+  const Eigen::Vector2d a = p_C.head<2>();
+  const double z = p_C.z();
+  const double a2 = a.squaredNorm();
+  const double n2 = a2 + z * z;
+  if (a2 < 1e-18 * n2) {
+    if (!(z > 0.)) return false;
+    out.xy = a / z;
+    out.J_point << 1. / z, 0., -a.x() / (z * z), 0., 1. / z, -a.y() / (z * z);
+    out.J_coefficients.setZero();
+    return true;
+  }
+  const double r = std::sqrt(a2);
+  const double theta = std::atan2(r, z);
+  const double t2 = theta * theta;
+  const double polynomial = 1. + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)));
+  const double slope = 1. + t2 * (3. * k1 + t2 * (5. * k2 + t2 * (7. * k3 + t2 * 9. * k4)));
+  if (!(slope > 0.) || theta > 3.14) return false;  // folds back
+  const double d = theta * polynomial;
+  const Eigen::Vector2d direction = a / r;
+  out.xy = d * direction;
+  // xy = d(theta) a / r with d theta / d a = z a / (r n2), d theta / d z = -r / n2.
+  const double radial = slope * z / n2;
+  out.J_point.leftCols<2>() =
+      (d / r) * Eigen::Matrix2d::Identity() + (radial - d / r) * direction * direction.transpose();
+  out.J_point.col(2) = -slope * r / n2 * direction;
+  double power = theta;
+  for (int i = 0; i < 4; ++i) {
+    power *= t2;
+    out.J_coefficients.col(i) = power * direction;
+  }
+  return true;
+}
+
+bool distort(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out) {
+  return camera.distortion == CameraDistortion::kRadtan ? distort_radtan(camera, p_C, out)
+                                                        : distort_equidistant(camera, p_C, out);
+}
+
+Eigen::Vector2d to_pixels(const CameraView& camera, const Eigen::Vector2d& xy) {
+  return camera.intrinsics.head<2>().cwiseProduct(xy) + camera.intrinsics.segment<2>(2);
+}
+
+}  // namespace
+
+bool project(const CameraView& camera, const Eigen::Vector3d& p_C, Eigen::Vector2d& uv) {
+  Distorted distorted;
+  if (!distort(camera, p_C, distorted)) return false;
+  uv = to_pixels(camera, distorted.xy);
+  return true;
+}
+
+bool project(const CameraView& camera, const Eigen::Vector3d& p_C, Eigen::Vector2d& uv,
+             PixelJacobian& J_point, IntrinsicsJacobian* J_intrinsics) {
+  Distorted distorted;
+  if (!distort(camera, p_C, distorted)) return false;
+  uv = to_pixels(camera, distorted.xy);
+  const Eigen::Vector2d focal = camera.intrinsics.head<2>();
+  J_point = focal.asDiagonal() * distorted.J_point;
+  if (J_intrinsics != nullptr) {
+    J_intrinsics->leftCols<2>() = distorted.xy.asDiagonal();
+    J_intrinsics->middleCols<2>(2).setIdentity();
+    J_intrinsics->rightCols<4>() = focal.asDiagonal() * distorted.J_coefficients;
+  }
+  return true;
+}
+
+std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::Vector2d& uv) {
+  const Eigen::Vector2d target =
+      (uv - camera.intrinsics.segment<2>(2)).cwiseQuotient(camera.intrinsics.head<2>());
+  if (!target.allFinite()) return std::nullopt;
+  if (camera.distortion == CameraDistortion::kEquidistant) {
+    const double d = target.norm();
+    if (d < 1e-12) return Eigen::Vector3d(target.x(), target.y(), 1.).normalized();
+    double theta = d;
+    for (int i = 0; i < 20; ++i) {
+      const double t2 = theta * theta;
+      const auto k = camera.intrinsics.tail<4>();
+      const double value = theta * (1. + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
+      const double slope =
+          1. + t2 * (3. * k[0] + t2 * (5. * k[1] + t2 * (7. * k[2] + t2 * 9. * k[3])));
+      if (!(slope > 0.) || !(theta >= 0.) || theta > 3.14) return std::nullopt;
+      const double step = (value - d) / slope;
+      theta -= step;
+      if (std::abs(step) < 1e-14) break;
+      if (i == 19 && std::abs(step) > 1e-9) return std::nullopt;
+    }
+    const double s = std::sin(theta) / d;
+    return Eigen::Vector3d(s * target.x(), s * target.y(), std::cos(theta));
+  }
+  // Newton's method on the distortion, from the distorted point.
+  Eigen::Vector3d p_C(target.x(), target.y(), 1.);
+  Distorted distorted;
+  for (int i = 0; i < 30; ++i) {
+    if (!distort_radtan(camera, p_C, distorted)) return std::nullopt;
+    const Eigen::Matrix2d J = distorted.J_point.leftCols<2>();
+    const Eigen::Vector2d residual = distorted.xy - target;
+    const double determinant = J.determinant();
+    if (!(std::abs(determinant) > 1e-12)) return std::nullopt;
+    Eigen::Matrix2d inverse;
+    inverse << J(1, 1), -J(0, 1), -J(1, 0), J(0, 0);
+    const Eigen::Vector2d step = inverse * residual / determinant;
+    p_C.head<2>() -= step;
+    if (step.squaredNorm() < 1e-26) return p_C.normalized();
+  }
+  return distorted.xy.isApprox(target, 1e-9) ? std::optional(p_C.normalized()) : std::nullopt;
+}
+
+}  // namespace viwo
