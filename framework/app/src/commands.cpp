@@ -34,7 +34,7 @@ int run_command(const Arguments& arguments) {
   const RunData data = collect(setup);
   const auto folder = out_folder(arguments);
   make_folder(folder);  // whether results can be written shows before the work
-  const RunResult result = run_odometry(setup, data);
+  const RunResult result = experiment::run(setup, data);
   write_run(folder, setup, result);
   std::cout << describe(result) << "report: " << (folder / "report.html").string() << "\n";
   return result.status == RunStatus::kOk ? 0 : 1;

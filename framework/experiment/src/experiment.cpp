@@ -132,7 +132,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
       const Node configuration =
           configuration_of(setup, setup.variants[run.variant], setup.recordings[run.recording]);
       RunSetup run_setup = read_run(configuration, plugins, run.seed);
-      run.result = run_odometry(run_setup, collect(run_setup));
+      run.result = experiment::run(run_setup, collect(run_setup));
       if (options.keep_runs) {
         std::string name = run_setup.name;
         if (setup.seeds > 1) name += "_" + std::to_string(run.seed);

@@ -27,6 +27,16 @@ const char* name(RunStatus status) {
 
 namespace {
 
+Eigen::Quaterniond quaternion(const std::array<double, 4>& xyzw) {
+  return {xyzw[3], xyzw[0], xyzw[1], xyzw[2]};
+}
+
+StampedPose planar_pose(std::int64_t t_ns, const std::array<double, 3>& p,
+                        const Eigen::Quaterniond& q) {
+  const Eigen::AngleAxisd about_z(yaw(q), Eigen::Vector3d::UnitZ());
+  return {t_ns, {p[0], p[1], 0.}, Eigen::Quaterniond(about_z)};
+}
+
 /// The model's complaint about the channels of a sensor, at the position of the model.
 void require_channels(const RunSetup& setup, const EncoderSample& sample,
                       const std::string& sensor) {
@@ -41,7 +51,7 @@ void require_channels(const RunSetup& setup, const EncoderSample& sample,
 
 RunData collect(RunSetup& setup) {
   RunData data;
-  std::string reference_name;
+  std::string reference_name, imu_name, images_name;
   const auto claim = [&setup](std::string& owner, const std::string& sensor, const char* what) {
     if (owner.empty()) owner = sensor;
     if (owner != sensor) {
@@ -49,6 +59,8 @@ RunData collect(RunSetup& setup) {
                                            ": a run takes them from one sensor");
     }
   };
+  const std::string wheels_sensor =
+      setup.filter && !setup.filter->wheels.empty() ? setup.filter->wheels.front().sensor : "";
   for (auto& entry : setup.sensors) {
     const std::string& name = entry.first;
     const Loaded<Sensor>& sensor = entry.second;
@@ -56,17 +68,28 @@ RunData collect(RunSetup& setup) {
       Measurement measurement;
       while (sensor.object->next(measurement) == Status::kOk) {
         if (const auto* encoders = std::get_if<EncoderSample>(&measurement)) {
+          if (!wheels_sensor.empty() && name != wheels_sensor) {
+            data.other_wheels[name].push_back(*encoders);
+            continue;
+          }
           claim(data.wheels_name, name, "encoder samples");
-          if (data.samples.empty()) require_channels(setup, *encoders, name);
+          if (data.samples.empty() && setup.model) require_channels(setup, *encoders, name);
           data.samples.push_back(*encoders);
         } else if (const auto* pose = std::get_if<PoseSample>(&measurement)) {
           claim(reference_name, name, "reference poses");
-          const Eigen::Quaterniond q(pose->q_BtoW_xyzw[3], pose->q_BtoW_xyzw[0],
-                                     pose->q_BtoW_xyzw[1], pose->q_BtoW_xyzw[2]);
-          const Eigen::AngleAxisd about_z(yaw(q), Eigen::Vector3d::UnitZ());
-          data.reference.push_back({pose->t_ns,
-                                    {pose->p_BinW_m[0], pose->p_BinW_m[1], 0.},
-                                    Eigen::Quaterniond(about_z)});
+          data.reference.push_back(
+              planar_pose(pose->t_ns, pose->p_BinW_m, quaternion(pose->q_BtoW_xyzw)));
+        } else if (const auto* imu = std::get_if<ImuSample>(&measurement)) {
+          claim(imu_name, name, "IMU samples");
+          data.imu.push_back(*imu);
+        } else if (auto* image = std::get_if<FeatureSample>(&measurement)) {
+          claim(images_name, name, "images");
+          data.images.push_back(*image);
+        } else if (const auto* state = std::get_if<StateSample>(&measurement)) {
+          claim(reference_name, name, "reference states");
+          data.states.push_back(*state);
+        } else if (const auto* truth = std::get_if<CalibrationSample>(&measurement)) {
+          data.calibration[truth->name] = truth->value;
         }
       }
       std::vector<RejectionCount> rejections;
@@ -74,8 +97,17 @@ RunData collect(RunSetup& setup) {
       for (RejectionCount& rejection : rejections) data.rejections.emplace_back(name, rejection);
     });
   }
+  if (setup.filter) {
+    if (data.imu.empty())
+      config::fail(setup.sensors_mark, "no sensor of this run gave IMU samples");
+    return data;
+  }
   if (data.samples.empty()) {
     config::fail(setup.sensors_mark, "no sensor of this run gave encoder samples");
+  }
+  for (const StateSample& state : data.states) {
+    data.reference.push_back(
+        planar_pose(state.t_ns, state.p_IinG_m, quaternion(state.q_ItoG_xyzw)));
   }
   return data;
 }
@@ -112,19 +144,6 @@ std::vector<std::int64_t> epoch_stamps(const RunSetup& setup, const RunData& dat
   return stamps;
 }
 
-StageTime stage_time(const std::vector<std::pair<double, double>>& epoch_ms) {
-  StageTime stage;
-  if (epoch_ms.empty()) return stage;
-  std::vector<double> spent;
-  for (const auto& [t, ms] : epoch_ms) spent.push_back(ms);
-  std::sort(spent.begin(), spent.end());
-  stage.mean_ms =
-      std::accumulate(spent.begin(), spent.end(), 0.) / static_cast<double>(spent.size());
-  stage.p95_ms = spent[(spent.size() - 1) * 95 / 100];
-  stage.max_ms = spent.back();
-  return stage;
-}
-
 /// Mean over the epochs of the squared error of the odometry since the start, normalised by what
 /// encoder noise and the uncertainty of the intrinsics explain. The error is the logarithm of the
 /// estimate seen from the truth, in which the bent clouds of dead reckoning are nearly Gaussian.
@@ -149,6 +168,16 @@ class PlanarNees {
 };
 
 }  // namespace
+
+StageTime stage_time(std::vector<double> ms) {
+  StageTime stage;
+  if (ms.empty()) return stage;
+  stage.mean_ms = std::accumulate(ms.begin(), ms.end(), 0.) / static_cast<double>(ms.size());
+  std::sort(ms.begin(), ms.end());
+  stage.p95_ms = ms[(ms.size() - 1) * 95 / 100];
+  stage.max_ms = ms.back();
+  return stage;
+}
 
 RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   RunResult result;
@@ -200,7 +229,23 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - wall_begin;
   result.wall_s = wall.count();
   result.duration_s = seconds_between(stamps.front(), stamps.back());
-  result.preintegration_ms = stage_time(result.epoch_ms);
+  std::vector<double> spent_ms;
+  for (const auto& [t_s, ms] : result.epoch_ms) spent_ms.push_back(ms);
+  result.total_ms = stage_time(spent_ms);
+  result.stages = {{"preintegration", result.total_ms}};
+  // Nothing is estimated while running here: the same at the start and at the end.
+  result.calibration_t_s = {0., result.duration_s};
+  for (int i = 0; i < setup.model->n_intrinsics(); ++i) {
+    CalibrationTrack track;
+    track.name = setup.model->description().intrinsics[static_cast<std::size_t>(i)].name;
+    track.estimate.assign(2, setup.x_WI[i]);
+    track.sigma.assign(2, setup.sigma[i]);
+    if (const auto truth = data.calibration.find(track.name); truth != data.calibration.end()) {
+      track.truth = truth->second;
+      track.final_error = setup.x_WI[i] - truth->second;
+    }
+    result.calibration.push_back(std::move(track));
+  }
   if (result.status == RunStatus::kOk && result.total.rejected >= result.total.samples) {
     result.status = RunStatus::kFailed;
     result.cause = "none of the encoder samples could be used";

@@ -22,15 +22,16 @@ nlohmann::json stage_json(const StageTime& stage) {
   return {{"mean", stage.mean_ms}, {"p95", stage.p95_ms}, {"max", stage.max_ms}};
 }
 
-std::string calibration_csv(const RunSetup& setup, const RunResult& result) {
+std::string calibration_csv(const RunResult& result) {
   std::ostringstream csv;
   csv.precision(17);
   csv << "time_s,name,estimate,sigma,truth\n";
-  // Nothing is estimated while running here: one row per intrinsic, at the start and at the end.
-  for (const double t_s : {0., result.duration_s}) {
-    for (int i = 0; i < setup.model->n_intrinsics(); ++i) {
-      csv << t_s << ',' << setup.model->description().intrinsics[static_cast<std::size_t>(i)].name
-          << ',' << setup.x_WI[i] << ',' << setup.sigma[i] << ",\n";
+  for (std::size_t k = 0; k < result.calibration_t_s.size(); ++k) {
+    for (const CalibrationTrack& track : result.calibration) {
+      csv << result.calibration_t_s[k] << ',' << track.name << ',' << track.estimate[k] << ','
+          << track.sigma[k] << ',';
+      if (std::isfinite(track.truth)) csv << track.truth;
+      csv << '\n';
     }
   }
   return csv.str();
@@ -38,55 +39,33 @@ std::string calibration_csv(const RunSetup& setup, const RunResult& result) {
 
 std::string timing_csv(const RunResult& result) {
   std::ostringstream csv;
-  csv << "time_s,preintegration_ms\n";
+  csv << "time_s,epoch_ms\n";
   for (const auto& [t_s, ms] : result.epoch_ms) csv << t_s << ',' << ms << '\n';
   return csv.str();
 }
 
-report::Document document_of(const RunSetup& setup, const RunResult& result) {
-  using namespace report;
-  Document document{
-      setup.name,
-      "wheel odometry with " + setup.kinematics.info.name + " " + setup.kinematics.info.version,
-      {}};
-  KeyValues facts;
-  facts.entries = {{"status", std::string(name(result.status)) +
-                                  (result.cause.empty() ? "" : ": " + result.cause)},
-                   {"seed", static_cast<double>(setup.seed)},
-                   {"duration [s]", result.duration_s},
-                   {"samples", static_cast<double>(result.total.samples)},
-                   {"samples not believed (parity gate)", static_cast<double>(result.total.gated)},
-                   {"rank-deficient samples", static_cast<double>(result.total.rank_deficient)},
-                   {"bridged [s]", result.total.bridged_s}};
-  if (result.accuracy) {
-    facts.entries.push_back({"path length [m]", result.accuracy->path_length_m});
-    facts.entries.push_back({"end position error [mm]", 1e3 * result.accuracy->end_m});
-    facts.entries.push_back({"end yaw error [deg]", result.accuracy->end_yaw_deg});
-    facts.entries.push_back({"ATE [mm]", 1e3 * result.accuracy->ate_m});
-    facts.entries.push_back({"planar NEES (3 is consistent)", result.nees_planar});
+nlohmann::json calibration_json(const RunResult& result) {
+  nlohmann::json calibration = nlohmann::json::object();
+  for (const CalibrationTrack& track : result.calibration) {
+    if (track.estimate.empty()) continue;
+    calibration[track.name] = {{"initial", track.estimate.front()},
+                               {"final", number_or_null(track.estimate.back())},
+                               {"sigma", number_or_null(track.sigma.back())},
+                               {"truth", number_or_null(track.truth)},
+                               {"error", number_or_null(track.final_error)}};
   }
-  document.sections.push_back({"Result", {facts}});
-  for (const std::string& line : describe_rejections(result)) {
-    document.sections.back().blocks.emplace_back(Paragraph{line, Paragraph::Tone::kWarning});
-  }
-  Plot top{"Trajectory, seen from above", "x [m]", "y [m]"};
-  top.equal_axes = true;
-  top.half_width = true;
-  top.series.push_back(trajectory_series("estimate", result.estimate));
-  if (!result.reference.empty()) {
-    top.series.push_back(trajectory_series("reference", result.reference));
-    top.series.back().reference = true;
-  }
-  document.sections.push_back({"Trajectory", {top}});
-  if (result.accuracy) {
-    Plot error{"Position error", "path length [m]", "error [mm]"};
-    error.half_width = true;
-    error.series.push_back(error_series("estimate", *result.accuracy));
-    document.sections.back().blocks.emplace_back(error);
-  }
-  document.sections.push_back(
-      {"Configuration", {Paragraph{"The resolved configuration is in config.resolved.yaml."}}});
-  return document;
+  return calibration;
+}
+
+/// What the wheels of a run without filter gave.
+nlohmann::json wheels_json(const RunSetup& setup, const PreintegratedPose& total) {
+  return {{"model", setup.kinematics.info.name},
+          {"samples", total.samples},
+          {"gated", total.gated},
+          {"rejected", total.rejected},
+          {"rank_deficient", total.rank_deficient},
+          {"bridged_s", total.bridged_s},
+          {"path_length_m", total.path_length_m}};
 }
 
 }  // namespace
@@ -94,51 +73,42 @@ report::Document document_of(const RunSetup& setup, const RunResult& result) {
 nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
   using nlohmann::json;
   json accuracy = json::object();
-  if (result.accuracy) {
-    accuracy = eval::to_json(*result.accuracy);
+  if (result.accuracy) accuracy = eval::to_json(*result.accuracy);
+  if (!setup.filter && result.accuracy)
     accuracy["nees_planar"] = number_or_null(result.nees_planar);
-  }
-  for (const char* key : {"nees_pose", "nees_position", "nees_orientation"})
-    accuracy[key] = nullptr;
-  json calibration = json::object();
-  for (int i = 0; i < setup.model->n_intrinsics(); ++i) {
-    calibration[setup.model->description().intrinsics[static_cast<std::size_t>(i)].name] = {
-        {"initial", setup.x_WI[i]},
-        {"final", setup.x_WI[i]},
-        {"sigma", setup.sigma[i]},
-        {"truth", nullptr}};
-  }
-  json sensors = json::object();
-  for (const auto& [sensor, rejection] : result.rejections) {
-    sensors[sensor].push_back(
+  accuracy["nees_pose"] = number_or_null(result.nees.pose);
+  accuracy["nees_position"] = number_or_null(result.nees.position);
+  accuracy["nees_orientation"] = number_or_null(result.nees.orientation);
+  json rejected = json::object();
+  for (const auto& [source, rejection] : result.rejections) {
+    rejected[source].push_back(
         {{"reason", rejection.reason}, {"count", rejection.count}, {"first", rejection.first}});
   }
-  const PreintegratedPose& total = result.total;
-  return {{"status", name(result.status)},
-          {"cause", result.cause},
-          {"name", setup.name},
-          {"seed", setup.seed},
-          {"epochs", result.epochs},
-          {"duration_s", result.duration_s},
-          {"wall_s", result.wall_s},
-          {"accuracy", accuracy},
-          {"calibration", calibration},
-          {"updates", json::object()},
-          {"wheels",
-           {{"model", setup.kinematics.info.name},
-            {"samples", total.samples},
-            {"gated", total.gated},
-            {"rejected", total.rejected},
-            {"rank_deficient", total.rank_deficient},
-            {"bridged_s", total.bridged_s},
-            {"path_length_m", total.path_length_m}}},
-          {"rejected_measurements", sensors},
-          {"timing_ms",
-           {{"preintegration", stage_json(result.preintegration_ms)},
-            {"total", stage_json(result.preintegration_ms)}}},
-          {"realtime_factor",
-           number_or_null(result.wall_s > 0. ? result.duration_s / result.wall_s : std::nan(""))},
-          {"peak_rss_mb", peak_rss_mb()}};
+  json updates = json::object();
+  for (const auto& [update, counts] : result.updates) {
+    updates[update] = {{"applied", counts.applied}, {"rejected", counts.rejected}};
+  }
+  json timing = json::object();
+  for (const auto& [stage, time] : result.stages) timing[stage] = stage_json(time);
+  timing["total"] = stage_json(result.total_ms);
+  json summary = {
+      {"status", name(result.status)},
+      {"cause", result.cause},
+      {"name", setup.name},
+      {"seed", setup.seed},
+      {"epochs", result.epochs},
+      {"duration_s", result.duration_s},
+      {"wall_s", result.wall_s},
+      {"accuracy", accuracy},
+      {"calibration", calibration_json(result)},
+      {"updates", updates},
+      {"rejected_measurements", rejected},
+      {"timing_ms", timing},
+      {"realtime_factor",
+       number_or_null(result.wall_s > 0. ? result.duration_s / result.wall_s : std::nan(""))},
+      {"peak_rss_mb", peak_rss_mb()}};
+  if (!setup.filter) summary["wheels"] = wheels_json(setup, result.total);
+  return summary;
 }
 
 void write_run(const std::filesystem::path& folder, const RunSetup& setup,
@@ -147,23 +117,38 @@ void write_run(const std::filesystem::path& folder, const RunSetup& setup,
   write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
   log::write_tum(folder / "trajectory.tum", result.estimate);
   if (!result.reference.empty()) log::write_tum(folder / "reference.tum", result.reference);
-  write_text(folder / "calibration.csv", calibration_csv(setup, result));
+  write_text(folder / "calibration.csv", calibration_csv(result));
   write_text(folder / "timing.csv", timing_csv(result));
   write_text(folder / "summary.json", summary_of(setup, result).dump(2) + "\n");
-  report::write_html(folder / "report.html", document_of(setup, result));
+  report::write_html(folder / "report.html", report_of(setup, result));
 }
+
+namespace {
+
+void describe_odometry(const PreintegratedPose& total, std::ostream& out) {
+  out << total.samples << " encoder samples";
+  if (total.rank_deficient > 0) out << ", " << total.rank_deficient << " rank-deficient";
+  if (total.gated > 0) out << ", " << total.gated << " not believed (parity gate)";
+  if (total.rejected > 0) out << ", " << total.rejected << " rejected";
+  if (total.bridged_s > 0.) out << ", " << significant(total.bridged_s, 3) << " s bridged";
+}
+
+}  // namespace
 
 std::string describe(const RunResult& result) {
   std::ostringstream out;
   out << "status " << name(result.status);
   if (!result.cause.empty()) out << ": " << result.cause;
-  out << "\n"
-      << significant(result.duration_s, 4) << " s, " << result.total.samples << " encoder samples";
-  const PreintegratedPose& total = result.total;
-  if (total.rank_deficient > 0) out << ", " << total.rank_deficient << " rank-deficient";
-  if (total.gated > 0) out << ", " << total.gated << " not believed (parity gate)";
-  if (total.rejected > 0) out << ", " << total.rejected << " rejected";
-  if (total.bridged_s > 0.) out << ", " << significant(total.bridged_s, 3) << " s bridged";
+  out << "\n" << significant(result.duration_s, 4) << " s, ";
+  if (result.updates.empty() && result.total.samples > 0) {
+    describe_odometry(result.total, out);
+  } else {
+    out << result.epochs << " epochs";
+    for (const auto& [update, counts] : result.updates) {
+      out << "; " << update << " " << counts.applied;
+      if (counts.rejected > 0) out << " (" << counts.rejected << " rejected)";
+    }
+  }
   if (result.wall_s > 0.) {
     out << ", " << significant(result.duration_s / result.wall_s, 3) << " x real time";
   }
@@ -174,6 +159,11 @@ std::string describe(const RunResult& result) {
         << significant(a.end_yaw_deg * M_PI / 180., 3) << " rad yaw over "
         << significant(a.path_length_m, 4) << " m; ATE " << significant(1e3 * a.ate_m, 4) << " mm, "
         << significant(a.ate_deg, 3) << " deg\n";
+  }
+  if (std::isfinite(result.nees.pose)) {
+    out << "NEES of the pose " << significant(result.nees.pose, 3) << " (6 is consistent); epoch "
+        << significant(result.total_ms.mean_ms, 3) << " ms mean, "
+        << significant(result.total_ms.p95_ms, 3) << " ms p95\n";
   }
   for (const std::string& line : describe_rejections(result)) out << line << "\n";
   return out.str();

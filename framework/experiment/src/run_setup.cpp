@@ -59,6 +59,11 @@ constexpr std::array kOdometryParams{
 };
 
 constexpr std::array kEvaluationParams{
+    ParamSpec{.name = "alignment",
+              .type = ParamType::kString,
+              .fallback = "yaw_position",
+              .choices = "none|start|yaw_position|se3",
+              .help = "how the estimate is brought onto the reference for the absolute error"},
     ParamSpec{.name = "segment_lengths_m",
               .type = ParamType::kNumbers,
               .unit = "m",
@@ -106,7 +111,9 @@ void read_kinematics(const Node& run, PluginRegistry& plugins, RunSetup& setup,
                      config::Errors& errors) {
   const Node* section = run.find("kinematics");
   if (section == nullptr) {
-    errors.add(run.mark(), "'kinematics' is missing: the section of the kinematic model");
+    if (!wants_filter(run)) {
+      errors.add(run.mark(), "'kinematics' is missing: the section of the kinematic model");
+    }
     return;
   }
   setup.kinematics_mark = section->mark();
@@ -155,6 +162,10 @@ void read_options(const Node& run, RunSetup& setup, config::Errors& errors) {
   setup.preintegration.parity = false;
   setup.epoch_s = o.number("epoch_s");
   setup.reference_time_offset_s = o.number("reference_time_offset_s");
+  for (const auto mode : {eval::Alignment::kNone, eval::Alignment::kStart,
+                          eval::Alignment::kYawPosition, eval::Alignment::kSe3}) {
+    if (e.text("alignment") == eval::name(mode)) setup.evaluation.alignment = mode;
+  }
   const auto lengths = e.numbers("segment_lengths_m");
   setup.evaluation.segment_lengths_m.assign(lengths.begin(), lengths.end());
   setup.evaluation.max_reference_gap_s = e.number("reference_max_gap_s");
@@ -168,7 +179,9 @@ void read_options(const Node& run, RunSetup& setup, config::Errors& errors) {
 RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed) {
   RunSetup setup;
   config::Errors errors;
-  constexpr std::string_view kSections[] = {"sensors", "kinematics", "odometry", "evaluation"};
+  constexpr std::string_view kSections[] = {"sensors", "kinematics", "odometry", "evaluation",
+                                            "imu",     "cameras",    "wheels",   "wheel_sets",
+                                            "updates", "estimator"};
   const ParamSet top =
       config::read_params(run, run.mark(), "run", kRunParams, kSections, {}, errors);
   if (errors.empty()) {
@@ -181,6 +194,10 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
   }
   read_kinematics(run, plugins, setup, errors);
   read_options(run, setup, errors);
+  if (wants_filter(run)) {
+    setup.filter = read_filter(run, setup.model, setup.x_WI, setup.sigma, setup.seed, plugins,
+                               setup.resolved, errors);
+  }
   read_sensors(run, plugins, setup, errors);
   errors.throw_if_any();
   return setup;

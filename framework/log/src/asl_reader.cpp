@@ -1,10 +1,15 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "viwo/log/asl.hpp"
+#include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/table_reader.hpp"
+#include "viwo/log/text.hpp"
 
 namespace viwo::log {
 namespace {
@@ -38,6 +43,23 @@ std::vector<std::size_t> channel_columns(const TableReader& table, const std::st
   return columns;
 }
 
+std::array<std::size_t, 3> xyz_columns(const TableReader& table, const std::string& prefix,
+                                       const char* unit) {
+  return {table.column(prefix + "x", unit), table.column(prefix + "y", unit),
+          table.column(prefix + "z", unit)};
+}
+
+std::array<std::size_t, 4> xyzw_columns(const TableReader& table) {
+  return {table.column("q_RS_x", ""), table.column("q_RS_y", ""), table.column("q_RS_z", ""),
+          table.column("q_RS_w", "")};
+}
+
+template <std::size_t N>
+void read_numbers(const TableReader& table, const std::array<std::size_t, N>& columns,
+                  std::array<double, N>& out) {
+  for (std::size_t i = 0; i < N; ++i) out[i] = table.number(columns[i]);
+}
+
 }  // namespace
 
 EncoderRecording read_asl_encoders(const std::filesystem::path& path,
@@ -63,19 +85,108 @@ EncoderRecording read_asl_encoders(const std::filesystem::path& path,
 PoseRecording read_asl_poses(const std::filesystem::path& path, const LogLimits& limits) {
   TableReader table(table_file(path));
   const std::size_t stamp = stamp_column(table);
-  const std::array<std::size_t, 3> p = {
-      table.column("p_RS_R_x", "m"), table.column("p_RS_R_y", "m"), table.column("p_RS_R_z", "m")};
-  const std::array<std::size_t, 4> q = {table.column("q_RS_x", ""), table.column("q_RS_y", ""),
-                                        table.column("q_RS_z", ""), table.column("q_RS_w", "")};
+  const auto p = xyz_columns(table, "p_RS_R_", "m");
+  const auto q = xyzw_columns(table);
   PoseCollector collector(limits);
   while (table.next()) {
     PoseSample pose;
     pose.t_ns = table.stamp_ns(stamp);
-    for (std::size_t i = 0; i < p.size(); ++i) pose.p_BinW_m[i] = table.number(p[i]);
-    for (std::size_t i = 0; i < q.size(); ++i) pose.q_BtoW_xyzw[i] = table.number(q[i]);
+    read_numbers(table, p, pose.p_BinW_m);
+    read_numbers(table, q, pose.q_BtoW_xyzw);
     collector.add(pose, table.reader());
   }
   return collector.finish(table.reader());
+}
+
+StateRecording read_asl_states(const std::filesystem::path& path, const LogLimits& limits) {
+  TableReader table(table_file(path));
+  const std::size_t stamp = stamp_column(table);
+  const auto p = xyz_columns(table, "p_RS_R_", "m");
+  const auto q = xyzw_columns(table);
+  const auto v = xyz_columns(table, "v_RS_R_", "m s^-1");
+  const auto gyro_bias = xyz_columns(table, "b_w_RS_S_", "rad s^-1");
+  const auto accel_bias = xyz_columns(table, "b_a_RS_S_", "m s^-2");
+  StateCollector collector(limits);
+  while (table.next()) {
+    StateSample state;
+    state.t_ns = table.stamp_ns(stamp);
+    read_numbers(table, q, state.q_ItoG_xyzw);
+    read_numbers(table, p, state.p_IinG_m);
+    read_numbers(table, v, state.v_IinG_m_per_s);
+    read_numbers(table, gyro_bias, state.gyro_bias_rad_per_s);
+    read_numbers(table, accel_bias, state.accel_bias_m_per_s2);
+    collector.add(state, table.reader());
+  }
+  return collector.finish(table.reader());
+}
+
+ImuRecording read_asl_imu(const std::filesystem::path& path, const LogLimits& limits) {
+  TableReader table(table_file(path));
+  const std::size_t stamp = stamp_column(table);
+  const auto gyro = xyz_columns(table, "w_RS_S_", "rad s^-1");
+  const auto accel = xyz_columns(table, "a_RS_S_", "m s^-2");
+  ImuCollector collector(limits);
+  while (table.next()) {
+    ImuSample imu;
+    imu.t_ns = table.stamp_ns(stamp);
+    read_numbers(table, gyro, imu.gyro_rad_per_s);
+    read_numbers(table, accel, imu.accel_m_per_s2);
+    collector.add(imu, table.reader());
+  }
+  return collector.finish(table.reader());
+}
+
+int camera_index(const TableReader& table, std::size_t column) {
+  const std::int64_t camera = table.integer(column);
+  if (camera < 0 || camera > kMaxCamera) {
+    table.fail(column, quoted(table.text(column)) + " is no camera: they are counted from 0 to " +
+                           std::to_string(kMaxCamera));
+  }
+  return static_cast<int>(camera);
+}
+
+FeatureRecording read_asl_features(const std::filesystem::path& path, const LogLimits& limits) {
+  TableReader table(table_file(path));
+  const std::size_t stamp = stamp_column(table);
+  const std::size_t camera = table.column("camera");
+  const std::size_t id = table.column("id");
+  const std::size_t u = table.column("u", "px");
+  const std::size_t v = table.column("v", "px");
+  FeatureCollector collector(limits);
+  while (table.next()) {
+    const std::int64_t t_ns = table.stamp_ns(stamp);
+    const int index = camera_index(table, camera);
+    if (table.text(id).empty() && table.text(u).empty() && table.text(v).empty()) {
+      collector.add_image(t_ns, index, table.reader());
+    } else {
+      const FeaturePoint point{table.integer(id), table.number(u), table.number(v)};
+      collector.add(t_ns, index, point, table.reader());
+    }
+  }
+  return collector.finish(table.reader());
+}
+
+CalibrationRecording read_asl_calibration(const std::filesystem::path& path,
+                                          double max_rejected_fraction) {
+  TableReader table(table_file(path));
+  const std::size_t stamp = stamp_column(table);
+  const std::size_t name = table.column("name");
+  const std::size_t value = table.column("value");
+  StampFilter filter({std::numeric_limits<double>::infinity(), max_rejected_fraction});
+  CalibrationRecording out;
+  while (table.next()) {
+    const CalibrationSample sample{table.stamp_ns(stamp), std::string(table.text(name)),
+                                   table.number(value)};
+    if (sample.name.empty()) table.fail(name, "is empty");
+    if (!std::isfinite(sample.value)) {
+      filter.reject(kNotFinite, table.reader());
+    } else if (filter.accept_or_same(sample.t_ns, table.reader())) {
+      out.samples.push_back(sample);
+    }
+  }
+  filter.finish(table.reader());
+  out.rejections = filter.counts();
+  return out;
 }
 
 }  // namespace viwo::log

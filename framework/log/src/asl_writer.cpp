@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -5,6 +9,7 @@
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/asl.hpp"
+#include "viwo/log/text.hpp"
 #include "viwo/log/text_writer.hpp"
 
 namespace viwo::log {
@@ -12,15 +17,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kWheels = "wheels0";
-constexpr const char* kTruth = "state_groundtruth_estimate0";
+/// Index into kFolders.
+enum Table : std::size_t { kWheels, kImu, kFeatures, kTruth, kCalibration, kTables };
+constexpr std::array<const char*, kTables> kFolders = {
+    "wheels0", "imu0", "features0", "state_groundtruth_estimate0", "calibration_groundtruth0"};
+
 constexpr const char* kData = "data.csv";
+constexpr const char* kImuHeader =
+    "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+    "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
 constexpr const char* kTruthHeader =
     "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
     "q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], "
     "b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1], "
     "b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]\n";
-constexpr const char* kUnknown = ",0,0,0,0,0,0,0,0,0\n";  // velocity and biases
+
+/// Velocity and biases of a pose: a reader of states must not take them for zero.
+constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 
 [[noreturn]] void refuse(const fs::path& folder, const fs::path& stranger) {
   throw InputError(folder.string() + "  already holds " + stranger.string() +
@@ -31,7 +44,10 @@ constexpr const char* kUnknown = ",0,0,0,0,0,0,0,0,0\n";  // velocity and biases
 void check_is_ours(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     const fs::path name = entry.path().filename();
-    if ((name != kWheels && name != kTruth) || !entry.is_directory()) refuse(folder, name);
+    if (std::find(kFolders.begin(), kFolders.end(), name) == kFolders.end() ||
+        !entry.is_directory()) {
+      refuse(folder, name);
+    }
     for (const auto& file : fs::directory_iterator(entry.path())) {
       if (file.path().filename() != kData || file.is_directory()) {
         refuse(folder, name / file.path().filename());
@@ -49,60 +65,126 @@ void make_folder(const fs::path& folder) {
   }
 }
 
-TextWriter open_table(const fs::path& folder, const char* table) {
-  make_folder(folder / table);
-  return TextWriter(folder / table / kData);
+template <std::size_t N>
+void append(TextWriter& out, const std::array<double, N>& values) {
+  for (const double value : values) out << "," << value;
+}
+
+bool fits_a_field(const std::string& name) {
+  return !name.empty() && trim(name) == name && name.find_first_of(",\r\n") == std::string::npos;
 }
 
 }  // namespace
 
 struct AslWriter::Tables {
   fs::path folder;
-  std::optional<TextWriter> wheels;
-  std::optional<TextWriter> truth;
+  std::array<std::optional<TextWriter>, kTables> writers;
   int n_drive = 0;
   int n_steer = 0;
+  bool has_poses = false;
+  bool has_states = false;
+
+  TextWriter& open(Table table, std::string_view header);
+  /// Of the truth, which is written for poses and for states.
+  TextWriter& truth_row(std::int64_t t_ns, const std::array<double, 3>& p,
+                        const std::array<double, 4>& q_xyzw);
 
   void write(const EncoderSample& sample);
   void write(const PoseSample& pose);
-  template <class Other>
-  void write(const Other&) {
-    throw std::logic_error("this kind of measurement has no table yet");
-  }
+  void write(const ImuSample& imu);
+  void write(const FeatureSample& image);
+  void write(const StateSample& state);
+  void write(const CalibrationSample& parameter);
 };
 
+TextWriter& AslWriter::Tables::open(Table table, std::string_view header) {
+  auto& writer = writers[table];
+  if (!writer) {
+    make_folder(folder / kFolders[table]);
+    writer.emplace(folder / kFolders[table] / kData);
+    *writer << header;
+  }
+  return *writer;
+}
+
 void AslWriter::Tables::write(const EncoderSample& sample) {
-  if (!wheels) {
-    wheels.emplace(open_table(folder, kWheels));
+  if (!writers[kWheels]) {
     n_drive = sample.n_drive;
     n_steer = sample.n_steer;
-    *wheels << "timestamp_ns";
-    for (int i = 1; i <= n_drive; ++i) *wheels << ",drive_" << std::int64_t{i} << " [rad/s]";
-    for (int i = 1; i <= n_steer; ++i) *wheels << ",steer_" << std::int64_t{i} << " [rad]";
-    *wheels << "\n";
+    TextWriter& header = open(kWheels, "timestamp_ns");
+    for (int i = 1; i <= n_drive; ++i) header << ",drive_" << std::int64_t{i} << " [rad/s]";
+    for (int i = 1; i <= n_steer; ++i) header << ",steer_" << std::int64_t{i} << " [rad]";
+    header << "\n";
   }
   if (sample.n_drive != n_drive || sample.n_steer != n_steer) {
     throw std::logic_error("encoder samples of one log differ in their number of channels");
   }
-  *wheels << sample.t_ns;
+  TextWriter& out = *writers[kWheels];
+  out << sample.t_ns;
   for (int i = 0; i < n_drive; ++i) {
-    *wheels << "," << sample.drive_rad_per_s[static_cast<std::size_t>(i)];
+    out << "," << sample.drive_rad_per_s[static_cast<std::size_t>(i)];
   }
   for (int i = 0; i < n_steer; ++i) {
-    *wheels << "," << sample.steer_rad[static_cast<std::size_t>(i)];
+    out << "," << sample.steer_rad[static_cast<std::size_t>(i)];
   }
-  *wheels << "\n";
+  out << "\n";
+}
+
+TextWriter& AslWriter::Tables::truth_row(std::int64_t t_ns, const std::array<double, 3>& p,
+                                         const std::array<double, 4>& q_xyzw) {
+  if (has_poses && has_states) {
+    throw InputError(
+        "reference poses and reference states share a table of a log: keep the sensors of one "
+        "kind only");
+  }
+  TextWriter& out = open(kTruth, kTruthHeader);
+  out << t_ns;
+  append(out, p);
+  out << "," << q_xyzw[3] << "," << q_xyzw[0] << "," << q_xyzw[1] << "," << q_xyzw[2];
+  return out;
 }
 
 void AslWriter::Tables::write(const PoseSample& pose) {
-  if (!truth) {
-    truth.emplace(open_table(folder, kTruth));
-    *truth << kTruthHeader;
+  has_poses = true;
+  TextWriter& out = truth_row(pose.t_ns, pose.p_BinW_m, pose.q_BtoW_xyzw);
+  for (int i = 0; i < 9; ++i) out << "," << kNotKnown;
+  out << "\n";
+}
+
+void AslWriter::Tables::write(const StateSample& state) {
+  has_states = true;
+  TextWriter& out = truth_row(state.t_ns, state.p_IinG_m, state.q_ItoG_xyzw);
+  append(out, state.v_IinG_m_per_s);
+  append(out, state.gyro_bias_rad_per_s);
+  append(out, state.accel_bias_m_per_s2);
+  out << "\n";
+}
+
+void AslWriter::Tables::write(const ImuSample& imu) {
+  TextWriter& out = open(kImu, kImuHeader);
+  out << imu.t_ns;
+  append(out, imu.gyro_rad_per_s);
+  append(out, imu.accel_m_per_s2);
+  out << "\n";
+}
+
+void AslWriter::Tables::write(const FeatureSample& image) {
+  TextWriter& out = open(kFeatures, "timestamp_ns,camera,id,u [px],v [px]\n");
+  const std::int64_t camera = image.camera;
+  if (image.points.empty()) out << image.t_ns << "," << camera << ",,,\n";
+  for (const FeaturePoint& point : image.points) {
+    out << image.t_ns << "," << camera << "," << point.id << "," << point.u_px << "," << point.v_px
+        << "\n";
   }
-  *truth << pose.t_ns;
-  for (const double value : pose.p_BinW_m) *truth << "," << value;
-  const auto& q = pose.q_BtoW_xyzw;
-  *truth << "," << q[3] << "," << q[0] << "," << q[1] << "," << q[2] << kUnknown;
+}
+
+void AslWriter::Tables::write(const CalibrationSample& parameter) {
+  if (!fits_a_field(parameter.name)) {
+    throw std::logic_error("the name of a calibration parameter does not fit into a table: " +
+                           log::quoted(parameter.name));
+  }
+  TextWriter& out = open(kCalibration, "timestamp_ns,name,value\n");
+  out << parameter.t_ns << "," << parameter.name << "," << parameter.value << "\n";
 }
 
 AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>()) {
@@ -113,8 +195,7 @@ AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>(
   make_folder(folder);
   check_is_ours(folder);
   // A table that the new log does not have must not stay behind.
-  fs::remove_all(folder / kWheels);
-  fs::remove_all(folder / kTruth);
+  for (const char* const table : kFolders) fs::remove_all(folder / table);
 }
 
 AslWriter::~AslWriter() = default;
@@ -124,8 +205,9 @@ void AslWriter::write(const Measurement& measurement) {
 }
 
 void AslWriter::close() {
-  if (tables_->wheels) tables_->wheels->close();
-  if (tables_->truth) tables_->truth->close();
+  for (auto& writer : tables_->writers) {
+    if (writer) writer->close();
+  }
 }
 
 }  // namespace viwo::log

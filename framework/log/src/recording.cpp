@@ -1,6 +1,7 @@
 #include "viwo/log/recording.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 
@@ -11,6 +12,38 @@ namespace viwo::log {
 namespace {
 
 bool is_finite(double value) { return std::isfinite(value); }
+
+template <std::size_t N>
+bool all_finite(const std::array<double, N>& values) {
+  return std::all_of(values.begin(), values.end(), is_finite);
+}
+
+/// nullptr when the quaternion can be used; it is of unit norm then.
+const char* why_not_unit(std::array<double, 4>& xyzw) {
+  Eigen::Quaterniond q(Eigen::Map<const Eigen::Vector4d>(xyzw.data()));
+  if (!make_unit(q)) return kNotUnit;
+  xyzw = {q.x(), q.y(), q.z(), q.w()};
+  return nullptr;
+}
+
+/// Why a sample cannot be used; nullptr when it can.
+const char* why_rejected(PoseSample& pose) {
+  if (!all_finite(pose.p_BinW_m) || !all_finite(pose.q_BtoW_xyzw)) return kNotFinite;
+  return why_not_unit(pose.q_BtoW_xyzw);
+}
+
+const char* why_rejected(ImuSample& imu) {
+  return all_finite(imu.gyro_rad_per_s) && all_finite(imu.accel_m_per_s2) ? nullptr : kNotFinite;
+}
+
+const char* why_rejected(StateSample& state) {
+  if (!all_finite(state.q_ItoG_xyzw) || !all_finite(state.p_IinG_m) ||
+      !all_finite(state.v_IinG_m_per_s) || !all_finite(state.gyro_bias_rad_per_s) ||
+      !all_finite(state.accel_bias_m_per_s2)) {
+    return kNotFinite;
+  }
+  return why_not_unit(state.q_ItoG_xyzw);
+}
 
 EncoderSample rate_sample(const EncoderReading& reading) {
   EncoderSample sample;
@@ -29,8 +62,7 @@ EncoderCollector::EncoderCollector(const EncoderRecordingOptions& options)
 
 void EncoderCollector::add(const EncoderReading& reading, const TextReader& at) {
   // Channels that are not used are zero, hence finite.
-  if (!std::all_of(reading.drive.begin(), reading.drive.end(), is_finite) ||
-      !std::all_of(reading.steer_rad.begin(), reading.steer_rad.end(), is_finite)) {
+  if (!all_finite(reading.drive) || !all_finite(reading.steer_rad)) {
     filter_.reject(kNotFinite, at);
   } else if (filter_.accept(reading.t_ns, at)) {
     readings_.push_back(reading);
@@ -55,26 +87,64 @@ EncoderRecording EncoderCollector::finish(const TextReader& at) const {
   return out;
 }
 
-PoseCollector::PoseCollector(const LogLimits& limits) : filter_(limits) {}
-
-void PoseCollector::add(PoseSample pose, const TextReader& at) {
-  if (!std::all_of(pose.p_BinW_m.begin(), pose.p_BinW_m.end(), is_finite) ||
-      !std::all_of(pose.q_BtoW_xyzw.begin(), pose.q_BtoW_xyzw.end(), is_finite)) {
-    filter_.reject(kNotFinite, at);
-    return;
+template <class Sample>
+void SampleCollector<Sample>::add(Sample sample, const TextReader& at) {
+  if (const char* const reason = why_rejected(sample)) {
+    filter_.reject(reason, at);
+  } else if (filter_.accept(sample.t_ns, at)) {
+    samples_.push_back(sample);
   }
-  Eigen::Quaterniond q(Eigen::Map<const Eigen::Vector4d>(pose.q_BtoW_xyzw.data()));
-  if (!make_unit(q)) {
-    filter_.reject(kNotUnit, at);
-    return;
-  }
-  pose.q_BtoW_xyzw = {q.x(), q.y(), q.z(), q.w()};
-  if (filter_.accept(pose.t_ns, at)) poses_.push_back(pose);
 }
 
-PoseRecording PoseCollector::finish(const TextReader& at) const {
+template <class Sample>
+Recording<Sample> SampleCollector<Sample>::finish(const TextReader& at) const {
   filter_.finish(at);
-  return {poses_, filter_.counts()};
+  return {samples_, filter_.counts()};
+}
+
+template class SampleCollector<PoseSample>;
+template class SampleCollector<ImuSample>;
+template class SampleCollector<StateSample>;
+
+std::size_t FeatureCollector::find(std::int64_t t_ns, int camera) const {
+  if (first_ == images_.size() || images_[first_].t_ns != t_ns) return images_.size();
+  std::size_t i = first_;
+  while (i < images_.size() && images_[i].camera != camera) ++i;
+  return i;
+}
+
+std::size_t FeatureCollector::find_or_make(std::int64_t t_ns, int camera) {
+  const std::size_t i = find(t_ns, camera);
+  if (i < images_.size()) return i;
+  if (first_ < images_.size() && images_[first_].t_ns != t_ns) {
+    first_ = images_.size();
+    ids_.clear();
+  }
+  images_.push_back({t_ns, camera, {}});
+  ids_.emplace_back();
+  return i;
+}
+
+void FeatureCollector::add(std::int64_t t_ns, int camera, const FeaturePoint& point,
+                           const TextReader& at) {
+  if (!is_finite(point.u_px) || !is_finite(point.v_px)) return filter_.reject(kNotFinite, at);
+  const std::size_t known = find(t_ns, camera);
+  if (known < images_.size() && ids_[known - first_].contains(point.id)) {
+    return filter_.reject(kIdTwice, at);
+  }
+  if (!filter_.accept_or_same(t_ns, at)) return;
+  const std::size_t image = find_or_make(t_ns, camera);
+  images_[image].points.push_back(point);
+  ids_[image - first_].insert(point.id);
+}
+
+void FeatureCollector::add_image(std::int64_t t_ns, int camera, const TextReader& at) {
+  if (filter_.accept_or_same(t_ns, at)) find_or_make(t_ns, camera);
+}
+
+FeatureRecording FeatureCollector::finish(const TextReader& at) const {
+  filter_.finish(at);
+  return {images_, filter_.counts()};
 }
 
 }  // namespace viwo::log

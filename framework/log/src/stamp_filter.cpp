@@ -40,6 +40,12 @@ bool StampFilter::accept(std::int64_t t_ns, const TextReader& at) {
   return true;
 }
 
+bool StampFilter::accept_or_same(std::int64_t t_ns, const TextReader& at) {
+  if (last_ns_ != t_ns) return accept(t_ns, at);
+  ++accepted_;
+  return true;
+}
+
 void StampFilter::finish(const TextReader& at) const {
   const std::int64_t total = accepted_ + rejected_;
   if (total == 0) throw InputError(at.file().string() + "  holds no data after its header");

@@ -92,6 +92,11 @@ std::int64_t TableReader::stamp_ns(std::size_t column) const {
   return stamp;
 }
 
+std::int64_t TableReader::seconds_ns(std::size_t column) const {
+  if (const auto value = parse_seconds_ns(fields_[column])) return *value;
+  fail(column, quoted(fields_[column]) + " is no time in seconds");
+}
+
 void TableReader::fail(std::size_t column, const std::string& text) const {
   reader_.fail("column '" + columns_[column] + "': " + text);
 }

@@ -178,7 +178,7 @@ TEST_F(AslTest, WritesTheDocumentedColumns) {
             "q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], "
             "b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1], "
             "b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]\n"
-            "8,1,2,0.5,1,0,0,0,0,0,0,0,0,0,0,0,0\n");
+            "8,1,2,0.5,1,0,0,0,nan,nan,nan,nan,nan,nan,nan,nan,nan\n");
 }
 
 TEST_F(AslTest, ReplacesAnEarlierLogCompletely) {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/cells.hpp"
@@ -107,9 +108,14 @@ class Base {
     y_.n_steer = description.n_steer;
   }
 
-  /// Moves on to twist `xi` without slip; the result starts the next one.
-  bool follow(const Twist& xi) {
-    return invert(xi, RowVector::Zero(description_.n_rows), y_) == Status::kOk;
+  /// Moves on to twist `xi` without slip; the result starts the next one. What is followed of a
+  /// small v_y that the base cannot follow is written back.
+  bool follow(Twist& xi, double sliding_m_per_s) {
+    const RowVector no_slip = RowVector::Zero(description_.n_rows);
+    if (invert(xi, no_slip, y_) == Status::kOk) return true;
+    if (!(std::abs(xi.y()) <= sliding_m_per_s)) return false;
+    xi.y() = 0.;
+    return invert(xi, no_slip, y_) == Status::kOk;
   }
 
   /// The channels at the twist of the last follow(), with slip where the model can realise it.
@@ -158,11 +164,12 @@ class Base {
   EncoderSample y_;
 };
 
-[[noreturn]] void cannot_follow(const std::string& motion, const Twist& xi, double t) {
+[[noreturn]] void cannot_follow(std::string_view motion, const Twist& xi, double t) {
   std::array<char, 160> numbers{};
   std::snprintf(numbers.data(), numbers.size(),
                 "v = [%.3g, %.3g] m/s, omega = %.3g rad/s after %.3g s", xi[0], xi[1], xi[2], t);
-  throw InputError("this base cannot follow motion '" + motion + "' (" + numbers.data() + ")");
+  throw InputError("this base cannot follow motion '" + std::string(motion) + "' (" +
+                   numbers.data() + ")");
 }
 
 }  // namespace
@@ -172,7 +179,8 @@ std::int64_t sample_time_ns(std::int64_t k, double rate_hz) {
 }
 
 std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const Intrinsics& truth,
-                                             const PlanarMotion& motion,
+                                             const std::function<Twist(double t_s)>& twist,
+                                             std::string_view motion_name,
                                              const EncoderSimulation& options, std::uint64_t seed) {
   ModelDescription description;
   model.describe(description);
@@ -182,13 +190,14 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
   Disturbances disturbances(description, options, seed);
   Base base(model, description, truth);
   // Wheels stand in the direction of the motion when it starts.
-  base.follow(motion.twist(std::max(options.time_offset_s, 0.) + 0.05));
+  Twist at_start = twist(std::max(options.time_offset_s, 0.) + 0.05);
+  base.follow(at_start, options.sliding_m_per_s);
   std::vector<EncoderSample> samples;
   const std::int64_t end_ns = std::llround(options.duration_s * 1e9);
   for (std::int64_t k = 0, t_ns = 0; t_ns <= end_ns; t_ns = sample_time_ns(++k, options.rate_hz)) {
     const double t = static_cast<double>(t_ns) * 1e-9 + options.time_offset_s;
-    const Twist xi = motion.twist(t);
-    if (!base.follow(xi)) cannot_follow(motion.name(), xi, t);
+    Twist xi = twist(t);
+    if (!base.follow(xi, options.sliding_m_per_s)) cannot_follow(motion_name, xi, t);
     const EncoderSample exact =
         options.noise ? base.with_slip(xi, disturbances.draw_slip()) : base.channels();
     EncoderSample sample = disturbances.read(exact, t);
@@ -197,6 +206,14 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
   }
   log::make_cells(samples, std::numeric_limits<double>::infinity());
   return samples;
+}
+
+std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const Intrinsics& truth,
+                                             const PlanarMotion& motion,
+                                             const EncoderSimulation& options, std::uint64_t seed) {
+  return simulate_encoders(
+      model, truth, [&motion](double t_s) { return motion.twist(t_s); }, motion.name(), options,
+      seed);
 }
 
 Intrinsics nominal_intrinsics(const ModelDescription& description) {

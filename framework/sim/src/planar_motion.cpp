@@ -105,8 +105,8 @@ double figure_eight_period_s(const MotionOptions& options) {
   return 2. * M_PI * kFirstZeroOfJ0 / options.yaw_rate_rad_per_s;
 }
 
-PoseIntegrator::PoseIntegrator(const PlanarMotion& motion, double max_step_s)
-    : motion_(motion), max_step_s_(max_step_s) {
+PoseIntegrator::PoseIntegrator(const PlanarMotion& motion, double max_step_s, double start_s)
+    : motion_(motion), max_step_s_(max_step_s), t_(start_s) {
   if (!(max_step_s > 0.)) throw std::logic_error("max_step_s must be positive");
 }
 

@@ -15,8 +15,8 @@ std::uint64_t mix(std::uint64_t x) {
 
 }  // namespace
 
-RandomStream::RandomStream(std::uint64_t seed, Stream purpose)
-    : engine_(mix(mix(seed) + static_cast<std::uint64_t>(purpose))) {}
+RandomStream::RandomStream(std::uint64_t seed, Stream purpose, std::uint64_t index)
+    : engine_(mix(mix(seed) + static_cast<std::uint64_t>(purpose) + (index << 32U))) {}
 
 double RandomStream::uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
 

@@ -114,4 +114,17 @@ Status SwerveBase::inverse(const Twist& xi, const Intrinsics& x_WI, const RowVec
   return Status::kOk;
 }
 
+Status SwerveBase::move_frame(const Eigen::Vector3d& g, Intrinsics& x_WI) const {
+  const double c = std::cos(g[0]);
+  const double s = std::sin(g[0]);
+  for (int j = 0; j < n_; ++j) {  // (S-11)
+    const double dx = x_WI[x(j)] - g[1];
+    const double dy = x_WI[y(j)] - g[2];
+    x_WI[x(j)] = c * dx + s * dy;
+    x_WI[y(j)] = c * dy - s * dx;
+    x_WI[delta_o(j)] += g[0];
+  }
+  return Status::kOk;
+}
+
 }  // namespace viwo::swerve

@@ -87,6 +87,7 @@ class SwerveBase : public KinematicModel {
  public:
   Status inverse(const Twist& xi, const Intrinsics& x_WI, const RowVector& slip,
                  EncoderSample& y) const override;
+  Status move_frame(const Eigen::Vector3d& g, Intrinsics& x_WI) const override;
 
  protected:
   /// Throws ParamError when the lists do not agree in length or there are fewer than two wheels.

@@ -24,6 +24,9 @@ std::string significant(double value, int digits);
 /// summary.json of a run.
 nlohmann::json summary_of(const RunSetup& setup, const RunResult& result);
 
+/// report.html of a run, as a document.
+report::Document report_of(const RunSetup& setup, const RunResult& result);
+
 /// Writes config.resolved.yaml, trajectory.tum, reference.tum, calibration.csv, timing.csv,
 /// summary.json and report.html.
 void write_run(const std::filesystem::path& folder, const RunSetup& setup, const RunResult& result);

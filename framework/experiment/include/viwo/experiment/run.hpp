@@ -1,4 +1,4 @@
-// One run: sensors in, wheel odometry through a kinematic model, trajectory and its accuracy out.
+// One run: sensors in, wheel odometry or the filter through it, trajectory and its accuracy out.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,7 @@
 
 #include "viwo/config/node.hpp"
 #include "viwo/eval/accuracy.hpp"
+#include "viwo/experiment/filter_setup.hpp"
 #include "viwo/math/trajectory.hpp"
 #include "viwo/plugin_host/registry.hpp"
 #include "viwo/wheel/preintegration.hpp"
@@ -23,9 +24,9 @@ using PlanarExtrinsics = Eigen::Vector3d;
 struct RunSetup {
   std::string name;
   std::uint64_t seed = 1;
-  Loaded<KinematicModel> kinematics;
-  std::shared_ptr<const WheelModel> model;
-  Intrinsics x_WI;   ///< to run with: nominal, or from a calibration file
+  Loaded<KinematicModel> kinematics;        ///< without object in a run without wheels
+  std::shared_ptr<const WheelModel> model;  ///< likewise null
+  Intrinsics x_WI;                          ///< to run with: nominal, or from a calibration file
   Intrinsics sigma;  ///< how well they are known; 0 where the gauge holds an entry
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
   std::vector<std::pair<std::string, Loaded<Sensor>>> sensors;
@@ -34,6 +35,7 @@ struct RunSetup {
   double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
   double reference_max_gap_s = 0.5;
   eval::Options evaluation;
+  std::optional<FilterSetup> filter;           ///< nothing: dead reckoning from the wheels alone
   config::Mark kinematics_mark, sensors_mark;  ///< where the sections are written
   config::Node resolved;  ///< all of it, with defaults: a valid run configuration
 };
@@ -48,6 +50,12 @@ struct RunData {
   std::string wheels_name;             ///< sensor that gave the encoder samples
   std::vector<EncoderSample> samples;  ///< in time order
   Trajectory reference;                ///< planar; empty if there is none
+  std::vector<ImuSample> imu;
+  std::vector<FeatureSample> images;
+  std::vector<StateSample> states;            ///< truth of the inertial state, if there is one
+  std::map<std::string, double> calibration;  ///< true values, if known
+  /// Encoder samples of further wheel sets, by sensor.
+  std::map<std::string, std::vector<EncoderSample>> other_wheels;
   std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor
 };
 
@@ -56,6 +64,7 @@ struct RunData {
 /// broken.
 RunData collect(RunSetup& setup);
 
+/// Statistics of the time that a stage took per epoch.
 struct StageTime {
   double mean_ms = 0.;
   double p95_ms = 0.;
@@ -64,6 +73,25 @@ struct StageTime {
 
 enum class RunStatus { kOk, kDiverged, kFailed };
 const char* name(RunStatus status);
+
+/// One calibration parameter over a run.
+struct CalibrationTrack {
+  std::string name;
+  std::vector<double> estimate;  ///< at RunResult::calibration_t_s
+  std::vector<double> sigma;
+  /// In the gauge that the estimate holds; NaN: not known.
+  double truth = std::numeric_limits<double>::quiet_NaN();
+  /// Last estimate minus truth in the filter's own error convention; NaN without truth.
+  double final_error = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// Mean over the epochs of the squared normalised error, in the filter's own error convention.
+struct PoseNees {
+  double pose = std::numeric_limits<double>::quiet_NaN();         ///< 6 = consistent
+  double position = std::numeric_limits<double>::quiet_NaN();     ///< 3
+  double orientation = std::numeric_limits<double>::quiet_NaN();  ///< 3
+  std::vector<std::pair<double, double>> series;                  ///< time [s], pose
+};
 
 struct RunResult {
   RunStatus status = RunStatus::kOk;
@@ -77,13 +105,31 @@ struct RunResult {
   double nees_planar =
       std::numeric_limits<double>::quiet_NaN();  ///< mean over epochs, 3 = consistent
   PreintegratedPose total;  ///< from the first to the last epoch, without the parity information
-  std::vector<std::pair<double, double>> epoch_ms;  ///< time since start [s], time spent [ms]
-  StageTime preintegration_ms;
+  std::vector<std::pair<double, double>> epoch_ms;        ///< time since start [s], time spent [ms]
+  std::vector<std::pair<std::string, StageTime>> stages;  ///< without the total
+  StageTime total_ms;                                     ///< of an epoch
   std::vector<std::pair<std::string, RejectionCount>> rejections;
+
+  // Of the filter.
+  PoseNees nees;
+  std::vector<double> calibration_t_s;
+  std::vector<CalibrationTrack> calibration;
+  std::vector<std::pair<std::string, UpdateCounts>> updates;
 };
 
 /// Integrates the wheels from the first to the last common instant, starting at the reference pose
 /// (or at the origin), and evaluates. Throws PluginFailure when the model misbehaves.
 RunResult run_odometry(const RunSetup& setup, const RunData& data);
+
+/// Runs the filter over all measurements and evaluates. A filter that diverges ends the run with
+/// the epoch and the cause.
+RunResult run_filter(const RunSetup& setup, const RunData& data);
+
+/// What the configuration asks for.
+inline RunResult run(const RunSetup& setup, const RunData& data) {
+  return setup.filter ? run_filter(setup, data) : run_odometry(setup, data);
+}
+
+StageTime stage_time(std::vector<double> ms);
 
 }  // namespace viwo::experiment

@@ -1,6 +1,12 @@
-// Log folders in the layout of the EuRoC/ASL datasets, extended by wheels:
+// Log folders in the layout of the EuRoC/ASL datasets, extended by wheels, features, calibration:
+//   imu0/data.csv                          the EuRoC columns
 //   wheels0/data.csv                       timestamp_ns, drive_1..N [rad/s], steer_1..M [rad]
-//   state_groundtruth_estimate0/data.csv   the EuRoC columns
+//   features0/data.csv                     timestamp_ns, camera, id, u [px], v [px]; a row with
+//                                          empty id, u and v is an image (maybe without points)
+//   state_groundtruth_estimate0/data.csv   the EuRoC columns; nan for what is not known
+//   calibration_groundtruth0/data.csv      timestamp_ns, name, value
+// Readers take a table as the file, plain or gzipped, or as the folder of its data.csv. The stamp
+// column is `timestamp_ns`, `timestamp [ns]` or `timestamp`. InputError for what is wrong with it.
 #pragma once
 
 #include <filesystem>
@@ -8,21 +14,37 @@
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/log/recording.hpp"
+#include "viwo/log/table_reader.hpp"
 
 namespace viwo::log {
 
-/// Reads an encoder table, given as the file or as the folder of its data.csv. The stamp column is
-/// `timestamp_ns`, `timestamp [ns]` or `timestamp`; drive channels are in rad/s, or in rad with
-/// drive_is_angle. InputError for what is wrong with the file.
+/// Drive channels are in rad/s, or in rad with drive_is_angle.
 EncoderRecording read_asl_encoders(const std::filesystem::path& path,
                                    const EncoderRecordingOptions& options);
 
-/// Reads stamps, positions and quaternions of a ground truth table, given as the file or its
-/// folder.
+/// Stamps, positions and quaternions of a ground truth table.
 PoseRecording read_asl_poses(const std::filesystem::path& path, const LogLimits& limits);
 
+/// All columns of a ground truth table.
+StateRecording read_asl_states(const std::filesystem::path& path, const LogLimits& limits);
+
+ImuRecording read_asl_imu(const std::filesystem::path& path, const LogLimits& limits);
+
+/// One sample for each camera and time.
+FeatureRecording read_asl_features(const std::filesystem::path& path, const LogLimits& limits);
+
+/// True values of calibration parameters; several may have the same stamp. Gaps are not counted.
+CalibrationRecording read_asl_calibration(const std::filesystem::path& path,
+                                          double max_rejected_fraction);
+
+/// Highest index of a camera in a log.
+inline constexpr int kMaxCamera = 63;
+
+/// The camera's index in a field; InputError when it is none.
+int camera_index(const TableReader& table, std::size_t column);
+
 /// Writes measurements into a log folder that the readers above read back to the same bits (but for
-/// the cells of encoder samples, which follow from the stamps).
+/// the cells of encoder samples, which follow from the stamps as make_cells() has it).
 class AslWriter {
  public:
   /// Creates the folder. An earlier log in it is replaced; InputError when it holds anything else.
@@ -31,8 +53,9 @@ class AslWriter {
   AslWriter(const AslWriter&) = delete;
   AslWriter& operator=(const AslWriter&) = delete;
 
-  /// Appends to the table of its kind. std::runtime_error when writing fails, std::logic_error when
-  /// encoder samples change their number of channels.
+  /// Appends to the table of its kind. std::runtime_error when writing fails; std::logic_error when
+  /// encoder samples change their number of channels, or for a name that a table cannot hold;
+  /// InputError when poses and states, which share a table, are both to be written.
   void write(const Measurement& measurement);
   /// Must be called at the end: the last bytes may fail, too.
   void close();

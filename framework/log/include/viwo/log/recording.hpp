@@ -1,9 +1,11 @@
-// Complete recordings of encoders and poses, and what every reader does with the rows of its file:
-// check, count, make cells.
+// Complete recordings of one kind of measurement, and what every reader does with the rows of its
+// file: check, count, make cells, gather the points of an image.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -28,6 +30,10 @@ struct Recording {
 };
 using EncoderRecording = Recording<EncoderSample>;
 using PoseRecording = Recording<PoseSample>;
+using ImuRecording = Recording<ImuSample>;
+using FeatureRecording = Recording<FeatureSample>;
+using StateRecording = Recording<StateSample>;
+using CalibrationRecording = Recording<CalibrationSample>;
 
 /// Takes readings in the order of the file.
 class EncoderCollector {
@@ -45,17 +51,50 @@ class EncoderCollector {
   std::vector<EncoderReading> readings_;
 };
 
-/// Takes poses in the order of the file; quaternions off the unit norm by less than 1e-3 are
+/// Takes samples that stand for themselves, in the order of the file: PoseSample, ImuSample and
+/// StateSample. Values must be finite; quaternions off the unit norm by less than 1e-3 are
 /// normalised, others rejected.
-class PoseCollector {
+template <class Sample>
+class SampleCollector {
  public:
-  explicit PoseCollector(const LogLimits& limits);
-  void add(PoseSample pose, const TextReader& at);
-  PoseRecording finish(const TextReader& at) const;
+  explicit SampleCollector(const LogLimits& limits) : filter_(limits) {}
+  /// `at` is at the row of the sample.
+  void add(Sample sample, const TextReader& at);
+  /// InputError when too little is left (see StampFilter::finish).
+  Recording<Sample> finish(const TextReader& at) const;
 
  private:
   StampFilter filter_;
-  std::vector<PoseSample> poses_;
+  std::vector<Sample> samples_;
+};
+using PoseCollector = SampleCollector<PoseSample>;
+using ImuCollector = SampleCollector<ImuSample>;
+using StateCollector = SampleCollector<StateSample>;
+
+extern template class SampleCollector<PoseSample>;
+extern template class SampleCollector<ImuSample>;
+extern template class SampleCollector<StateSample>;
+
+/// Gathers points to images: one for each camera at each time, in the order in which they come
+/// first. Stamps must not go back; the cameras of one time may alternate. Points that are not
+/// finite, and ids that an image already has, are rejected.
+class FeatureCollector {
+ public:
+  explicit FeatureCollector(const LogLimits& limits) : filter_(limits) {}
+  void add(std::int64_t t_ns, int camera, const FeaturePoint& point, const TextReader& at);
+  /// An image, whether or not points of it follow.
+  void add_image(std::int64_t t_ns, int camera, const TextReader& at);
+  FeatureRecording finish(const TextReader& at) const;
+
+ private:
+  /// Its index in images_; images_.size() when there is none.
+  std::size_t find(std::int64_t t_ns, int camera) const;
+  std::size_t find_or_make(std::int64_t t_ns, int camera);
+
+  StampFilter filter_;
+  std::vector<FeatureSample> images_;
+  std::size_t first_ = 0;                              ///< image of the last stamp
+  std::vector<std::unordered_set<std::int64_t>> ids_;  ///< of the images from first_ on
 };
 
 /// A sensor that plays a recording back.

@@ -20,6 +20,7 @@ struct LogLimits {
 
 inline constexpr const char* kStampNotAfter = "stamp not after the previous one";
 inline constexpr const char* kNotFinite = "value that is not finite";
+inline constexpr const char* kIdTwice = "point whose id the image already has";
 inline constexpr const char* kNotUnit = "quaternion that is not of unit norm";
 
 class StampFilter {
@@ -29,6 +30,8 @@ class StampFilter {
   /// True for a stamp after all stamps accepted before; otherwise it is rejected and counted. A gap
   /// before an accepted stamp is counted, too. `at` is at the datum.
   bool accept(std::int64_t t_ns, const TextReader& at);
+  /// True also for the stamp that was accepted last: several data of one time.
+  bool accept_or_same(std::int64_t t_ns, const TextReader& at);
   /// Counts a datum that is dropped.
   void reject(const std::string& reason, const TextReader& at);
 

@@ -37,6 +37,9 @@ class TableReader {
   /// An integer in nanoseconds within +-4e18, so that differences of stamps cannot overflow.
   std::int64_t stamp_ns(std::size_t column) const;
 
+  /// Decimal seconds as nanoseconds, exact (parse_seconds_ns).
+  std::int64_t seconds_ns(std::size_t column) const;
+
   const TextReader& reader() const { return reader_; }
   /// Throws InputError "file:line  column 'name': text".
   [[noreturn]] void fail(std::size_t column, const std::string& text) const;

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <string_view>
 #include <vector>
 
 #include "viwo/api/kinematic_model.hpp"
@@ -28,6 +30,9 @@ struct EncoderSimulation {
   double outlier_probability = 0.;  ///< per sample; hits one drive channel
   double outlier_rad_per_s = 0.;    ///< size, of either sign
   double drive_resolution_rad_per_s = 0.;  ///< rates are rounded to its multiples; 0: not rounded
+  /// A base that cannot move sideways follows a twist all the same whose v_y is not more than this:
+  /// it slides then. For twists that are exact only up to an approximation.
+  double sliding_m_per_s = 0.;
 };
 
 /// Stamp of the sample `k` of a sensor with `rate_hz`, in nanoseconds from its first one.
@@ -42,7 +47,16 @@ std::int64_t sample_time_ns(std::int64_t k, double rate_hz);
 /// than 0.2 rad, has none. Models without inverse() are solved with Newton's method from the
 /// previous sample; before the first one the wheels stand in the direction of the motion.
 ///
+/// The twist is asked for in time order, at stamps of the motion from time_offset_s (and 0.05 s) to
+/// duration_s + time_offset_s; `motion_name` is for messages.
+///
 /// InputError when the base cannot follow the motion, std::invalid_argument for a wrong slip wheel.
+std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const Intrinsics& truth,
+                                             const std::function<Twist(double t_s)>& twist,
+                                             std::string_view motion_name,
+                                             const EncoderSimulation& options, std::uint64_t seed);
+
+/// The same for a motion on a plane.
 std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const Intrinsics& truth,
                                              const PlanarMotion& motion,
                                              const EncoderSimulation& options, std::uint64_t seed);

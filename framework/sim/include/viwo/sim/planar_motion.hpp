@@ -59,15 +59,16 @@ class PlanarMotion {
 /// the Bessel function J0), hence 2 pi j0 / w.
 double figure_eight_period_s(const MotionOptions& options);
 
-/// Integrates a motion: g = [yaw, x, y] of O in G with g = 0 at t = 0, yaw not wrapped.
+/// Integrates a motion: g = [yaw, x, y] of O in G with g = 0 at t = start_s, yaw not wrapped.
 ///
 /// Fourth-order Magnus steps on SE(2) of at most `max_step_s`: the twist at the two Gauss points
 /// and the exact exponential, so that constant twists are exact for any step.
 class PoseIntegrator {
  public:
-  explicit PoseIntegrator(const PlanarMotion& motion, double max_step_s = 1e-3);
+  explicit PoseIntegrator(const PlanarMotion& motion, double max_step_s = 1e-3,
+                          double start_s = 0.);
 
-  /// The pose at `t` >= 0; calls must be in time order (std::logic_error otherwise).
+  /// The pose at `t` >= start_s; calls must be in time order (std::logic_error otherwise).
   const Eigen::Vector3d& advance_to(double t);
 
  private:
@@ -75,7 +76,7 @@ class PoseIntegrator {
 
   PlanarMotion motion_;
   double max_step_s_;
-  double t_ = 0.;
+  double t_;
   Eigen::Vector3d g_ = Eigen::Vector3d::Zero();
 };
 

@@ -15,12 +15,24 @@ enum class Stream : std::uint64_t {
   kSlip,
   kOutliers,
   kIntrinsics,
+  kGyroNoise,
+  kAccelNoise,
+  kGyroWalk,
+  kAccelWalk,
+  kInitialBias,
+  kLandmarks,
+  kPixelNoise,
+  kFeatureOutliers,
+  kFeatureDropouts,
+  kCalibrationError,
+  kStartError,
 };
 
-/// A stream of independent numbers; equal seed and purpose give equal numbers.
+/// A stream of independent numbers; equal seed, purpose and index give equal numbers. `index`
+/// tells several sensors of one kind apart.
 class RandomStream {
  public:
-  RandomStream(std::uint64_t seed, Stream purpose);
+  RandomStream(std::uint64_t seed, Stream purpose, std::uint64_t index = 0);
 
   double uniform();   ///< in [0, 1)
   double gaussian();  ///< mean 0, standard deviation 1

@@ -1,0 +1,321 @@
+// A run of the filter: feed, record, evaluate.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include <Eigen/Dense>
+
+#include "held_gauge.hpp"
+#include "viwo/eval/consistency.hpp"
+#include "viwo/experiment/run.hpp"
+#include "viwo/filter/standstill_start.hpp"
+#include "viwo/math/so3.hpp"
+#include "viwo/sim/random.hpp"
+
+namespace viwo::experiment {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+Vector3d vector(const std::array<double, 3>& values) { return {values[0], values[1], values[2]}; }
+
+/// R_GtoI of a reference state.
+Matrix3d R_GtoI(const StateSample& state) {
+  const auto& q = state.q_ItoG_xyzw;
+  return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized().toRotationMatrix().transpose();
+}
+
+StampedPose pose_of(const StateSample& state) {
+  return {state.t_ns, vector(state.p_IinG_m), Eigen::Quaterniond(R_GtoI(state).transpose())};
+}
+
+/// Start at the first state of the reference, off by draws from the prior if asked for.
+ImuPrior start_from_reference(const FilterSetup& setup, const StateSample& truth,
+                              std::uint64_t seed) {
+  const StartSetup& start = setup.start;
+  sim::RandomStream random(seed, sim::Stream::kStartError);
+  ImuPrior prior;
+  prior.t_ns = truth.t_ns;
+  const auto place = [&](int column, double sigma) {
+    Vector3d error;
+    for (int i = 0; i < 3; ++i) error[i] = start.state_error_scale * sigma * random.gaussian();
+    prior.P.diagonal().segment<3>(column).setConstant(sigma * sigma);
+    return error;
+  };
+  const Vector3d turn = place(kThetaColumn, start.sigma_orientation_rad);
+  prior.state.R_GtoI = exp_so3(turn) * R_GtoI(truth);
+  prior.state.p_IinG = vector(truth.p_IinG_m) - place(kPositionColumn, start.sigma_position_m);
+  prior.state.v_IinG =
+      vector(truth.v_IinG_m_per_s) - place(kVelocityColumn, start.sigma_velocity_m_per_s);
+  prior.state.gyro_bias =
+      vector(truth.gyro_bias_rad_per_s) - place(kGyroBiasColumn, start.sigma_gyro_bias_rad_per_s);
+  prior.state.accel_bias =
+      vector(truth.accel_bias_m_per_s2) - place(kAccelBiasColumn, start.sigma_accel_bias_m_per_s2);
+  return prior;
+}
+
+void start(Estimator& estimator, const RunSetup& run, const RunData& data) {
+  const FilterSetup& setup = *run.filter;
+  switch (setup.start.mode) {
+    case StartMode::kReference:
+      if (data.states.empty()) {
+        throw InputError(
+            "estimator.start: reference needs a sensor that gives reference states; without one "
+            "choose start: standstill or moving");
+      }
+      estimator.start(start_from_reference(setup, data.states.front(), run.seed));
+      return;
+    case StartMode::kStandstill: {
+      StandstillOptions options;
+      options.window_s = setup.start.window_s;
+      options.noise = setup.options.filter.imu_noise;
+      options.gravity_m_per_s2 = setup.options.filter.gravity_m_per_s2;
+      options.sigma_position_m = setup.start.sigma_position_m;
+      options.sigma_yaw_rad = setup.start.sigma_orientation_rad;
+      options.sigma_gyro_bias_rad_per_s = setup.start.sigma_gyro_bias_rad_per_s;
+      options.sigma_accel_bias_m_per_s2 = setup.start.sigma_accel_bias_m_per_s2;
+      estimator.start([options](auto imu, auto encoders) {
+        return start_from_standstill(imu, encoders, options);
+      });
+      return;
+    }
+    case StartMode::kMoving:
+      throw InputError("estimator.start: moving is not there yet");
+  }
+}
+
+/// Collects what a run reports while it goes on.
+class Recorder {
+ public:
+  Recorder(const RunSetup& setup, const RunData& data, RunResult& result)
+      : setup_(*setup.filter), data_(data), result_(result) {
+    for (const StateSample& state : data.states) truth_.push_back(pose_of(state));
+    for (const WheelSet& wheels : setup_.wheels) {
+      for (const std::string& name : calibration_names(wheels)) {
+        result_.calibration.push_back({name, {}, {}});
+      }
+      truths_.push_back(true_calibration(wheels));
+    }
+  }
+
+  void record(const Estimator& estimator) {
+    const Filter& filter = estimator.filter();
+    const ImuView& imu = filter.imu();
+    if (result_.estimate.empty()) begin_ns_ = filter.t_ns();
+    const double t_s = seconds_between(begin_ns_, filter.t_ns());
+    result_.estimate.push_back(
+        {filter.t_ns(), imu.p_IinG, Eigen::Quaterniond(imu.R_GtoI.transpose())});
+    add_nees(filter, t_s);
+    add_calibration(filter, t_s);
+    const auto stages = estimator.stage_ms();
+    stage_ms_.resize(stages.size());
+    for (std::size_t i = 0; i < stages.size(); ++i) stage_ms_[i].push_back(stages[i]);
+    result_.epoch_ms.emplace_back(t_s, std::accumulate(stages.begin(), stages.end(), 0.));
+  }
+
+  void finish(const Estimator& estimator) {
+    const auto names = estimator.stage_names();
+    for (std::size_t i = 0; i < stage_ms_.size(); ++i) {
+      result_.stages.emplace_back(names[i], stage_time(stage_ms_[i]));
+    }
+    std::vector<double> total;
+    for (const auto& [t_s, ms] : result_.epoch_ms) total.push_back(ms);
+    result_.total_ms = stage_time(total);
+    for (std::size_t i = 0; i < estimator.updates().size(); ++i) {
+      result_.updates.emplace_back(estimator.updates()[i].name, estimator.counts()[i]);
+    }
+    for (const RejectionCount& rejection : estimator.rejections()) {
+      result_.rejections.emplace_back("estimator", rejection);
+    }
+    if (n_nees_ > 0) {
+      result_.nees.pose = sum_pose_ / n_nees_;
+      result_.nees.position = sum_position_ / n_nees_;
+      result_.nees.orientation = sum_orientation_ / n_nees_;
+    }
+    result_.reference = truth_;
+  }
+
+ private:
+  /// The true calibration in the gauge that the estimate holds; nothing if not all of it is known.
+  std::optional<WheelsView> true_calibration(const WheelSet& wheels) const {
+    const auto names = calibration_names(wheels);
+    std::vector<double> values;
+    for (const std::string& name : names) {
+      const auto found = data_.calibration.find(name);
+      if (found == data_.calibration.end()) return std::nullopt;
+      values.push_back(found->second);
+    }
+    WheelsView truth = wheels.prior.wheels;
+    truth.R_ItoO = exp_so3({values[0], values[1], values[2]});
+    truth.p_IinO = {values[3], values[4], values[5]};
+    truth.t_OtoI_s = values[6];
+    for (Eigen::Index i = 0; i < truth.x_WI.size(); ++i) {
+      truth.x_WI[i] = values[static_cast<std::size_t>(7 + i)];
+    }
+    move_to_held_gauge(*wheels.model, wheels.prior.wheels.x_WI, truth);
+    return truth;
+  }
+
+  void add_nees(const Filter& filter, double t_s) {
+    const auto truth = interpolate(truth_, filter.t_ns(), 0.2);
+    if (!truth) return;
+    const ImuView& imu = filter.imu();
+    Vector6d error;
+    error.head<3>() =
+        -log_so3(truth->q_BtoW.toRotationMatrix().transpose() * imu.R_GtoI.transpose());
+    error.tail<3>() = truth->p_BinW - imu.p_IinG;
+    const auto& P = filter.covariance();
+    const double pose = eval::nees(error, P.topLeftCorner<6, 6>());
+    if (!std::isfinite(pose)) return;
+    sum_pose_ += pose;
+    sum_orientation_ += eval::nees(error.head<3>(), P.topLeftCorner<3, 3>());
+    sum_position_ += eval::nees(error.tail<3>(), P.block<3, 3>(3, 3));
+    ++n_nees_;
+    result_.nees.series.emplace_back(t_s, pose);
+  }
+
+  void add_calibration(const Filter& filter, double t_s) {
+    result_.calibration_t_s.push_back(t_s);
+    auto track = result_.calibration.begin();
+    for (std::size_t k = 0; k < setup_.wheels.size(); ++k) {
+      const WheelsView& wheels = filter.wheels()[k];
+      const std::optional<WheelsView>& truth = truths_[k];
+      const auto add = [&](double estimate, int column, double true_value, double error) {
+        track->estimate.push_back(estimate);
+        track->sigma.push_back(column < 0 ? 0. : std::sqrt(filter.covariance()(column, column)));
+        if (truth) {
+          track->truth = true_value;
+          track->final_error = error;
+        }
+        ++track;
+      };
+      const auto column = [](int first, int i) { return first < 0 ? -1 : first + i; };
+      const WheelsView& is = truth ? *truth : wheels;
+      const Vector3d turned = log_so3(wheels.R_ItoO), truly = log_so3(is.R_ItoO);
+      const Vector3d turn_error = log_so3(is.R_ItoO * wheels.R_ItoO.transpose());
+      for (int i = 0; i < 3; ++i) {
+        add(turned[i], column(wheels.extrinsics_column, i), truly[i], turn_error[i]);
+      }
+      for (int i = 0; i < 3; ++i) {
+        add(wheels.p_IinO[i], column(wheels.extrinsics_column, 3 + i), is.p_IinO[i],
+            wheels.p_IinO[i] - is.p_IinO[i]);
+      }
+      add(wheels.t_OtoI_s, wheels.time_offset_column, is.t_OtoI_s, wheels.t_OtoI_s - is.t_OtoI_s);
+      for (int i = 0; i < wheels.x_WI.size(); ++i) {
+        add(wheels.x_WI[i], column(wheels.intrinsics_column, i), is.x_WI[i],
+            wheels.x_WI[i] - is.x_WI[i]);
+      }
+    }
+  }
+
+  const FilterSetup& setup_;
+  const RunData& data_;
+  RunResult& result_;
+  Trajectory truth_;
+  std::vector<std::optional<WheelsView>> truths_;
+  std::int64_t begin_ns_ = 0;
+  std::vector<std::vector<double>> stage_ms_;
+  double sum_pose_ = 0., sum_position_ = 0., sum_orientation_ = 0.;
+  int n_nees_ = 0;
+};
+
+/// All measurements in the order of their stamps, each handed to `take`.
+class Feed {
+ public:
+  Feed(const RunSetup& setup, const RunData& data) : data_(data) {
+    for (const WheelSet& wheels : setup.filter->wheels) {
+      const auto other = data.other_wheels.find(wheels.sensor);
+      wheels_.push_back(other != data.other_wheels.end() ? &other->second : &data.samples);
+    }
+    next_wheel_.resize(wheels_.size(), 0);
+  }
+
+  /// False when there is nothing left.
+  bool next(Estimator& estimator) {
+    constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::max();
+    const auto stamp = [](const auto& samples, std::size_t i) {
+      return i < samples.size() ? samples[i].t_ns : kNone;
+    };
+    std::int64_t first = std::min(stamp(data_.imu, next_imu_), stamp(data_.images, next_image_));
+    for (std::size_t k = 0; k < wheels_.size(); ++k) {
+      first = std::min(first, stamp(*wheels_[k], next_wheel_[k]));
+    }
+    if (first == kNone) return false;
+    if (stamp(data_.imu, next_imu_) == first) {
+      estimator.add(data_.imu[next_imu_++]);
+      return true;
+    }
+    for (std::size_t k = 0; k < wheels_.size(); ++k) {
+      if (stamp(*wheels_[k], next_wheel_[k]) != first) continue;
+      estimator.add((*wheels_[k])[next_wheel_[k]++], static_cast<int>(k));
+      return true;
+    }
+    estimator.add(data_.images[next_image_++]);
+    return true;
+  }
+
+ private:
+  const RunData& data_;
+  std::vector<const std::vector<EncoderSample>*> wheels_;
+  std::vector<std::size_t> next_wheel_;
+  std::size_t next_imu_ = 0;
+  std::size_t next_image_ = 0;
+};
+
+Estimator make_estimator(const FilterSetup& setup) {
+  std::vector<WheelsPrior> wheels;
+  for (const WheelSet& set : setup.wheels) wheels.push_back(set.prior);
+  std::vector<UpdateEntry> updates;
+  for (const auto& entry : setup.updates) {
+    updates.push_back({entry.name, entry.update.object, entry.wheels});
+  }
+  return {setup.options, setup.cameras, wheels, updates};
+}
+
+}  // namespace
+
+RunResult run_filter(const RunSetup& setup, const RunData& data) {
+  RunResult result;
+  result.rejections = data.rejections;
+  Estimator estimator = make_estimator(*setup.filter);
+  start(estimator, setup, data);
+  Recorder recorder(setup, data, result);
+  Feed feed(setup, data);
+  double wall_s = 0.;
+  bool more = true;
+  while (more && estimator.failure().empty()) {
+    more = feed.next(estimator);
+    if (!more) estimator.finish();
+    for (;;) {
+      const auto begin = std::chrono::steady_clock::now();
+      const bool stepped = estimator.step();
+      wall_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      if (!stepped) break;
+      recorder.record(estimator);
+    }
+  }
+  recorder.finish(estimator);
+  result.wall_s = wall_s;
+  result.epochs = estimator.epochs();
+  if (!result.estimate.empty()) {
+    result.duration_s = seconds_between(result.estimate.front().t_ns, result.estimate.back().t_ns);
+  }
+  if (!estimator.failure().empty()) {
+    result.status = RunStatus::kDiverged;
+    result.cause = estimator.failure() + " (epoch " + std::to_string(result.epochs) + ", " +
+                   std::to_string(result.duration_s) + " s)";
+  } else if (result.epochs == 0) {
+    result.status = RunStatus::kFailed;
+    result.cause = setup.filter->start.mode == StartMode::kReference
+                       ? "the measurements do not make a single epoch"
+                       : "no state to start from was found in the measurements";
+  }
+  if (result.status == RunStatus::kOk && !result.reference.empty()) {
+    result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);
+  }
+  return result;
+}
+
+}  // namespace viwo::experiment

@@ -1,0 +1,291 @@
+#include "viwo/experiment/filter_setup.hpp"
+
+#include "filter_params.hpp"
+#include "viwo/config/params.hpp"
+#include "viwo/log/kalibr.hpp"
+#include "viwo/math/so3.hpp"
+#include "viwo/sim/random.hpp"
+
+namespace viwo::experiment {
+namespace {
+
+using config::Errors;
+using config::Node;
+using Eigen::Vector3d;
+
+Node section_or_empty(const Node& parent, const char* key) {
+  const Node* section = parent.find(key);
+  return section != nullptr ? *section : Node::empty_map(parent.mark());
+}
+
+/// The values of a section, resolved; nothing if something in it is wrong.
+std::optional<ParamSet> read_section(const Node& section, const std::string& path,
+                                     std::span<const ParamSpec> specs, Node& resolved,
+                                     Errors& errors) {
+  const std::size_t before = errors.size();
+  const ParamSet params = config::read_params(section, section.mark(), path, specs, {}, {}, errors);
+  if (errors.size() > before) return std::nullopt;
+  resolved = config::write_params(specs, params);
+  return params;
+}
+
+std::optional<Vector3d> three(const ParamSet& params, const char* key, const Node& section,
+                              Errors& errors) {
+  const auto values = params.numbers(key);
+  if (values.size() == 3) return Vector3d(values[0], values[1], values[2]);
+  const Node* node = section.find(key);
+  errors.add(node != nullptr ? node->mark() : section.mark(),
+             std::string(key) + " needs three numbers");
+  return std::nullopt;
+}
+
+Eigen::Matrix3d from_rpy(const Vector3d& rpy) {
+  return exp_so3({0., 0., rpy[2]}) * exp_so3({0., rpy[1], 0.}) * exp_so3({rpy[0], 0., 0.});
+}
+
+void read_estimator(const ParamSet& p, FilterSetup& setup) {
+  setup.options.filter.clones = static_cast<int>(p.integer("clones"));
+  setup.options.filter.first_estimates = p.flag("first_estimates");
+  setup.options.filter.gravity_m_per_s2 = p.number("gravity_m_per_s2");
+  setup.options.max_epoch_s = p.number("max_epoch_s");
+  setup.options.max_wait_s = p.number("max_wait_s");
+  setup.options.max_imu_gap_s = p.number("max_imu_gap_s");
+  StartSetup& start = setup.start;
+  start.mode = p.text("start") == "standstill" ? StartMode::kStandstill
+               : p.text("start") == "moving"   ? StartMode::kMoving
+                                               : StartMode::kReference;
+  start.window_s = p.number("start_window_s");
+  start.sigma_orientation_rad = p.number("sigma_start_orientation_rad");
+  start.sigma_position_m = p.number("sigma_start_position_m");
+  start.sigma_velocity_m_per_s = p.number("sigma_start_velocity_m_per_s");
+  start.sigma_gyro_bias_rad_per_s = p.number("sigma_start_gyro_bias_rad_per_s");
+  start.sigma_accel_bias_m_per_s2 = p.number("sigma_start_accel_bias_m_per_s2");
+  start.state_error_scale = p.number("start_error_scale");
+}
+
+void read_imu(const ParamSet& p, FilterSetup& setup) {
+  if (!p.text("kalibr").empty()) {
+    setup.options.filter.imu_noise = log::read_kalibr_imu(p.text("kalibr"));
+    return;
+  }
+  setup.options.filter.imu_noise = {p.number("sigma_gyro_rad_per_s_sqrt_hz"),
+                                    p.number("sigma_accel_m_per_s2_sqrt_hz"),
+                                    p.number("sigma_gyro_walk_rad_per_s2_sqrt_hz"),
+                                    p.number("sigma_accel_walk_m_per_s3_sqrt_hz")};
+}
+
+void read_cameras(const ParamSet& p, const Node& section, FilterSetup& setup, Errors& errors) {
+  auto cameras = log::read_kalibr_cameras(p.text("kalibr"));
+  const auto use = static_cast<std::size_t>(p.integer("use"));
+  if (use > cameras.size()) {
+    errors.add(section.mark(), "cameras.use: " + p.text("kalibr") + " has only " +
+                                   std::to_string(cameras.size()) + " cameras");
+    return;
+  }
+  if (use > 0) cameras.resize(use);
+  for (const CameraView& camera : cameras) {
+    CameraPrior prior;
+    prior.camera = camera;
+    prior.sigma_extrinsics.head<3>().setConstant(p.number("sigma_orientation_rad"));
+    prior.sigma_extrinsics.tail<3>().setConstant(p.number("sigma_position_m"));
+    prior.sigma_intrinsics.head<4>().setConstant(p.number("sigma_focal_px"));
+    prior.sigma_intrinsics.tail<4>().setConstant(p.number("sigma_distortion"));
+    setup.cameras.push_back(prior);
+  }
+}
+
+/// A wheel set from its section `wheels`; the intrinsics and their sigmas are those of its model.
+void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double error_scale,
+                 std::uint64_t seed, FilterSetup& setup, Errors& errors) {
+  const auto p_IinO = three(p, "p_IinO_m", section, errors);
+  const auto rpy = three(p, "rpy_ItoO_rad", section, errors);
+  if (!p_IinO || !rpy) return;
+  set.sensor = p.text("sensor");
+  WheelsPrior& prior = set.prior;
+  prior.wheels.model = &set.model->model();
+  prior.wheels.R_ItoO = from_rpy(*rpy);
+  prior.wheels.p_IinO = *p_IinO;
+  prior.wheels.t_OtoI_s = p.number("t_OtoI_s");
+  prior.sigma_extrinsics.head<3>().setConstant(p.number("sigma_R_ItoO_rad"));
+  prior.sigma_extrinsics.tail<3>().setConstant(p.number("sigma_p_IinO_m"));
+  prior.sigma_time_offset_s = p.number("sigma_t_OtoI_s");
+
+  // A start that is wrong is wrong in the same way whether it is then calibrated or not.
+  sim::RandomStream random(seed, sim::Stream::kCalibrationError, setup.wheels.size());
+  const auto draw = [&](double sigma) { return error_scale * sigma * random.gaussian(); };
+  Vector3d turn, shift;
+  for (int i = 0; i < 3; ++i) turn[i] = draw(prior.sigma_extrinsics[i]);
+  for (int i = 0; i < 3; ++i) shift[i] = draw(prior.sigma_extrinsics[3 + i]);
+  const double later = draw(prior.sigma_time_offset_s);
+  if (error_scale > 0.) {
+    prior.wheels.R_ItoO = exp_so3(turn) * prior.wheels.R_ItoO;
+    prior.wheels.p_IinO += shift;
+    prior.wheels.t_OtoI_s += later;
+    for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
+      prior.wheels.x_WI[i] += draw(prior.sigma_intrinsics[i]);
+    }
+  }
+  if (!p.flag("calibrate_extrinsics")) prior.sigma_extrinsics.setZero();
+  if (!p.flag("calibrate_time_offset")) prior.sigma_time_offset_s = 0.;
+  if (!p.flag("calibrate_intrinsics")) prior.sigma_intrinsics.setZero();
+  setup.wheels.push_back(std::move(set));
+}
+
+/// Further wheel sets: NAME: {kinematics: {...}, wheels: {...}}.
+void read_wheel_sets(const Node& run, double error_scale, std::uint64_t seed,
+                     PluginRegistry& plugins, FilterSetup& setup, Node& resolved, Errors& errors) {
+  const Node* sets = run.find("wheel_sets");
+  if (sets == nullptr) return;
+  if (!sets->is_map()) {
+    errors.add(sets->mark(), "'wheel_sets' is a section NAME: {kinematics: ..., wheels: ...}");
+    return;
+  }
+  Node resolved_sets = Node::empty_map(sets->mark());
+  for (const auto& entry : sets->entries()) {
+    const std::string path = "wheel_sets." + entry.key;
+    const Node* kinematics = entry.value.is_map() ? entry.value.find("kinematics") : nullptr;
+    if (kinematics == nullptr) {
+      errors.add(entry.value.mark(), path + " needs a section 'kinematics'");
+      continue;
+    }
+    for (const auto& part : entry.value.entries()) {
+      if (part.key != "kinematics" && part.key != "wheels") {
+        errors.add(part.key_mark,
+                   path + ": unknown key '" + part.key + "' - known: kinematics, wheels");
+      }
+    }
+    const auto model = plugins.make_kinematics(*kinematics, path + ".kinematics", errors);
+    const Node section = section_or_empty(entry.value, "wheels");
+    Node resolved_wheels;
+    const auto params =
+        read_section(section, path + ".wheels", kWheelsParams, resolved_wheels, errors);
+    if (!model.object || !params) continue;
+    WheelSet set;
+    set.name = entry.key;
+    set.model = guarded(model.info, "describe",
+                        [&] { return std::make_shared<const WheelModel>(model.object); });
+    set.prior.wheels.x_WI = set.model->nominal();
+    set.prior.sigma_intrinsics = set.model->prior_sigma();
+    read_wheels(*params, section, std::move(set), error_scale, seed, setup, errors);
+    Node resolved_set = Node::empty_map();
+    resolved_set.set("kinematics", model.resolved);
+    resolved_set.set("wheels", resolved_wheels);
+    resolved_sets.set(entry.key, resolved_set);
+  }
+  resolved.set("wheel_sets", resolved_sets);
+}
+
+void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, Node& resolved,
+                  Errors& errors) {
+  const Node* updates = run.find("updates");
+  if (updates == nullptr) return;
+  if (!updates->is_map()) {
+    errors.add(updates->mark(), "'updates' is a section NAME: {its parameters}");
+    return;
+  }
+  Node resolved_updates = Node::empty_map(updates->mark());
+  for (const auto& entry : updates->entries()) {
+    const std::string path = "updates." + entry.key;
+    Node section = entry.value.is_null() ? Node::empty_map(entry.value.mark()) : entry.value;
+    if (!section.is_map()) {
+      errors.add(section.mark(), path + " must be a section of parameters ({} for none)");
+      continue;
+    }
+    bool enabled = true;
+    if (const Node* flag = section.find("enabled")) {
+      if (!flag->is_scalar() || (flag->scalar() != "true" && flag->scalar() != "false")) {
+        errors.add(flag->mark(), path + ".enabled must be true or false");
+      } else {
+        enabled = flag->scalar() == "true";
+      }
+    }
+    // The name says which update it is unless it says so itself.
+    if (section.find("type") == nullptr) section.set("type", Node::scalar_of(entry.key));
+    constexpr std::string_view kHostKeys[] = {"enabled"};
+    // One instance per wheel set; the first also tells which kind it is.
+    auto loaded = plugins.make_update(section, path, errors, kHostKeys);
+    if (!loaded.object) continue;
+    Node resolved_update = loaded.resolved;
+    resolved_update.set("enabled", Node::scalar_of(enabled ? "true" : "false"));
+    resolved_updates.set(entry.key, resolved_update, entry.key_mark);
+    if (!enabled) continue;
+    if (loaded.object->kind() == UpdateKind::kBody) {
+      setup.updates.push_back({entry.key, std::move(loaded), -1});
+      continue;
+    }
+    if (setup.wheels.empty()) {
+      errors.add(entry.key_mark, path + " needs wheels: the run has no section 'kinematics'");
+      continue;
+    }
+    for (std::size_t i = 0; i < setup.wheels.size(); ++i) {
+      const std::string name =
+          setup.wheels[i].name.empty() ? entry.key : setup.wheels[i].name + "." + entry.key;
+      if (i > 0) loaded = plugins.make_update(section, path, errors, kHostKeys);
+      setup.updates.push_back({name, loaded, static_cast<int>(i)});
+    }
+  }
+  resolved.set("updates", resolved_updates);
+}
+
+}  // namespace
+
+bool wants_filter(const Node& run) {
+  if (const Node* estimator = run.find("estimator"); estimator != nullptr && estimator->is_map()) {
+    const Node* type = estimator->find("type");
+    if (type != nullptr && type->is_scalar() && type->scalar() != "auto") {
+      return type->scalar() == "msckf";
+    }
+  }
+  return run.find("updates") != nullptr;
+}
+
+std::vector<std::string> calibration_names(const WheelSet& wheels) {
+  const std::string prefix = wheels.name.empty() ? "" : wheels.name + ".";
+  std::vector<std::string> names;
+  for (const char* name : {"theta_ItoO_x", "theta_ItoO_y", "theta_ItoO_z", "p_IinO_x", "p_IinO_y",
+                           "p_IinO_z", "t_OtoI"}) {
+    names.push_back(prefix + name);
+  }
+  for (const IntrinsicSpec& spec : wheels.model->description().intrinsics) {
+    names.push_back(prefix + spec.name);
+  }
+  return names;
+}
+
+FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>& model,
+                        const Intrinsics& x_WI, const Intrinsics& sigma, std::uint64_t seed,
+                        PluginRegistry& plugins, Node& resolved, Errors& errors) {
+  FilterSetup setup;
+  const auto read = [&](const char* key, std::span<const ParamSpec> specs) {
+    Node section = Node::empty_map();
+    const auto params = read_section(section_or_empty(run, key), key, specs, section, errors);
+    if (params) resolved.set(key, section);
+    return params;
+  };
+  double error_scale = 0.;
+  if (const auto params = read("estimator", kEstimatorParams)) {
+    read_estimator(*params, setup);
+    error_scale = params->number("calibration_error_scale");
+  }
+  if (const auto params = read("imu", kImuParams)) read_imu(*params, setup);
+  if (run.find("cameras") != nullptr) {
+    if (const auto params = read("cameras", kCamerasParams)) {
+      read_cameras(*params, *run.find("cameras"), setup, errors);
+    }
+  }
+  if (model != nullptr) {
+    if (const auto params = read("wheels", kWheelsParams)) {
+      WheelSet set;
+      set.model = model;
+      set.prior.wheels.x_WI = x_WI;
+      set.prior.sigma_intrinsics = sigma;
+      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error_scale, seed,
+                  setup, errors);
+    }
+  }
+  read_wheel_sets(run, error_scale, seed, plugins, setup, resolved, errors);
+  read_updates(run, plugins, setup, resolved, errors);
+  return setup;
+}
+
+}  // namespace viwo::experiment

@@ -1,0 +1,118 @@
+// The host of the updates: takes measurements as they come, and at every image propagates, clones,
+// lets each update emit its factors, applies them, and drops the oldest clone.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "viwo/api/update.hpp"
+#include "viwo/filter/filter.hpp"
+
+namespace viwo {
+
+struct EstimatorOptions {
+  FilterOptions filter;
+  /// Without an image for this long an epoch is made without one.
+  double max_epoch_s = 0.25;
+  /// How long (in stamps) an epoch waits for encoder samples that reach its end.
+  double max_wait_s = 0.2;
+  /// Longer spacings of the IMU are counted.
+  double max_imu_gap_s = 0.05;
+};
+
+/// An update as the estimator runs it. For kind kWheels: `wheels` is the index of its wheel set.
+struct UpdateEntry {
+  std::string name;
+  std::shared_ptr<Update> update;
+  int wheels = -1;
+};
+
+/// How often an update's factors, or the measurements in them, were applied and rejected.
+struct UpdateCounts {
+  std::int64_t applied = 0;
+  std::int64_t rejected = 0;
+};
+
+/// An update that threw. The estimator is unusable after it.
+class UpdateFailure : public std::runtime_error {
+ public:
+  UpdateFailure(const std::string& update, const std::string& text)
+      : std::runtime_error("update '" + update + "' failed: " + text) {}
+};
+
+/// Finds a state to start from, given everything that was measured so far. Nothing: not yet.
+using Initializer = std::function<std::optional<ImuPrior>(
+    std::span<const ImuSample> imu, std::span<const std::vector<EncoderSample>> encoders)>;
+
+class Estimator {
+ public:
+  /// Starts the updates (InputError when one of them cannot work with this configuration).
+  Estimator(const EstimatorOptions& options, std::vector<CameraPrior> cameras,
+            std::vector<WheelsPrior> wheels, std::vector<UpdateEntry> updates);
+
+  /// Where to start: a state, or a way to find one.
+  void start(const ImuPrior& prior);
+  void start(Initializer initializer) { initializer_ = std::move(initializer); }
+
+  /// Measurements of one kind must come in time order; others are counted and dropped, as are
+  /// values that are not finite and images before the start.
+  void add(const ImuSample& sample);
+  void add(const FeatureSample& image);
+  void add(const EncoderSample& sample, int wheels);
+  /// No further measurement will come: what waits for others is done without them.
+  void finish() { finished_ = true; }
+
+  /// Runs one epoch when the measurements suffice, else returns false. UpdateFailure.
+  bool step();
+  /// Why the filter cannot go on (it has diverged); empty as long as it can.
+  const std::string& failure() const { return failure_; }
+
+  const Filter& filter() const { return filter_; }
+  std::span<const UpdateEntry> updates() const { return updates_; }
+  std::span<const UpdateCounts> counts() const { return counts_; }
+  std::vector<RejectionCount> rejections() const;
+  std::int64_t epochs() const { return epochs_; }
+
+  /// Stages of an epoch: "propagate", the updates, "marginalise".
+  std::vector<std::string> stage_names() const;
+  /// Time that each stage of the last epoch took, ms.
+  std::span<const double> stage_ms() const { return stage_ms_; }
+
+ private:
+  std::optional<std::int64_t> next_epoch_ns() const;
+  bool encoders_reach(std::int64_t t_ns) const;
+  void cut_imu(std::int64_t end_ns);
+  void take_images(std::int64_t t_ns);
+  void forget_used();
+  bool try_to_initialize();
+  void run_update(std::size_t index, const EpochData& data);
+  void reject(const char* reason, std::int64_t t_ns);
+
+  EstimatorOptions options_;
+  Filter filter_;
+  std::vector<UpdateEntry> updates_;
+  std::vector<UpdateCounts> counts_;
+  FactorSink sink_;
+  Initializer initializer_;
+
+  std::vector<ImuSample> imu_;                        // from the last epoch on
+  std::vector<std::vector<EncoderSample>> encoders_;  // from the oldest clone on, per wheel set
+  std::vector<FeatureSample> waiting_;                // images, in time order; spare ones behind
+  std::size_t n_waiting_ = 0;
+  std::vector<FeatureSample> images_;  // of the present epoch; spare ones behind
+  std::size_t n_images_ = 0;
+  std::vector<ImuSample> cut_;  // IMU of the present epoch, interpolated at its ends
+  std::int64_t latest_ns_ = 0;  // largest stamp of anything
+  bool finished_ = false;
+  std::string failure_;
+  std::int64_t epochs_ = 0;
+  std::vector<double> stage_ms_;
+  std::vector<RejectionCount> rejections_;
+};
+
+}  // namespace viwo

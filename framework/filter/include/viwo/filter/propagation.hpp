@@ -1,0 +1,32 @@
+// IMU propagation: mean, transition and noise of the inertial state between two instants.
+// Equations: docs/math/filter.md.
+#pragma once
+
+#include <span>
+
+#include <Eigen/Core>
+
+#include "viwo/api/filter_view.hpp"
+
+namespace viwo {
+
+using ImuMatrix = Eigen::Matrix<double, kImuSize, kImuSize>;
+
+/// The reading at `t_ns` on the straight line between two others.
+ImuSample interpolate(const ImuSample& before, const ImuSample& after, std::int64_t t_ns);
+
+/// Transition Phi and noise Q of the inertial error state over an interval:
+/// P <- Phi P Phi^T + Q.
+struct ImuTransition {
+  ImuMatrix Phi;
+  ImuMatrix Q;
+};
+
+/// Moves `imu` over the samples, from the stamp of the first to that of the last (F-1, F-2), and
+/// returns the transition (F-3 .. F-5). Readings are taken as linear between samples. Phi is taken
+/// between the first estimates at the start (imu.*_fej) and the new estimate (F-6), which becomes
+/// the first estimate of what follows. With fewer than two samples nothing moves.
+ImuTransition propagate(std::span<const ImuSample> samples, const ImuNoise& noise,
+                        double gravity_m_per_s2, ImuView& imu);
+
+}  // namespace viwo

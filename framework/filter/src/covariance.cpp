@@ -1,0 +1,207 @@
+#include "viwo/filter/covariance.hpp"
+
+#include <Eigen/Cholesky>
+
+#include "viwo/math/chi2.hpp"
+
+namespace viwo {
+namespace {
+
+using Eigen::Index;
+
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor,
+                                  kMaxFactorRows, kMaxFactorRows>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxFactorRows, 1>;
+using InPlaceCholesky = Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>;
+
+void mirror_lower(Eigen::MatrixXd& M) { M.triangularView<Eigen::StrictlyUpper>() = M.transpose(); }
+
+}  // namespace
+
+Covariance::Covariance(int size)
+    : P_(Eigen::MatrixXd::Zero(size, size)),
+      PHt_(size, kMaxFactorRows),
+      in_factor_(static_cast<std::size_t>(size)),
+      C_(size, size),
+      T_(size, size),
+      Y_(size, size),
+      Z_(size, size),
+      G_(size, size),
+      W_(size, size),
+      y_(size) {
+  order_.reserve(static_cast<std::size_t>(size));
+  factor_index_.reserve(static_cast<std::size_t>(size));
+  gates_.reserve(64);
+}
+
+void Covariance::set_block(int first, const Eigen::MatrixXd& block) {
+  clear_block(first, static_cast<int>(block.rows()));
+  P_.block(first, first, block.rows(), block.cols()) = block;
+}
+
+void Covariance::clear_block(int first, int count) {
+  P_.middleRows(first, count).setZero();
+  P_.middleCols(first, count).setZero();
+}
+
+void Covariance::propagate(const ImuTransition& transition) {
+  const Index rest = size() - kImuSize;
+  const ImuMatrix P_imu = P_.topLeftCorner<kImuSize, kImuSize>();
+  const ImuMatrix half = transition.Phi * P_imu;
+  ImuMatrix next = half * transition.Phi.transpose() + transition.Q;
+  next.triangularView<Eigen::StrictlyUpper>() = next.transpose();
+  P_.topLeftCorner<kImuSize, kImuSize>() = next;
+  auto shared = P_.bottomLeftCorner(rest, kImuSize);
+  auto product = PHt_.topLeftCorner(rest, kImuSize);
+  product.noalias() = shared * transition.Phi.transpose();
+  shared = product;
+  P_.topRightCorner(kImuSize, rest) = product.transpose();
+}
+
+void Covariance::clone_pose(int column) {
+  P_.middleCols<kPoseSize>(column) = P_.middleCols<kPoseSize>(kThetaColumn);
+  P_.middleRows<kPoseSize>(column) = P_.middleRows<kPoseSize>(kThetaColumn);
+}
+
+double Covariance::gate(int rows, double probability) {
+  for (const Gate& gate : gates_) {
+    if (gate.rows == rows && gate.probability == probability) return gate.threshold;
+  }
+  gates_.push_back({rows, probability, chi2_quantile(1. - probability, rows)});
+  return gates_.back().threshold;
+}
+
+FactorResult Covariance::apply(const ResidualFactor& factor, Eigen::VectorXd& dx) {
+  const Index rows = factor.residual.size();
+  dx.setZero();
+  if (rows == 0 || !factor.residual.allFinite() || !factor.H.allFinite()) {
+    return FactorResult::kRejected;
+  }
+  auto PHt = PHt_.leftCols(rows);
+  PHt.setZero();
+  Index start = 0;
+  for (const ColumnRange& block : factor.columns.blocks()) {
+    PHt.noalias() += P_.middleCols(block.first, block.count) *
+                     factor.H.middleCols(start, block.count).transpose();
+    start += block.count;
+  }
+  SmallMatrix S = factor.R;
+  start = 0;
+  for (const ColumnRange& block : factor.columns.blocks()) {
+    S += factor.H.middleCols(start, block.count)
+             .lazyProduct(PHt.middleRows(block.first, block.count));
+    start += block.count;
+  }
+  const Eigen::LLT<SmallMatrix> llt(S);
+  if (llt.info() != Eigen::Success) return FactorResult::kRejected;
+  const SmallVector white = llt.matrixL().solve(factor.residual);
+  if (factor.gate_probability > 0. &&
+      !(white.squaredNorm() <= gate(static_cast<int>(rows), factor.gate_probability))) {
+    return FactorResult::kGated;
+  }
+  // W = P H^T L^-T: P <- P - W W^T, dx = W L^-1 r (F-7).
+  for (Index i = 0; i < rows; ++i) {
+    for (Index k = 0; k < i; ++k) PHt.col(i) -= llt.matrixLLT()(i, k) * PHt.col(k);
+    PHt.col(i) /= llt.matrixLLT()(i, i);
+  }
+  dx.noalias() = PHt * white;
+  for (Index j = 0; j < P_.cols(); ++j) {
+    for (Index k = 0; k < rows; ++k) {
+      P_.col(j).tail(P_.rows() - j) -= PHt(j, k) * PHt.col(k).tail(P_.rows() - j);
+    }
+  }
+  mirror_lower(P_);
+  return FactorResult::kApplied;
+}
+
+void Covariance::collect_columns(const FactorColumns& columns) {
+  order_.clear();
+  factor_index_.clear();
+  std::fill(in_factor_.begin(), in_factor_.end(), false);
+  int start = 0;
+  for (const ColumnRange& block : columns.blocks()) {
+    for (int i = 0; i < block.count; ++i) {
+      const int column = block.first + i;
+      if (P_(column, column) <= 0.) continue;  // held: nothing to learn
+      order_.push_back(column);
+      factor_index_.push_back(start + i);
+      in_factor_[static_cast<std::size_t>(column)] = true;
+    }
+    start += block.count;
+  }
+  for (int column = 0; column < size(); ++column) {
+    if (!in_factor_[static_cast<std::size_t>(column)]) order_.push_back(column);
+  }
+}
+
+FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd& dx) {
+  dx.setZero();
+  collect_columns(factor.columns);
+  const Index m = static_cast<Index>(factor_index_.size());
+  const Index n = size();
+  if (m == 0) return FactorResult::kRejected;
+  const auto at = [](const std::vector<int>& list, Index i) {
+    return list[static_cast<std::size_t>(i)];
+  };
+  auto C = C_.topLeftCorner(m, m);
+  auto Lambda = W_.topLeftCorner(m, m);
+  for (Index j = 0; j < m; ++j) {
+    for (Index i = j; i < m; ++i) {
+      const int row = at(factor_index_, i), col = at(factor_index_, j);
+      Lambda(i, j) = row >= col ? factor.Lambda(row, col) : factor.Lambda(col, row);
+      Lambda(j, i) = Lambda(i, j);
+      C(i, j) = P_(at(order_, i), at(order_, j));
+    }
+  }
+  auto y = y_.head(m);
+  for (Index i = 0; i < m; ++i) y[i] = factor.eta[at(factor_index_, i)];
+  if (!Lambda.allFinite() || !y.allFinite()) return FactorResult::kRejected;
+
+  // P_cc = C C^T; T = I + C^T Lambda C = L L^T; Z = L^-1 C^-1 P_c: (F-8).
+  Eigen::Ref<Eigen::MatrixXd> C_ref(C);
+  if (InPlaceCholesky(C_ref).info() != Eigen::Success) return FactorResult::kFailed;
+  C.triangularView<Eigen::StrictlyUpper>().setZero();
+  auto LambdaC = G_.topLeftCorner(m, m);
+  LambdaC.noalias() = Lambda * C.triangularView<Eigen::Lower>();
+  auto T = T_.topLeftCorner(m, m);
+  T.noalias() = C.transpose().triangularView<Eigen::Upper>() * LambdaC;
+  T.diagonal().array() += 1.;
+  Eigen::Ref<Eigen::MatrixXd> T_ref(T);
+  if (InPlaceCholesky(T_ref).info() != Eigen::Success) return FactorResult::kRejected;
+
+  auto Y = Y_.topLeftCorner(m, n);
+  Y.leftCols(m) = C.transpose();
+  for (Index j = m; j < n; ++j) {
+    for (Index i = 0; i < m; ++i) Y(i, j) = P_(at(order_, i), at(order_, j));
+  }
+  auto Y_others = Y.rightCols(n - m);
+  C.triangularView<Eigen::Lower>().solveInPlace(Y_others);
+  auto Z = Z_.topLeftCorner(m, n);
+  Z = Y;
+  T.triangularView<Eigen::Lower>().solveInPlace(Z);
+
+  // dx = P_:c (I + Lambda P_cc)^-1 eta = Z^T L^-1 C^T eta.
+  y = (C.transpose().triangularView<Eigen::Upper>() * y).eval();
+  T.triangularView<Eigen::Lower>().solveInPlace(y);
+  auto G = G_.topLeftCorner(n, n);
+  G.triangularView<Eigen::Lower>().setZero();
+  G.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose());
+  // What the factor does not see directly: P_oo - Y_o^T Y_o + Z_o^T Z_o.
+  auto G_others = G.bottomRightCorner(n - m, n - m);
+  G_others.selfadjointView<Eigen::Lower>().rankUpdate(Y_others.transpose(), -1.);
+  for (Index j = 0; j < n; ++j) {
+    const int col = at(order_, j);
+    double correction = 0.;
+    for (Index i = 0; i < m; ++i) correction += Z(i, j) * y[i];
+    dx[col] = correction;
+    for (Index i = j; i < n; ++i) {
+      const int row = at(order_, i);
+      const double value = G(i, j) + (j >= m ? P_(row, col) : 0.);
+      P_(row, col) = value;
+      P_(col, row) = value;
+    }
+  }
+  return FactorResult::kApplied;
+}
+
+}  // namespace viwo

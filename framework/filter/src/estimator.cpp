@@ -1,0 +1,279 @@
+#include "viwo/filter/estimator.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace viwo {
+namespace {
+
+constexpr int kMaxFactorsPerUpdate = 16;
+constexpr double kNsPerS = 1e9;
+
+using Clock = std::chrono::steady_clock;
+
+double ms_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+template <std::size_t kSize>
+bool finite(const std::array<double, kSize>& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+std::int64_t to_ns(double seconds) {
+  return static_cast<std::int64_t>(std::llround(seconds * 1e9));
+}
+
+}  // namespace
+
+Estimator::Estimator(const EstimatorOptions& options, std::vector<CameraPrior> cameras,
+                     std::vector<WheelsPrior> wheels, std::vector<UpdateEntry> updates)
+    : options_(options),
+      filter_(options.filter, std::move(cameras), std::move(wheels)),
+      updates_(std::move(updates)),
+      counts_(updates_.size()),
+      sink_(kMaxFactorsPerUpdate, filter_.size()),
+      encoders_(filter_.wheels().size()),
+      stage_ms_(updates_.size() + 2, 0.) {
+  imu_.reserve(4096);
+  cut_.reserve(4096);
+  for (auto& samples : encoders_) samples.reserve(4096);
+  for (const UpdateEntry& entry : updates_) {
+    UpdateSetup setup;
+    setup.max_clones = options.filter.clones + 1;
+    setup.max_state_size = filter_.size();
+    setup.cameras = filter_.cameras();
+    if (entry.wheels >= 0) setup.wheels = &filter_.wheels()[static_cast<std::size_t>(entry.wheels)];
+    entry.update->start(setup);
+  }
+}
+
+void Estimator::reject(const char* reason, std::int64_t t_ns) {
+  for (RejectionCount& known : rejections_) {
+    if (known.reason == reason) {
+      ++known.count;
+      return;
+    }
+  }
+  rejections_.push_back({reason, 1, "stamp " + std::to_string(t_ns) + " ns"});
+}
+
+std::vector<RejectionCount> Estimator::rejections() const {
+  std::vector<RejectionCount> all = rejections_;
+  for (const UpdateEntry& entry : updates_) {
+    const std::size_t before = all.size();
+    entry.update->rejections(all);
+    for (std::size_t i = before; i < all.size(); ++i) {
+      all[i].reason = entry.name + ": " + all[i].reason;
+    }
+  }
+  return all;
+}
+
+std::vector<std::string> Estimator::stage_names() const {
+  std::vector<std::string> names{"propagate"};
+  for (const UpdateEntry& entry : updates_) names.push_back(entry.name);
+  names.emplace_back("marginalise");
+  return names;
+}
+
+void Estimator::start(const ImuPrior& prior) {
+  filter_.initialize(prior);
+  initializer_ = nullptr;
+}
+
+void Estimator::add(const ImuSample& sample) {
+  if (!finite(sample.gyro_rad_per_s) || !finite(sample.accel_m_per_s2)) {
+    return reject("IMU value that is not finite", sample.t_ns);
+  }
+  if (!imu_.empty()) {
+    if (sample.t_ns <= imu_.back().t_ns) return reject("IMU stamp not after the last", sample.t_ns);
+    if (seconds_between(imu_.back().t_ns, sample.t_ns) > options_.max_imu_gap_s) {
+      reject("gap of the IMU bridged", sample.t_ns);
+    }
+  }
+  imu_.push_back(sample);
+  latest_ns_ = std::max(latest_ns_, sample.t_ns);
+}
+
+void Estimator::add(const FeatureSample& image) {
+  if (filter_.initialized() && image.t_ns <= filter_.t_ns()) {
+    return reject("image at or before the present epoch", image.t_ns);
+  }
+  if (n_waiting_ > 0 && image.t_ns < waiting_[n_waiting_ - 1].t_ns) {
+    return reject("image before the last one", image.t_ns);
+  }
+  // Storage of former images is used again.
+  if (n_waiting_ == waiting_.size()) waiting_.emplace_back();
+  FeatureSample& slot = waiting_[n_waiting_++];
+  slot.t_ns = image.t_ns;
+  slot.camera = image.camera;
+  slot.points.assign(image.points.begin(), image.points.end());
+  latest_ns_ = std::max(latest_ns_, image.t_ns);
+}
+
+void Estimator::add(const EncoderSample& sample, int wheels) {
+  auto& samples = encoders_.at(static_cast<std::size_t>(wheels));
+  if (!finite(sample.drive_rad_per_s) || !finite(sample.steer_rad)) {
+    return reject("encoder value that is not finite", sample.t_ns);
+  }
+  if (!samples.empty() && sample.begin_ns < samples.back().end_ns) {
+    return reject("encoder sample that begins before the end of the last", sample.t_ns);
+  }
+  samples.push_back(sample);
+  latest_ns_ = std::max(latest_ns_, sample.t_ns);
+}
+
+bool Estimator::encoders_reach(std::int64_t t_ns) const {
+  for (std::size_t i = 0; i < encoders_.size(); ++i) {
+    const std::int64_t t_wheel = t_ns - to_ns(filter_.wheels()[i].t_OtoI_s);
+    if (encoders_[i].empty() || encoders_[i].back().end_ns < t_wheel) return false;
+  }
+  return true;
+}
+
+std::optional<std::int64_t> Estimator::next_epoch_ns() const {
+  if (imu_.empty()) return std::nullopt;
+  const std::int64_t reached_ns = imu_.back().t_ns;
+  std::int64_t t_ns = filter_.t_ns() + to_ns(options_.max_epoch_s);
+  if (n_waiting_ > 0) t_ns = std::min(t_ns, waiting_.front().t_ns);
+  if (reached_ns < t_ns) return std::nullopt;
+  // The other images of the same instant may still be on their way.
+  const bool all_arrived = finished_ || latest_ns_ > t_ns;
+  if (!all_arrived) return std::nullopt;
+  const bool waited = finished_ || seconds_between(t_ns, latest_ns_) > options_.max_wait_s;
+  if (!waited && !encoders_reach(t_ns)) return std::nullopt;
+  return t_ns;
+}
+
+void Estimator::cut_imu(std::int64_t end_ns) {
+  // imu_.front() is at, or the last one before, the present time of the filter.
+  const std::int64_t begin_ns = filter_.t_ns();
+  cut_.clear();
+  for (std::size_t i = 0; i < imu_.size(); ++i) {
+    const ImuSample& sample = imu_[i];
+    if (sample.t_ns <= begin_ns) {
+      if (sample.t_ns == begin_ns || i + 1 == imu_.size() || imu_[i + 1].t_ns > begin_ns) {
+        cut_.clear();
+        cut_.push_back(sample.t_ns == begin_ns || i + 1 == imu_.size()
+                           ? sample
+                           : interpolate(sample, imu_[i + 1], begin_ns));
+        cut_.back().t_ns = begin_ns;
+      }
+      continue;
+    }
+    if (cut_.empty()) {  // the IMU begins after the start: its first reading holds before
+      cut_.push_back(sample);
+      cut_.back().t_ns = begin_ns;
+    }
+    if (sample.t_ns >= end_ns) {
+      cut_.push_back(sample.t_ns == end_ns
+                         ? sample
+                         : interpolate(i > 0 ? imu_[i - 1] : cut_.back(), sample, end_ns));
+      return;
+    }
+    cut_.push_back(sample);
+  }
+}
+
+void Estimator::take_images(std::int64_t t_ns) {
+  n_images_ = 0;
+  std::size_t taken = 0;
+  while (taken < n_waiting_ && waiting_[taken].t_ns <= t_ns) {
+    if (n_images_ == images_.size()) images_.emplace_back();
+    std::swap(images_[n_images_++], waiting_[taken++]);
+  }
+  std::rotate(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(taken),
+              waiting_.begin() + static_cast<std::ptrdiff_t>(n_waiting_));
+  n_waiting_ -= taken;
+}
+
+void Estimator::forget_used() {
+  // The IMU from the last sample at or before now on, encoders from the oldest clone on.
+  std::size_t first = 0;
+  while (first + 1 < imu_.size() && imu_[first + 1].t_ns <= filter_.t_ns()) ++first;
+  imu_.erase(imu_.begin(), imu_.begin() + static_cast<std::ptrdiff_t>(first));
+  const std::int64_t oldest_ns =
+      filter_.clones().empty() ? filter_.t_ns() : filter_.clones().front().t_ns;
+  constexpr double kMarginS = 0.5;  // for clocks that are found to be off, and interpolation
+  for (std::size_t i = 0; i < encoders_.size(); ++i) {
+    const std::int64_t keep_ns = oldest_ns - to_ns(filter_.wheels()[i].t_OtoI_s + kMarginS);
+    auto& samples = encoders_[i];
+    const auto keep = std::find_if(samples.begin(), samples.end(),
+                                   [&](const EncoderSample& s) { return s.end_ns >= keep_ns; });
+    // Moving them all every time is not worth while.
+    if (keep - samples.begin() > 64) samples.erase(samples.begin(), keep);
+  }
+}
+
+bool Estimator::try_to_initialize() {
+  if (!initializer_) return false;
+  const auto prior = initializer_(imu_, encoders_);
+  if (!prior) return false;
+  start(*prior);
+  return true;
+}
+
+void Estimator::run_update(std::size_t index, const EpochData& data) {
+  const UpdateEntry& entry = updates_[index];
+  sink_.clear();
+  try {
+    entry.update->update(filter_.view(entry.wheels), data, sink_);
+  } catch (const std::exception& error) {
+    throw UpdateFailure(entry.name, error.what());
+  } catch (...) {
+    throw UpdateFailure(entry.name, "threw something that is not a std::exception");
+  }
+  UpdateCounts& counts = counts_[index];
+  counts.applied += sink_.applied();
+  counts.rejected += sink_.rejected();
+  for (const ResidualFactor& factor : sink_.residuals()) {
+    const bool applied = filter_.apply(factor) == FactorResult::kApplied;
+    ++(applied ? counts.applied : counts.rejected);
+  }
+  if (const InformationFactor* information = sink_.information()) {
+    if (filter_.apply(*information) == FactorResult::kRejected) {
+      reject((entry.name + ": information that is not finite or empty").c_str(), filter_.t_ns());
+    }
+  }
+}
+
+bool Estimator::step() {
+  if (!failure_.empty()) return false;
+  if (!filter_.initialized() && !try_to_initialize()) return false;
+  while (n_waiting_ > 0 && waiting_.front().t_ns <= filter_.t_ns()) {
+    reject("image before the start", waiting_.front().t_ns);
+    take_images(waiting_.front().t_ns);
+  }
+  const auto t_ns = next_epoch_ns();
+  if (!t_ns) return false;
+
+  const auto begin = Clock::now();
+  EpochData data;
+  data.begin_ns = filter_.t_ns();
+  data.end_ns = *t_ns;
+  take_images(*t_ns);
+  cut_imu(*t_ns);
+  filter_.propagate(cut_);
+  filter_.clone(cut_.back());
+  data.imu = cut_;
+  data.features = {images_.data(), n_images_};
+  stage_ms_.front() = ms_since(begin);
+  for (std::size_t i = 0; i < updates_.size(); ++i) {
+    const auto update_begin = Clock::now();
+    const int wheels = updates_[i].wheels;
+    if (wheels >= 0) data.encoders = encoders_[static_cast<std::size_t>(wheels)];
+    run_update(i, data);
+    stage_ms_[i + 1] = ms_since(update_begin);
+  }
+  const auto end_begin = Clock::now();
+  if (filter_.window_full()) filter_.drop_oldest_clone();
+  forget_used();
+  failure_ = filter_.failure();
+  ++epochs_;
+  stage_ms_.back() = ms_since(end_begin);
+  return true;
+}
+
+}  // namespace viwo

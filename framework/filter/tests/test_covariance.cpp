@@ -1,0 +1,197 @@
+// Both forms of the update against the textbook equations.
+#include <random>
+
+#include <Eigen/Dense>
+#include <gtest/gtest.h>
+
+#include "viwo/filter/covariance.hpp"
+
+namespace viwo {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kSize = 40;
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : engine_(seed) {}
+  MatrixXd matrix(Eigen::Index rows, Eigen::Index cols) {
+    return MatrixXd::NullaryExpr(rows, cols, [this] { return normal_(engine_); });
+  }
+
+ private:
+  std::mt19937_64 engine_;
+  std::normal_distribution<double> normal_;
+};
+
+MatrixXd random_covariance(Random& random) {
+  const MatrixXd A = random.matrix(kSize, kSize);
+  return A * A.transpose() + 0.1 * MatrixXd::Identity(kSize, kSize);
+}
+
+/// K = P H^T (H P H^T + R)^-1 with dense matrices.
+struct Textbook {
+  MatrixXd P;
+  VectorXd dx;
+};
+Textbook textbook(const MatrixXd& P, const MatrixXd& H, const MatrixXd& R, const VectorXd& r) {
+  const MatrixXd S = H * P * H.transpose() + R;
+  const MatrixXd K = P * H.transpose() * S.inverse();
+  return {P - K * S * K.transpose(), K * r};
+}
+
+ResidualFactor residual_factor(Random& random, MatrixXd& dense_H) {
+  ResidualFactor factor;
+  factor.columns.add(20, 6);
+  factor.columns.add(3, 2);
+  factor.columns.add(35, 3);
+  factor.set_rows(4);
+  factor.H = random.matrix(4, 11);
+  factor.residual = random.matrix(4, 1);
+  const MatrixXd A = random.matrix(4, 4);
+  factor.R = A * A.transpose() + MatrixXd::Identity(4, 4);
+  dense_H = MatrixXd::Zero(4, kSize);
+  dense_H.middleCols(20, 6) = factor.H.leftCols(6);
+  dense_H.middleCols(3, 2) = factor.H.middleCols(6, 2);
+  dense_H.middleCols(35, 3) = factor.H.rightCols(3);
+  return factor;
+}
+
+TEST(Covariance, ResidualFactorIsTheTextbookUpdate) {
+  Random random(1);
+  const MatrixXd P = random_covariance(random);
+  MatrixXd H;
+  const ResidualFactor factor = residual_factor(random, H);
+  Covariance covariance(kSize);
+  covariance.set_block(0, P);
+  VectorXd dx(kSize);
+  ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
+  const Textbook expected = textbook(P, H, factor.R, factor.residual);
+  EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
+  EXPECT_LT((dx - expected.dx).norm(), 1e-10);
+  EXPECT_EQ(covariance.matrix(), covariance.matrix().transpose());
+}
+
+TEST(Covariance, InformationFactorIsTheSameUpdateWithoutStackingRows) {
+  Random random(2);
+  const MatrixXd P = random_covariance(random);
+  // Many rows on two blocks, with a direction that no row sees.
+  MatrixXd H = MatrixXd::Zero(60, kSize);
+  H.middleCols(18, 12) = random.matrix(60, 12);
+  H.col(29) = H.col(28);
+  H.middleCols(5, 3) = random.matrix(60, 3);
+  const VectorXd r = random.matrix(60, 1);
+  InformationFactor factor;
+  factor.columns.add(18, 12);
+  factor.columns.add(5, 3);
+  MatrixXd compact(60, 15);
+  compact << H.middleCols(18, 12), H.middleCols(5, 3);
+  factor.Lambda = MatrixXd::Constant(kSize, kSize, std::nan(""));  // what is not to be read
+  factor.eta = VectorXd::Constant(kSize, std::nan(""));
+  factor.Lambda.topLeftCorner(15, 15).triangularView<Eigen::Lower>() =
+      compact.transpose() * compact;
+  factor.eta.head(15) = compact.transpose() * r;
+  Covariance covariance(kSize);
+  covariance.set_block(0, P);
+  VectorXd dx(kSize);
+  ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
+  const Textbook expected = textbook(P, H, MatrixXd::Identity(60, 60), r);
+  EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
+  EXPECT_LT((dx - expected.dx).norm(), 1e-10);
+  EXPECT_EQ(covariance.matrix(), covariance.matrix().transpose());
+}
+
+TEST(Covariance, ColumnsWithoutVarianceNeverMove) {
+  Random random(3);
+  MatrixXd P = random_covariance(random);
+  for (const int held : {5, 21}) {
+    P.row(held).setZero();
+    P.col(held).setZero();
+  }
+  Covariance covariance(kSize);
+  covariance.set_block(0, P);
+  InformationFactor factor;
+  factor.columns.add(18, 12);
+  factor.columns.add(5, 3);
+  const MatrixXd rows = random.matrix(40, 15);
+  factor.Lambda = rows.transpose() * rows;
+  factor.eta = random.matrix(15, 1);
+  VectorXd dx(kSize);
+  ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
+  MatrixXd H;
+  ASSERT_EQ(covariance.apply(residual_factor(random, H), dx), FactorResult::kApplied);
+  for (const int held : {5, 21}) {
+    EXPECT_EQ(dx[held], 0.);
+    EXPECT_TRUE(covariance.matrix().row(held).isZero(0.));
+    EXPECT_TRUE(covariance.matrix().col(held).isZero(0.));
+  }
+  EXPECT_NE(dx[6], 0.);
+}
+
+TEST(Covariance, GatesByTheProbabilityOfTheResidual) {
+  Random random(4);
+  MatrixXd H;
+  ResidualFactor factor = residual_factor(random, H);
+  const MatrixXd P = random_covariance(random);
+  const MatrixXd S = H * P * H.transpose() + factor.R;
+  // Squared normalised residual of 4 rows: the 1 % quantile of chi-square is 13.2767 (tables).
+  factor.residual *= std::sqrt(13.2 / factor.residual.dot(S.inverse() * factor.residual));
+  factor.gate_probability = 0.01;
+  VectorXd dx(kSize);
+  Covariance covariance(kSize);
+  covariance.set_block(0, P);
+  EXPECT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
+  covariance.set_block(0, P);
+  factor.residual *= std::sqrt(13.4 / 13.2);
+  EXPECT_EQ(covariance.apply(factor, dx), FactorResult::kGated);
+  EXPECT_TRUE(dx.isZero(0.));
+  EXPECT_EQ(covariance.matrix(), P);
+}
+
+TEST(Covariance, RefusesWhatIsNotFiniteAndTellsWhenItIsLost) {
+  Random random(5);
+  Covariance covariance(kSize);
+  const MatrixXd P = random_covariance(random);
+  covariance.set_block(0, P);
+  MatrixXd H;
+  ResidualFactor factor = residual_factor(random, H);
+  factor.residual[1] = std::nan("");
+  VectorXd dx(kSize);
+  EXPECT_EQ(covariance.apply(factor, dx), FactorResult::kRejected);
+  EXPECT_EQ(covariance.matrix(), P);
+  InformationFactor information;
+  information.columns.add(18, 12);
+  information.Lambda = MatrixXd::Identity(12, 12);
+  information.eta = VectorXd::Constant(12, std::nan(""));
+  EXPECT_EQ(covariance.apply(information, dx), FactorResult::kRejected);
+  MatrixXd broken = P;
+  broken(20, 19) = broken(19, 20) = 2. * std::sqrt(P(19, 19) * P(20, 20));
+  covariance.set_block(0, broken);
+  information.eta.setZero();
+  EXPECT_EQ(covariance.apply(information, dx), FactorResult::kFailed);
+}
+
+TEST(Covariance, PropagatesAndClonesLikeTheDenseProduct) {
+  Random random(6);
+  const MatrixXd P = random_covariance(random);
+  Covariance covariance(kSize);
+  covariance.set_block(0, P);
+  ImuTransition transition{random.matrix(kImuSize, kImuSize), ImuMatrix::Identity()};
+  MatrixXd Phi = MatrixXd::Identity(kSize, kSize);
+  Phi.topLeftCorner<kImuSize, kImuSize>() = transition.Phi;
+  MatrixXd expected = Phi * P * Phi.transpose();
+  expected.diagonal().head<kImuSize>().array() += 1.;
+  covariance.propagate(transition);
+  EXPECT_LT((covariance.matrix() - expected).norm(), 1e-11 * expected.norm());
+  MatrixXd copy = MatrixXd::Identity(kSize, kSize);
+  copy.middleRows(24, 6).setZero();
+  copy.block(24, 0, 6, 6).setIdentity();
+  covariance.clone_pose(24);
+  EXPECT_LT((covariance.matrix() - copy * expected * copy.transpose()).norm(),
+            1e-11 * expected.norm());
+}
+
+}  // namespace
+}  // namespace viwo

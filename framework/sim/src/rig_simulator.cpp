@@ -1,0 +1,131 @@
+#include "viwo/sim/rig_simulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "viwo/api/status.hpp"
+#include "viwo/log/kalibr.hpp"
+#include "viwo/math/so3.hpp"
+
+namespace viwo::sim {
+namespace {
+
+Eigen::Vector3d vector_from(const ParamSet& params, const std::string& key) {
+  const auto numbers = params.numbers(key);
+  if (numbers.size() != 3) {
+    throw ParamError(key, "needs 3 numbers, not " + std::to_string(numbers.size()));
+  }
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+ImuSimulation imu_from(const ParamSet& params, double duration_s, std::int64_t start_ns) {
+  ImuSimulation imu;
+  imu.duration_s = duration_s;
+  imu.start_ns = start_ns;
+  imu.rate_hz = params.number("imu_rate_hz");
+  imu.gravity_m_per_s2 = params.number("gravity_m_per_s2");
+  imu.noise = params.flag("noise");
+  imu.densities = {params.number("sigma_gyro_rad_per_s_sqrt_hz"),
+                   params.number("sigma_accel_m_per_s2_sqrt_hz"),
+                   params.number("sigma_gyro_walk_rad_per_s2_sqrt_hz"),
+                   params.number("sigma_accel_walk_m_per_s3_sqrt_hz")};
+  imu.gyro_bias = vector_from(params, "gyro_bias_rad_per_s");
+  imu.accel_bias = vector_from(params, "accel_bias_m_per_s2");
+  imu.sigma_gyro_bias_rad_per_s = params.number("sigma_gyro_bias_rad_per_s");
+  imu.sigma_accel_bias_m_per_s2 = params.number("sigma_accel_bias_m_per_s2");
+  return imu;
+}
+
+FeatureSimulation features_from(const ParamSet& params, double duration_s, std::int64_t start_ns) {
+  FeatureSimulation features;
+  features.duration_s = duration_s;
+  features.start_ns = start_ns;
+  features.rate_hz = params.number("camera_rate_hz");
+  features.phase_s = params.number("camera_phase_s");
+  features.features = static_cast<int>(params.integer("features"));
+  features.landmark_min_m = params.number("landmark_min_m");
+  features.landmark_max_m = params.number("landmark_max_m");
+  features.max_view_angle_rad = params.number("max_view_angle_rad");
+  features.sigma_px = params.number("sigma_px");
+  features.noise = params.flag("noise");
+  features.outlier_probability = params.number("feature_outlier_probability");
+  features.outlier_px = params.number("feature_outlier_px");
+  features.dropout_probability = params.number("feature_dropout_probability");
+  if (features.landmark_max_m < features.landmark_min_m) {
+    throw ParamError("landmark_max_m", "is less than landmark_min_m");
+  }
+  return features;
+}
+
+std::vector<CameraView> cameras_from(const ParamSet& params) {
+  if (params.text("cameras").empty()) {
+    throw ParamError("cameras", "a file is needed, or features: 0");
+  }
+  std::vector<CameraView> cameras = log::read_kalibr_cameras(params.text("cameras"));
+  const auto n = static_cast<std::size_t>(params.integer("n_cameras"));
+  if (n > cameras.size()) {
+    throw ParamError("n_cameras", "there are only " + std::to_string(cameras.size()) + " in " +
+                                      params.text("cameras"));
+  }
+  cameras.resize(n);
+  return cameras;
+}
+
+}  // namespace
+
+RigSimulation rig_from(const ParamSet& params, double duration_s, std::int64_t start_ns) {
+  RigSimulation rig;
+  const Eigen::Vector3d rpy = vector_from(params, "rpy_ItoO_rad");
+  rig.mounting = {rotation_from_euler(rpy[2], rpy[1], rpy[0]), vector_from(params, "p_IinO_m")};
+  rig.with_imu = params.flag("imu");
+  rig.imu = imu_from(params, duration_s, start_ns);
+  rig.features = features_from(params, duration_s, start_ns);
+  if (rig.features.features > 0) rig.cameras = cameras_from(params);
+  return rig;
+}
+
+double rig_end_s(const RigSimulation& rig) {
+  return std::max(imu_end_s(rig.imu), rig.features.duration_s);
+}
+
+std::vector<Measurement> simulate_rig(const BodyTrajectory& trajectory, const RigSimulation& rig,
+                                      std::uint64_t seed) {
+  const SimulatedImu imu = simulate_imu(trajectory, rig.mounting, rig.imu, seed);
+  const std::int64_t start_ns = rig.imu.start_ns;
+  std::vector<Measurement> out;
+  const auto add_state = [&](std::int64_t t_ns) {
+    out.emplace_back(true_state(trajectory, rig.mounting, imu, start_ns, t_ns));
+  };
+  add_state(start_ns);
+  for (const std::int64_t t_ns : image_times_ns(rig.features)) {
+    if (t_ns > 0) add_state(start_ns + t_ns);
+  }
+  if (rig.with_imu) out.insert(out.end(), imu.samples.begin(), imu.samples.end());
+  if (!rig.cameras.empty() && rig.features.features > 0) {
+    SimulatedFeatures features =
+        simulate_features(trajectory, rig.mounting, rig.cameras, rig.features, seed);
+    for (FeatureSample& sample : features.samples) out.emplace_back(std::move(sample));
+  }
+  return out;
+}
+
+std::vector<CalibrationSample> mounting_truth(const Mounting& mounting, std::int64_t t_ns) {
+  const Eigen::Vector3d theta = log_so3(mounting.R_ItoO);
+  std::vector<CalibrationSample> out;
+  for (int i = 0; i < 3; ++i) {
+    out.push_back({t_ns, std::string("theta_ItoO_") + "xyz"[i], theta[i]});
+  }
+  for (int i = 0; i < 3; ++i) {
+    out.push_back({t_ns, std::string("p_IinO_") + "xyz"[i], mounting.p_IinO[i]});
+  }
+  return out;
+}
+
+void sort_by_time(std::vector<Measurement>& measurements) {
+  std::stable_sort(
+      measurements.begin(), measurements.end(),
+      [](const Measurement& a, const Measurement& b) { return stamp_ns(a) < stamp_ns(b); });
+}
+
+}  // namespace viwo::sim

@@ -1,0 +1,50 @@
+// The intrinsics of a swerve base in another odometry frame.
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "viwo/math/se2.hpp"
+#include "viwo/wheel/twist_solver.hpp"
+#include "wheel_fixture.hpp"
+
+namespace viwo {
+namespace {
+
+TEST(MoveFrame, GivesTheTwistOfTheOtherFrameFromTheSameReadings) {
+  std::mt19937_64 rng(11);
+  std::uniform_real_distribution<double> uniform(-1., 1.);
+  for (const char* type : {"four_wis_wid", "four_wis_wid_drive_only"}) {
+    const auto model = testing::load_model(testing::swerve(type));
+    for (int trial = 0; trial < 20; ++trial) {
+      const Twist xi(uniform(rng), uniform(rng), 2. * uniform(rng));
+      const Eigen::Vector3d g(3. * uniform(rng), 0.3 * uniform(rng), 0.3 * uniform(rng));
+      EncoderSample sample;
+      testing::follow(*model, xi, sample);
+      Intrinsics moved = model->nominal();
+      ASSERT_EQ(model->model().move_frame(g, moved), Status::kOk);
+      TwistSolver solver(model, {});
+      solver.set_intrinsics(moved);
+      TwistSolution solution;
+      ASSERT_EQ(solver.solve(sample, solution), Status::kOk);
+      // The velocity of the origin of O', written in O'.
+      const Eigen::Vector2d v = xi.head<2>() + xi[2] * J2() * g.tail<2>();
+      Twist expected;
+      expected << R2(-g[0]) * v, xi[2];
+      EXPECT_LT((solution.xi - expected).norm(), 1e-9);
+      EXPECT_LT(solution.e.norm(), 1e-9);
+    }
+  }
+}
+
+TEST(MoveFrame, ThereAndBackChangesNothing) {
+  const auto model = testing::load_model(testing::swerve("four_wis_wid"));
+  const Eigen::Vector3d g(0.7, -0.2, 0.4);
+  Intrinsics x = model->nominal();
+  model->model().move_frame(g, x);
+  EXPECT_GT((x - model->nominal()).norm(), 0.1);
+  model->model().move_frame(between(g, Eigen::Vector3d::Zero()), x);
+  EXPECT_LT((x - model->nominal()).norm(), 1e-14);
+}
+
+}  // namespace
+}  // namespace viwo

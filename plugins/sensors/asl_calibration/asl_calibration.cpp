@@ -1,0 +1,29 @@
+// Sensor asl_calibration: true calibration parameters from a log folder (model.md).
+#include <array>
+
+#include "viwo/api/plugin.hpp"
+#include "viwo/log/asl.hpp"
+#include "viwo/log/sensor_params.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr std::array kParams{
+    ParamSpec{.name = "path",
+              .type = ParamType::kPath,
+              .help = "the calibration table, or the folder of its data.csv"},
+    log::kMaxRejectedFractionParam};
+
+class AslCalibration final : public log::RecordingSensor<CalibrationSample> {
+ public:
+  AslCalibration(const ParamSet& params, const HostServices& /*services*/)
+      : RecordingSensor(log::read_asl_calibration(params.text("path"),
+                                                  params.number("max_rejected_fraction"))) {}
+};
+
+VIWO_REGISTER(Sensor, AslCalibration, "asl_calibration", "1.0.0",
+              "true calibration parameters from a log folder (calibration_groundtruth0/data.csv)",
+              "Apache-2.0", kParams);
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,84 @@
+// Sensor recorded_motion_simulator: IMU, cameras and true states on a spline through recorded poses
+// (model.md). The encoders of the same recording are another sensor's.
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "viwo/api/plugin.hpp"
+#include "viwo/log/recording.hpp"
+#include "viwo/log/ros_text.hpp"
+#include "viwo/log/sensor_params.hpp"
+#include "viwo/sim/body_trajectory.hpp"
+#include "viwo/sim/rig_simulator.hpp"
+
+namespace viwo {
+namespace {
+
+// clang-format off
+constexpr std::array kMotionParams{
+    ParamSpec{.name = "path", .type = ParamType::kPath,
+              .help = "recorded poses of O: ROS PoseStamped messages printed as text, or gzipped"},
+    ParamSpec{.name = "planar", .type = ParamType::kBool, .fallback = "true",
+              .help = "use x, y and yaw only; z, pitch and roll are zero"},
+    ParamSpec{.name = "knot_spacing_s", .type = ParamType::kNumber, .unit = "s",
+              .fallback = "0.3", .min = 0.02, .max = 10.,
+              .help = "of the spline through the poses: shorter is closer to them and rougher"},
+    ParamSpec{.name = "time_offset_s", .type = ParamType::kNumber, .unit = "s", .fallback = "0",
+              .min = -10., .max = 10., .help = "t_imu = stamp of a pose + time_offset_s"},
+    log::kClockParam, log::kReceptionUtcOffsetParam, log::kMaxGapParam,
+    log::kMaxRejectedFractionParam,
+};
+// clang-format on
+
+constexpr auto kParams = sim::joined(kMotionParams, sim::kRigParams);
+
+/// IMU samples must not lie behind the last pose.
+double duration_within(double recorded_s, double imu_rate_hz) {
+  return std::floor(recorded_s * imu_rate_hz - 1e-6) / imu_rate_hz;
+}
+
+void report(const HostServices& services, const sim::FitResidual& residual) {
+  std::array<char, 120> text{};
+  std::snprintf(text.data(), text.size(),
+                "poses are off the spline by %.3f mm rms, %.3f mm at most, %.3f mrad rms in yaw",
+                1e3 * residual.rms_m, 1e3 * residual.max_m, 1e3 * residual.rms_rad);
+  services.log(LogLevel::kInfo, text.data());
+}
+
+log::Recording<Measurement> simulate(const ParamSet& params, const HostServices& services) {
+  auto recorded =
+      log::read_ros_poses(params.text("path"), log::clock_from(params), log::limits_from(params));
+  const std::int64_t offset_ns = std::llround(params.number("time_offset_s") * 1e9);
+  for (PoseSample& pose : recorded.samples) pose.t_ns += offset_ns;
+  // The spline is poor at its ends, where it has samples on one side only.
+  const double margin_s = params.number("knot_spacing_s");
+  const std::int64_t start_ns = recorded.samples.front().t_ns + std::llround(margin_s * 1e9);
+  const sim::BodyTrajectory trajectory = sim::BodyTrajectory::through(
+      recorded.samples, start_ns, params.flag("planar"), params.number("knot_spacing_s"));
+  report(services, sim::fit_residual(trajectory, recorded.samples, start_ns));
+  const double duration_s =
+      duration_within(trajectory.end_s() - margin_s, params.number("imu_rate_hz"));
+  if (!(duration_s > 0.)) throw ParamError("path", "the recording is too short");
+
+  log::Recording<Measurement> out;
+  out.rejections = std::move(recorded.rejections);
+  out.samples =
+      sim::simulate_rig(trajectory, sim::rig_from(params, duration_s, start_ns), services.seed);
+  sim::sort_by_time(out.samples);
+  return out;
+}
+
+class RecordedMotionSimulator final : public log::RecordingSensor<Measurement> {
+ public:
+  RecordedMotionSimulator(const ParamSet& params, const HostServices& services)
+      : RecordingSensor(simulate(params, services)) {}
+};
+
+VIWO_REGISTER(Sensor, RecordedMotionSimulator, "recorded_motion_simulator", "1.0.0",
+              "IMU, cameras and true states on a trajectory through recorded poses", "Apache-2.0",
+              kParams);
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,172 @@
+// Sensor simulator: IMU, cameras, encoders and the truth of a base that drives on a ground
+// (model.md).
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "viwo/api/plugin.hpp"
+#include "viwo/log/recording.hpp"
+#include "viwo/sim/body_trajectory.hpp"
+#include "viwo/sim/encoder_simulator.hpp"
+#include "viwo/sim/rig_simulator.hpp"
+
+namespace viwo {
+namespace {
+
+/// The trajectory goes on before and after the run, so that the ends of its spline do not matter.
+constexpr double kMargin = 0.5;  // s
+/// A base that cannot move sideways slides by what the spline deviates from its motion, m/s.
+constexpr double kSliding = 1e-4;
+
+// clang-format off
+constexpr std::array kBaseParams{
+    ParamSpec{.name = "robot", .type = ParamType::kKinematics,
+              .help = "the base: its nominal intrinsics and its noise"},
+    ParamSpec{.name = "true_intrinsics_scale", .type = ParamType::kNumber, .fallback = "0",
+              .min = 0.,
+              .help = "0: the nominal intrinsics are true; s: nominal + s * prior sigma * gaussian"},
+    ParamSpec{.name = "motion", .type = ParamType::kString, .fallback = "icr_sweep",
+              .choices = "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
+                         "spin|constant_steering",
+              .help = "how the base moves"},
+    ParamSpec{.name = "duration_s", .type = ParamType::kNumber, .unit = "s", .fallback = "60",
+              .min = 0., .max = 7200., .min_exclusive = true, .help = "how long"},
+    ParamSpec{.name = "speed_m_per_s", .type = ParamType::kNumber, .unit = "m/s",
+              .fallback = "0.5", .min = -20., .max = 20., .help = "speed of the motion"},
+    ParamSpec{.name = "yaw_rate_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
+              .fallback = "0.6", .min = -6., .max = 6.,
+              .help = "constant or peak yaw rate of the motions that turn"},
+    ParamSpec{.name = "ramp_s", .type = ParamType::kNumber, .unit = "s", .fallback = "1", .min = 0.,
+              .max = 3600., .help = "smooth start from rest; 0: at speed from the beginning"},
+    ParamSpec{.name = "ground", .type = ParamType::kString, .fallback = "flat",
+              .choices = "flat|uneven", .help = "what the base drives on"},
+    ParamSpec{.name = "ground_amplitude_m", .type = ParamType::kNumber, .unit = "m",
+              .fallback = "0.05", .min = 0., .max = 10., .help = "of the waves of uneven ground"},
+    ParamSpec{.name = "ground_wavelength_m", .type = ParamType::kNumber, .unit = "m",
+              .fallback = "3", .min = 0.1, .max = 1000., .help = "of the waves of uneven ground"},
+    ParamSpec{.name = "start_ns", .type = ParamType::kInt, .unit = "ns", .fallback = "0",
+              .min = 0., .max = 4e18, .help = "stamp at which the motion starts"},
+    ParamSpec{.name = "wheels", .type = ParamType::kBool, .fallback = "true",
+              .help = "whether there are encoder samples"},
+    ParamSpec{.name = "wheel_rate_hz", .type = ParamType::kNumber, .unit = "Hz", .fallback = "100",
+              .min = 1., .max = 10000., .help = "rate of the encoder samples"},
+    ParamSpec{.name = "t_OtoI_s", .type = ParamType::kNumber, .unit = "s", .fallback = "0",
+              .min = -10., .max = 10., .help = "t_imu = t_odom + t_OtoI"},
+    ParamSpec{.name = "slip_start_s", .type = ParamType::kNumbers, .unit = "s", .fallback = "[]",
+              .help = "when a wheel starts to spin, reading more than it rolls"},
+    ParamSpec{.name = "slip_duration_s", .type = ParamType::kNumber, .unit = "s",
+              .fallback = "0.5", .min = 0., .help = "for how long each time"},
+    ParamSpec{.name = "slip_wheel", .type = ParamType::kInt, .fallback = "1", .min = 1.,
+              .help = "drive channel that slips, from 1"},
+    ParamSpec{.name = "slip_ratio", .type = ParamType::kNumber, .fallback = "0.3",
+              .help = "0.3: the drive reads 30 % more than the wheel rolls"},
+    ParamSpec{.name = "outlier_probability", .type = ParamType::kNumber, .fallback = "0",
+              .min = 0., .max = 1.,
+              .help = "probability per encoder sample that one drive channel is off"},
+    ParamSpec{.name = "outlier_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
+              .fallback = "5", .min = 0., .help = "by how much, with either sign"},
+    ParamSpec{.name = "drive_resolution_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
+              .fallback = "0", .min = 0.,
+              .help = "drive rates are rounded to its multiples; 0: not rounded"},
+};
+// clang-format on
+
+constexpr auto kParams = sim::joined(kBaseParams, sim::kRigParams);
+
+sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
+                                               const ModelDescription& robot) {
+  sim::EncoderSimulation out;
+  out.duration_s = params.number("duration_s");
+  out.rate_hz = params.number("wheel_rate_hz");
+  out.start_ns = params.integer("start_ns");
+  out.time_offset_s = params.number("t_OtoI_s");
+  out.noise = params.flag("noise");
+  const auto starts = params.numbers("slip_start_s");
+  out.slip.start_s.assign(starts.begin(), starts.end());
+  out.slip.duration_s = params.number("slip_duration_s");
+  out.slip.ratio = params.number("slip_ratio");
+  const std::int64_t wheel = params.integer("slip_wheel");
+  if (wheel > robot.n_drive) {
+    throw ParamError("slip_wheel", std::to_string(wheel) + " is not one of the robot's " +
+                                       std::to_string(robot.n_drive) + " wheels");
+  }
+  out.slip.wheel = static_cast<int>(wheel) - 1;
+  out.outlier_probability = params.number("outlier_probability");
+  out.outlier_rad_per_s = params.number("outlier_rad_per_s");
+  out.drive_resolution_rad_per_s = params.number("drive_resolution_rad_per_s");
+  out.sliding_m_per_s = kSliding;
+  return out;
+}
+
+sim::BodyTrajectory trajectory_from(const ParamSet& params, const sim::RigSimulation& rig) {
+  const sim::PlanarMotion motion(
+      params.text("motion"), {params.number("speed_m_per_s"), params.number("yaw_rate_rad_per_s"),
+                              params.number("ramp_s")});
+  const bool uneven = params.text("ground") == "uneven";
+  const sim::Ground ground = uneven ? sim::Ground::uneven(params.number("ground_amplitude_m"),
+                                                          params.number("ground_wavelength_m"))
+                                    : sim::Ground();
+  const double margin = kMargin + std::abs(params.number("t_OtoI_s"));
+  return sim::BodyTrajectory::drive(motion, ground, -margin, sim::rig_end_s(rig) + margin);
+}
+
+std::vector<Measurement> calibration_truth(const ModelDescription& robot, const Intrinsics& x_WI,
+                                           const sim::Mounting& mounting, double t_OtoI_s,
+                                           std::int64_t t_ns) {
+  std::vector<Measurement> out;
+  for (Eigen::Index i = 0; i < x_WI.size(); ++i) {
+    const std::string& name = robot.intrinsics[static_cast<std::size_t>(i)].name;
+    out.emplace_back(CalibrationSample{t_ns, name, x_WI[i]});
+  }
+  for (const CalibrationSample& sample : sim::mounting_truth(mounting, t_ns)) {
+    out.emplace_back(sample);
+  }
+  out.emplace_back(CalibrationSample{t_ns, "t_OtoI", t_OtoI_s});
+  return out;
+}
+
+log::Recording<Measurement> simulate(const ParamSet& params, const HostServices& services) {
+  const KinematicModel& robot = params.kinematics("robot");
+  ModelDescription description;
+  robot.describe(description);
+  const std::int64_t start_ns = params.integer("start_ns");
+  const sim::RigSimulation rig = sim::rig_from(params, params.number("duration_s"), start_ns);
+  const sim::EncoderSimulation wheels = encoder_simulation_from(params, description);
+  const sim::BodyTrajectory trajectory = trajectory_from(params, rig);
+  const Intrinsics x_WI =
+      sim::perturbed_intrinsics(description, params.number("true_intrinsics_scale"), services.seed);
+
+  log::Recording<Measurement> out;
+  out.samples =
+      calibration_truth(description, x_WI, rig.mounting, params.number("t_OtoI_s"), start_ns);
+  auto from_rig = sim::simulate_rig(trajectory, rig, services.seed);
+  std::move(from_rig.begin(), from_rig.end(), std::back_inserter(out.samples));
+  if (params.flag("wheels")) {
+    try {
+      const auto from_wheels = sim::simulate_encoders(
+          robot, x_WI, [&trajectory](double t_s) { return trajectory.twist(t_s); },
+          params.text("motion"), wheels, services.seed);
+      out.samples.insert(out.samples.end(), from_wheels.begin(), from_wheels.end());
+    } catch (const InputError& error) {
+      throw ParamError("motion", error.what());
+    }
+  }
+  sim::sort_by_time(out.samples);
+  return out;
+}
+
+class Simulator final : public log::RecordingSensor<Measurement> {
+ public:
+  Simulator(const ParamSet& params, const HostServices& services)
+      : RecordingSensor(simulate(params, services)) {}
+};
+
+VIWO_REGISTER(Sensor, Simulator, "simulator", "1.0.0",
+              "IMU, cameras, encoders and truth of any base that drives on a ground", "Apache-2.0",
+              kParams);
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,173 @@
+#include "feature.hpp"
+
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "viwo/math/so3.hpp"
+
+namespace viwo::visual {
+namespace {
+
+constexpr int kMaxIterations = 10;
+/// Steps below this part of the distance end the refinement: far below any pixel noise, and the
+/// rest is linear in the point, which is eliminated (VF-8).
+constexpr double kStepTolerance = 1e-6;
+
+}  // namespace
+
+void Feature::start(int max_sights, double sigma_px, const TriangulationLimits& limits) {
+  inverse_sigma_ = 1. / sigma_px;
+  limits_ = limits;
+  sights_.reserve(static_cast<std::size_t>(max_sights));
+  rays_.reserve(static_cast<std::size_t>(max_sights));
+  linear_.reserve(static_cast<std::size_t>(max_sights));
+}
+
+int Feature::collect(const TrackStore& tracks, int track, const Window& window) {
+  sights_.clear();
+  for (int clone = 0; clone < window.n_clones(); ++clone) {
+    const int slot = window.clone(clone).slot;
+    for (int camera = 0; camera < tracks.n_cameras(); ++camera) {
+      if ((tracks.mask(track, camera) >> slot & 1u) == 0) continue;
+      if (window.camera(camera).view == nullptr) continue;
+      sights_.push_back({clone, camera, &tracks.observation(track, slot, camera)});
+    }
+  }
+  return static_cast<int>(sights_.size());
+}
+
+FeatureStatus Feature::triangulate(const Window& window) {
+  rays_.clear();
+  for (const Sight& sight : sights_) {
+    const CameraPose& pose = window.pose(sight.clone, sight.camera);
+    Ray& ray = rays_.emplace_back();
+    ray.origin = pose.p_CinG;
+    ray.direction.noalias() = pose.R_GtoC.transpose() * sight.observation->ray;
+    ray.J.noalias() = sight.observation->J_ray * pose.R_GtoC;
+  }
+  FeatureStatus status = intersect_rays();
+  if (status == FeatureStatus::kOk) status = refine();
+  return status == FeatureStatus::kOk ? check_distance() : status;
+}
+
+FeatureStatus Feature::intersect_rays() {
+  // (VF-1), relative to the first origin: far from the global origin nothing is lost.
+  const Eigen::Vector3d start = rays_.front().origin;
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (const Ray& ray : rays_) {
+    const Eigen::Vector3d& d = ray.direction;
+    const Eigen::Vector3d o = ray.origin - start;
+    A.noalias() -= d * d.transpose();
+    A.diagonal().array() += 1.;
+    b += o - d * d.dot(o);
+  }
+  if (!A.allFinite() || !b.allFinite()) return FeatureStatus::kParallax;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(A, Eigen::EigenvaluesOnly);
+  const double smallest = eigen.eigenvalues()[0];
+  // (VF-2)
+  if (!(smallest * limits_.max_condition > eigen.eigenvalues()[2])) return FeatureStatus::kParallax;
+  p_FinG_ = start + A.llt().solve(b);
+  return p_FinG_.allFinite() ? FeatureStatus::kOk : FeatureStatus::kParallax;
+}
+
+FeatureStatus Feature::refine() {
+  // Levenberg-Marquardt on (VF-3). `point` is the one under test, p_FinG_ the best so far.
+  Eigen::Vector3d point = p_FinG_;
+  Eigen::Matrix3d A_best = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b_best = Eigen::Vector3d::Zero();
+  double cost_best = std::numeric_limits<double>::infinity();
+  double damping = 0.;
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();
+    double cost = 0.;
+    bool visible = true;
+    for (const Ray& ray : rays_) {
+      const Eigen::Vector3d q = point - ray.origin;
+      const double depth = ray.direction.dot(q);
+      visible = visible && depth > 0.;
+      const double inverse_depth = 1. / depth;
+      const Eigen::Vector2d e = ray.J * q * inverse_depth;
+      const Eigen::Matrix<double, 2, 3> J = (ray.J - e * ray.direction.transpose()) * inverse_depth;
+      cost += e.squaredNorm();
+      A.noalias() += J.transpose() * J;
+      b.noalias() -= J.transpose() * e;
+    }
+    if (visible && cost <= cost_best) {
+      p_FinG_ = point;
+      A_best = A;
+      b_best = b;
+      cost_best = cost;
+      damping *= 0.1;
+      if (damping < 1e-9) damping = 0.;
+    } else if (iteration == 0) {
+      return FeatureStatus::kNotVisible;
+    } else {
+      damping = damping > 0. ? 10. * damping : 1e-3;
+    }
+    Eigen::Matrix3d A_damped = A_best;
+    A_damped.diagonal() *= 1. + damping;
+    const Eigen::Vector3d step = A_damped.llt().solve(b_best);
+    if (!step.allFinite()) return FeatureStatus::kParallax;
+    const double distance = (p_FinG_ - rays_.front().origin).norm();
+    point = p_FinG_ + step;
+    if (step.norm() <= kStepTolerance * distance) break;
+  }
+  return FeatureStatus::kOk;
+}
+
+FeatureStatus Feature::check_distance() const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Ray& ray : rays_) nearest = std::min(nearest, (p_FinG_ - ray.origin).squaredNorm());
+  nearest = std::sqrt(nearest);
+  return nearest >= limits_.min_distance_m && nearest <= limits_.max_distance_m
+             ? FeatureStatus::kOk
+             : FeatureStatus::kDistance;
+}
+
+FeatureStatus Feature::linearize(const Window& window) {
+  linear_.clear();
+  for (const Sight& sight : sights_) {
+    const WindowClone& clone = window.clone(sight.clone);
+    const WindowCamera& camera = window.camera(sight.camera);
+    const CameraPose& pose = window.pose(sight.clone, sight.camera);
+    LinearSight& row = linear_.emplace_back();
+    row.column = clone.column;
+    row.camera = sight.camera;
+    const Eigen::Vector3d p_C = pose.R_GtoC_fej * (p_FinG_ - pose.p_CinG_fej);
+    const bool calibrates = camera.intrinsics >= 0;
+    Eigen::Vector2d uv;
+    PixelJacobian J;
+    if (!project(*camera.view, p_C, uv, J, calibrates ? &row.H_intrinsics : nullptr)) {
+      return FeatureStatus::kNotVisible;
+    }
+    if (!clone.at_first_estimate) {
+      const Eigen::Vector3d p_C_now = pose.R_GtoC * (p_FinG_ - pose.p_CinG);
+      if (!project(*camera.view, p_C_now, uv)) return FeatureStatus::kNotVisible;
+    }
+    row.residual = inverse_sigma_ * (sight.observation->uv - uv);
+    J *= inverse_sigma_;
+    row.H_f.noalias() = J * pose.R_GtoC_fej;  // (VF-4)
+    // (VF-5): h^T skew(d) = (h x d)^T.
+    const Eigen::Vector3d d = p_FinG_ - clone.p_IinG_fej;
+    Eigen::Matrix<double, 2, 3> H_f_skew;
+    for (int i = 0; i < 2; ++i) H_f_skew.row(i) = row.H_f.row(i).cross(d.transpose());
+    row.H_x.leftCols<3>().noalias() = H_f_skew * clone.R_GtoI_fej.transpose();
+    row.H_x.rightCols<3>() = -row.H_f;
+    if (camera.extrinsics >= 0) {                                // (VF-6)
+      const Eigen::Vector3d turned = p_C - camera.view->p_IinC;  // R_ItoC p_FinI
+      row.H_extrinsics.leftCols<3>().noalias() = J * skew(turned);
+      row.H_extrinsics.rightCols<3>() = J;
+    }
+    if (calibrates) row.H_intrinsics *= inverse_sigma_;
+  }
+  return FeatureStatus::kOk;
+}
+
+}  // namespace viwo::visual

@@ -1,0 +1,82 @@
+// One landmark: its place from its observations, and the linear system that they give.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "track_store.hpp"
+#include "viwo/camera/camera_model.hpp"
+#include "window.hpp"
+
+namespace viwo::visual {
+
+/// An observation of the feature at hand; ordered by clone, then camera.
+struct Sight {
+  int clone = 0;  ///< index in the window
+  int camera = 0;
+  const Observation* observation = nullptr;
+};
+
+struct TriangulationLimits {
+  double min_distance_m = 0.1;
+  double max_distance_m = 60.;
+  double max_condition = 1e4;
+};
+
+enum class FeatureStatus : std::uint8_t { kOk, kParallax, kNotVisible, kDistance };
+
+/// Two rows, divided by the standard deviation of the pixels.
+struct LinearSight {
+  int column = 0;  ///< of the clone, in the factor
+  int camera = 0;
+  Eigen::Vector2d residual;                  ///< measured - predicted, at the estimates
+  Eigen::Matrix<double, 2, 3> H_f;           ///< by p_FinG
+  Eigen::Matrix<double, 2, 6> H_x;           ///< by dtheta, dp of the clone
+  Eigen::Matrix<double, 2, 6> H_extrinsics;  ///< valid when the camera has such columns
+  IntrinsicsJacobian H_intrinsics;
+};
+
+/// Finds p_FinG and its linear system. Keeps its storage.
+class Feature {
+ public:
+  /// Allocates for tracks of up to `max_sights` observations.
+  void start(int max_sights, double sigma_px, const TriangulationLimits& limits);
+
+  /// All observations of a track whose clones are in the window; returns how many.
+  int collect(const TrackStore& tracks, int track, const Window& window);
+
+  /// Least squares of the pixel residuals, from the point next to all rays; anything but kOk: no
+  /// use to linearise.
+  FeatureStatus triangulate(const Window& window);
+
+  /// Residuals at the estimates, Jacobians at the first estimates, both at point().
+  /// kNotVisible: a camera model has no image of the point.
+  FeatureStatus linearize(const Window& window);
+
+  const Eigen::Vector3d& point() const { return p_FinG_; }
+  void set_point(const Eigen::Vector3d& p_FinG) { p_FinG_ = p_FinG; }
+  const std::vector<Sight>& sights() const { return sights_; }
+  const std::vector<LinearSight>& linear() const { return linear_; }
+
+ private:
+  /// Ray of a sight in G.
+  struct Ray {
+    Eigen::Vector3d origin;
+    Eigen::Vector3d direction;
+    Eigen::Matrix<double, 2, 3> J;  ///< d uv / d (p_FinG - origin) at `direction`
+  };
+  FeatureStatus intersect_rays();
+  FeatureStatus refine();
+  FeatureStatus check_distance() const;
+
+  double inverse_sigma_ = 1.;
+  TriangulationLimits limits_;
+  Eigen::Vector3d p_FinG_ = Eigen::Vector3d::Zero();
+  std::vector<Sight> sights_;
+  std::vector<Ray> rays_;
+  std::vector<LinearSight> linear_;
+};
+
+}  // namespace viwo::visual

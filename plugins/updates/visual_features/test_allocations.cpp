@@ -1,0 +1,97 @@
+// The steady state of the update does not touch the heap, however it is reached.
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include <gtest/gtest.h>
+
+#include "test_support.hpp"
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+// Eigen allocates with malloc, not with operator new: count there. Sanitizers need malloc
+// themselves, glibc offers the original under this name.
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+constexpr bool kCountsMalloc = true;
+extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+#else
+constexpr bool kCountsMalloc = false;
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#endif
+
+namespace viwo::visual {
+namespace {
+
+/// A window that slides over a long path, twice as long as the window: allocations of the second
+/// half.
+void check(const testing::SceneOptions& window, double gate_probability) {
+  testing::Random random(41);
+  testing::SceneOptions options = window;
+  options.n_clones = 3 * window.n_clones;
+  const testing::Scene path = testing::make_scene(options, 300, random);
+  testing::Scene scene = path;
+  VisualFeatures update(testing::params_with({{"gate_probability", gate_probability}}),
+                        HostServices{});
+  UpdateSetup setup = scene.setup();
+  setup.max_clones = window.n_clones;
+  update.start(setup);
+  FactorSink sink(1, static_cast<int>(scene.P.cols()));
+  const auto n = static_cast<std::size_t>(window.n_clones);
+  long counted = 0;
+  std::int64_t applied = 0;
+  for (std::size_t k = 0; k < path.clones.size(); ++k) {
+    const std::size_t begin = k + 1 > n ? k + 1 - n : 0;
+    scene.clones.assign(path.clones.begin() + static_cast<std::ptrdiff_t>(begin),
+                        path.clones.begin() + static_cast<std::ptrdiff_t>(k + 1));
+    for (std::size_t i = 0; i < scene.clones.size(); ++i) {
+      scene.clones[i].slot = static_cast<int>((begin + i) % n);
+      scene.clones[i].column = path.clones[0].column - kPoseSize * path.clones[0].slot +
+                               kPoseSize * scene.clones[i].slot;
+    }
+    FilterView filter = scene.view();
+    filter.oldest_leaves = scene.clones.size() == n;
+    const auto samples = testing::images(path, k, 1., random);
+    EpochData data;
+    data.features = samples;
+    data.end_ns = path.clones[k].t_ns;
+    sink.clear();
+    const long before = allocations;
+    update.update(filter, data, sink);
+    if (k > n) {
+      counted += allocations - before;
+      applied += sink.applied();
+    }
+  }
+  EXPECT_EQ(counted, 0);
+  EXPECT_GT(applied, 100);
+}
+
+TEST(VisualFeatures, DoesNotAllocateInTheSteadyState) {
+  check({.n_clones = 12}, 0.05);
+  check({.n_clones = 12, .n_cameras = 2}, 0.9);
+  check({.n_clones = 8, .n_cameras = 2, .calibrates = true}, 0.9);
+}
+
+TEST(VisualFeatures, CountingSeesAnAllocationOfEigen) {
+  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  const long before = allocations;
+  Eigen::MatrixXd matrix(50, 50);
+  matrix.setZero();
+  EXPECT_EQ(matrix.sum(), 0.);
+  EXPECT_GT(allocations - before, 0);
+}
+
+}  // namespace
+}  // namespace viwo::visual

@@ -1,0 +1,225 @@
+// Triangulation and Jacobians of one feature.
+#include <gtest/gtest.h>
+
+#include "feature.hpp"
+#include "test_support.hpp"
+#include "viwo/math/chi2.hpp"
+
+namespace viwo::visual {
+namespace {
+
+using testing::Random;
+using testing::Scene;
+using testing::SceneOptions;
+
+/// Track 0 of a store, with all sights of a landmark.
+struct Track {
+  TrackStore store;
+  Window window;
+  Feature feature;
+
+  Track(const Scene& truth, const Scene& estimate, const Eigen::Vector3d& landmark, double sigma_px,
+        double noise_px, Random& random, const TriangulationLimits& limits = {}) {
+    const int n_clones = static_cast<int>(truth.clones.size());
+    const int n_cameras = static_cast<int>(truth.cameras.size());
+    store.start(4, n_clones, n_cameras);
+    store.keep_clones(truth.clones);
+    const int track = store.find_or_add(7);
+    for (std::size_t i = 0; i < truth.clones.size(); ++i) {
+      for (std::size_t j = 0; j < truth.cameras.size(); ++j) {
+        Observation seen;
+        if (!truth.see(i, j, landmark, seen.uv)) continue;
+        seen.uv += noise_px * Eigen::Vector2d(testing::normals(random, 2));
+        seen.ray = unproject(estimate.cameras[j], seen.uv).value();
+        Eigen::Vector2d uv;
+        EXPECT_TRUE(project(estimate.cameras[j], seen.ray, uv, seen.J_ray));
+        store.set(track, truth.clones[i].slot, static_cast<int>(j), seen);
+      }
+    }
+    window.start(n_clones, n_cameras);
+    window.set(estimate.view());
+    feature.start(n_clones * n_cameras, sigma_px, limits);
+    feature.collect(store, track, window);
+  }
+};
+
+/// Pixel that a sight predicts, with everything at the values of `scene`.
+Eigen::Vector2d predicted(const Scene& scene, const Window& window, const Sight& sight,
+                          const Eigen::Vector3d& p_FinG) {
+  for (std::size_t i = 0; i < scene.clones.size(); ++i) {
+    if (scene.clones[i].slot != window.clone(sight.clone).slot) continue;
+    const CameraView& camera = scene.cameras[static_cast<std::size_t>(sight.camera)];
+    const Eigen::Vector3d p_I = scene.clones[i].R_GtoI * (p_FinG - scene.clones[i].p_IinG);
+    Eigen::Vector2d uv;
+    EXPECT_TRUE(project(camera, camera.R_ItoC * p_I + camera.p_IinC, uv));
+    return uv;
+  }
+  ADD_FAILURE();
+  return Eigen::Vector2d::Zero();
+}
+
+/// The rows of a sight over the whole error state.
+Eigen::MatrixXd dense_row(const LinearSight& row, const Sight& sight, const Scene& scene,
+                          const Window& window) {
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, scene.P.cols());
+  for (const CloneView& clone : scene.clones) {
+    if (clone.slot == window.clone(sight.clone).slot) {
+      H.middleCols<6>(clone.column) = row.H_x;
+    }
+  }
+  const CameraView& camera = scene.cameras[static_cast<std::size_t>(sight.camera)];
+  if (camera.extrinsics_column >= 0) {
+    H.middleCols<6>(camera.extrinsics_column) = row.H_extrinsics;
+    H.middleCols<8>(camera.intrinsics_column) = row.H_intrinsics;
+  }
+  return H;
+}
+
+void check_jacobians(const SceneOptions& options, std::uint64_t seed) {
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  Random random(seed);
+  const Scene scene = testing::make_scene(options, 1, random);
+  const double sigma_px = 0.7;
+  Track track(scene, scene, scene.landmarks[0], sigma_px, 0.5, random);
+  ASSERT_GE(track.feature.sights().size(), 3u);
+  ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+  ASSERT_EQ(track.feature.linearize(track.window), FeatureStatus::kOk);
+  Scene first = scene;  // Jacobians are those of the first estimates
+  for (CloneView& clone : first.clones) {
+    clone.R_GtoI = clone.R_GtoI_fej;
+    clone.p_IinG = clone.p_IinG_fej;
+  }
+  const Eigen::Vector3d p_FinG = track.feature.point();
+  const double step = 1e-6;
+  for (std::size_t k = 0; k < track.feature.sights().size(); ++k) {
+    const Sight& sight = track.feature.sights()[k];
+    const LinearSight& row = track.feature.linear()[k];
+    const Eigen::Vector2d residual =
+        (sight.observation->uv - predicted(scene, track.window, sight, p_FinG)) / sigma_px;
+    EXPECT_LT((row.residual - residual).norm(), 1e-9);
+    Eigen::MatrixXd numeric(2, scene.P.cols());
+    for (int c = 0; c < numeric.cols(); ++c) {
+      Eigen::VectorXd dx = Eigen::VectorXd::Zero(numeric.cols());
+      Scene plus = first, minus = first;
+      dx[c] = step;
+      plus.move(dx);
+      minus.move(-dx);
+      const Eigen::Vector2d difference = predicted(plus, track.window, sight, p_FinG) -
+                                         predicted(minus, track.window, sight, p_FinG);
+      numeric.block<2, 1>(0, c) = difference / (2. * step * sigma_px);
+    }
+    const Eigen::MatrixXd H = dense_row(row, sight, scene, track.window);
+    EXPECT_LT((H - numeric).norm(), 1e-6 * numeric.norm()) << H << "\n\n" << numeric;
+    for (int c = 0; c < 3; ++c) {
+      const Eigen::Vector3d d = step * Eigen::Vector3d::Unit(c);
+      const Eigen::Vector2d column = (predicted(first, track.window, sight, p_FinG + d) -
+                                      predicted(first, track.window, sight, p_FinG - d)) /
+                                     (2. * step * sigma_px);
+      EXPECT_LT((row.H_f.col(c) - column).norm(), 1e-6 * row.H_f.norm());
+    }
+  }
+}
+
+TEST(Feature, JacobiansAreCentralDifferencesThroughTheErrorState) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    check_jacobians({.n_clones = 5, .n_cameras = 2, .calibrates = true}, seed);
+    check_jacobians({.n_clones = 5,
+                     .n_cameras = 2,
+                     .distortion = CameraDistortion::kEquidistant,
+                     .calibrates = true},
+                    seed);
+  }
+}
+
+TEST(Feature, JacobiansAreThoseOfTheFirstEstimatesAndResidualsThoseOfTheEstimates) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    check_jacobians({.n_clones = 5, .n_cameras = 2, .calibrates = true, .first_estimate_off = 0.01},
+                    seed);
+  }
+}
+
+TEST(Feature, TriangulationRecoversExactPoints) {
+  for (const auto distortion : {CameraDistortion::kRadtan, CameraDistortion::kEquidistant}) {
+    Random random(3);
+    const Scene scene = testing::make_scene({.n_clones = 8, .distortion = distortion}, 50, random);
+    for (const Eigen::Vector3d& landmark : scene.landmarks) {
+      Track track(scene, scene, landmark, 1., 0., random);
+      if (track.feature.sights().size() < 4) continue;
+      ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+      EXPECT_LT((track.feature.point() - landmark).norm(), 1e-8);
+    }
+  }
+}
+
+TEST(Feature, TriangulationIsUnbiasedAndAsPreciseAsItsNormalMatrixSays) {
+  Random random(4);
+  const Scene scene = testing::make_scene({.n_clones = 10}, 0, random);
+  const Eigen::Vector3d landmark(0.6, 0.3, 3.);
+  const int n = 2000;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  double nees = 0.;
+  for (int i = 0; i < n; ++i) {
+    Track track(scene, scene, landmark, 0.5, 0.5, random);
+    ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+    ASSERT_EQ(track.feature.linearize(track.window), FeatureStatus::kOk);
+    information.setZero();
+    for (const LinearSight& row : track.feature.linear()) {
+      information += row.H_f.transpose() * row.H_f;
+    }
+    const Eigen::Vector3d error = track.feature.point() - landmark;
+    mean += error / n;
+    nees += error.dot(information * error);
+  }
+  EXPECT_LT(n * mean.dot(information * mean), chi2_quantile(0.999, 3.));
+  EXPECT_GT(nees, chi2_quantile(0.005, 3. * n));
+  EXPECT_LT(nees, chi2_quantile(0.995, 3. * n));
+}
+
+TEST(Feature, TriangulationIsTheMinimumOfThePixelResiduals) {
+  Random random(5);
+  const Scene scene = testing::make_scene(
+      {.n_clones = 6, .n_cameras = 2, .distortion = CameraDistortion::kEquidistant}, 20, random);
+  for (const Eigen::Vector3d& landmark : scene.landmarks) {
+    Track track(scene, scene, landmark, 1., 1., random);
+    if (track.feature.sights().size() < 4) continue;
+    ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+    ASSERT_EQ(track.feature.linearize(track.window), FeatureStatus::kOk);
+    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();
+    for (const LinearSight& row : track.feature.linear()) {
+      A += row.H_f.transpose() * row.H_f;
+      b += row.H_f.transpose() * row.residual;
+    }
+    // What is left of the gradient, in standard deviations of the point.
+    EXPECT_LT(std::sqrt(b.dot(A.llt().solve(b))), 0.05);
+  }
+}
+
+TEST(Feature, RefusesPointsWithoutParallaxTooFarTooNearAndBehind) {
+  Random random(6);
+  Scene still = testing::make_scene({.n_clones = 6}, 0, random);
+  for (CloneView& clone : still.clones) clone.p_IinG.setZero();
+  Track no_parallax(still, still, {0.1, 0.1, 4.}, 1., 0.3, random);
+  ASSERT_EQ(no_parallax.feature.sights().size(), 6u);
+  EXPECT_EQ(no_parallax.feature.triangulate(no_parallax.window), FeatureStatus::kParallax);
+
+  const Scene scene = testing::make_scene({.n_clones = 6}, 0, random);
+  Track far(scene, scene, {0.4, 0.1, 5.}, 1., 0.1, random, {.max_distance_m = 4.5});
+  EXPECT_EQ(far.feature.triangulate(far.window), FeatureStatus::kDistance);
+  Track near(scene, scene, {0.4, 0.1, 5.}, 1., 0.1, random, {.min_distance_m = 5.5});
+  EXPECT_EQ(near.feature.triangulate(near.window), FeatureStatus::kDistance);
+
+  Scene backwards = scene;  // the same bearings from a mirrored path meet behind the cameras
+  for (CloneView& clone : backwards.clones) clone.p_IinG *= -1.;
+  Track behind(scene, backwards, {0.4, 0.1, 5.}, 1., 0.1, random);
+  EXPECT_EQ(behind.feature.triangulate(behind.window), FeatureStatus::kNotVisible);
+
+  Scene broken = scene;
+  broken.clones[2].p_IinG.x() = std::numeric_limits<double>::quiet_NaN();
+  Track nan(scene, broken, {0.4, 0.1, 5.}, 1., 0.1, random);
+  EXPECT_NE(nan.feature.triangulate(nan.window), FeatureStatus::kOk);
+}
+
+}  // namespace
+}  // namespace viwo::visual

@@ -1,0 +1,228 @@
+// Elimination and gate against a dense null-space projection.
+#include <Eigen/QR>
+#include <gtest/gtest.h>
+
+#include "normal_equations.hpp"
+#include "test_support.hpp"
+
+namespace viwo::visual {
+namespace {
+
+using testing::Random;
+using testing::Scene;
+using testing::SceneOptions;
+
+/// All features of a scene, each linearised, with its rows over the whole error state projected on
+/// the left null space of H_f.
+struct Batch {
+  Scene truth, estimate;
+  TrackStore store;
+  Window window;
+  Feature feature;
+
+  Batch(const SceneOptions& options, int n_landmarks, Random& random)
+      : truth(testing::make_scene(options, n_landmarks, random)), estimate(truth) {
+    const int n_clones = options.n_clones;
+    store.start(n_landmarks, n_clones, options.n_cameras);
+    store.keep_clones(truth.clones);
+    for (std::size_t k = 0; k < truth.clones.size(); ++k) {
+      for (const FeatureSample& image : testing::images(truth, k, 1., random)) {
+        for (const FeaturePoint& point : image.points) {
+          Observation seen;
+          seen.uv << point.u_px, point.v_px;
+          const CameraView& camera = truth.cameras[static_cast<std::size_t>(image.camera)];
+          seen.ray = unproject(camera, seen.uv).value();
+          Eigen::Vector2d uv;
+          EXPECT_TRUE(project(camera, seen.ray, uv, seen.J_ray));
+          store.set(store.find_or_add(point.id), truth.clones[k].slot, image.camera, seen);
+        }
+      }
+    }
+    window.start(n_clones, options.n_cameras);
+    window.set(estimate.view());
+    feature.start(n_clones * options.n_cameras, 1., {});
+  }
+
+  bool linearize(int track) {
+    return feature.collect(store, track, window) >= 3 &&
+           feature.triangulate(window) == FeatureStatus::kOk &&
+           feature.linearize(window) == FeatureStatus::kOk;
+  }
+
+  /// Rows of the feature at hand without the point: N^T H_x, N^T r.
+  void project_out(Eigen::MatrixXd& H, Eigen::VectorXd& r) const {
+    const auto& rows = feature.linear();
+    const int n = 2 * static_cast<int>(rows.size());
+    Eigen::MatrixXd H_x = Eigen::MatrixXd::Zero(n, truth.P.cols()), H_f(n, 3);
+    Eigen::VectorXd residual(n);
+    for (int i = 0; i < n / 2; ++i) {
+      const LinearSight& row = rows[static_cast<std::size_t>(i)];
+      const Sight& sight = feature.sights()[static_cast<std::size_t>(i)];
+      for (const CloneView& clone : estimate.clones) {
+        if (clone.slot != window.clone(sight.clone).slot) continue;
+        H_x.block<2, 6>(2 * i, clone.column) = row.H_x;
+      }
+      const CameraView& camera = estimate.cameras[static_cast<std::size_t>(sight.camera)];
+      if (camera.extrinsics_column >= 0) {
+        H_x.block<2, 6>(2 * i, camera.extrinsics_column) = row.H_extrinsics;
+        H_x.block<2, 8>(2 * i, camera.intrinsics_column) = row.H_intrinsics;
+      }
+      H_f.middleRows<2>(2 * i) = row.H_f;
+      residual.segment<2>(2 * i) = row.residual;
+    }
+    const Eigen::MatrixXd Q = H_f.householderQr().householderQ();
+    H = Q.rightCols(n - 3).transpose() * H_x;
+    r = Q.rightCols(n - 3).transpose() * residual;
+  }
+};
+
+NormalEquations equations_for(const SceneOptions& options) {
+  NormalEquations equations;
+  const int calibration = kCalibrationSize * options.n_cameras;
+  equations.start(kPoseSize * options.n_clones + calibration, calibration,
+                  options.n_clones * options.n_cameras);
+  return equations;
+}
+
+const std::vector<SceneOptions> kCases{
+    {.n_clones = 12},
+    {.n_clones = 7, .n_cameras = 2, .distortion = CameraDistortion::kEquidistant},
+    {.n_clones = 6, .n_cameras = 2, .calibrates = true, .first_estimate_off = 0.005},
+    {.n_clones = 12, .n_cameras = 1, .first_estimate_off = 0.005}};
+
+TEST(NormalEquations, EqualTheDenseProjectionOnTheNullSpace) {
+  for (const SceneOptions& options : kCases) {
+    Random random(11);
+    Batch batch(options, 120, random);
+    NormalEquations equations = equations_for(options);
+    FactorSink sink(1, static_cast<int>(batch.truth.P.cols()));
+    InformationFactor& factor = sink.add_information();
+    equations.begin(batch.window, factor);
+    const auto size = batch.truth.P.cols();
+    Eigen::MatrixXd Lambda = Eigen::MatrixXd::Zero(size, size), H;
+    Eigen::VectorXd eta = Eigen::VectorXd::Zero(size), r;
+    int used = 0;
+    for (const int track : batch.store.active()) {
+      if (!batch.linearize(track)) continue;
+      ASSERT_TRUE(equations.prepare(batch.feature));
+      equations.add(batch.feature, batch.window, factor);
+      batch.project_out(H, r);
+      Lambda += H.transpose() * H;
+      eta += H.transpose() * r;
+      ++used;
+    }
+    equations.finish(factor);
+    EXPECT_GT(used, 60);
+    Eigen::MatrixXd Lambda_sum = Eigen::MatrixXd::Zero(size, size);
+    Eigen::VectorXd eta_sum = Eigen::VectorXd::Zero(size);
+    testing::scatter(factor, Lambda_sum, eta_sum);
+    EXPECT_LT((Lambda_sum - Lambda).norm(), 1e-10 * Lambda.norm());
+    EXPECT_LT((eta_sum - eta).norm(), 1e-9 * eta.norm());
+  }
+}
+
+TEST(NormalEquations, KeepTheirPrecisionWhenTheParallaxIsWeak) {
+  // Half a millimetre between clones, points several metres away: far beyond max_condition.
+  Random random(12);
+  const SceneOptions options{.n_clones = 8};
+  Batch batch(options, 40, random);
+  for (CloneView& clone : batch.estimate.clones) {
+    clone.p_IinG = clone.p_IinG_fej = 0.0005 * testing::normal3(random);
+  }
+  batch.estimate.cameras[0].p_IinC.setZero();
+  batch.window.set(batch.estimate.view());
+  NormalEquations equations = equations_for(options);
+  Eigen::MatrixXd H;
+  Eigen::VectorXd r;
+  int used = 0;
+  for (const int track : batch.store.active()) {
+    if (batch.feature.collect(batch.store, track, batch.window) < 3) continue;
+    batch.feature.set_point(
+        batch.truth.landmarks[static_cast<std::size_t>(batch.store.id(track) - 100)]);
+    if (batch.feature.linearize(batch.window) != FeatureStatus::kOk) continue;
+    ASSERT_TRUE(equations.prepare(batch.feature));
+    FactorSink sink(1, static_cast<int>(batch.truth.P.cols()));
+    InformationFactor& factor = sink.add_information();
+    equations.begin(batch.window, factor);
+    equations.add(batch.feature, batch.window, factor);
+    equations.finish(factor);
+    batch.project_out(H, r);
+    const auto size = batch.truth.P.cols();
+    Eigen::MatrixXd Lambda = Eigen::MatrixXd::Zero(size, size);
+    Eigen::VectorXd eta = Eigen::VectorXd::Zero(size);
+    testing::scatter(factor, Lambda, eta);
+    EXPECT_LT((Lambda - H.transpose() * H).norm(), 1e-7 * Lambda.norm());
+    EXPECT_NEAR(equations.chi2_bound(), r.squaredNorm(), 1e-7 * r.squaredNorm());
+    ++used;
+  }
+  EXPECT_GT(used, 20);
+}
+
+TEST(NormalEquations, Chi2IsThatOfTheProjectedResidualAndItsBoundHolds) {
+  for (const SceneOptions& options : kCases) {
+    Random random(13);
+    Batch batch(options, 60, random);
+    NormalEquations equations = equations_for(options);
+    Eigen::MatrixXd H;
+    Eigen::VectorXd r;
+    int used = 0;
+    for (const int track : batch.store.active()) {
+      if (!batch.linearize(track)) continue;
+      ASSERT_TRUE(equations.prepare(batch.feature));
+      batch.project_out(H, r);
+      const Eigen::MatrixXd S =
+          H * batch.truth.P * H.transpose() + Eigen::MatrixXd::Identity(r.size(), r.size());
+      const double expected = r.dot(S.llt().solve(r));
+      const double chi2 = equations.chi2(batch.feature, batch.window);
+      EXPECT_NEAR(chi2, expected, 1e-8 * expected);
+      EXPECT_NEAR(equations.chi2_bound(), r.squaredNorm(), 1e-8 * r.squaredNorm());
+      EXPECT_LE(chi2, equations.chi2_bound());
+      ++used;
+    }
+    EXPECT_GT(used, 30);
+  }
+}
+
+TEST(NormalEquations, ReadOnlyTheLowerTriangleOfTheCovariance) {
+  Random random(14);
+  Batch batch({.n_clones = 6, .n_cameras = 2, .calibrates = true}, 5, random);
+  batch.window.set(batch.estimate.view());
+  const Eigen::MatrixXd whole = batch.window.covariance();
+  const int size = batch.window.size();
+  EXPECT_EQ(whole.topLeftCorner(size, size),
+            Eigen::MatrixXd(whole.topLeftCorner(size, size).transpose()));
+  batch.estimate.P.triangularView<Eigen::StrictlyUpper>().setConstant(1e9);
+  batch.window.set(batch.estimate.view());
+  EXPECT_EQ(batch.window.covariance(), whole);
+  // By name: the extrinsics of the first camera stand before the clones in the state, after them
+  // in the factor.
+  const CameraView& camera = batch.estimate.cameras[0];
+  const CloneView& clone = batch.estimate.clones[3];
+  const int row = batch.window.clone_columns() + batch.window.camera(0).extrinsics;
+  const int column = batch.window.clone(batch.window.clone_in_slot(clone.slot)).column;
+  EXPECT_EQ((whole.block<6, 6>(row, column)),
+            (batch.truth.P.block<6, 6>(camera.extrinsics_column, clone.column)));
+}
+
+TEST(NormalEquations, RefuseAPointThatTheRowsDoNotDetermine) {
+  Random random(15);
+  Batch batch({.n_clones = 5}, 30, random);
+  for (CloneView& clone : batch.estimate.clones) {
+    clone.p_IinG = clone.p_IinG_fej = Eigen::Vector3d(1e-9 * clone.slot, 0., 0.);
+  }
+  batch.estimate.cameras[0].p_IinC.setZero();
+  batch.window.set(batch.estimate.view());
+  NormalEquations equations = equations_for({.n_clones = 5});
+  int used = 0;
+  for (const int track : batch.store.active()) {
+    if (batch.feature.collect(batch.store, track, batch.window) < 3) continue;
+    batch.feature.set_point({0.1, 0.1, 5.});
+    if (batch.feature.linearize(batch.window) != FeatureStatus::kOk) continue;
+    EXPECT_FALSE(equations.prepare(batch.feature));
+    ++used;
+  }
+  EXPECT_GT(used, 10);
+}
+
+}  // namespace
+}  // namespace viwo::visual

@@ -1,0 +1,120 @@
+// Cuts the stream of encoder samples at the clones of the filter: which interval of the wheel clock
+// belongs between which two clones, so that every sample is used exactly once even while the time
+// offset is being estimated (wheel_odometry/model.md).
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "tally.hpp"
+#include "viwo/api/update.hpp"
+#include "viwo/wheel/preintegration.hpp"
+
+namespace viwo {
+
+/// Encoder time [begin_ns, end_ns] (wheel clock) between two clones of FilterView::clones.
+struct EncoderInterval {
+  std::size_t first_clone = 0;
+  std::size_t last_clone = 0;
+  std::int64_t begin_ns = 0;
+  std::int64_t end_ns = 0;
+};
+
+/// Yields the intervals, one epoch after the other. The first cut is made where the clock offset
+/// says that a clone is; each interval begins where the last one ended. What one epoch cannot use
+/// because samples are late belongs to the next interval, as long as its first clone lives.
+class EncoderIntervals {
+ public:
+  /// The interval that ends now, if the samples reach; the next one begins at its end. The filter
+  /// must have wheels and at least one clone.
+  std::optional<EncoderInterval> next(const FilterView& filter, const EpochData& data) {
+    const CloneView& now = filter.clones.back();
+    const std::int64_t cut_ns = now.t_ns - std::llround(1e9 * filter.wheels->t_OtoI_s);  // (WO-1)
+    if (!started_) {
+      start_at(now, cut_ns);
+      return std::nullopt;
+    }
+    const std::optional<std::size_t> first = find_start(filter);
+    if (!first.has_value()) {
+      clone_left_.add(1, now.t_ns);
+      start_at(now, cut_ns);
+      return std::nullopt;
+    }
+    const auto encoders = data.encoders;
+    if (encoders.empty() || encoders.back().end_ns < cut_ns || cut_ns <= begin_ns_ ||
+        *first + 1 == filter.clones.size()) {
+      return std::nullopt;
+    }
+    if (encoders.front().begin_ns > begin_ns_) {
+      no_samples_.add(1, now.t_ns);
+      start_at(now, cut_ns);
+      return std::nullopt;
+    }
+    const EncoderInterval interval{*first, filter.clones.size() - 1, begin_ns_, cut_ns};
+    start_at(now, cut_ns);
+    return interval;
+  }
+
+  void append_rejections(std::vector<RejectionCount>& out) const {
+    clone_left_.append_to(out);
+    no_samples_.append_to(out);
+  }
+
+ private:
+  void start_at(const CloneView& clone, std::int64_t cut_ns) {
+    started_ = true;
+    start_t_ns_ = clone.t_ns;
+    start_slot_ = clone.slot;
+    begin_ns_ = cut_ns;
+  }
+
+  std::optional<std::size_t> find_start(const FilterView& filter) const {
+    for (std::size_t i = filter.clones.size(); i-- > 0;) {
+      const CloneView& clone = filter.clones[i];
+      if (clone.t_ns == start_t_ns_ && clone.slot == start_slot_) return i;
+    }
+    return std::nullopt;
+  }
+
+  bool started_ = false;
+  std::int64_t start_t_ns_ = 0;
+  int start_slot_ = 0;
+  std::int64_t begin_ns_ = 0;  // wheel clock
+  Tally clone_left_{"interval lost: its first clone left before the encoder samples came"};
+  Tally no_samples_{"interval lost: the encoder samples begin after it"};
+};
+
+/// What the preintegration of an interval left out.
+class SampleTallies {
+ public:
+  void add(const PreintegratedPose& pose, std::int64_t t_ns) {
+    rejected_.add(pose.rejected, t_ns);
+    gated_.add(pose.gated, t_ns);
+    rank_deficient_.add(pose.rank_deficient, t_ns);
+  }
+  void append_rejections(std::vector<RejectionCount>& out) const {
+    rejected_.append_to(out);
+    gated_.append_to(out);
+    rank_deficient_.append_to(out);
+  }
+
+ private:
+  Tally rejected_{"encoder sample refused by the kinematic model (bridged)"};
+  Tally gated_{"encoder sample whose wheels contradict each other (bridged)"};
+  Tally rank_deficient_{"encoder sample that does not tell the whole twist (used)"};
+};
+
+/// The host's kinematic model, which outlives the updates, as the wheel module wants it.
+inline std::shared_ptr<const WheelModel> wheel_model_of(const UpdateSetup& setup) {
+  if (setup.wheels == nullptr || setup.wheels->model == nullptr) {
+    throw InputError("this update needs a wheel set");
+  }
+  return std::make_shared<const WheelModel>(
+      std::shared_ptr<const KinematicModel>(setup.wheels->model, [](const KinematicModel*) {}));
+}
+
+}  // namespace viwo

@@ -1,0 +1,35 @@
+// Counting what an update did not use, without allocating.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "viwo/api/sensor.hpp"
+
+namespace viwo {
+
+/// One reason for leaving data out: how often, and the time of the first.
+struct Tally {
+  const char* reason;
+  std::int64_t count = 0;
+  std::int64_t first_ns = 0;
+
+  /// Adds `n` (nothing for 0) that happened at `t_ns`.
+  void add(std::int64_t n, std::int64_t t_ns) {
+    if (n <= 0) return;
+    if (count == 0) first_ns = t_ns;
+    count += n;
+  }
+
+  /// Appends itself to `out` if it happened at all.
+  void append_to(std::vector<RejectionCount>& out) const {
+    if (count == 0) return;
+    char where[48];
+    std::snprintf(where, sizeof where, "t = %.3f s", 1e-9 * static_cast<double>(first_ns));
+    out.push_back({reason, count, where});
+  }
+};
+
+}  // namespace viwo

@@ -1,0 +1,72 @@
+#include "relative_pose.hpp"
+
+#include "viwo/math/so3.hpp"
+
+namespace viwo::wheel_odometry {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// What prediction and Jacobian share.
+struct Geometry {
+  Matrix3d E0, E1;  ///< turn of the IMU from clone to instant
+  Matrix3d D;       ///< G to O at the first instant
+  Matrix3d M;       ///< O at the first instant to O at the last one
+  Vector3d l;       ///< origin of O in I
+  Vector3d b1;      ///< origin of O at the last instant, in I at the last clone
+  Vector3d s;       ///< the same seen from the first clone, in G
+  Vector3d y;       ///< from I to O at the last instant, in I at the first one
+  Vector3d d;       ///< origin of O at the last instant, in O at the first one
+
+  Geometry(const MovingPose& first, const MovingPose& last, const Mount& mount)
+      : E0(exp_so3(-first.after_s * first.w_IinI)), E1(exp_so3(-last.after_s * last.w_IinI)) {
+    const Matrix3d& C = mount.R_ItoO;
+    D = C * E0 * first.R_GtoI;
+    M = C * E1 * last.R_GtoI * D.transpose();  // (WO-3)
+    l = -C.transpose() * mount.p_IinO;
+    b1 = last.v_IinI * last.after_s + E1.transpose() * l;
+    s = last.p_IinG - first.p_IinG + last.R_GtoI.transpose() * b1;
+    y = E0 * (first.R_GtoI * s - first.v_IinI * first.after_s);
+    d = C * y + mount.p_IinO;  // (WO-4)
+  }
+};
+
+}  // namespace
+
+Vector3d relative_pose(const MovingPose& first, const MovingPose& last, const Mount& mount) {
+  const Geometry g(first, last, mount);
+  return {-log_so3(g.M).z(), g.d.x(), g.d.y()};  // (WO-5)
+}
+
+PoseJacobian relative_pose_jacobian(const MovingPose& first, const MovingPose& last,
+                                    const Mount& mount) {
+  const Geometry g(first, last, mount);
+  const Matrix3d& C = mount.R_ItoO;
+  const Vector3d& q = mount.p_IinO;
+  PoseJacobian J = PoseJacobian::Zero();
+
+  // Yaw: M = Exp(-a) M_hat changes it by e3^T Jl^-1(Log M) a; the left Jacobian is Jr(-phi).
+  const Eigen::RowVector3d by_a = right_jacobian_inverse_so3(-log_so3(g.M)).row(2);  // (WO-6)
+  const Matrix3d CE1 = C * g.E1;
+  const Matrix3d MCE0 = g.M * C * g.E0;
+  J.block<1, 3>(0, kFirstTheta) = -by_a * MCE0;
+  J.block<1, 3>(0, kLastTheta) = by_a * CE1;
+  J.block<1, 3>(0, kMountTheta) = by_a * (Matrix3d::Identity() - g.M);
+  J(0, kTimeOffset) = by_a.dot(CE1 * last.w_IinI - MCE0 * first.w_IinI);
+
+  // Position, (WO-7).
+  const Matrix3d DR1t = g.D * last.R_GtoI.transpose();
+  J.block<2, 3>(1, kFirstTheta) = (C * g.E0 * skew(first.R_GtoI * g.s)).topRows<2>();
+  J.block<2, 3>(1, kFirstPosition) = -g.D.topRows<2>();
+  J.block<2, 3>(1, kLastTheta) = -(DR1t * skew(g.b1)).topRows<2>();
+  J.block<2, 3>(1, kLastPosition) = g.D.topRows<2>();
+  J.block<2, 3>(1, kMountTheta) = (skew(g.d - q) + g.M.transpose() * skew(q)).topRows<2>();
+  J.block<2, 3>(1, kMountPosition) = (Matrix3d::Identity() - g.M.transpose()).topRows<2>();
+  const Vector3d by_t = -C * (first.w_IinI.cross(g.y) + g.E0 * first.v_IinI) +
+                        DR1t * (last.v_IinI + g.E1.transpose() * last.w_IinI.cross(g.l));
+  J.block<2, 1>(1, kTimeOffset) = by_t.head<2>();
+  return J;
+}
+
+}  // namespace viwo::wheel_odometry

@@ -1,0 +1,43 @@
+// Planar pose of the odometry frame O between two instants, predicted from two poses of the IMU,
+// with its derivatives. Equations: model.md beside this file.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace viwo::wheel_odometry {
+
+/// Pose of the IMU at a clone, and how it moved there; wanted `after_s` later.
+struct MovingPose {
+  Eigen::Matrix3d R_GtoI = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_IinG = Eigen::Vector3d::Zero();  ///< m
+  Eigen::Vector3d w_IinI = Eigen::Vector3d::Zero();  ///< rad/s
+  Eigen::Vector3d v_IinI = Eigen::Vector3d::Zero();  ///< velocity relative to G, in I, m/s
+  double after_s = 0.;                               ///< small
+};
+
+/// Where the IMU sits in O.
+struct Mount {
+  Eigen::Matrix3d R_ItoO = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_IinO = Eigen::Vector3d::Zero();
+};
+
+/// Columns of the Jacobian, each block with three but the last with one.
+inline constexpr int kFirstTheta = 0;
+inline constexpr int kFirstPosition = 3;
+inline constexpr int kLastTheta = 6;
+inline constexpr int kLastPosition = 9;
+inline constexpr int kMountTheta = 12;
+inline constexpr int kMountPosition = 15;
+inline constexpr int kTimeOffset = 18;
+inline constexpr int kGeometrySize = 19;
+using PoseJacobian = Eigen::Matrix<double, 3, kGeometrySize>;
+
+/// [yaw, x, y] of O at `last` in O at `first`: rad, m, m. Yaw in (-pi, pi).
+Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last, const Mount& mount);
+
+/// Its derivative by the errors of both poses (R = Exp(-dtheta) R_hat), of the mount, and by the
+/// time offset that moves both instants; rates and velocities are held.
+PoseJacobian relative_pose_jacobian(const MovingPose& first, const MovingPose& last,
+                                    const Mount& mount);
+
+}  // namespace viwo::wheel_odometry

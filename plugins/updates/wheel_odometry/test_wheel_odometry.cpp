@@ -1,0 +1,324 @@
+// The relative pose factor: derivatives, signs against simulated motion, cuts, consistency.
+#include <gtest/gtest.h>
+
+#include "allocations.hpp"
+#include "calibration_runs.hpp"
+#include "encoder_intervals.hpp"
+#include "filter_fixture.hpp"
+#include "relative_pose.hpp"
+#include "viwo/testing/jacobian.hpp"
+
+namespace viwo {
+namespace {
+
+using Eigen::VectorXd;
+using namespace wheel_odometry;
+
+constexpr std::int64_t kMs = 1'000'000;
+const std::string kModel = testing::swerve("four_wis_wid");
+
+TEST(RelativePose, HasTheDerivativesOfCentralDifferencesAtRandomStates) {
+  std::mt19937_64 rng(7);
+  for (int trial = 0; trial < 50; ++trial) {
+    const VectorXd n = testing::gaussian(30, rng);
+    MovingPose first, last;
+    first.R_GtoI = exp_so3(n.segment<3>(0));
+    last.R_GtoI = exp_so3(0.3 * n.segment<3>(3)) * first.R_GtoI;
+    first.p_IinG = n.segment<3>(6);
+    last.p_IinG = first.p_IinG + 0.3 * n.segment<3>(9);
+    first.w_IinI = n.segment<3>(12);
+    last.w_IinI = n.segment<3>(15);
+    first.v_IinI = n.segment<3>(18);
+    last.v_IinI = n.segment<3>(21);
+    first.after_s = 0.02 * n[24];
+    last.after_s = 0.02 * n[25];
+    const Mount mount{exp_so3(n.segment<3>(26)), n.segment<3>(0)};
+    const auto predict = [&](const VectorXd& d) -> VectorXd {
+      MovingPose a = first, b = last;
+      a.R_GtoI = exp_so3(-d.segment<3>(kFirstTheta)) * a.R_GtoI;
+      a.p_IinG += d.segment<3>(kFirstPosition);
+      b.R_GtoI = exp_so3(-d.segment<3>(kLastTheta)) * b.R_GtoI;
+      b.p_IinG += d.segment<3>(kLastPosition);
+      a.after_s += d[kTimeOffset];
+      b.after_s += d[kTimeOffset];
+      const Mount m{exp_so3(-d.segment<3>(kMountTheta)) * mount.R_ItoO,
+                    mount.p_IinO + d.segment<3>(kMountPosition)};
+      return relative_pose(a, b, m);
+    };
+    EXPECT_EQ(testing::jacobian_mismatch(
+                  relative_pose_jacobian(first, last, mount),
+                  testing::central_difference(predict, VectorXd::Zero(kGeometrySize)), {}, 1e-6),
+              "");
+  }
+}
+
+/// A circle driven over a tilted plane, and a filter with two clones 0.1 s apart.
+class OneInterval : public ::testing::Test {
+ protected:
+  OneInterval() : model_(testing::load_model(kModel)), motion_("circle", {.ramp_s = 0.}) {
+    sim::EncoderSimulation simulation;
+    simulation.duration_s = 3.;
+    simulation.time_offset_s = 0.02;
+    simulation.noise = false;
+    encoders_ = sim::simulate_encoders(model_->model(), model_->nominal(), motion_, simulation, 1);
+    sim::PoseIntegrator pose(motion_);
+    for (int k = 0; k < 2; ++k) {
+      const double t = 1. + 0.1 * k;
+      truth_.clones.push_back(
+          drive_.clone((1000 + 100 * k) * kMs, k, pose.advance_to(t), motion_.twist(t)));
+    }
+    truth_.wheels.model = &model_->model();
+    truth_.wheels.R_ItoO = drive_.R_ItoO;
+    truth_.wheels.p_IinO = drive_.p_IinO;
+    truth_.wheels.t_OtoI_s = 0.02;
+    truth_.wheels.x_WI = model_->nominal();
+    truth_.layout();
+    truth_.P.setIdentity();
+    truth_.P *= 1e-6;
+  }
+
+  /// The factor of `filter`; the first cut is made with the clock offset of `at_first_cut`.
+  ResidualFactor factor(const testing::SmallFilter& filter, const std::string& more = "",
+                        double at_first_cut_s = 0.02) const {
+    const auto update = testing::load_update("{type: wheel_odometry" + more + "}");
+    update->start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = &filter.wheels});
+    FactorSink sink(2, 60);
+    EpochData data;
+    data.encoders = encoders_;
+    testing::SmallFilter before = filter;
+    before.wheels.t_OtoI_s = at_first_cut_s;
+    FilterView view = before.view();
+    view.clones = view.clones.first(1);
+    update->update(view, data, sink);
+    EXPECT_EQ(sink.residuals().size(), 0u);
+    data.end_ns = filter.clones[1].t_ns;
+    update->update(filter.view(), data, sink);
+    EXPECT_EQ(sink.residuals().size(), 1u);
+    return sink.residuals()[0];
+  }
+
+  std::shared_ptr<const WheelModel> model_;
+  testing::TiltedDrive drive_;
+  sim::PlanarMotion motion_;
+  std::vector<EncoderSample> encoders_;
+  testing::SmallFilter truth_;
+};
+
+TEST_F(OneInterval, HasNoResidualAtTheTruthOnATiltedPlane) {
+  const ResidualFactor exact = factor(truth_);
+  EXPECT_LT(exact.residual.cwiseAbs().maxCoeff(), 1e-8);
+  // Cut 2 ms off: the clones are carried there, to second order in the 2 ms.
+  const ResidualFactor carried = factor(truth_, ", max_iterations: 1", 0.022);
+  EXPECT_LT(carried.residual.cwiseAbs().maxCoeff(), 2e-6);
+  EXPECT_GT(0.5 * 2e-3, 100 * carried.residual.cwiseAbs().maxCoeff());
+}
+
+TEST_F(OneInterval, HasTheDerivativesOfItsResidualWithAndWithoutFirstEstimates) {
+  const auto residual = [&](const VectorXd& d) -> VectorXd {
+    testing::SmallFilter moved = truth_;
+    moved.plus(d);
+    return factor(moved, ", max_iterations: 1").residual;
+  };
+  const auto size = truth_.P.rows();
+  const Eigen::MatrixXd numeric = testing::central_difference(residual, VectorXd::Zero(size), 1e-4);
+  const ResidualFactor at_truth = factor(truth_, ", max_iterations: 1");
+  const Eigen::MatrixXd H = testing::SmallFilter::spread(at_truth.columns, at_truth.H, size);
+  EXPECT_EQ(testing::jacobian_mismatch(-H, numeric, {}, 2e-4), "");
+
+  // Estimates off, first estimates at the truth: the residual is another, the Jacobian by clones
+  // stays.
+  std::mt19937_64 rng(3);
+  VectorXd off = VectorXd::Zero(size);
+  off.segment(kImuSize, 12) = 0.01 * testing::gaussian(12, rng);
+  testing::SmallFilter moved = truth_;
+  moved.plus(off);
+  const ResidualFactor fej = factor(moved, ", max_iterations: 1");
+  EXPECT_GT((fej.residual - at_truth.residual).norm(), 1e-3);
+  EXPECT_LT((fej.H - at_truth.H).cwiseAbs().maxCoeff(), 1e-12);
+  moved.first_estimates();
+  const ResidualFactor no_fej = factor(moved, ", max_iterations: 1");
+  EXPECT_GT((no_fej.H - at_truth.H).cwiseAbs().maxCoeff(), 1e-4);
+}
+
+TEST_F(OneInterval, LeavesOutWhatTheFilterHolds) {
+  testing::SmallFilter filter = truth_;
+  filter.wheels.extrinsics_column = -1;
+  filter.wheels.intrinsics_column = -1;
+  const ResidualFactor held = factor(filter, ", max_iterations: 1");
+  EXPECT_EQ(held.columns.size(), 13);
+  const ResidualFactor all = factor(truth_, ", max_iterations: 1");
+  EXPECT_TRUE(held.H.leftCols(12) == all.H.leftCols(12));
+  EXPECT_TRUE(held.H.col(12) == all.H.col(18));
+}
+
+TEST_F(OneInterval, LandsOnTheMeasurementWhenItIterates) {
+  testing::SmallFilter rough = truth_;
+  const int mount = rough.wheels.extrinsics_column;
+  rough.P *= 1e-4;
+  rough.P.diagonal().segment<3>(mount).setConstant(0.2 * 0.2);
+  rough.P.diagonal().segment<3>(mount + 3).setConstant(0.3 * 0.3);
+  VectorXd off = VectorXd::Zero(rough.P.rows());
+  off.segment<6>(mount) << 0.05, -0.04, 0.3, 0.3, -0.2, 0.1;
+  rough.plus(off);
+  const auto left = [&](const std::string& more) {
+    testing::SmallFilter filter = rough;
+    FactorSink sink(1, 60);
+    sink.add_residual() = factor(rough, more + ", second_order_noise: false, gate_probability: 0");
+    filter.apply(sink);
+    return factor(filter, ", max_iterations: 1").residual.norm();
+  };
+  EXPECT_GT(left(", max_iterations: 1"), 5e-4);
+  EXPECT_LT(left(", max_iterations: 10"), 1e-4);
+}
+
+TEST(EncoderIntervals, UsesEachSampleOnceWhileTheClockOffsetChanges) {
+  const auto model = testing::load_model(kModel);
+  const auto samples = testing::sample_motion(
+      *model, [](double) { return Twist(0.4, 0.1, 0.3); }, 10., 100.);
+  Preintegrator preintegrator(model, {});
+  EncoderIntervals intervals;
+  testing::SmallFilter filter;
+  filter.clones.resize(2);
+  std::mt19937_64 rng(5);
+  std::int64_t used = 0, first_ns = -1, last_ns = -1;
+  for (int k = 1; k < 90; ++k) {
+    filter.clones[0] = filter.clones[1];
+    filter.clones[1].t_ns = 100 * k * kMs;
+    filter.clones[1].slot = k % 2;
+    filter.wheels.t_OtoI_s = 0.004 * testing::gaussian(1, rng)[0];
+    EpochData data;
+    data.encoders = samples;
+    const auto interval = intervals.next(filter.view(), data);
+    if (!interval.has_value()) continue;
+    if (first_ns < 0) first_ns = interval->begin_ns;
+    if (last_ns >= 0) {
+      EXPECT_EQ(interval->begin_ns, last_ns);
+    }
+    last_ns = interval->end_ns;
+    PreintegratedPose pose;
+    ASSERT_TRUE(preintegrator.integrate(samples, interval->begin_ns, interval->end_ns, pose));
+    used += pose.samples;
+  }
+  std::int64_t expected = 0;
+  for (const EncoderSample& sample : samples) {
+    expected += sample.t_ns >= first_ns && sample.t_ns < last_ns ? 1 : 0;
+  }
+  EXPECT_GT(expected, 850);
+  EXPECT_EQ(used, expected);
+}
+
+TEST(EncoderIntervals, WaitsForLateSamplesAndCountsLostIntervals) {
+  const auto model = testing::load_model(kModel);
+  const auto samples = testing::sample_motion(
+      *model, [](double) { return Twist(0.4, 0.1, 0.3); }, 2., 100.);
+  EncoderIntervals intervals;
+  testing::SmallFilter filter;
+  const auto clone_at = [&](int k) {
+    CloneView clone;
+    clone.t_ns = 100 * k * kMs;
+    clone.slot = k % 4;
+    return clone;
+  };
+  EpochData data;
+  filter.clones = {clone_at(1)};
+  data.encoders = std::span(samples).first(10);
+  EXPECT_FALSE(intervals.next(filter.view(), data).has_value());
+  filter.clones = {clone_at(1), clone_at(2)};
+  data.encoders = std::span(samples).first(19);  // up to 0.19 s
+  EXPECT_FALSE(intervals.next(filter.view(), data).has_value());
+  filter.clones = {clone_at(1), clone_at(2), clone_at(3)};
+  data.encoders = std::span(samples).first(30);
+  const auto longer = intervals.next(filter.view(), data);
+  ASSERT_TRUE(longer.has_value());
+  EXPECT_EQ(longer->first_clone, 0u);
+  EXPECT_EQ(longer->last_clone, 2u);
+  EXPECT_EQ(longer->begin_ns, 100 * kMs);
+  EXPECT_EQ(longer->end_ns, 300 * kMs);
+  std::vector<RejectionCount> counts;
+  intervals.append_rejections(counts);
+  EXPECT_TRUE(counts.empty());
+
+  filter.clones = {clone_at(4), clone_at(5)};  // that at 0.3 s has left
+  data.encoders = std::span(samples).first(60);
+  EXPECT_FALSE(intervals.next(filter.view(), data).has_value());
+  filter.clones = {clone_at(5), clone_at(6)};
+  data.encoders = std::span(samples).subspan(55, 20);  // from 0.55 s, the interval begins at 0.5 s
+  EXPECT_FALSE(intervals.next(filter.view(), data).has_value());
+  intervals.append_rejections(counts);
+  ASSERT_EQ(counts.size(), 2u);
+  EXPECT_EQ(counts[0].reason,
+            "interval lost: its first clone left before the encoder samples came");
+  EXPECT_EQ(counts[0].first, "t = 0.500 s");
+  EXPECT_EQ(counts[1].reason, "interval lost: the encoder samples begin after it");
+  EXPECT_EQ(counts[1].first, "t = 0.600 s");
+  EXPECT_EQ(counts[1].count, 1);
+}
+
+TEST_F(OneInterval, DoesNotAllocateInTheSteadyState) {
+  const auto update = testing::load_update("{type: wheel_odometry}");
+  testing::SmallFilter filter = truth_;
+  update->start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = &filter.wheels});
+  FactorSink sink(2, 60);
+  sim::PoseIntegrator pose(motion_);
+  long before = 0;
+  int factors = 0;
+  for (int k = 0; k < 15; ++k) {
+    const double t = 1. + 0.1 * k;
+    filter.clones[0] = filter.clones[1];
+    filter.clones[1] =
+        drive_.clone((1000 + 100 * k) * kMs, k % 2, pose.advance_to(t), motion_.twist(t));
+    filter.layout();
+    EpochData data;
+    data.encoders = encoders_;
+    sink.clear();
+    if (k == 3) before = testing::allocations();
+    update->update(filter.view(), data, sink);
+    factors += static_cast<int>(sink.residuals().size());
+  }
+  EXPECT_EQ(testing::allocations() - before, 0);
+  EXPECT_GE(factors, 13);
+}
+
+TEST(WheelOdometry, IsConsistentAndNotWithAWrongNoise) {
+  const auto result = testing::run_calibration({.updates = {"{type: wheel_odometry}"}});
+  // 99 % bounds of chi-square / dof for 12 seeds of 13 and 7, and for 3 rows of 12 x 99 factors.
+  EXPECT_GT(result.nees_intrinsics, 0.73);
+  EXPECT_LT(result.nees_intrinsics, 1.32);
+  EXPECT_GT(result.nees_mount, 0.65);
+  EXPECT_LT(result.nees_mount, 1.44);
+  EXPECT_NEAR(result.chi2, 1., 0.06);
+  RecordProperty("microseconds", static_cast<int>(result.microseconds));
+  const auto wrong = testing::run_calibration(
+      {.updates = {"{type: wheel_odometry, noise_scale: 0.25, second_order_noise: false}"},
+       .pose_sigma_rad = 1e-6,
+       .pose_sigma_m = 1e-6});
+  EXPECT_GT(wrong.nees_intrinsics, 3.);
+  EXPECT_GT(wrong.chi2, 3.);
+}
+
+TEST_F(OneInterval, RefusesSamplesOfAnotherBaseAndSurvivesReadingsThatAreNotNumbers) {
+  for (EncoderSample& sample : encoders_) sample.n_drive = 2;
+  EXPECT_THROW(factor(truth_), InputError);
+  for (EncoderSample& sample : encoders_) {
+    sample.n_drive = 4;
+    sample.drive_rad_per_s[1] = std::nan("");
+  }
+  const auto update = testing::load_update("{type: wheel_odometry}");
+  update->start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = &truth_.wheels});
+  FactorSink sink(2, 60);
+  EpochData data;
+  data.encoders = encoders_;
+  FilterView view = truth_.view();
+  view.clones = view.clones.first(1);
+  update->update(view, data, sink);
+  update->update(truth_.view(), data, sink);
+  EXPECT_EQ(sink.residuals().size(), 0u);
+  std::vector<RejectionCount> counts;
+  update->rejections(counts);
+  ASSERT_EQ(counts.size(), 2u);
+  EXPECT_EQ(counts[0].reason, "encoder sample refused by the kinematic model (bridged)");
+  EXPECT_EQ(counts[1].reason, "interval left out: too long without believable encoder samples");
+}
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,384 @@
+// Preintegrated relative planar pose between consecutive clones, as one residual factor per epoch,
+// linearised where the measurement itself puts the calibration. Equations: model.md beside this
+// file.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include <Eigen/Cholesky>
+
+#include "encoder_intervals.hpp"
+#include "relative_pose.hpp"
+#include "viwo/api/plugin.hpp"
+#include "viwo/math/so3.hpp"
+
+namespace viwo {
+namespace {
+
+using namespace wheel_odometry;
+
+constexpr std::array kParams{
+    ParamSpec{.name = "twist",
+              .type = ParamType::kString,
+              .fallback = "noise_weighted",
+              .choices = "plain|noise_weighted",
+              .help = "least squares of the wheel rows: plain, or weighted by their noise (then "
+                      "independent of the parity residual)"},
+    ParamSpec{.name = "gate_probability",
+              .type = ParamType::kNumber,
+              .fallback = "0.001",
+              .min = 0.,
+              .max = 0.5,
+              .help = "intervals less likely than this are left out; 0: none"},
+    ParamSpec{.name = "sample_gate_probability",
+              .type = ParamType::kNumber,
+              .fallback = "0",
+              .min = 0.,
+              .max = 0.5,
+              .help = "samples whose wheels contradict each other more than this are bridged; only "
+                      "for calibrated wheels; 0: none"},
+    ParamSpec{.name = "noise_scale",
+              .type = ParamType::kNumber,
+              .fallback = "1",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "factor on the standard deviation that the encoder noise gives"},
+    ParamSpec{.name = "sigma_floor_yaw_rad",
+              .type = ParamType::kNumber,
+              .unit = "rad",
+              .fallback = "1e-6",
+              .min = 0.,
+              .help = "yaw noise of each interval on top of the encoders'"},
+    ParamSpec{.name = "sigma_floor_position_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "1e-6",
+              .min = 0.,
+              .help = "position noise of each interval on top of the encoders', per axis"},
+    ParamSpec{.name = "sigma_yaw_rad_per_sqrt_m",
+              .type = ParamType::kNumber,
+              .unit = "rad/sqrt(m)",
+              .fallback = "0",
+              .min = 0.,
+              .help = "yaw noise that grows with the path, for slip"},
+    ParamSpec{.name = "sigma_position_m_per_sqrt_m",
+              .type = ParamType::kNumber,
+              .unit = "m/sqrt(m)",
+              .fallback = "0",
+              .min = 0.,
+              .help = "position noise per axis that grows with the path, for slip"},
+    ParamSpec{.name = "max_iterations",
+              .type = ParamType::kInt,
+              .fallback = "5",
+              .min = 1,
+              .max = 20,
+              .help = "linearisations per interval at most; 1: a plain EKF update"},
+    ParamSpec{.name = "second_order_noise",
+              .type = ParamType::kBool,
+              .fallback = "true",
+              .help = "adds what the linearisation leaves out, as far as the prior is uncertain"},
+    ParamSpec{.name = "max_bridged_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0.05",
+              .min = 0.,
+              .help = "intervals with longer holes in the encoder data are left out"},
+};
+
+constexpr int kMaxColumns = kGeometrySize + kMaxIntrinsics;
+using Step = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxColumns, 1>;
+using Jacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxColumns>;
+using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxColumns,
+                             kMaxColumns>;
+using GeometryMatrix = Eigen::Matrix<double, kGeometrySize, kGeometrySize>;
+
+/// Steps for the second derivatives, of the mount (rad, m) and the time offset (s). The Jacobian is
+/// nearly quadratic in them, so that they may be large.
+constexpr double kSecondDerivativeStep = 1e-4;
+
+/// What the last linearisation may be off by, squared, in units of the noise (chi-square of 3).
+constexpr double kConverged = 0.01;
+
+/// Where a factor is linearised.
+struct Point {
+  MovingPose first, last;
+  Mount mount;
+  Intrinsics x_WI;
+};
+
+class WheelOdometry final : public Update {
+ public:
+  WheelOdometry(const ParamSet& params, const HostServices& /*services*/)
+      : gate_probability_(params.number("gate_probability")),
+        noise_scale_(params.number("noise_scale")),
+        sigma_floor_yaw_rad_(params.number("sigma_floor_yaw_rad")),
+        sigma_floor_position_m_(params.number("sigma_floor_position_m")),
+        sigma_yaw_rad_per_sqrt_m_(params.number("sigma_yaw_rad_per_sqrt_m")),
+        sigma_position_m_per_sqrt_m_(params.number("sigma_position_m_per_sqrt_m")),
+        max_iterations_(static_cast<int>(params.integer("max_iterations"))),
+        second_order_noise_(params.flag("second_order_noise")),
+        max_bridged_s_(params.number("max_bridged_s")) {
+    options_.twist.noise_weighted = params.text("twist") == "noise_weighted";
+    options_.parity_gate_probability = params.number("sample_gate_probability");
+    options_.parity = false;
+  }
+
+  UpdateKind kind() const override { return UpdateKind::kWheels; }
+
+  void start(const UpdateSetup& setup) override {
+    preintegrator_.emplace(wheel_model_of(setup), options_);
+  }
+
+  void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
+    if (filter.wheels == nullptr || filter.clones.empty()) return;
+    const std::optional<EncoderInterval> interval = intervals_.next(filter, data);
+    if (!interval.has_value()) return;
+    preintegrator_->model().require_channels(data.encoders.back(), "the wheel set");
+    const CloneView& first = filter.clones[interval->first_clone];
+    const CloneView& last = filter.clones[interval->last_clone];
+    set_start(*filter.wheels, first, last, *interval);
+    if (!measure(data, *interval, at_)) return;
+    tallies_.add(pose_, last.t_ns);
+    if (!(pose_.bridged_s <= max_bridged_s_) || !pose_.g.allFinite() || !pose_.P_g.allFinite()) {
+      bridged_.add(1, last.t_ns);
+      return;
+    }
+    ResidualFactor& factor = sink.add_residual();
+    set_columns(filter, first, last, factor.columns);
+    iterate(filter, data, *interval, factor);
+  }
+
+  void rejections(std::vector<RejectionCount>& out) const override {
+    intervals_.append_rejections(out);
+    tallies_.append_rejections(out);
+    bridged_.append_to(out);
+  }
+
+ private:
+  /// Prior estimate of the factor's states, and the first estimates for its Jacobian.
+  void set_start(const WheelsView& wheels, const CloneView& first, const CloneView& last,
+                 const EncoderInterval& interval) {
+    const auto moving = [&](const CloneView& clone, std::int64_t cut_ns, bool fej) {
+      MovingPose pose;
+      pose.R_GtoI = fej ? clone.R_GtoI_fej : clone.R_GtoI;
+      pose.p_IinG = fej ? clone.p_IinG_fej : clone.p_IinG;
+      pose.w_IinI = clone.w_IinI;
+      pose.v_IinI = clone.R_GtoI_fej * clone.v_IinG;
+      pose.after_s = seconds_between(clone.t_ns, cut_ns) + wheels.t_OtoI_s;  // (WO-2)
+      return pose;
+    };
+    start_.first = moving(first, interval.begin_ns, false);
+    start_.last = moving(last, interval.end_ns, false);
+    start_.mount = {wheels.R_ItoO, wheels.p_IinO};
+    start_.x_WI = wheels.x_WI;
+    first_fej_ = moving(first, interval.begin_ns, true);
+    last_fej_ = moving(last, interval.end_ns, true);
+    at_ = start_;
+  }
+
+  bool measure(const EpochData& data, const EncoderInterval& interval, const Point& point) {
+    preintegrator_->set_intrinsics(point.x_WI);
+    return preintegrator_->integrate(data.encoders, interval.begin_ns, interval.end_ns, pose_);
+  }
+
+  /// Columns of what the filter estimates, and where they stand in the geometry and in x_WI.
+  void set_columns(const FilterView& filter, const CloneView& first, const CloneView& last,
+                   FactorColumns& columns) {
+    const WheelsView& wheels = *filter.wheels;
+    n_geometry_ = 0;
+    const auto add = [&](int column, int count, int geometry) {
+      if (column < 0) return;
+      columns.add(column, count);
+      for (int i = 0; i < count; ++i)
+        geometry_[static_cast<std::size_t>(n_geometry_++)] = geometry + i;
+    };
+    add(first.column, kPoseSize, kFirstTheta);
+    add(last.column, kPoseSize, kLastTheta);
+    add(wheels.extrinsics_column, kPoseSize, kMountTheta);
+    add(wheels.time_offset_column, 1, kTimeOffset);
+    if (wheels.intrinsics_column >= 0) {
+      columns.add(wheels.intrinsics_column, static_cast<int>(wheels.x_WI.size()));
+    }
+    // The prior of just these columns.
+    const FilterView::Covariance P = filter.P();
+    P_.resize(columns.size(), columns.size());
+    int row = 0;
+    for (const ColumnRange rows : columns.blocks()) {
+      int col = 0;
+      for (const ColumnRange cols : columns.blocks()) {
+        P_.block(row, col, rows.count, cols.count) =
+            P.block(rows.first, cols.first, rows.count, cols.count);
+        col += cols.count;
+      }
+      row += rows.count;
+    }
+  }
+
+  /// (WO-8): residual and Jacobian at at_, and the noise of pose_.
+  void linearise() {
+    residual_ = pose_.g - relative_pose(at_.first, at_.last, at_.mount);
+    residual_[0] = std::remainder(residual_[0], 2. * M_PI);
+    MovingPose first = first_fej_;
+    MovingPose last = last_fej_;
+    first.after_s = at_.first.after_s;
+    last.after_s = at_.last.after_s;
+    geometry_jacobian_ = relative_pose_jacobian(first, last, at_.mount);
+    // What the mount and the clock show is proportional to the motion. Taken at the noisy first
+    // estimates it would count their noise as motion, and so as information; the iterate has the
+    // motion that the wheels themselves measured.
+    geometry_jacobian_.rightCols<kGeometrySize - kMountTheta>() =
+        relative_pose_jacobian(at_.first, at_.last, at_.mount)
+            .rightCols<kGeometrySize - kMountTheta>();
+    H_.resize(3, P_.cols());
+    for (int k = 0; k < n_geometry_; ++k) {
+      H_.col(k) = geometry_jacobian_.col(geometry_[static_cast<std::size_t>(k)]);
+    }
+    const auto n = P_.cols() - n_geometry_;
+    if (n > 0) H_.rightCols(n) = -pose_.J_g_WI;
+    const double path = pose_.path_length_m;
+    const auto square = [](double x) { return x * x; };
+    R_ = square(noise_scale_) * pose_.P_g;  // (WO-9)
+    R_(0, 0) += square(sigma_floor_yaw_rad_) + path * square(sigma_yaw_rad_per_sqrt_m_);
+    for (int i = 1; i < 3; ++i) {
+      R_(i, i) += square(sigma_floor_position_m_) + path * square(sigma_position_m_per_sqrt_m_);
+    }
+  }
+
+  /// at_ = start_ (+) step.
+  void move(const Step& step) {
+    Eigen::Matrix<double, kGeometrySize, 1> d = Eigen::Matrix<double, kGeometrySize, 1>::Zero();
+    for (int k = 0; k < n_geometry_; ++k) d[geometry_[static_cast<std::size_t>(k)]] = step[k];
+    at_.first.R_GtoI = exp_so3(-d.segment<3>(kFirstTheta)) * start_.first.R_GtoI;
+    at_.first.p_IinG = start_.first.p_IinG + d.segment<3>(kFirstPosition);
+    at_.last.R_GtoI = exp_so3(-d.segment<3>(kLastTheta)) * start_.last.R_GtoI;
+    at_.last.p_IinG = start_.last.p_IinG + d.segment<3>(kLastPosition);
+    at_.mount.R_ItoO = exp_so3(-d.segment<3>(kMountTheta)) * start_.mount.R_ItoO;
+    at_.mount.p_IinO = start_.mount.p_IinO + d.segment<3>(kMountPosition);
+    at_.first.after_s = start_.first.after_s + d[kTimeOffset];
+    at_.last.after_s = start_.last.after_s + d[kTimeOffset];
+    const auto n = step.size() - n_geometry_;
+    if (n > 0) at_.x_WI = start_.x_WI + step.tail(n);
+  }
+
+  /// Gauss-Newton steps with the prior, then the factor of the last linearisation (WO-10).
+  void iterate(const FilterView& filter, const EpochData& data, const EncoderInterval& interval,
+               ResidualFactor& factor) {
+    linearise();
+    Step step = Step::Zero(P_.cols());
+    Eigen::Vector3d moved_back = residual_;
+    for (int i = 1; i < max_iterations_; ++i) {
+      const Jacobian HP = H_ * P_;
+      Eigen::Matrix3d S = R_;
+      S.noalias() += HP * H_.transpose();
+      const Step next = HP.transpose() * S.llt().solve(moved_back);
+      const Eigen::Vector3d predicted = moved_back - H_ * next;
+      if (!next.allFinite()) break;
+      const PreintegratedPose before = pose_;
+      const Point from = at_;
+      move(next);
+      if (!measure(data, interval, at_) || !pose_.g.allFinite() || !pose_.P_g.allFinite()) {
+        pose_ = before;
+        at_ = from;
+        break;
+      }
+      step = next;
+      linearise();
+      moved_back = residual_ + H_ * step;
+      const Eigen::Vector3d missed = residual_ - predicted;
+      if (missed.dot(R_.llt().solve(missed)) < kConverged) break;
+    }
+    if (second_order_noise_) add_second_order_noise(filter);
+    factor.set_rows(3);
+    factor.H = H_;
+    factor.residual = moved_back;
+    factor.R = R_;
+    factor.gate_probability = gate_probability_;
+  }
+
+  /// (WO-11), for the mount and the time offset, crossed with all of the geometry.
+  void add_second_order_noise(const FilterView& filter) {
+    const WheelsView& wheels = *filter.wheels;
+    if (wheels.extrinsics_column < 0 && wheels.time_offset_column < 0) return;
+    std::array<GeometryMatrix, 3>& second = second_derivative_;
+    for (GeometryMatrix& D : second) D.setZero();
+    for (int k = kMountTheta; k < kGeometrySize; ++k) {
+      Mount mount = at_.mount;
+      MovingPose first = first_fej_;
+      MovingPose last = last_fej_;
+      first.after_s = at_.first.after_s;
+      last.after_s = at_.last.after_s;
+      Eigen::Vector3d d = Eigen::Vector3d::Zero();
+      if (k == kTimeOffset) {
+        first.after_s += kSecondDerivativeStep;
+        last.after_s += kSecondDerivativeStep;
+      } else {
+        d[k % 3] = kSecondDerivativeStep;
+        if (k < kMountPosition) {
+          mount.R_ItoO = exp_so3(-d) * mount.R_ItoO;
+        } else {
+          mount.p_IinO += d;
+        }
+      }
+      const PoseJacobian change =
+          (relative_pose_jacobian(first, last, mount) - geometry_jacobian_) / kSecondDerivativeStep;
+      for (int a = 0; a < 3; ++a) {
+        GeometryMatrix& D = second[static_cast<std::size_t>(a)];
+        D.row(k) = change.row(a);
+        D.col(k) = change.row(a).transpose();
+      }
+    }
+    // The prior of the geometry, zero where something is held.
+    GeometryMatrix P = GeometryMatrix::Zero();
+    for (int i = 0; i < n_geometry_; ++i) {
+      for (int k = 0; k < n_geometry_; ++k) {
+        P(geometry_[static_cast<std::size_t>(i)], geometry_[static_cast<std::size_t>(k)]) =
+            P_(i, k);
+      }
+    }
+    for (GeometryMatrix& D : second) D = (D * P).eval();
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b <= a; ++b) {
+        const double trace = second[static_cast<std::size_t>(a)]
+                                 .cwiseProduct(second[static_cast<std::size_t>(b)].transpose())
+                                 .sum();
+        R_(a, b) += 0.5 * trace;
+        R_(b, a) = R_(a, b);
+      }
+    }
+  }
+
+  PreintegrationOptions options_;
+  double gate_probability_, noise_scale_;
+  double sigma_floor_yaw_rad_, sigma_floor_position_m_;
+  double sigma_yaw_rad_per_sqrt_m_, sigma_position_m_per_sqrt_m_;
+  int max_iterations_;
+  bool second_order_noise_;
+  double max_bridged_s_;
+
+  EncoderIntervals intervals_;
+  SampleTallies tallies_;
+  Tally bridged_{"interval left out: too long without believable encoder samples"};
+  std::optional<Preintegrator> preintegrator_;
+
+  // Of the interval at hand.
+  PreintegratedPose pose_;
+  Point start_, at_;
+  MovingPose first_fej_, last_fej_;
+  std::array<int, kGeometrySize> geometry_{};  // the factor's leading columns in a PoseJacobian
+  int n_geometry_ = 0;
+  Square P_;
+  Eigen::Vector3d residual_ = Eigen::Vector3d::Zero();
+  PoseJacobian geometry_jacobian_ = PoseJacobian::Zero();
+  Jacobian H_;
+  Eigen::Matrix3d R_ = Eigen::Matrix3d::Zero();
+  std::array<GeometryMatrix, 3> second_derivative_{};
+};
+
+VIWO_REGISTER(Update, WheelOdometry, "wheel_odometry", "1.0.0",
+              "relative planar pose between clones, preintegrated from the wheel encoders",
+              "Apache-2.0", kParams);
+
+}  // namespace
+}  // namespace viwo

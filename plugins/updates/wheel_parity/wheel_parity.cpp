@@ -1,0 +1,287 @@
+// What the wheels contradict each other by, as information about the intrinsics: one information
+// factor per epoch, linearised where prior and wheels meet. Equations: model.md beside this file.
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "encoder_intervals.hpp"
+#include "viwo/api/plugin.hpp"
+#include "viwo/math/chi2.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr std::array kParams{
+    ParamSpec{.name = "gate_probability",
+              .type = ParamType::kNumber,
+              .fallback = "0.001",
+              .min = 0.,
+              .max = 0.5,
+              .help = "intervals less likely than this are left out; 0: none"},
+    ParamSpec{.name = "sample_gate_probability",
+              .type = ParamType::kNumber,
+              .fallback = "0",
+              .min = 0.,
+              .max = 0.5,
+              .help = "samples less likely than this at the present intrinsics are left out; only "
+                      "for calibrated wheels; 0: none"},
+    ParamSpec{.name = "noise_scale",
+              .type = ParamType::kNumber,
+              .fallback = "1",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "factor on the standard deviation of the parity noise, for encoders whose "
+                      "noise is not white"},
+    ParamSpec{.name = "max_iterations",
+              .type = ParamType::kInt,
+              .fallback = "6",
+              .min = 1,
+              .max = 20,
+              .help = "linearisations per interval at most; 1: a plain EKF update"},
+    ParamSpec{.name = "second_order_noise",
+              .type = ParamType::kBool,
+              .fallback = "true",
+              .help = "adds what the linearisation leaves out, as far as the prior is uncertain"},
+};
+
+using Square = IntrinsicMatrix;
+
+/// Squared step, in units of the uncertainty after the update, below which no further linearisation
+/// is needed.
+constexpr double kConverged = 1e-2;
+
+/// Step for the change of the information along a direction, in units of its uncertainty.
+constexpr double kCurvatureStep = 0.2;
+/// Curvature that adds less than this to the noise is left out, and not looked for in the next
+/// intervals: the uncertainty of constants does not grow.
+constexpr double kNegligibleCurvature = 0.01;
+/// Information about a direction, relative to the prior, that is not worth being corrected.
+constexpr double kNegligibleInformation = 1e-4;
+constexpr int kIntervalsUnchecked = 5;
+
+class WheelParity final : public Update {
+ public:
+  WheelParity(const ParamSet& params, const HostServices& /*services*/)
+      : gate_probability_(params.number("gate_probability")),
+        noise_scale_(params.number("noise_scale")),
+        max_iterations_(static_cast<int>(params.integer("max_iterations"))),
+        second_order_noise_(params.flag("second_order_noise")) {
+    options_.twist.noise_weighted = true;
+    options_.parity_gate_probability = params.number("sample_gate_probability");
+    options_.parity = true;
+  }
+
+  UpdateKind kind() const override { return UpdateKind::kWheels; }
+
+  void start(const UpdateSetup& setup) override {
+    preintegrator_.emplace(wheel_model_of(setup), options_);
+  }
+
+  void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
+    if (filter.wheels == nullptr || filter.clones.empty()) return;
+    const std::optional<EncoderInterval> interval = intervals_.next(filter, data);
+    if (!interval.has_value() || filter.wheels->intrinsics_column < 0) return;
+    preintegrator_->model().require_channels(data.encoders.back(), "the wheel set");
+    find_free(filter);
+    if (n_free_ == 0) return;
+    const double gain = iterate(filter.wheels->x_WI, data, *interval);
+    tallies_.add(pose_, data.end_ns);
+    if (std::isnan(gain)) return;
+    // (WP-5): what no change of the intrinsics within their prior explains.
+    const bool believed = cost_ - gain <= gate(pose_.parity.dof);
+    sink.count(believed ? 1 : 0, believed ? 0 : 1);
+    if (!believed) return;
+    if (second_order_noise_ && --unchecked_ < 0) add_second_order_noise(data, *interval);
+    emit(filter.wheels->intrinsics_column, sink.add_information());
+  }
+
+  void rejections(std::vector<RejectionCount>& out) const override {
+    intervals_.append_rejections(out);
+    tallies_.append_rejections(out);
+  }
+
+ private:
+  /// The intrinsics that have a variance, their sigmas and correlations.
+  void find_free(const FilterView& filter) {
+    const FilterView::Covariance P = filter.P();
+    const int first = filter.wheels->intrinsics_column;
+    n_free_ = 0;
+    for (int i = 0; i < filter.wheels->x_WI.size(); ++i) {
+      if (P(first + i, first + i) > 0.) free_[static_cast<std::size_t>(n_free_++)] = i;
+    }
+    sigma_.resize(n_free_);
+    C_.resize(n_free_, n_free_);
+    for (int i = 0; i < n_free_; ++i) {
+      sigma_[i] = std::sqrt(P(first + free(i), first + free(i)));
+      for (int k = 0; k < n_free_; ++k) C_(i, k) = P(first + free(i), first + free(k)) / sigma_[i];
+    }
+    for (int k = 0; k < n_free_; ++k) C_.col(k) /= sigma_[k];
+  }
+
+  int free(int i) const { return free_[static_cast<std::size_t>(i)]; }
+
+  /// Gauss-Newton until the step is small: Lambda_, eta_ and cost_ are then those of the last
+  /// linearisation, at at_, but about x0. Returns by how much the best change lowers the cost; NaN
+  /// when the interval tells nothing.
+  double iterate(const Intrinsics& x0, const EpochData& data, const EncoderInterval& interval) {
+    Intrinsics& x = at_;
+    x = x0;
+    Intrinsics z_before = Intrinsics::Zero(n_free_);
+    double gain = std::numeric_limits<double>::quiet_NaN();
+    for (int i = 0; i < max_iterations_; ++i) {
+      preintegrator_->set_intrinsics(x);
+      preintegrator_->integrate(data.encoders, interval.begin_ns, interval.end_ns, pose_);
+      if (pose_.parity.dof == 0 || !pose_.parity.eta.allFinite()) break;
+      linearise(x0, x);
+      // (WP-4): the step is C z in units of sigma.
+      Square M = Lambda_ * C_;
+      M.diagonal().array() += 1.;
+      const Intrinsics z = M.partialPivLu().solve(eta_);
+      const Intrinsics step = C_ * z;
+      if (!step.allFinite()) break;
+      gain = eta_.dot(step);
+      if (i + 1 == max_iterations_) break;
+      const Intrinsics change = z - z_before;
+      const Intrinsics further = C_ * change;
+      if (further.dot(Lambda_ * further) + change.dot(further) < kConverged) break;
+      z_before = z;
+      for (int k = 0; k < n_free_; ++k) x[free(k)] = x0[free(k)] + sigma_[k] * step[k];
+    }
+    return gain;
+  }
+
+  /// (WP-1), (WP-2), (WP-3): the parity information at x as a cost of errors about x0, in units
+  /// of sigma.
+  void linearise(const Intrinsics& x0, const Intrinsics& x) {
+    const ParityInformation& parity = pose_.parity;
+    const double weight = 1. / (noise_scale_ * noise_scale_);
+    Lambda_.resize(n_free_, n_free_);
+    eta_.resize(n_free_);
+    Intrinsics back(n_free_);
+    Intrinsics eta_at_x(n_free_);
+    for (int k = 0; k < n_free_; ++k) {
+      for (int i = 0; i < n_free_; ++i) {
+        Lambda_(i, k) = weight * sigma_[i] * sigma_[k] * parity.Lambda(free(i), free(k));
+      }
+      eta_at_x[k] = weight * sigma_[k] * parity.eta[free(k)];
+      back[k] = (x0[free(k)] - x[free(k)]) / sigma_[k];
+    }
+    const Intrinsics Lambda_back = Lambda_ * back;
+    eta_ = -(eta_at_x + Lambda_back);
+    cost_ = weight * parity.chi2 + back.dot(2. * eta_at_x + Lambda_back);
+  }
+
+  /// (WP-6), (WP-7): the noise of eta_ grows by what the curvature makes of the prior
+  /// uncertainty.
+  void add_second_order_noise(const EpochData& data, const EncoderInterval& interval) {
+    eigen_.compute(C_);
+    const Square L =
+        eigen_.eigenvectors() * eigen_.eigenvalues().cwiseMax(0.).cwiseSqrt().asDiagonal();
+    Square M(n_free_, n_free_);
+    const double weight = 1. / (noise_scale_ * noise_scale_);
+    Square noise = Square::Zero(n_free_, n_free_);
+    Intrinsics mean = Intrinsics::Zero(n_free_);
+    for (int i = 0; i < n_free_; ++i) {
+      Intrinsics x = at_;
+      for (int k = 0; k < n_free_; ++k) x[free(k)] += kCurvatureStep * sigma_[k] * L(k, i);
+      preintegrator_->set_intrinsics(x);
+      preintegrator_->integrate(data.encoders, interval.begin_ns, interval.end_ns, moved_);
+      for (int k = 0; k < n_free_; ++k) {
+        for (int l = 0; l < n_free_; ++l) {
+          M(l, k) = (weight * sigma_[l] * sigma_[k] * moved_.parity.Lambda(free(l), free(k)) -
+                     Lambda_(l, k)) /
+                    kCurvatureStep;
+        }
+      }
+      const Square h = M * L;
+      noise += 0.5 * h * h.transpose();
+      mean += 0.5 * h.col(i);
+    }
+    noise += mean * mean.transpose();
+    if (!noise.allFinite()) return;
+    inflate(noise);
+  }
+
+  /// Lambda_ and eta_ for noise of covariance Lambda_ + `noise` in eta_.
+  void inflate(const Square& noise) {
+    eigen_.compute(Lambda_);
+    const Intrinsics information = eigen_.eigenvalues();
+    int dropped = 0;  // directions that the interval tells next to nothing about
+    while (dropped < n_free_ && information[dropped] <= kNegligibleInformation) ++dropped;
+    const int kept = n_free_ - dropped;
+    if (kept == 0) return;
+    // Directions whitened: unit noise before the curvature adds to it.
+    const Intrinsics root = information.tail(kept).cwiseSqrt();
+    const Square to_eta = eigen_.eigenvectors().rightCols(kept) * root.asDiagonal();
+    const Square to_white =
+        root.cwiseInverse().asDiagonal() * eigen_.eigenvectors().rightCols(kept).transpose();
+    Square R = to_white * noise * to_white.transpose();
+    if (R.trace() < kNegligibleCurvature) {
+      unchecked_ = kIntervalsUnchecked;
+      return;
+    }
+    R.diagonal().array() += 1.;
+    const Square W = R.llt().solve(Square::Identity(kept, kept));
+    const Intrinsics white = to_white * eta_;
+    eta_ = to_eta * (W * white);
+    Lambda_ = to_eta * W * to_eta.transpose();
+  }
+
+  double gate(int dof) {
+    if (gate_probability_ <= 0.) return std::numeric_limits<double>::infinity();
+    if (dof != gate_dof_) {
+      gate_dof_ = dof;
+      gate_ = chi2_quantile(1. - gate_probability_, dof);
+    }
+    return gate_;
+  }
+
+  void emit(int first_column, InformationFactor& factor) const {
+    for (int i = 0; i < n_free_;) {
+      int end = i + 1;
+      while (end < n_free_ && free(end) == free(end - 1) + 1) ++end;
+      factor.columns.add(first_column + free(i), end - i);
+      i = end;
+    }
+    for (int k = 0; k < n_free_; ++k) {
+      for (int i = 0; i < n_free_; ++i) {
+        factor.Lambda(i, k) = Lambda_(i, k) / (sigma_[i] * sigma_[k]);
+      }
+      factor.eta[k] = eta_[k] / sigma_[k];
+    }
+  }
+
+  PreintegrationOptions options_;
+  double gate_probability_, noise_scale_;
+  int max_iterations_;
+  bool second_order_noise_;
+
+  EncoderIntervals intervals_;
+  SampleTallies tallies_;
+  std::optional<Preintegrator> preintegrator_;
+  double gate_ = 0.;
+  int gate_dof_ = 0;
+  int unchecked_ = 0;  // intervals for which curvature needs no look
+
+  // Of the interval at hand; entries of the free intrinsics, in units of their sigma.
+  PreintegratedPose pose_, moved_;
+  Intrinsics at_;  // where the last linearisation is
+  std::array<int, kMaxIntrinsics> free_{};
+  int n_free_ = 0;
+  Intrinsics sigma_, eta_;
+  Square C_, Lambda_;
+  Eigen::SelfAdjointEigenSolver<Square> eigen_;
+  double cost_ = 0.;
+};
+
+VIWO_REGISTER(Update, WheelParity, "wheel_parity", "1.0.0",
+              "information about the wheel intrinsics from how the wheels contradict each other",
+              "Apache-2.0", kParams);
+
+}  // namespace
+}  // namespace viwo

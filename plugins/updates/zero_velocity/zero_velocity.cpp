@@ -1,0 +1,264 @@
+// Standstill: when the IMU is quiet and wheels, images or the filter itself say that the base does
+// not creep, the velocity is zero and the last two clones are the same pose. Equations: model.md.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "still_images.hpp"
+#include "tally.hpp"
+#include "viwo/api/plugin.hpp"
+#include "viwo/math/so3.hpp"
+
+namespace viwo {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr std::array kParams{
+    ParamSpec{.name = "detector",
+              .type = ParamType::kString,
+              .fallback = "imu",
+              .choices = "imu|wheels",
+              .help = "what tells a standstill from slow, even motion: images or else the filter's "
+                      "own certainty (imu), or drive rates of a wheel set (wheels)"},
+    ParamSpec{.name = "max_noise_ratio",
+              .type = ParamType::kNumber,
+              .fallback = "3",
+              .min = 1.,
+              .help = "IMU samples of an epoch may scatter by this factor more than their noise"},
+    ParamSpec{.name = "max_drive_rad_per_s",
+              .type = ParamType::kNumber,
+              .unit = "rad/s",
+              .fallback = "0.02",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "detector wheels: drive rate of a wheel that stands"},
+    ParamSpec{.name = "max_disparity_px",
+              .type = ParamType::kNumber,
+              .unit = "px",
+              .fallback = "2.5",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "detector imu: median distance of the points of two images that are "
+                      "window_s apart; above 1.7 times the noise of a point"},
+    ParamSpec{.name = "min_points",
+              .type = ParamType::kInt,
+              .fallback = "10",
+              .min = 3,
+              .max = 1000,
+              .help = "detector imu: points that two images must share to be compared"},
+    ParamSpec{.name = "window_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "1",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "detector imu: how long the images must not have moved"},
+    ParamSpec{.name = "slowest_m_per_s",
+              .type = ParamType::kNumber,
+              .unit = "m/s",
+              .fallback = "0.05",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "detector imu without images: the slowest motion; a standstill is only "
+                      "believed when the filter knows its velocity to a quarter of it"},
+    ParamSpec{.name = "slowest_rad_per_s",
+              .type = ParamType::kNumber,
+              .unit = "rad/s",
+              .fallback = "0.02",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "the same for the slowest rotation and the gyroscope bias"},
+    ParamSpec{.name = "sigma_velocity_m_per_s",
+              .type = ParamType::kNumber,
+              .unit = "m/s",
+              .fallback = "0.001",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "how still a standing base is: velocity, per axis"},
+    ParamSpec{.name = "sigma_rotation_rad",
+              .type = ParamType::kNumber,
+              .unit = "rad",
+              .fallback = "1e-5",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "how still a standing base is: rotation from epoch to epoch, per axis"},
+    ParamSpec{.name = "sigma_position_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "1e-5",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "how still a standing base is: displacement from epoch to epoch, per axis"},
+    ParamSpec{.name = "gate_probability",
+              .type = ParamType::kNumber,
+              .fallback = "0.01",
+              .min = 0.,
+              .max = 0.5,
+              .help = "standstills less likely than this to the filter are not believed; 0: none"},
+};
+
+/// The IMU must have so many samples in an epoch to be judged quiet.
+constexpr std::size_t kFewestSamples = 5;
+
+class ZeroVelocity final : public Update {
+ public:
+  ZeroVelocity(const ParamSet& params, const HostServices& /*services*/)
+      : use_wheels_(params.text("detector") == "wheels"),
+        max_noise_ratio_(params.number("max_noise_ratio")),
+        max_drive_rad_per_s_(params.number("max_drive_rad_per_s")),
+        slowest_m_per_s_(params.number("slowest_m_per_s")),
+        slowest_rad_per_s_(params.number("slowest_rad_per_s")),
+        sigma_velocity_m_per_s_(params.number("sigma_velocity_m_per_s")),
+        sigma_rotation_rad_(params.number("sigma_rotation_rad")),
+        sigma_position_m_(params.number("sigma_position_m")),
+        gate_probability_(params.number("gate_probability")),
+        images_(params.number("max_disparity_px"), static_cast<int>(params.integer("min_points")),
+                params.number("window_s")) {}
+
+  UpdateKind kind() const override { return use_wheels_ ? UpdateKind::kWheels : UpdateKind::kBody; }
+
+  void start(const UpdateSetup& setup) override {
+    if (use_wheels_ && setup.wheels == nullptr) {
+      throw InputError("zero_velocity: detector 'wheels' needs a wheel set");
+    }
+    images_.reserve();
+  }
+
+  void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
+    if (filter.clones.empty()) return;
+    if (!quiet(data.imu, filter.imu_noise)) {
+      images_.forget();
+      return;
+    }
+    if (use_wheels_) {
+      if (!wheels_stand(filter, data)) return;
+    } else {
+      switch (images_.compare(data.features)) {
+        case StillImages::kMoved:
+          images_moved_.add(1, data.end_ns);
+          return;
+        case StillImages::kTooEarly:
+          return;
+        case StillImages::kStill:
+          break;
+        case StillImages::kUnknown:
+          if (!would_notice(filter)) return;
+          break;
+      }
+    }
+    emit(filter, sink.add_residual());
+  }
+
+  void rejections(std::vector<RejectionCount>& out) const override { images_moved_.append_to(out); }
+
+ private:
+  /// (ZV-1): the samples scatter around their mean as their noise does.
+  bool quiet(std::span<const ImuSample> imu, const ImuNoise& noise) const {
+    if (imu.size() < kFewestSamples) return false;
+    const double span_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
+    if (!(span_s > 0.)) return false;
+    const auto n = static_cast<double>(imu.size());
+    const double rate_hz = (n - 1.) / span_s;
+    const auto scatters = [&](const std::array<double, 3> ImuSample::*channel, double density) {
+      Vector3d sum = Vector3d::Zero();
+      for (const ImuSample& sample : imu) sum += Vector3d((sample.*channel).data());
+      const Vector3d mean = sum / n;
+      double squares = 0.;
+      for (const ImuSample& sample : imu) {
+        squares += (Vector3d((sample.*channel).data()) - mean).squaredNorm();
+      }
+      const double limit = max_noise_ratio_ * max_noise_ratio_ * density * density * rate_hz;
+      return !(squares <= 3. * (n - 1.) * limit);
+    };
+    return !scatters(&ImuSample::gyro_rad_per_s, noise.gyro_rad_per_s_sqrt_hz) &&
+           !scatters(&ImuSample::accel_m_per_s2, noise.accel_m_per_s2_sqrt_hz);
+  }
+
+  /// No wheel has turned since the last epoch; there must be a sample that says so.
+  bool wheels_stand(const FilterView& filter, const EpochData& data) const {
+    if (filter.wheels == nullptr || data.begin_ns == 0 || data.encoders.empty()) return false;
+    const std::int64_t offset_ns = std::llround(1e9 * filter.wheels->t_OtoI_s);
+    const std::int64_t from_ns = data.begin_ns - offset_ns;
+    const std::int64_t to_ns = data.end_ns - offset_ns;
+    std::int64_t reached_ns = from_ns;
+    for (const EncoderSample& sample : data.encoders) {
+      if (sample.end_ns <= from_ns || sample.begin_ns >= to_ns) continue;
+      for (int i = 0; i < sample.n_drive; ++i) {
+        const double rate = sample.drive_rad_per_s[static_cast<std::size_t>(i)];
+        if (!(std::abs(rate) <= max_drive_rad_per_s_)) return false;
+      }
+      reached_ns = sample.end_ns;
+    }
+    // Most of the epoch must have been seen; samples may be a little late.
+    return 2 * (reached_ns - from_ns) >= to_ns - from_ns;
+  }
+
+  /// (ZV-2): the slowest motion would not pass the gate.
+  bool would_notice(const FilterView& filter) const {
+    const FilterView::Covariance P = filter.P();
+    const auto largest_sigma = [&](int column) {
+      return std::sqrt(P.diagonal().segment<3>(column).maxCoeff());
+    };
+    return 4. * largest_sigma(kVelocityColumn) < slowest_m_per_s_ &&
+           4. * largest_sigma(kGyroBiasColumn) < slowest_rad_per_s_;
+  }
+
+  void emit(const FilterView& filter, ResidualFactor& factor) const {
+    const CloneView& now = filter.clones.back();
+    const bool two = filter.clones.size() > 1;
+    const int theta = factor.columns.add(kThetaColumn, 3);
+    const int velocity = factor.columns.add(kVelocityColumn, 3);
+    int first = 0, last = 0;
+    if (two) {
+      first = factor.columns.add(filter.clones[filter.clones.size() - 2].column, kPoseSize);
+      last = factor.columns.add(now.column, kPoseSize);
+    }
+    factor.set_rows(two ? 9 : 3);
+    factor.gate_probability = gate_probability_;
+    const auto square = [](double x) { return x * x; };
+
+    // (ZV-3)
+    const ImuView& imu = filter.imu;
+    factor.residual.head<3>() = -imu.R_GtoI * imu.v_IinG;
+    factor.H.block<3, 3>(0, theta) = skew(imu.R_GtoI_fej * imu.v_IinG_fej);
+    factor.H.block<3, 3>(0, velocity) = imu.R_GtoI_fej;
+    factor.R.diagonal().head<3>().setConstant(square(sigma_velocity_m_per_s_));
+    if (!two) return;
+
+    // (ZV-4)
+    const CloneView& before = filter.clones[filter.clones.size() - 2];
+    factor.residual.segment<3>(3) = -log_so3(now.R_GtoI * before.R_GtoI.transpose());
+    const Vector3d phi = log_so3(now.R_GtoI_fej * before.R_GtoI_fej.transpose());
+    factor.H.block<3, 3>(3, first) = right_jacobian_inverse_so3(phi);
+    factor.H.block<3, 3>(3, last) = -right_jacobian_inverse_so3(-phi);
+    factor.R.diagonal().segment<3>(3).setConstant(square(sigma_rotation_rad_));
+    // (ZV-5)
+    factor.residual.tail<3>() = -before.R_GtoI * (now.p_IinG - before.p_IinG);
+    factor.H.block<3, 3>(6, first) = skew(before.R_GtoI_fej * (now.p_IinG_fej - before.p_IinG_fej));
+    factor.H.block<3, 3>(6, first + 3) = -before.R_GtoI_fej;
+    factor.H.block<3, 3>(6, last + 3) = before.R_GtoI_fej;
+    factor.R.diagonal().tail<3>().setConstant(square(sigma_position_m_));
+  }
+
+  bool use_wheels_;
+  double max_noise_ratio_, max_drive_rad_per_s_;
+  double slowest_m_per_s_, slowest_rad_per_s_;
+  double sigma_velocity_m_per_s_, sigma_rotation_rad_, sigma_position_m_;
+  double gate_probability_;
+  StillImages images_;
+  Tally images_moved_{"quiet IMU, but the images move"};
+};
+
+VIWO_REGISTER(Update, ZeroVelocity, "zero_velocity", "1.0.0",
+              "a base that stands has no velocity and does not move between clones", "Apache-2.0",
+              kParams);
+
+}  // namespace
+}  // namespace viwo
