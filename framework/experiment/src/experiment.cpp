@@ -2,6 +2,7 @@
 
 #include <array>
 #include <chrono>
+#include <cmath>
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -73,6 +74,9 @@ std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
   if (setup.seeds > 1) line += "  seed " + std::to_string(run.seed);
   line += std::string("  ") + name(run.result.status);
   if (!run.result.cause.empty()) line += ": " + run.result.cause;
+  if (std::isfinite(run.result.nees.pose)) {
+    line += "  NEES " + significant(run.result.nees.pose, 3);
+  }
   if (run.result.accuracy) {
     line += "  end error " + significant(1e3 * run.result.accuracy->end_m, 4) + " mm, " +
             significant(run.result.accuracy->end_yaw_deg, 3) + " deg yaw";

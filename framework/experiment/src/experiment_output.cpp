@@ -21,6 +21,7 @@ struct Metric {
   const char* heading;  ///< of a table
   double table_scale;   ///< from SI to the unit of the table
   double (*of)(const RunResult&);
+  double target = 0.;  ///< best value; 0: the lower the better
 };
 
 double rpe(const RunResult& run, double length_m, bool degrees) {
@@ -44,7 +45,15 @@ const Metric kMetrics[] = {
      [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_deg : kNan; }},
     {"rpe_10_m", "RPE 10 m [mm]", 1e3, [](const RunResult& r) { return rpe(r, 10., false); }},
     {"rpe_10_deg", "RPE 10 m [deg]", 1., [](const RunResult& r) { return rpe(r, 10., true); }},
-    {"nees_planar", "NEES (3)", 1., [](const RunResult& r) { return r.nees_planar; }},
+    {"rpe_25_m", "RPE 25 m [mm]", 1e3, [](const RunResult& r) { return rpe(r, 25., false); }},
+    {"rpe_25_deg", "RPE 25 m [deg]", 1., [](const RunResult& r) { return rpe(r, 25., true); }},
+    {"nees_planar", "NEES (3)", 1., [](const RunResult& r) { return r.nees_planar; }, 3.},
+    {"nees_pose", "NEES (6)", 1., [](const RunResult& r) { return r.nees.pose; }, 6.},
+    {"nees_position", "NEES pos (3)", 1., [](const RunResult& r) { return r.nees.position; }, 3.},
+    {"nees_orientation", "NEES ori (3)", 1., [](const RunResult& r) { return r.nees.orientation; },
+     3.},
+    {"epoch_ms", "epoch [ms]", 1.,
+     [](const RunResult& r) { return r.updates.empty() ? kNan : r.total_ms.mean_ms; }},
 };
 
 using Filter = std::function<bool(const ExperimentRun&)>;
@@ -106,6 +115,44 @@ bool has_values(const ExperimentResult& result, const Metric& metric) {
   });
 }
 
+/// Final errors of one calibration parameter over the runs of a variant that estimated it.
+struct CalibrationStatistics {
+  std::string name;
+  int runs = 0;
+  double rmse = 0., mean_sigma = 0., prior_sigma = 0.;
+  double nees = 0.;  ///< mean squared normalised error
+};
+
+std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,
+                                                          std::size_t variant) {
+  std::vector<CalibrationStatistics> all;
+  for (const ExperimentRun& run : result.runs) {
+    if (run.variant != variant || run.result.status != RunStatus::kOk) continue;
+    for (const CalibrationTrack& track : run.result.calibration) {
+      if (run.result.updates.empty() || track.sigma.empty() || !(track.sigma.back() > 0.) ||
+          !std::isfinite(track.final_error)) {
+        continue;
+      }
+      auto at =
+          std::find_if(all.begin(), all.end(), [&](const auto& c) { return c.name == track.name; });
+      if (at == all.end()) at = all.insert(all.end(), {track.name});
+      const double e = track.final_error, sigma = track.sigma.back();
+      ++at->runs;
+      at->rmse += e * e;
+      at->mean_sigma += sigma;
+      at->prior_sigma += track.sigma.front();
+      at->nees += e * e / (sigma * sigma);
+    }
+  }
+  for (CalibrationStatistics& c : all) {
+    c.rmse = std::sqrt(c.rmse / c.runs);
+    c.mean_sigma /= c.runs;
+    c.prior_sigma /= c.runs;
+    c.nees /= c.runs;
+  }
+  return all;
+}
+
 json summary_of(const ExperimentResult& result) {
   json variants = json::object();
   const auto all = [](const ExperimentRun&) { return true; };
@@ -134,9 +181,22 @@ json summary_of(const ExperimentResult& result) {
       entry["rpe"][key] = {{"m", number_or_null(eval::mean(m))},
                            {"deg", number_or_null(eval::mean(deg))}};
     }
-    entry["nees_pose"] = nullptr;
-    entry["nees_pose_median"] = nullptr;
+    std::vector<double> nees;
+    for (const ExperimentRun& run : result.runs) {
+      if (run.variant == v && std::isfinite(run.result.nees.pose)) {
+        nees.push_back(run.result.nees.pose);
+      }
+    }
+    entry["nees_pose"] = number_or_null(eval::mean(nees));
+    entry["nees_pose_median"] = number_or_null(eval::median(nees));
     entry["calibration"] = json::object();
+    for (const CalibrationStatistics& c : calibration_statistics(result, v)) {
+      entry["calibration"][c.name] = {{"runs", c.runs},
+                                      {"rmse", number_or_null(c.rmse)},
+                                      {"mean_sigma", number_or_null(c.mean_sigma)},
+                                      {"prior_sigma", number_or_null(c.prior_sigma)},
+                                      {"nees", number_or_null(c.nees)}};
+    }
     for (const Metric& metric : kMetrics) {
       const auto values = values_of(result, v, metric, all);
       entry["metrics"][metric.key] = {
@@ -176,9 +236,10 @@ report::Table table_of(const ExperimentResult& result, const Group& group) {
   table.columns = {{"variant"}, {"runs"}, {"not ok"}};
   for (const Metric& metric : kMetrics) {
     if (!has_values(result, metric)) continue;
-    const bool nees = metric.key == std::string_view("nees_planar");
-    table.columns.push_back(
-        {metric.heading, {}, nees ? report::Best::kNearest : report::Best::kLowest, 3.});
+    table.columns.push_back({metric.heading,
+                             {},
+                             metric.target > 0. ? report::Best::kNearest : report::Best::kLowest,
+                             metric.target});
   }
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
     std::vector<report::Cell> row{result.setup.variants[v].name};
@@ -192,6 +253,24 @@ report::Table table_of(const ExperimentResult& result, const Group& group) {
       row.emplace_back(table_mean(result, v, metric, group.passes));
     }
     table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+/// One row per parameter, per variant rmse / mean sigma and NEES.
+report::Table calibration_table(const ExperimentResult& result, std::size_t variant) {
+  report::Table table;
+  table.caption = "Calibration at the end: " + result.setup.variants[variant].name;
+  table.columns = {{"parameter"},
+                   {"runs"},
+                   {"prior sigma"},
+                   {"rmse"},
+                   {"mean sigma"},
+                   {"rmse / prior"},
+                   {"NEES (1)", {}, report::Best::kNearest, 1.}};
+  for (const CalibrationStatistics& c : calibration_statistics(result, variant)) {
+    table.rows.push_back(
+        {c.name, c.runs, c.prior_sigma, c.rmse, c.mean_sigma, c.rmse / c.prior_sigma, c.nees});
   }
   return table;
 }
@@ -250,8 +329,32 @@ void write_experiment(const std::filesystem::path& folder, const ExperimentResul
                               result.setup.recordings[run.recording].name + ": " + run.result.cause,
                           report::Paragraph::Tone::kWarning});
   }
+  for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
+    report::Table table = calibration_table(result, v);
+    if (!table.rows.empty()) document.sections[0].blocks.emplace_back(std::move(table));
+  }
   add_recording_plots(result, document);
   report::write_html(folder / "report.html", document);
+}
+
+static std::string describe_calibration(const ExperimentResult& result) {
+  std::ostringstream out;
+  for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
+    const auto statistics = calibration_statistics(result, v);
+    if (statistics.empty()) continue;
+    out << "\ncalibration of " << result.setup.variants[v].name
+        << ": rmse at the end (part of the prior sigma; NEES, 1 is consistent)\n";
+    std::size_t column = 0;
+    for (const CalibrationStatistics& c : statistics) {
+      const std::string text = "  " + c.name + " " + significant(c.rmse, 3) + " (" +
+                               significant(100. * c.rmse / c.prior_sigma, 3) + " %; " +
+                               significant(c.nees, 3) + ")";
+      out << text << std::string(text.size() < 42 ? 42 - text.size() : 1, ' ');
+      if (++column % 3 == 0) out << "\n";
+    }
+    if (column % 3 != 0) out << "\n";
+  }
+  return out.str();
 }
 
 std::string describe(const ExperimentResult& result) {
@@ -281,6 +384,7 @@ std::string describe(const ExperimentResult& result) {
       out << "\n";
     }
   }
+  out << describe_calibration(result);
   return out.str();
 }
 

@@ -23,13 +23,13 @@ inline constexpr std::array kParams{
               .help = "most tracks that are tried in one epoch; the longest come first"},
     ParamSpec{.name = "gate_probability",
               .type = ParamType::kNumber,
-              .fallback = "0.05",
+              .fallback = "0.001",
               .min = 0.,
               .max = 0.999,
               .help = "a track whose chi-square is less likely than this is dropped; 0: no gate"},
     ParamSpec{.name = "min_observations",
               .type = ParamType::kInt,
-              .fallback = "3",
+              .fallback = "2",
               .min = 2.,
               .help = "fewest observations, of all cameras together, that a track is used with"},
     ParamSpec{.name = "max_tracks",
@@ -47,16 +47,16 @@ inline constexpr std::array kParams{
     ParamSpec{.name = "max_distance_m",
               .type = ParamType::kNumber,
               .unit = "m",
-              .fallback = "60",
+              .fallback = "1000",
               .min = 0.,
               .min_exclusive = true,
               .help = "a track whose point is farther from all of its cameras is not used"},
     ParamSpec{.name = "max_condition",
               .type = ParamType::kNumber,
-              .fallback = "10000",
+              .fallback = "1e6",
               .min = 1.,
               .max = 1e8,
               .help = "largest condition number of the intersection of a track's rays; 1e4 is a "
-                      "parallax of about one degree"}};
+                      "parallax of about one degree, 1e6 of a tenth"}};
 
 }  // namespace viwo::visual

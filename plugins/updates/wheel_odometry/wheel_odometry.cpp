@@ -292,7 +292,7 @@ class WheelOdometry final : public Update {
     if (second_order_noise_) add_second_order_noise(filter);
     factor.set_rows(3);
     factor.H = H_;
-    factor.residual = moved_back;
+    factor.residual.head<3>() = moved_back;
     factor.R = R_;
     factor.gate_probability = gate_probability_;
   }
@@ -303,12 +303,11 @@ class WheelOdometry final : public Update {
     if (wheels.extrinsics_column < 0 && wheels.time_offset_column < 0) return;
     std::array<GeometryMatrix, 3>& second = second_derivative_;
     for (GeometryMatrix& D : second) D.setZero();
+    const PoseJacobian here = relative_pose_jacobian(at_.first, at_.last, at_.mount);
     for (int k = kMountTheta; k < kGeometrySize; ++k) {
       Mount mount = at_.mount;
-      MovingPose first = first_fej_;
-      MovingPose last = last_fej_;
-      first.after_s = at_.first.after_s;
-      last.after_s = at_.last.after_s;
+      MovingPose first = at_.first;
+      MovingPose last = at_.last;
       Eigen::Vector3d d = Eigen::Vector3d::Zero();
       if (k == kTimeOffset) {
         first.after_s += kSecondDerivativeStep;
@@ -322,7 +321,7 @@ class WheelOdometry final : public Update {
         }
       }
       const PoseJacobian change =
-          (relative_pose_jacobian(first, last, mount) - geometry_jacobian_) / kSecondDerivativeStep;
+          (relative_pose_jacobian(first, last, mount) - here) / kSecondDerivativeStep;
       for (int a = 0; a < 3; ++a) {
         GeometryMatrix& D = second[static_cast<std::size_t>(a)];
         D.row(k) = change.row(a);
