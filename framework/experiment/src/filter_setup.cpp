@@ -99,15 +99,16 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double er
                  std::uint64_t seed, FilterSetup& setup, Errors& errors) {
   const auto p_IinO = three(p, "p_IinO_m", section, errors);
   const auto rpy = three(p, "rpy_ItoO_rad", section, errors);
-  if (!p_IinO || !rpy) return;
+  const auto sigma_p = three(p, "sigma_p_IinO_m", section, errors);
+  const auto sigma_R = three(p, "sigma_R_ItoO_rad", section, errors);
+  if (!p_IinO || !rpy || !sigma_p || !sigma_R) return;
   set.sensor = p.text("sensor");
   WheelsPrior& prior = set.prior;
   prior.wheels.model = &set.model->model();
   prior.wheels.R_ItoO = from_rpy(*rpy);
   prior.wheels.p_IinO = *p_IinO;
   prior.wheels.t_OtoI_s = p.number("t_OtoI_s");
-  prior.sigma_extrinsics.head<3>().setConstant(p.number("sigma_R_ItoO_rad"));
-  prior.sigma_extrinsics.tail<3>().setConstant(p.number("sigma_p_IinO_m"));
+  prior.sigma_extrinsics << *sigma_R, *sigma_p;
   prior.sigma_time_offset_s = p.number("sigma_t_OtoI_s");
 
   // A start that is wrong is wrong in the same way whether it is then calibrated or not.

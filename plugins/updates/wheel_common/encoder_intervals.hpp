@@ -29,9 +29,11 @@ struct EncoderInterval {
 /// because samples are late belongs to the next interval, as long as its first clone lives.
 class EncoderIntervals {
  public:
-  /// The interval that ends now, if the samples reach; the next one begins at its end. The filter
-  /// must have wheels and at least one clone.
-  std::optional<EncoderInterval> next(const FilterView& filter, const EpochData& data) {
+  /// The interval that ends now, if the samples reach; the next one begins at its end. It is put
+  /// off while it is shorter than `at_least_s` and its first clone stays. The filter must have
+  /// wheels and at least one clone.
+  std::optional<EncoderInterval> next(const FilterView& filter, const EpochData& data,
+                                      double at_least_s = 0.) {
     const CloneView& now = filter.clones.back();
     const std::int64_t cut_ns = now.t_ns - std::llround(1e9 * filter.wheels->t_OtoI_s);  // (WO-1)
     if (!started_) {
@@ -49,6 +51,8 @@ class EncoderIntervals {
         *first + 1 == filter.clones.size()) {
       return std::nullopt;
     }
+    const bool last_chance = *first == 0 && filter.oldest_leaves;
+    if (!last_chance && seconds_between(begin_ns_, cut_ns) < at_least_s) return std::nullopt;
     if (encoders.front().begin_ns > begin_ns_) {
       no_samples_.add(1, now.t_ns);
       start_at(now, cut_ns);

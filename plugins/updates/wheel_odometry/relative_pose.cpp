@@ -1,5 +1,6 @@
 #include "relative_pose.hpp"
 
+#include "viwo/math/se2.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo::wheel_odometry {
@@ -43,7 +44,6 @@ PoseJacobian relative_pose_jacobian(const MovingPose& first, const MovingPose& l
                                     const Mount& mount) {
   const Geometry g(first, last, mount);
   const Matrix3d& C = mount.R_ItoO;
-  const Vector3d& q = mount.p_IinO;
   PoseJacobian J = PoseJacobian::Zero();
 
   // Yaw: M = Exp(-a) M_hat changes it by e3^T Jl^-1(Log M) a; the left Jacobian is Jr(-phi).
@@ -52,7 +52,6 @@ PoseJacobian relative_pose_jacobian(const MovingPose& first, const MovingPose& l
   const Matrix3d MCE0 = g.M * C * g.E0;
   J.block<1, 3>(0, kFirstTheta) = -by_a * MCE0;
   J.block<1, 3>(0, kLastTheta) = by_a * CE1;
-  J.block<1, 3>(0, kMountTheta) = by_a * (Matrix3d::Identity() - g.M);
   J(0, kTimeOffset) = by_a.dot(CE1 * last.w_IinI - MCE0 * first.w_IinI);
 
   // Position, (WO-7).
@@ -61,11 +60,32 @@ PoseJacobian relative_pose_jacobian(const MovingPose& first, const MovingPose& l
   J.block<2, 3>(1, kFirstPosition) = -g.D.topRows<2>();
   J.block<2, 3>(1, kLastTheta) = -(DR1t * skew(g.b1)).topRows<2>();
   J.block<2, 3>(1, kLastPosition) = g.D.topRows<2>();
-  J.block<2, 3>(1, kMountTheta) = (skew(g.d - q) + g.M.transpose() * skew(q)).topRows<2>();
-  J.block<2, 3>(1, kMountPosition) = (Matrix3d::Identity() - g.M.transpose()).topRows<2>();
   const Vector3d by_t = -C * (first.w_IinI.cross(g.y) + g.E0 * first.v_IinI) +
                         DR1t * (last.v_IinI + g.E1.transpose() * last.w_IinI.cross(g.l));
   J.block<2, 1>(1, kTimeOffset) = by_t.head<2>();
+  J.middleCols<6>(kMountTheta) = mount_jacobian({g.M, g.d}, mount.p_IinO);
+  return J;
+}
+
+Motion complete_motion(const Vector3d& g, const Eigen::Vector2d& tilt) {
+  // The planar twist that the wheels integrated, and the same with roll and pitch (WO-12).
+  const Vector3d planar = log_se2(g);
+  const Vector3d turn(tilt.x(), tilt.y(), planar[0]);
+  return {exp_so3(-turn), right_jacobian_so3(-turn) * Vector3d(planar[1], planar[2], 0.)};
+}
+
+Eigen::Vector2d relative_tilt(const MovingPose& first, const MovingPose& last, const Mount& mount) {
+  return -log_so3(Geometry(first, last, mount).M).head<2>();
+}
+
+Eigen::Matrix<double, 3, 6> mount_jacobian(const Motion& motion, const Vector3d& p_IinO) {
+  const Matrix3d& M = motion.M;
+  Eigen::Matrix<double, 3, 6> J = Eigen::Matrix<double, 3, 6>::Zero();
+  const Eigen::RowVector3d by_a = right_jacobian_inverse_so3(-log_so3(M)).row(2);  // (WO-6)
+  J.block<1, 3>(0, 0) = by_a * (Matrix3d::Identity() - M);
+  J.block<2, 3>(1, 0) =
+      (skew(motion.d - p_IinO) + M.transpose() * skew(p_IinO)).topRows<2>();  // (WO-7)
+  J.block<2, 3>(1, 3) = (Matrix3d::Identity() - M.transpose()).topRows<2>();
   return J;
 }
 

@@ -40,4 +40,20 @@ Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last, c
 PoseJacobian relative_pose_jacobian(const MovingPose& first, const MovingPose& last,
                                     const Mount& mount);
 
+/// Motion of O over an interval.
+struct Motion {
+  Eigen::Matrix3d M = Eigen::Matrix3d::Identity();  ///< takes vectors from the first O to the last
+  Eigen::Vector3d d = Eigen::Vector3d::Zero();      ///< origin of the last O in the first, m
+};
+
+/// The motion with constant twist that O made if the wheels measured g = [yaw, x, y] while O turned
+/// by `tilt` = [roll, pitch] (rad, in the axes of O) on the side; O moves along its own x-y plane.
+Motion complete_motion(const Eigen::Vector3d& g, const Eigen::Vector2d& tilt);
+
+/// [roll, pitch] that O turns by from `first` to `last`, as a rotation vector's first two entries.
+Eigen::Vector2d relative_tilt(const MovingPose& first, const MovingPose& last, const Mount& mount);
+
+/// The columns of the mount in relative_pose_jacobian(), for a given motion of O.
+Eigen::Matrix<double, 3, 6> mount_jacobian(const Motion& motion, const Eigen::Vector3d& p_IinO);
+
 }  // namespace viwo::wheel_odometry

@@ -48,15 +48,19 @@ constexpr std::array kParams{
     ParamSpec{.name = "sigma_floor_yaw_rad",
               .type = ParamType::kNumber,
               .unit = "rad",
-              .fallback = "1e-6",
+              .fallback = "3e-5",
               .min = 0.,
-              .help = "yaw noise of each interval on top of the encoders'"},
+              .help =
+                  "yaw noise of each interval on top of the encoders'; not below what gyro noise "
+                  "alone turns in an interval"},
     ParamSpec{.name = "sigma_floor_position_m",
               .type = ParamType::kNumber,
               .unit = "m",
-              .fallback = "1e-6",
+              .fallback = "3e-5",
               .min = 0.,
-              .help = "position noise of each interval on top of the encoders', per axis"},
+              .help =
+                  "position noise of each interval on top of the encoders', per axis; not below "
+                  "that turn times the height of the IMU above O"},
     ParamSpec{.name = "sigma_yaw_rad_per_sqrt_m",
               .type = ParamType::kNumber,
               .unit = "rad/sqrt(m)",
@@ -218,19 +222,22 @@ class WheelOdometry final : public Update {
 
   /// (WO-8): residual and Jacobian at at_, and the noise of pose_.
   void linearise() {
+    const Eigen::Vector2d tilt = relative_tilt(at_.first, at_.last, at_.mount);
     residual_ = pose_.g - relative_pose(at_.first, at_.last, at_.mount);
+    residual_.tail<2>() += complete_motion(pose_.g, tilt).d.head<2>() - pose_.g.tail<2>();
     residual_[0] = std::remainder(residual_[0], 2. * M_PI);
     MovingPose first = first_fej_;
     MovingPose last = last_fej_;
     first.after_s = at_.first.after_s;
     last.after_s = at_.last.after_s;
     geometry_jacobian_ = relative_pose_jacobian(first, last, at_.mount);
-    // What the mount and the clock show is proportional to the motion. Taken at the noisy first
-    // estimates it would count their noise as motion, and so as information; the iterate has the
-    // motion that the wheels themselves measured.
-    geometry_jacobian_.rightCols<kGeometrySize - kMountTheta>() =
-        relative_pose_jacobian(at_.first, at_.last, at_.mount)
-            .rightCols<kGeometrySize - kMountTheta>();
+    // What the mount shows is proportional to the motion. Taken at the noisy first estimates it
+    // would count their noise as motion, and so as information: it is taken at the motion that the
+    // wheels measured, with the tilt of the iterate (WO-12).
+    geometry_jacobian_.middleCols<6>(kMountTheta) =
+        mount_jacobian(complete_motion(pose_.g, tilt), at_.mount.p_IinO);
+    geometry_jacobian_.col(kTimeOffset) =
+        relative_pose_jacobian(at_.first, at_.last, at_.mount).col(kTimeOffset);
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
       H_.col(k) = geometry_jacobian_.col(geometry_[static_cast<std::size_t>(k)]);

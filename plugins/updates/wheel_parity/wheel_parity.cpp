@@ -37,6 +37,13 @@ constexpr std::array kParams{
               .min_exclusive = true,
               .help = "factor on the standard deviation of the parity noise, for encoders whose "
                       "noise is not white"},
+    ParamSpec{.name = "period_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0.5",
+              .min = 0.,
+              .help = "how much is taken together, at most what the clones reach over; 0: every "
+                      "epoch by itself"},
     ParamSpec{.name = "max_iterations",
               .type = ParamType::kInt,
               .fallback = "6",
@@ -62,6 +69,8 @@ constexpr double kCurvatureStep = 0.2;
 constexpr double kNegligibleCurvature = 0.01;
 /// Information about a direction, relative to the prior, that is not worth being corrected.
 constexpr double kNegligibleInformation = 1e-4;
+/// Epochs do not come to the nanosecond: a period may end a little early.
+constexpr double kPeriodSlackS = 0.02;
 constexpr int kIntervalsUnchecked = 5;
 
 class WheelParity final : public Update {
@@ -69,6 +78,7 @@ class WheelParity final : public Update {
   WheelParity(const ParamSet& params, const HostServices& /*services*/)
       : gate_probability_(params.number("gate_probability")),
         noise_scale_(params.number("noise_scale")),
+        period_s_(params.number("period_s")),
         max_iterations_(static_cast<int>(params.integer("max_iterations"))),
         second_order_noise_(params.flag("second_order_noise")) {
     options_.twist.noise_weighted = true;
@@ -84,7 +94,7 @@ class WheelParity final : public Update {
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
     if (filter.wheels == nullptr || filter.clones.empty()) return;
-    const std::optional<EncoderInterval> interval = intervals_.next(filter, data);
+    const std::optional<EncoderInterval> interval = intervals_.next(filter, data, period_s_ - kPeriodSlackS);
     if (!interval.has_value() || filter.wheels->intrinsics_column < 0) return;
     preintegrator_->model().require_channels(data.encoders.back(), "the wheel set");
     find_free(filter);
@@ -258,6 +268,7 @@ class WheelParity final : public Update {
 
   PreintegrationOptions options_;
   double gate_probability_, noise_scale_;
+  double period_s_;
   int max_iterations_;
   bool second_order_noise_;
 
