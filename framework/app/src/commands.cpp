@@ -6,6 +6,7 @@
 #include "viwo/experiment/calibrate.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/experiment/output.hpp"
+#include "viwo/experiment/progress.hpp"
 #include "viwo/experiment/simulate.hpp"
 #include "viwo/log/tum.hpp"
 
@@ -34,7 +35,11 @@ int run_command(const Arguments& arguments) {
   const RunData data = collect(setup);
   const auto folder = out_folder(arguments);
   make_folder(folder);  // whether results can be written shows before the work
-  const RunResult result = experiment::run(setup, data);
+  RunResult result;
+  {
+    TimeProgress progress(setup.name);  // gone before anything else is printed
+    result = experiment::run(setup, data, [&](double fraction) { progress.at(fraction); });
+  }
   write_run(folder, setup, result);
   std::cout << describe(result) << "report: " << (folder / "report.html").string() << "\n";
   return result.status == RunStatus::kOk ? 0 : 1;
@@ -77,8 +82,7 @@ int simulate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
   const SimulateResult result = write_log(setup, *arguments.out);
-  std::cout << result.encoder_samples << " encoder samples and " << result.reference_poses
-            << " reference poses in " << arguments.out->string() << "\n";
+  std::cout << describe(result) << " in " << arguments.out->string() << "\n";
   return 0;
 }
 

@@ -16,8 +16,9 @@ namespace {
 
 constexpr Command kCommands[] = {
     {"run", "run CONFIG [--out DIR] [--seed N] [--set KEY=VALUE]...",
-     "Runs one configuration and writes trajectory, summary.json and report.html.", "out seed set",
-     1, run_command},
+     "Runs one configuration, the filter or wheel odometry alone; writes trajectory, summary.json "
+     "and report.html.",
+     "out seed set", 1, run_command},
     {"experiment", "experiment EXPERIMENT [--out DIR] [--jobs N] [--seeds N] [--set KEY=VALUE]...",
      "Runs variants x recordings x seeds side by side and writes tables and report.html.",
      "out jobs seeds set keep-runs", 1, experiment_command},
@@ -25,14 +26,16 @@ constexpr Command kCommands[] = {
      "Estimates the wheel intrinsics from encoder logs and a reference trajectory.", "out set", 1,
      calibrate_command},
     {"simulate", "simulate CONFIG --out DIR [--seed N] [--set KEY=VALUE]...",
-     "Writes what the sensors of a configuration yield as a log folder.", "out! seed set", 1,
-     simulate_command},
+     "Writes what the sensors of a configuration yield (IMU, images' tracks, encoders, truth) as a "
+     "log folder.",
+     "out! seed set", 1, simulate_command},
     {"evaluate", "evaluate --reference A.tum --estimate B.tum [--align MODE] [--out DIR]",
      "Compares two trajectories (ATE, RPE, end error).", "reference estimate align out", 0,
      evaluate_command},
     {"plugins", "plugins list | describe NAME | check FILE",
-     "Lists the plugins that are found, the parameters of one, or why a file is refused.", "", -1,
-     plugins_command}};
+     "Lists the plugins that are found (kinematics, sensors, updates), the parameters of one, or "
+     "why a file is refused.",
+     "", -1, plugins_command}};
 
 void print_help() {
   std::cout << "viwo " VIWO_VERSION " - visual-inertial-wheel odometry\n\nUsage:\n";

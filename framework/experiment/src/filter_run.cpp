@@ -276,13 +276,14 @@ Estimator make_estimator(const FilterSetup& setup) {
 
 }  // namespace
 
-RunResult run_filter(const RunSetup& setup, const RunData& data) {
+RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgress& progress) {
   RunResult result;
   result.rejections = data.rejections;
   Estimator estimator = make_estimator(*setup.filter);
   start(estimator, setup, data);
   Recorder recorder(setup, data, result);
   Feed feed(setup, data);
+  const double log_s = seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);
   double wall_s = 0.;
   bool more = true;
   while (more && estimator.failure().empty()) {
@@ -294,6 +295,9 @@ RunResult run_filter(const RunSetup& setup, const RunData& data) {
       wall_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       if (!stepped) break;
       recorder.record(estimator);
+      if (progress && log_s > 0.) {
+        progress(seconds_between(data.imu.front().t_ns, estimator.filter().t_ns()) / log_s);
+      }
     }
   }
   recorder.finish(estimator);

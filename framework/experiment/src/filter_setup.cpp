@@ -2,6 +2,7 @@
 
 #include "filter_params.hpp"
 #include "viwo/config/params.hpp"
+#include "viwo/config/suggest.hpp"
 #include "viwo/log/kalibr.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/random.hpp"
@@ -35,7 +36,7 @@ std::optional<Vector3d> three(const ParamSet& params, const char* key, const Nod
   if (values.size() == 3) return Vector3d(values[0], values[1], values[2]);
   const Node* node = section.find(key);
   errors.add(node != nullptr ? node->mark() : section.mark(),
-             std::string(key) + " needs three numbers");
+             "wheels." + std::string(key) + " needs three numbers");
   return std::nullopt;
 }
 
@@ -63,9 +64,23 @@ void read_estimator(const ParamSet& p, FilterSetup& setup) {
   start.state_error_scale = p.number("start_error_scale");
 }
 
-void read_imu(const ParamSet& p, FilterSetup& setup) {
+/// What `read` reads from the file that `section` names with the key `kalibr`; nothing if it
+/// cannot.
+template <class Read>
+auto from_kalibr(const ParamSet& p, const Node& section, const std::string& path, Read read,
+                 Errors& errors) -> std::optional<decltype(read(p.text("kalibr")))> {
+  try {
+    return read(p.text("kalibr"));
+  } catch (const InputError& error) {
+    errors.add(section.find("kalibr")->mark(), path + ".kalibr: " + error.what());
+    return std::nullopt;
+  }
+}
+
+void read_imu(const ParamSet& p, const Node& section, FilterSetup& setup, Errors& errors) {
   if (!p.text("kalibr").empty()) {
-    setup.options.filter.imu_noise = log::read_kalibr_imu(p.text("kalibr"));
+    const auto noise = from_kalibr(p, section, "imu", log::read_kalibr_imu, errors);
+    if (noise) setup.options.filter.imu_noise = *noise;
     return;
   }
   setup.options.filter.imu_noise = {p.number("sigma_gyro_rad_per_s_sqrt_hz"),
@@ -75,15 +90,17 @@ void read_imu(const ParamSet& p, FilterSetup& setup) {
 }
 
 void read_cameras(const ParamSet& p, const Node& section, FilterSetup& setup, Errors& errors) {
-  auto cameras = log::read_kalibr_cameras(p.text("kalibr"));
+  auto cameras = from_kalibr(p, section, "cameras", log::read_kalibr_cameras, errors);
+  if (!cameras) return;
   const auto use = static_cast<std::size_t>(p.integer("use"));
-  if (use > cameras.size()) {
-    errors.add(section.mark(), "cameras.use: " + p.text("kalibr") + " has only " +
-                                   std::to_string(cameras.size()) + " cameras");
+  if (use > cameras->size()) {
+    errors.add(section.find("use")->mark(), "cameras.use: there are only " +
+                                                std::to_string(cameras->size()) + " in " +
+                                                p.text("kalibr"));
     return;
   }
-  if (use > 0) cameras.resize(use);
-  for (const CameraView& camera : cameras) {
+  if (use > 0) cameras->resize(use);
+  for (const CameraView& camera : *cameras) {
     CameraPrior prior;
     prior.camera = camera;
     prior.sigma_extrinsics.head<3>().setConstant(p.number("sigma_orientation_rad"));
@@ -176,6 +193,36 @@ void read_wheel_sets(const Node& run, double error_scale, std::uint64_t seed,
   resolved.set("wheel_sets", resolved_sets);
 }
 
+/// Whether the estimator can work with an update as it is configured: tried with instances of their
+/// own, because an update is started once.
+void try_update(const FilterSetup& setup, const std::shared_ptr<Update>& update, int wheels,
+                const config::Mark& mark, const std::string& path, Errors& errors) {
+  std::vector<WheelsPrior> priors;
+  for (const WheelSet& set : setup.wheels) priors.push_back(set.prior);
+  try {
+    const Estimator estimator(setup.options, setup.cameras, priors, {{path, update, wheels}});
+  } catch (const InputError& error) {
+    errors.add(mark, path + ": " + error.what());
+  }
+}
+
+/// A wheel set whose sensor does not exist would get no samples and never say so.
+void check_wheel_sensors(const Node& run, const FilterSetup& setup, Errors& errors) {
+  const Node* sensors = run.find("sensors");
+  if (sensors == nullptr || !sensors->is_map()) return;
+  std::vector<std::string> names;
+  for (const auto& entry : sensors->entries()) names.push_back(entry.key);
+  for (const WheelSet& set : setup.wheels) {
+    if (set.sensor.empty() || sensors->find(set.sensor) != nullptr) continue;
+    const Node* at = &run;
+    if (!set.name.empty()) at = at->find("wheel_sets")->find(set.name);
+    errors.add(at->find("wheels")->find("sensor")->mark(),
+               (set.name.empty() ? "" : "wheel_sets." + set.name + ".") +
+                   "wheels.sensor: no sensor '" + set.sensor + "'" +
+                   config::did_you_mean(set.sensor, names));
+  }
+}
+
 void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, Node& resolved,
                   Errors& errors) {
   const Node* updates = run.find("updates");
@@ -201,7 +248,8 @@ void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, 
       }
     }
     // The name says which update it is unless it says so itself.
-    if (section.find("type") == nullptr) section.set("type", Node::scalar_of(entry.key));
+    if (section.find("type") == nullptr)
+      section.set("type", Node::scalar_of(entry.key, entry.key_mark));
     constexpr std::string_view kHostKeys[] = {"enabled"};
     // One instance per wheel set; the first also tells which kind it is.
     auto loaded = plugins.make_update(section, path, errors, kHostKeys);
@@ -210,11 +258,16 @@ void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, 
     resolved_update.set("enabled", Node::scalar_of(enabled ? "true" : "false"));
     resolved_updates.set(entry.key, resolved_update, entry.key_mark);
     if (!enabled) continue;
+    const int wheels = loaded.object->kind() == UpdateKind::kWheels ? 0 : -1;
+    if (errors.empty() && (wheels < 0 || !setup.wheels.empty())) {
+      const auto trial = plugins.make_update(section, path, errors, kHostKeys);
+      try_update(setup, trial.object, wheels, entry.key_mark, path, errors);
+    }
     if (loaded.object->kind() == UpdateKind::kBody) {
       setup.updates.push_back({entry.key, std::move(loaded), -1});
       continue;
     }
-    if (setup.wheels.empty()) {
+    if (run.find("kinematics") == nullptr && run.find("wheel_sets") == nullptr) {
       errors.add(entry.key_mark, path + " needs wheels: the run has no section 'kinematics'");
       continue;
     }
@@ -229,6 +282,13 @@ void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, 
 }
 
 }  // namespace
+
+bool has_filter_sections(const Node& run) {
+  for (const char* key : {"estimator", "imu", "cameras", "wheels", "wheel_sets", "updates"}) {
+    if (run.find(key) != nullptr) return true;
+  }
+  return false;
+}
 
 bool wants_filter(const Node& run) {
   if (const Node* estimator = run.find("estimator"); estimator != nullptr && estimator->is_map()) {
@@ -268,7 +328,9 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
     read_estimator(*params, setup);
     error_scale = params->number("calibration_error_scale");
   }
-  if (const auto params = read("imu", kImuParams)) read_imu(*params, setup);
+  if (const auto params = read("imu", kImuParams)) {
+    read_imu(*params, section_or_empty(run, "imu"), setup, errors);
+  }
   if (run.find("cameras") != nullptr) {
     if (const auto params = read("cameras", kCamerasParams)) {
       read_cameras(*params, *run.find("cameras"), setup, errors);
@@ -285,6 +347,7 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
     }
   }
   read_wheel_sets(run, error_scale, seed, plugins, setup, resolved, errors);
+  check_wheel_sensors(run, setup, errors);
   read_updates(run, plugins, setup, resolved, errors);
   return setup;
 }

@@ -1,5 +1,6 @@
 #include "viwo/experiment/progress.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <utility>
@@ -7,6 +8,22 @@
 #include <unistd.h>
 
 namespace viwo::experiment {
+namespace {
+
+/// One line that replaces itself: "what [####....] text, about 3 s left".
+void draw_bar(const std::string& what, double fraction, const std::string& text, double spent_s) {
+  constexpr int kWidth = 30;
+  std::string bar(static_cast<std::size_t>(kWidth * std::clamp(fraction, 0., 1.)), '#');
+  bar.resize(kWidth, '.');
+  std::fprintf(stderr, "\r\033[K%s [%s] %s", what.c_str(), bar.c_str(), text.c_str());
+  if (fraction > 0.) {
+    const double left_s = spent_s / fraction * (1. - fraction);
+    std::fprintf(stderr, ", about %.0f s left", std::ceil(left_s));
+  }
+  std::fflush(stderr);
+}
+
+}  // namespace
 
 Progress::Progress(std::string what, int total)
     : what_(std::move(what)),
@@ -32,17 +49,35 @@ void Progress::done(const std::string& line) {
 }
 
 void Progress::draw() const {
-  constexpr int kWidth = 30;
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
-  const int filled = total_ > 0 ? kWidth * count_ / total_ : kWidth;
-  std::string bar(static_cast<std::size_t>(filled), '#');
-  bar.resize(kWidth, '.');
-  std::fprintf(stderr, "\r\033[K%s [%s] %d/%d", what_.c_str(), bar.c_str(), count_, total_);
-  if (count_ > 0) {
-    const double left_s = spent.count() / count_ * (total_ - count_);
-    std::fprintf(stderr, ", about %.0f s left", std::ceil(left_s));
+  const double fraction = total_ > 0 ? static_cast<double>(count_) / total_ : 1.;
+  draw_bar(what_, fraction, std::to_string(count_) + "/" + std::to_string(total_), spent.count());
+}
+
+TimeProgress::TimeProgress(std::string what)
+    : what_(std::move(what)),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      start_(Clock::now()),
+      next_(start_ + std::chrono::seconds(1)) {}
+
+TimeProgress::~TimeProgress() {
+  if (drawn_) std::fprintf(stderr, "\r\033[K");
+}
+
+void TimeProgress::at(double fraction) {
+  const Clock::time_point now = Clock::now();
+  if (now < next_ || !(fraction >= 0.)) return;
+  const int percent = static_cast<int>(100. * std::min(fraction, 1.));
+  const std::string text = std::to_string(percent) + " %";
+  if (terminal_) {
+    draw_bar(what_, percent / 100., text, std::chrono::duration<double>(now - start_).count());
+    drawn_ = true;
+    next_ = now + std::chrono::milliseconds(100);
+  } else if (percent >= shown_percent_ + 10) {
+    std::fprintf(stderr, "%s: %s\n", what_.c_str(), text.c_str());
+    shown_percent_ = percent - percent % 10;
+    next_ = now + std::chrono::seconds(1);
   }
-  std::fflush(stderr);
 }
 
 }  // namespace viwo::experiment

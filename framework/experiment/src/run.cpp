@@ -37,13 +37,31 @@ StampedPose planar_pose(std::int64_t t_ns, const std::array<double, 3>& p,
   return {t_ns, {p[0], p[1], 0.}, Eigen::Quaterniond(about_z)};
 }
 
-/// The model's complaint about the channels of a sensor, at the position of the model.
-void require_channels(const RunSetup& setup, const EncoderSample& sample,
-                      const std::string& sensor) {
+/// A model's complaint about the channels of a sensor, at the position of the model or the sensors.
+void require_channels(const WheelModel& model, const config::Mark& mark,
+                      const EncoderSample& sample, const std::string& sensor) {
   try {
-    setup.model->require_channels(sample, "sensors." + sensor);
+    model.require_channels(sample, "sensors." + sensor);
   } catch (const InputError& error) {
-    config::fail(setup.kinematics_mark, error.what());
+    config::fail(mark, error.what());
+  }
+}
+
+/// The same for the first sample of a sensor that gives those of a further wheel set.
+void require_channels_of_set(const RunSetup& setup, const EncoderSample& sample,
+                             const std::string& sensor) {
+  for (const WheelSet& wheels : setup.filter->wheels) {
+    if (wheels.sensor != sensor) continue;
+    require_channels(*wheels.model, setup.sensors_mark, sample, sensor);
+  }
+}
+
+void require_what_the_filter_needs(const RunSetup& setup, const RunData& data) {
+  if (data.imu.empty()) config::fail(setup.sensors_mark, "no sensor of this run gave IMU samples");
+  if (setup.filter->start.mode == StartMode::kReference && data.states.empty()) {
+    config::fail(setup.sensors_mark,
+                 "no sensor of this run gave reference states, which estimator.start: reference "
+                 "needs - choose start: standstill or moving");
   }
 }
 
@@ -69,11 +87,15 @@ RunData collect(RunSetup& setup) {
       while (sensor.object->next(measurement) == Status::kOk) {
         if (const auto* encoders = std::get_if<EncoderSample>(&measurement)) {
           if (!wheels_sensor.empty() && name != wheels_sensor) {
-            data.other_wheels[name].push_back(*encoders);
+            auto& samples = data.other_wheels[name];
+            if (samples.empty()) require_channels_of_set(setup, *encoders, name);
+            samples.push_back(*encoders);
             continue;
           }
           claim(data.wheels_name, name, "encoder samples");
-          if (data.samples.empty() && setup.model) require_channels(setup, *encoders, name);
+          if (data.samples.empty() && setup.model) {
+            require_channels(*setup.model, setup.kinematics_mark, *encoders, name);
+          }
           data.samples.push_back(*encoders);
         } else if (const auto* pose = std::get_if<PoseSample>(&measurement)) {
           claim(reference_name, name, "reference poses");
@@ -98,8 +120,7 @@ RunData collect(RunSetup& setup) {
     });
   }
   if (setup.filter) {
-    if (data.imu.empty())
-      config::fail(setup.sensors_mark, "no sensor of this run gave IMU samples");
+    require_what_the_filter_needs(setup, data);
     return data;
   }
   if (data.samples.empty()) {

@@ -194,9 +194,11 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
   }
   read_kinematics(run, plugins, setup, errors);
   read_options(run, setup, errors);
-  if (wants_filter(run)) {
-    setup.filter = read_filter(run, setup.model, setup.x_WI, setup.sigma, setup.seed, plugins,
-                               setup.resolved, errors);
+  if (has_filter_sections(run)) {
+    // Read also when the wheels run alone: what is wrong in it is wrong.
+    FilterSetup filter = read_filter(run, setup.model, setup.x_WI, setup.sigma, setup.seed, plugins,
+                                     setup.resolved, errors);
+    if (wants_filter(run)) setup.filter = std::move(filter);
   }
   read_sensors(run, plugins, setup, errors);
   errors.throw_if_any();

@@ -1,6 +1,7 @@
 #include "viwo/experiment/simulate.hpp"
 
 #include <algorithm>
+#include <vector>
 
 #include "viwo/log/asl.hpp"
 
@@ -23,11 +24,35 @@ SimulateResult write_log(RunSetup& setup, const std::filesystem::path& folder) {
   log::AslWriter writer(folder);
   for (const Measurement& measurement : measurements) {
     writer.write(measurement);
-    ++(std::holds_alternative<EncoderSample>(measurement) ? result.encoder_samples
-                                                          : result.reference_poses);
+    ++result.counts[measurement.index()];
   }
   writer.close();
   return result;
+}
+
+std::string describe(const SimulateResult& result) {
+  struct Kind {
+    std::size_t index;
+    const char* one;
+    const char* many;
+  };
+  // `index` is that of the kind in Measurement.
+  static_assert(std::variant_size_v<Measurement> == 6);
+  constexpr Kind kKinds[] = {
+      {2, "IMU sample", "IMU samples"},           {3, "image", "images"},
+      {0, "encoder sample", "encoder samples"},   {1, "reference pose", "reference poses"},
+      {4, "reference state", "reference states"}, {5, "true parameter", "true parameters"}};
+  std::vector<std::string> parts;
+  for (const Kind& kind : kKinds) {
+    const std::int64_t n = result.counts[kind.index];
+    if (n > 0) parts.push_back(std::to_string(n) + " " + (n == 1 ? kind.one : kind.many));
+  }
+  std::string text;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (i > 0) text += i + 1 < parts.size() ? ", " : " and ";
+    text += parts[i];
+  }
+  return text;
 }
 
 }  // namespace viwo::experiment

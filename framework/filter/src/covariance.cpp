@@ -74,7 +74,8 @@ double Covariance::gate(int rows, double probability) {
 FactorResult Covariance::apply(const ResidualFactor& factor, Eigen::VectorXd& dx) {
   const Index rows = factor.residual.size();
   dx.setZero();
-  if (rows == 0 || !factor.residual.allFinite() || !factor.H.allFinite()) {
+  if (rows == 0 || !factor.residual.allFinite() || !factor.H.allFinite() ||
+      !factor.R.allFinite()) {  // Eigen's LLT succeeds on NaN
     return FactorResult::kRejected;
   }
   auto PHt = PHt_.leftCols(rows);

@@ -8,7 +8,6 @@ namespace viwo {
 namespace {
 
 constexpr int kMaxFactorsPerUpdate = 16;
-constexpr double kNsPerS = 1e9;
 
 using Clock = std::chrono::steady_clock;
 
@@ -25,6 +24,29 @@ std::int64_t to_ns(double seconds) {
   return static_cast<std::int64_t>(std::llround(seconds * 1e9));
 }
 
+/// residual -= H dx: the factor as it would be at an estimate that has moved by dx since.
+void take_off(const Eigen::VectorXd& dx, ResidualFactor& factor) {
+  int start = 0;
+  for (const ColumnRange& block : factor.columns.blocks()) {
+    factor.residual.noalias() -=
+        factor.H.middleCols(start, block.count).lazyProduct(dx.segment(block.first, block.count));
+    start += block.count;
+  }
+}
+
+/// eta -= Lambda dx, likewise.
+void take_off(const Eigen::VectorXd& dx, InformationFactor& factor) {
+  int col = 0;
+  for (const ColumnRange& block : factor.columns.blocks()) {
+    for (int i = 0; i < block.count; ++i, ++col) {
+      const double step = dx[block.first + i];
+      for (int row = 0; row < factor.columns.size(); ++row) {
+        factor.eta[row] -= step * factor.Lambda(std::max(row, col), std::min(row, col));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 Estimator::Estimator(const EstimatorOptions& options, std::vector<CameraPrior> cameras,
@@ -34,6 +56,10 @@ Estimator::Estimator(const EstimatorOptions& options, std::vector<CameraPrior> c
       updates_(std::move(updates)),
       counts_(updates_.size()),
       sink_(kMaxFactorsPerUpdate, filter_.size()),
+      moved_(Eigen::VectorXd::Zero(filter_.size())),
+      information_factor_{{},
+                          Eigen::MatrixXd::Zero(filter_.size(), filter_.size()),
+                          Eigen::VectorXd::Zero(filter_.size())},
       encoders_(filter_.wheels().size()),
       stage_ms_(updates_.size() + 2, 0.) {
   imu_.reserve(4096);
@@ -118,11 +144,16 @@ void Estimator::add(const EncoderSample& sample, int wheels) {
   if (!finite(sample.drive_rad_per_s) || !finite(sample.steer_rad)) {
     return reject("encoder value that is not finite", sample.t_ns);
   }
+  if (sample.end_ns < sample.begin_ns) {
+    return reject("encoder sample that ends before it begins", sample.t_ns);
+  }
   if (!samples.empty() && sample.begin_ns < samples.back().end_ns) {
     return reject("encoder sample that begins before the end of the last", sample.t_ns);
   }
   samples.push_back(sample);
-  latest_ns_ = std::max(latest_ns_, sample.t_ns);
+  // Their clock is not that of the filter.
+  const double t_OtoI_s = filter_.wheels()[static_cast<std::size_t>(wheels)].t_OtoI_s;
+  latest_ns_ = std::max(latest_ns_, sample.t_ns + to_ns(t_OtoI_s));
 }
 
 bool Estimator::encoders_reach(std::int64_t t_ns) const {
@@ -228,11 +259,27 @@ void Estimator::run_update(std::size_t index, const EpochData& data) {
   UpdateCounts& counts = counts_[index];
   counts.applied += sink_.applied();
   counts.rejected += sink_.rejected();
+  bool has_moved = false;
   for (const ResidualFactor& factor : sink_.residuals()) {
-    const bool applied = filter_.apply(factor) == FactorResult::kApplied;
+    const ResidualFactor* next = &factor;
+    if (has_moved) {
+      residual_factor_ = factor;
+      take_off(moved_, residual_factor_);
+      next = &residual_factor_;
+    }
+    const bool applied = filter_.apply(*next) == FactorResult::kApplied;
     ++(applied ? counts.applied : counts.rejected);
+    if (!applied) continue;
+    if (!has_moved) moved_.setZero();
+    has_moved = true;
+    moved_ += filter_.correction();
   }
   if (const InformationFactor* information = sink_.information()) {
+    if (has_moved) {
+      information_factor_ = *information;
+      take_off(moved_, information_factor_);
+      information = &information_factor_;
+    }
     if (filter_.apply(*information) == FactorResult::kRejected) {
       reject((entry.name + ": information that is not finite or empty").c_str(), filter_.t_ns());
     }

@@ -1,6 +1,7 @@
 #include "viwo/filter/filter.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "viwo/math/so3.hpp"
@@ -176,7 +177,8 @@ std::string Filter::failure() const {
   if (!finite) return "the estimate or its covariance is not finite any more";
   if ((P.diagonal().array() < 0.).any()) return "a variance is negative";
   for (const WheelsView& wheels : wheels_) {
-    if (!wheels.x_WI.allFinite() || !wheels.R_ItoO.allFinite() || !wheels.p_IinO.allFinite()) {
+    if (!wheels.x_WI.allFinite() || !wheels.R_ItoO.allFinite() || !wheels.p_IinO.allFinite() ||
+        !std::isfinite(wheels.t_OtoI_s)) {
       return "the calibration of the wheels is not finite any more";
     }
   }

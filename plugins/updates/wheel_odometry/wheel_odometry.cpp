@@ -102,6 +102,9 @@ using GeometryMatrix = Eigen::Matrix<double, kGeometrySize, kGeometrySize>;
 /// nearly quadratic in them, so that they may be large.
 constexpr double kSecondDerivativeStep = 1e-4;
 
+/// For the derivative by time, ns: the rates of a few encoder samples are averaged.
+constexpr std::int64_t kShiftNs = 50'000'000;
+
 /// What the last linearisation may be off by, squared, in units of the noise (chi-square of 3).
 constexpr double kConverged = 0.01;
 
@@ -133,6 +136,7 @@ class WheelOdometry final : public Update {
 
   void start(const UpdateSetup& setup) override {
     preintegrator_.emplace(wheel_model_of(setup), options_);
+    shifted_preintegrator_.emplace(wheel_model_of(setup), options_);
   }
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
@@ -144,6 +148,7 @@ class WheelOdometry final : public Update {
     const CloneView& last = filter.clones[interval->last_clone];
     set_start(*filter.wheels, first, last, *interval);
     if (!measure(data, *interval, at_)) return;
+    measure_rate(data, *interval);
     tallies_.add(pose_, last.t_ns);
     if (!(pose_.bridged_s <= max_bridged_s_) || !pose_.g.allFinite() || !pose_.P_g.allFinite()) {
       bridged_.add(1, last.t_ns);
@@ -185,6 +190,18 @@ class WheelOdometry final : public Update {
   bool measure(const EpochData& data, const EncoderInterval& interval, const Point& point) {
     preintegrator_->set_intrinsics(point.x_WI);
     return preintegrator_->integrate(data.encoders, interval.begin_ns, interval.end_ns, pose_);
+  }
+
+  /// How the relative pose changes when both instants move on: of the encoders themselves, whose
+  /// rates are less noisy than those of the IMU (WO-13). From the clones where samples are missing.
+  void measure_rate(const EpochData& data, const EncoderInterval& interval) {
+    shifted_preintegrator_->set_intrinsics(at_.x_WI);
+    const bool covered = shifted_preintegrator_->integrate(
+        data.encoders, interval.begin_ns - kShiftNs, interval.end_ns - kShiftNs, shifted_);
+    g_rate_ = covered && shifted_.g.allFinite() && shifted_.bridged_s == 0.
+                  ? Eigen::Vector3d((pose_.g - shifted_.g) / (1e-9 * kShiftNs))
+                  : Eigen::Vector3d(
+                        relative_pose_jacobian(at_.first, at_.last, at_.mount).col(kTimeOffset));
   }
 
   /// Columns of what the filter estimates, and where they stand in the geometry and in x_WI.
@@ -236,8 +253,7 @@ class WheelOdometry final : public Update {
     // wheels measured, with the tilt of the iterate (WO-12).
     geometry_jacobian_.middleCols<6>(kMountTheta) =
         mount_jacobian(complete_motion(pose_.g, tilt), at_.mount.p_IinO);
-    geometry_jacobian_.col(kTimeOffset) =
-        relative_pose_jacobian(at_.first, at_.last, at_.mount).col(kTimeOffset);
+    geometry_jacobian_.col(kTimeOffset) = g_rate_;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
       H_.col(k) = geometry_jacobian_.col(geometry_[static_cast<std::size_t>(k)]);
@@ -366,10 +382,11 @@ class WheelOdometry final : public Update {
   EncoderIntervals intervals_;
   SampleTallies tallies_;
   Tally bridged_{"interval left out: too long without believable encoder samples"};
-  std::optional<Preintegrator> preintegrator_;
+  std::optional<Preintegrator> preintegrator_, shifted_preintegrator_;
 
   // Of the interval at hand.
-  PreintegratedPose pose_;
+  PreintegratedPose pose_, shifted_;
+  Eigen::Vector3d g_rate_ = Eigen::Vector3d::Zero();  // rad/s, m/s
   Point start_, at_;
   MovingPose first_fej_, last_fej_;
   std::array<int, kGeometrySize> geometry_{};  // the factor's leading columns in a PoseJacobian

@@ -106,6 +106,7 @@ class WheelParity final : public Update {
     const bool believed = cost_ - gain <= gate(pose_.parity.dof);
     sink.count(believed ? 1 : 0, believed ? 0 : 1);
     if (!believed) return;
+    ++intervals_used_;
     if (second_order_noise_ && --unchecked_ < 0) add_second_order_noise(data, *interval);
     emit(filter.wheels->intrinsics_column, sink.add_information());
   }
@@ -230,13 +231,17 @@ class WheelParity final : public Update {
     const Square to_eta = eigen_.eigenvectors().rightCols(kept) * root.asDiagonal();
     const Square to_white =
         root.cwiseInverse().asDiagonal() * eigen_.eigenvectors().rightCols(kept).transpose();
-    Square R = to_white * noise * to_white.transpose();
+    // The same curvature bends every interval the same way as long as the excitation is the same,
+    // so that it does not average out: after K intervals its share is K times that of one, and the
+    // last one adds the difference of Lambda K / (1 + K R) (WP-8).
+    Square R = intervals_used_ * to_white * noise * to_white.transpose();
     if (R.trace() < kNegligibleCurvature) {
       unchecked_ = kIntervalsUnchecked;
       return;
     }
     R.diagonal().array() += 1.;
-    const Square W = R.llt().solve(Square::Identity(kept, kept));
+    const Square once = R.llt().solve(Square::Identity(kept, kept));
+    const Square W = once * once;
     const Intrinsics white = to_white * eta_;
     eta_ = to_eta * (W * white);
     Lambda_ = to_eta * W * to_eta.transpose();
@@ -277,6 +282,7 @@ class WheelParity final : public Update {
   std::optional<Preintegrator> preintegrator_;
   double gate_ = 0.;
   int gate_dof_ = 0;
+  double intervals_used_ = 0.;
   int unchecked_ = 0;  // intervals for which curvature needs no look
 
   // Of the interval at hand; entries of the free intrinsics, in units of their sigma.

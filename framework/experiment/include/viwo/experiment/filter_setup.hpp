@@ -63,6 +63,9 @@ FilterSetup read_filter(const config::Node& run, const std::shared_ptr<const Whe
                         const Intrinsics& x_WI, const Intrinsics& sigma, std::uint64_t seed,
                         PluginRegistry& plugins, config::Node& resolved, config::Errors& errors);
 
+/// Whether a run configuration has any of the sections that read_filter() reads.
+bool has_filter_sections(const config::Node& run);
+
 /// Whether a run configuration asks for the filter: estimator.type, or, if that is not said,
 /// whether it has updates.
 bool wants_filter(const config::Node& run);

@@ -29,4 +29,27 @@ class Progress {
   std::chrono::steady_clock::time_point start_;
 };
 
+/// How far one long piece of work is, in percent. Silent for its first second; then a bar that is
+/// drawn again at most ten times a second, or a line for every ten percent (at most one a second).
+class TimeProgress {
+ public:
+  explicit TimeProgress(std::string what);
+  ~TimeProgress();
+  TimeProgress(const TimeProgress&) = delete;
+  TimeProgress& operator=(const TimeProgress&) = delete;
+
+  /// `fraction` of the work is done, 0 to 1.
+  void at(double fraction);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  std::string what_;
+  bool terminal_;
+  bool drawn_ = false;
+  int shown_percent_ = 0;
+  Clock::time_point start_;
+  Clock::time_point next_;
+};
+
 }  // namespace viwo::experiment

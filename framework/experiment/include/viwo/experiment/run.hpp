@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -121,13 +122,16 @@ struct RunResult {
 /// (or at the origin), and evaluates. Throws PluginFailure when the model misbehaves.
 RunResult run_odometry(const RunSetup& setup, const RunData& data);
 
+/// Called now and then with the part of the log's time that is done, 0 to 1.
+using OnProgress = std::function<void(double)>;
+
 /// Runs the filter over all measurements and evaluates. A filter that diverges ends the run with
 /// the epoch and the cause.
-RunResult run_filter(const RunSetup& setup, const RunData& data);
+RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgress& progress = {});
 
 /// What the configuration asks for.
-inline RunResult run(const RunSetup& setup, const RunData& data) {
-  return setup.filter ? run_filter(setup, data) : run_odometry(setup, data);
+inline RunResult run(const RunSetup& setup, const RunData& data, const OnProgress& progress = {}) {
+  return setup.filter ? run_filter(setup, data, progress) : run_odometry(setup, data);
 }
 
 StageTime stage_time(std::vector<double> ms);

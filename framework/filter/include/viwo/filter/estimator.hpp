@@ -98,6 +98,11 @@ class Estimator {
   std::vector<UpdateEntry> updates_;
   std::vector<UpdateCounts> counts_;
   FactorSink sink_;
+  // Factors of one call are linearised at one estimate: what those before them have corrected, and
+  // room for a factor with that taken off.
+  Eigen::VectorXd moved_;
+  ResidualFactor residual_factor_;
+  InformationFactor information_factor_;
   Initializer initializer_;
 
   std::vector<ImuSample> imu_;                        // from the last epoch on

@@ -68,6 +68,8 @@ class Filter {
   /// Applies a factor and corrects the estimate.
   FactorResult apply(const ResidualFactor& factor);
   FactorResult apply(const InformationFactor& factor);
+  /// What the last apply() corrected the estimate by; zero unless its factor was applied.
+  const Eigen::VectorXd& correction() const { return dx_; }
 
   /// Why the filter cannot go on; empty as long as it can.
   std::string failure() const;

@@ -1,0 +1,440 @@
+// Layout of the error state, the ring of clones, first estimates, corrections, the ends of a run.
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include <Eigen/Dense>
+#include <gtest/gtest.h>
+
+#include "filter_fixture.hpp"
+#include "viwo/filter/filter.hpp"
+
+namespace viwo {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using testing::camera_prior;
+using testing::imu_prior;
+using testing::imu_sample;
+using testing::observation;
+using testing::Random;
+using testing::wheels_prior;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::int64_t kPeriodNs = 100'000'000;
+// Three clones and the newest one.
+constexpr FilterOptions kOptions{.clones = 3};
+constexpr int kClones = kImuSize;
+constexpr int kCameraExtrinsics = kClones + 4 * kPoseSize;
+constexpr int kCameraIntrinsics = kCameraExtrinsics + 6;
+constexpr int kWheelsExtrinsics = kCameraIntrinsics + 8;
+constexpr int kTimeOffset = kWheelsExtrinsics + 6;
+constexpr int kIntrinsics = kTimeOffset + 1;
+constexpr int kSize = kIntrinsics + 3;
+
+Filter make_filter(const FilterOptions& options = kOptions) {
+  return {options, {camera_prior()}, {wheels_prior()}};
+}
+
+/// Propagates by one period with random readings and clones.
+void step(Filter& filter, Random& random) {
+  const ImuSample samples[] = {imu_sample(filter.t_ns(), random),
+                               imu_sample(filter.t_ns() + kPeriodNs / 2, random),
+                               imu_sample(filter.t_ns() + kPeriodNs, random)};
+  filter.propagate(samples);
+  filter.clone(samples[2]);
+}
+
+/// A filter that has been started and has `clones` clones.
+Filter running_filter(Random& random, int clones, const FilterOptions& options = kOptions) {
+  Filter filter = make_filter(options);
+  filter.initialize(imu_prior(random));
+  for (int i = 0; i < clones; ++i) step(filter, random);
+  return filter;
+}
+
+/// A factor that looks at a bit of everything.
+ResidualFactor random_factor(Random& random) {
+  ResidualFactor factor;
+  factor.columns.add(0, kImuSize);
+  factor.columns.add(kClones, 2 * kPoseSize);
+  factor.columns.add(kCameraExtrinsics, kSize - kCameraExtrinsics);
+  factor.set_rows(5);
+  factor.H = random.matrix(5, factor.columns.size());
+  factor.residual = 0.05 * random.matrix(5, 1);
+  factor.R.setIdentity();
+  return factor;
+}
+
+std::string refusal(const FilterOptions& options, const CameraPrior& camera,
+                    const WheelsPrior& wheels) {
+  try {
+    Filter filter(options, {camera}, {wheels});
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "(accepted)";
+}
+
+TEST(Filter, LaysOutInertialStateClonesCamerasAndWheels) {
+  const Filter filter = make_filter();
+  EXPECT_EQ(filter.size(), kSize);
+  EXPECT_EQ(filter.cameras()[0].extrinsics_column, kCameraExtrinsics);
+  EXPECT_EQ(filter.cameras()[0].intrinsics_column, kCameraIntrinsics);
+  EXPECT_EQ(filter.wheels()[0].extrinsics_column, kWheelsExtrinsics);
+  EXPECT_EQ(filter.wheels()[0].time_offset_column, kTimeOffset);
+  EXPECT_EQ(filter.wheels()[0].intrinsics_column, kIntrinsics);
+  VectorXd sigma = VectorXd::Zero(kSize);
+  sigma.segment<6>(kCameraExtrinsics) = camera_prior().sigma_extrinsics;
+  sigma.segment<8>(kCameraIntrinsics) = camera_prior().sigma_intrinsics;
+  sigma.segment<6>(kWheelsExtrinsics) = wheels_prior().sigma_extrinsics;
+  sigma[kTimeOffset] = wheels_prior().sigma_time_offset_s;
+  sigma.segment<3>(kIntrinsics) = wheels_prior().sigma_intrinsics;
+  const MatrixXd expected = sigma.cwiseAbs2().asDiagonal();
+  EXPECT_EQ(filter.covariance(), expected);
+  EXPECT_FALSE(filter.initialized());
+  EXPECT_EQ(filter.view(-1).wheels, nullptr);
+  EXPECT_EQ(filter.view(0).wheels, &filter.wheels()[0]);
+  EXPECT_EQ(filter.view(0).P(), filter.covariance());
+}
+
+TEST(Filter, GivesNoColumnsToWhatIsHeld) {
+  CameraPrior camera = camera_prior();
+  camera.sigma_extrinsics.setZero();
+  WheelsPrior wheels = wheels_prior();
+  wheels.sigma_time_offset_s = 0.;
+  wheels.sigma_extrinsics.setZero();
+  const Filter filter(kOptions, {camera}, {wheels});
+  EXPECT_EQ(filter.size(), kSize - 13);
+  EXPECT_EQ(filter.cameras()[0].extrinsics_column, -1);
+  EXPECT_EQ(filter.cameras()[0].intrinsics_column, kCameraExtrinsics);
+  EXPECT_EQ(filter.wheels()[0].extrinsics_column, -1);
+  EXPECT_EQ(filter.wheels()[0].time_offset_column, -1);
+  EXPECT_EQ(filter.wheels()[0].intrinsics_column, kCameraExtrinsics + 8);
+}
+
+TEST(Filter, RefusesPriorsAndSizesThatMakeNoSense) {
+  EXPECT_EQ(refusal(kOptions, camera_prior(), wheels_prior()), "(accepted)");
+  const std::string bad_sigma = "a prior sigma is negative or not finite";
+  for (const double value : {-1e-9, kNaN, std::numeric_limits<double>::infinity()}) {
+    CameraPrior camera = camera_prior();
+    camera.sigma_extrinsics[5] = value;
+    EXPECT_EQ(refusal(kOptions, camera, wheels_prior()), bad_sigma);
+    camera = camera_prior();
+    camera.sigma_intrinsics[7] = value;
+    EXPECT_EQ(refusal(kOptions, camera, wheels_prior()), bad_sigma);
+    WheelsPrior wheels = wheels_prior();
+    wheels.sigma_extrinsics[0] = value;
+    EXPECT_EQ(refusal(kOptions, camera_prior(), wheels), bad_sigma);
+    wheels = wheels_prior();
+    wheels.sigma_time_offset_s = value;
+    EXPECT_EQ(refusal(kOptions, camera_prior(), wheels), bad_sigma);
+    wheels = wheels_prior();
+    wheels.sigma_intrinsics[1] = value;
+    EXPECT_EQ(refusal(kOptions, camera_prior(), wheels), bad_sigma);
+  }
+  WheelsPrior wheels = wheels_prior();
+  wheels.sigma_intrinsics.conservativeResize(2);
+  EXPECT_EQ(refusal(kOptions, camera_prior(), wheels),
+            "each intrinsic of a wheel set needs a prior sigma");
+  for (const int clones : {-1, 0, 1, 101}) {
+    EXPECT_EQ(refusal({.clones = clones}, camera_prior(), wheels_prior()),
+              "the number of clones must be within 2 .. 100");
+  }
+}
+
+TEST(Filter, CloneIsACopyOfThePoseAndOfItsCovarianceWithEverything) {
+  Random random(1);
+  Filter filter = running_filter(random, 2);
+  const ImuSample samples[] = {imu_sample(filter.t_ns(), random),
+                               imu_sample(filter.t_ns() + kPeriodNs, random)};
+  filter.propagate(samples);
+  const MatrixXd before = filter.covariance();
+  filter.clone(samples[1]);
+  const CloneView& clone = filter.clones().back();
+  EXPECT_EQ(clone.t_ns, samples[1].t_ns);
+  EXPECT_EQ(clone.R_GtoI, filter.imu().R_GtoI);
+  EXPECT_EQ(clone.p_IinG, filter.imu().p_IinG);
+  EXPECT_EQ(clone.R_GtoI_fej, filter.imu().R_GtoI);
+  EXPECT_EQ(clone.p_IinG_fej, filter.imu().p_IinG);
+  EXPECT_EQ(clone.v_IinG, filter.imu().v_IinG);
+  const auto& gyro = samples[1].gyro_rad_per_s;
+  EXPECT_EQ(clone.w_IinI, Vector3d(gyro[0], gyro[1], gyro[2]) - filter.imu().gyro_bias);
+  // P of [x; pose] is J P J^T with J that copies the pose.
+  MatrixXd J = MatrixXd::Identity(kSize, kSize);
+  J.middleRows(clone.column, kPoseSize).setZero();
+  J.block(clone.column, 0, kPoseSize, kPoseSize).setIdentity();
+  EXPECT_EQ(filter.covariance(), J * before * J.transpose());
+}
+
+TEST(Filter, DroppingTheOldestCloneFreesItsSlotAndLeavesAllOthersAlone) {
+  Random random(2);
+  Filter filter = running_filter(random, 4);
+  EXPECT_TRUE(filter.window_full());
+  EXPECT_TRUE(filter.view(-1).oldest_leaves);
+  EXPECT_THROW(filter.clone(imu_sample(filter.t_ns(), random)), std::logic_error);
+  std::vector<int> slots;
+  for (int k = 0; k < 9; ++k) {
+    const std::vector<CloneView> clones(filter.clones().begin(), filter.clones().end());
+    MatrixXd expected = filter.covariance();
+    expected.middleRows(clones[0].column, kPoseSize).setZero();
+    expected.middleCols(clones[0].column, kPoseSize).setZero();
+    filter.drop_oldest_clone();
+    EXPECT_EQ(filter.covariance(), expected);
+    EXPECT_FALSE(filter.window_full());
+    EXPECT_FALSE(filter.view(-1).oldest_leaves);
+    ASSERT_EQ(filter.clones().size(), 3u);
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(filter.clones()[i].t_ns, clones[i + 1].t_ns);
+      EXPECT_EQ(filter.clones()[i].slot, clones[i + 1].slot);
+      EXPECT_EQ(filter.clones()[i].column, clones[i + 1].column);
+      EXPECT_EQ(filter.clones()[i].R_GtoI, clones[i + 1].R_GtoI);
+    }
+    step(filter, random);
+    EXPECT_EQ(filter.clones().back().slot, clones[0].slot);
+    EXPECT_EQ(filter.clones().back().column, kClones + kPoseSize * clones[0].slot);
+    slots.push_back(clones[0].slot);
+  }
+  EXPECT_EQ(slots, (std::vector<int>{0, 1, 2, 3, 0, 1, 2, 3, 0}));
+}
+
+TEST(Filter, DroppingACloneOfAnEmptyWindowDoesNothing) {
+  Random random(3);
+  Filter filter = running_filter(random, 0);
+  const MatrixXd before = filter.covariance();
+  filter.drop_oldest_clone();
+  EXPECT_EQ(filter.covariance(), before);
+  EXPECT_TRUE(filter.clones().empty());
+}
+
+TEST(Filter, FirstEstimatesStayWhenAnUpdateMovesTheEstimate) {
+  Random random(4);
+  Filter filter = running_filter(random, 3);
+  const std::vector<CloneView> before(filter.clones().begin(), filter.clones().end());
+  const ImuView imu = filter.imu();
+  ASSERT_EQ(filter.apply(random_factor(random)), FactorResult::kApplied);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_NE(filter.clones()[i].R_GtoI, before[i].R_GtoI);
+    EXPECT_NE(filter.clones()[i].p_IinG, before[i].p_IinG);
+    EXPECT_EQ(filter.clones()[i].R_GtoI_fej, before[i].R_GtoI);
+    EXPECT_EQ(filter.clones()[i].p_IinG_fej, before[i].p_IinG);
+    EXPECT_EQ(filter.clones()[i].v_IinG, before[i].v_IinG);
+  }
+  EXPECT_EQ(filter.imu().R_GtoI_fej, imu.R_GtoI);
+  EXPECT_EQ(filter.imu().p_IinG_fej, imu.p_IinG);
+  EXPECT_EQ(filter.imu().v_IinG_fej, imu.v_IinG);
+}
+
+TEST(Filter, WithoutFirstEstimatesTheyFollowTheEstimate) {
+  Random random(5);
+  FilterOptions options = kOptions;
+  options.first_estimates = false;
+  Filter filter = running_filter(random, 3, options);
+  ASSERT_EQ(filter.apply(random_factor(random)), FactorResult::kApplied);
+  for (const CloneView& clone : filter.clones()) {
+    EXPECT_EQ(clone.R_GtoI_fej, clone.R_GtoI);
+    EXPECT_EQ(clone.p_IinG_fej, clone.p_IinG);
+  }
+  // The transition starts at the present estimate: as that of a filter that was started there.
+  ImuPrior prior;
+  prior.t_ns = filter.t_ns();
+  prior.state = filter.imu();
+  prior.P = filter.covariance().topLeftCorner<kImuSize, kImuSize>();
+  Filter fresh = make_filter(options);
+  fresh.initialize(prior);
+  const ImuSample samples[] = {imu_sample(filter.t_ns(), random),
+                               imu_sample(filter.t_ns() + kPeriodNs, random)};
+  filter.propagate(samples);
+  fresh.propagate(samples);
+  const auto imu_block = [](const Filter& f) -> ImuMatrix {
+    return f.covariance().topLeftCorner<kImuSize, kImuSize>();
+  };
+  EXPECT_EQ(imu_block(filter), imu_block(fresh));
+}
+
+/// The rotation that a filter must have after an error dtheta is found in `R`.
+Matrix3d turned(const Matrix3d& R, const VectorXd& dx, int column) {
+  return exp_so3(-Vector3d(dx.segment<3>(column))) * R;
+}
+
+TEST(Filter, CorrectsEveryBlockThroughItsBoxplus) {
+  Random random(6);
+  Filter filter = running_filter(random, 3);
+  const std::vector<CloneView> clones(filter.clones().begin(), filter.clones().end());
+  const ImuView imu = filter.imu();
+  // The information factor correlates calibration and motion first.
+  InformationFactor information;
+  information.columns.add(0, kSize);
+  const MatrixXd A = random.matrix(kSize + 20, kSize);
+  information.Lambda = A.transpose() * A;
+  information.eta = VectorXd::Zero(kSize);
+  ASSERT_EQ(filter.apply(information), FactorResult::kApplied);
+  EXPECT_EQ(filter.imu().p_IinG, imu.p_IinG);  // eta was zero
+
+  const ResidualFactor factor = random_factor(random);
+  MatrixXd H = MatrixXd::Zero(5, kSize);
+  int start = 0;
+  for (const ColumnRange& block : factor.columns.blocks()) {
+    H.middleCols(block.first, block.count) = factor.H.middleCols(start, block.count);
+    start += block.count;
+  }
+  const MatrixXd P = filter.covariance();
+  const MatrixXd S = H * P * H.transpose() + MatrixXd(factor.R);
+  const VectorXd dx = P * H.transpose() * S.inverse() * factor.residual;
+  ASSERT_EQ(filter.apply(factor), FactorResult::kApplied);
+  EXPECT_LT((filter.correction() - dx).norm(), 1e-12);
+
+  constexpr double kTolerance = 1e-12;
+  const auto near = [](const auto& a, const auto& b) { return (a - b).norm() < kTolerance; };
+  EXPECT_TRUE(near(filter.imu().R_GtoI, turned(imu.R_GtoI, dx, kThetaColumn)));
+  EXPECT_TRUE(near(filter.imu().p_IinG, imu.p_IinG + dx.segment<3>(kPositionColumn)));
+  EXPECT_TRUE(near(filter.imu().v_IinG, imu.v_IinG + dx.segment<3>(kVelocityColumn)));
+  EXPECT_TRUE(near(filter.imu().gyro_bias, imu.gyro_bias + dx.segment<3>(kGyroBiasColumn)));
+  EXPECT_TRUE(near(filter.imu().accel_bias, imu.accel_bias + dx.segment<3>(kAccelBiasColumn)));
+  for (std::size_t i = 0; i < clones.size(); ++i) {
+    const int column = clones[i].column;
+    EXPECT_TRUE(near(filter.clones()[i].R_GtoI, turned(clones[i].R_GtoI, dx, column)));
+    EXPECT_TRUE(near(filter.clones()[i].p_IinG, clones[i].p_IinG + dx.segment<3>(column + 3)));
+  }
+  const CameraView camera = camera_prior().camera;
+  const CameraView& is = filter.cameras()[0];
+  EXPECT_TRUE(near(is.R_ItoC, turned(camera.R_ItoC, dx, kCameraExtrinsics)));
+  EXPECT_TRUE(near(is.p_IinC, camera.p_IinC + dx.segment<3>(kCameraExtrinsics + 3)));
+  EXPECT_TRUE(near(is.intrinsics, camera.intrinsics + dx.segment<8>(kCameraIntrinsics)));
+  const WheelsView wheels = wheels_prior().wheels;
+  const WheelsView& now = filter.wheels()[0];
+  EXPECT_TRUE(near(now.R_ItoO, turned(wheels.R_ItoO, dx, kWheelsExtrinsics)));
+  EXPECT_TRUE(near(now.p_IinO, wheels.p_IinO + dx.segment<3>(kWheelsExtrinsics + 3)));
+  EXPECT_NEAR(now.t_OtoI_s, wheels.t_OtoI_s + dx[kTimeOffset], kTolerance);
+  EXPECT_TRUE(near(now.x_WI, wheels.x_WI + dx.segment<3>(kIntrinsics)));
+  // Every block has moved by more than the tolerance, so that a wrong sign is seen.
+  for (int column = 0; column < kImuSize; ++column) EXPECT_GT(std::abs(dx[column]), 1e-10);
+  EXPECT_GT(dx.segment<6>(kCameraExtrinsics).cwiseAbs().minCoeff(), 1e-10);
+  EXPECT_GT(dx.segment<6>(kWheelsExtrinsics).cwiseAbs().minCoeff(), 1e-10);
+}
+
+TEST(Filter, ObservedRotationErrorTurnsTheEstimateOntoTheTruth) {
+  Random random(7);
+  Filter filter = running_filter(random, 1);
+  const Vector3d error(0.02, -0.01, 0.03);
+  const Matrix3d truth = exp_so3(-error) * filter.wheels()[0].R_ItoO;
+  filter.apply(observation(kWheelsExtrinsics, error, 1e-9));
+  EXPECT_LT((filter.wheels()[0].R_ItoO - truth).norm(), 1e-12);
+  const Matrix3d true_R_GtoI = exp_so3(-error) * filter.imu().R_GtoI;
+  filter.apply(observation(kThetaColumn, error, 1e-9));
+  EXPECT_LT((filter.imu().R_GtoI - true_R_GtoI).norm(), 1e-10);
+}
+
+TEST(Filter, HeldValuesStayTheSameBits) {
+  Random random(8);
+  CameraPrior camera = camera_prior();
+  camera.sigma_intrinsics.setZero();
+  WheelsPrior wheels = wheels_prior();
+  wheels.sigma_extrinsics.tail<1>().setZero();
+  Filter filter(kOptions, {camera}, {wheels});
+  filter.initialize(imu_prior(random));
+  const int intrinsics = filter.wheels()[0].intrinsics_column;
+  const int held_position = filter.wheels()[0].extrinsics_column + 5;
+  for (int k = 0; k < 12; ++k) {
+    if (filter.window_full()) filter.drop_oldest_clone();
+    step(filter, random);
+    ResidualFactor factor;
+    factor.columns.add(0, kImuSize);
+    factor.columns.add(filter.wheels()[0].extrinsics_column, filter.size() - held_position + 5);
+    factor.set_rows(4);
+    factor.H = random.matrix(4, factor.columns.size());
+    factor.residual = 0.05 * random.matrix(4, 1);
+    factor.R.setIdentity();
+    ASSERT_EQ(filter.apply(factor), FactorResult::kApplied);
+    InformationFactor information;
+    information.columns = factor.columns;
+    const int n = factor.columns.size();
+    const MatrixXd A = random.matrix(2 * n, n);
+    information.Lambda = A.transpose() * A;
+    information.eta = random.matrix(n, 1);
+    ASSERT_EQ(filter.apply(information), FactorResult::kApplied);
+  }
+  EXPECT_EQ(filter.wheels()[0].x_WI[1], wheels.wheels.x_WI[1]);
+  EXPECT_EQ(filter.wheels()[0].p_IinO[2], wheels.wheels.p_IinO[2]);
+  EXPECT_EQ(filter.cameras()[0].intrinsics, camera.camera.intrinsics);
+  for (const int column : {intrinsics + 1, held_position}) {
+    EXPECT_EQ(filter.covariance().col(column), VectorXd::Zero(filter.size()));
+    EXPECT_EQ(filter.covariance().row(column).transpose(), VectorXd::Zero(filter.size()));
+  }
+  EXPECT_NE(filter.wheels()[0].x_WI[0], wheels.wheels.x_WI[0]);
+  EXPECT_NE(filter.wheels()[0].x_WI[2], wheels.wheels.x_WI[2]);
+  EXPECT_NE(filter.wheels()[0].p_IinO[1], wheels.wheels.p_IinO[1]);
+  EXPECT_EQ(filter.failure(), "");
+}
+
+TEST(Filter, FactorThatIsNotFiniteIsRejectedAndChangesNothing) {
+  Random random(9);
+  Filter filter = running_filter(random, 2);
+  const MatrixXd P = filter.covariance();
+  const Vector3d p = filter.imu().p_IinG;
+  for (int part = 0; part < 3; ++part) {
+    for (const double gate : {0., 0.01}) {
+      ResidualFactor factor = random_factor(random);
+      factor.gate_probability = gate;
+      (part == 0 ? factor.H(1, 2) : part == 1 ? factor.residual[3] : factor.R(2, 2)) = kNaN;
+      EXPECT_EQ(filter.apply(factor), FactorResult::kRejected) << part;
+    }
+  }
+  EXPECT_EQ(filter.covariance(), P);
+  EXPECT_EQ(filter.imu().p_IinG, p);
+}
+
+TEST(Filter, SaysWhyItCannotGoOn) {
+  const std::string not_finite = "the estimate or its covariance is not finite any more";
+  {
+    ImuPrior prior = testing::level_prior(0);
+    Filter filter = make_filter();
+    filter.initialize(prior);
+    EXPECT_EQ(filter.failure(), "");
+    prior.state.accel_bias[1] = kNaN;
+    filter.initialize(prior);
+    EXPECT_EQ(filter.failure(), not_finite);
+    prior = testing::level_prior(0);
+    prior.P(4, 4) = kNaN;
+    filter.initialize(prior);
+    EXPECT_EQ(filter.failure(), not_finite);
+    prior.P(4, 4) = -1e-3;
+    filter.initialize(prior);
+    EXPECT_EQ(filter.failure(), "a variance is negative");
+  }
+  {
+    ImuPrior prior = testing::level_prior(0, 1.);
+    prior.P(0, 1) = prior.P(1, 0) = 2.;
+    Filter filter = make_filter();
+    filter.initialize(prior);
+    EXPECT_EQ(filter.failure(), "");  // not yet seen
+    InformationFactor factor;
+    factor.columns.add(0, 3);
+    factor.Lambda = Matrix3d::Identity();
+    factor.eta = Vector3d::Zero();
+    EXPECT_EQ(filter.apply(factor), FactorResult::kFailed);
+    EXPECT_EQ(filter.failure(),
+              "the covariance of the clones is not positive definite any more");
+  }
+}
+
+TEST(Filter, CalibrationOfTheWheelsThatOverflowsEndsTheRun) {
+  for (const int column : {kWheelsExtrinsics + 3, kTimeOffset, kIntrinsics}) {
+    WheelsPrior wheels = wheels_prior();
+    wheels.sigma_extrinsics.tail<3>().setConstant(1e10);
+    wheels.sigma_time_offset_s = 1e10;
+    wheels.sigma_intrinsics[0] = 1e10;
+    Filter filter(kOptions, {camera_prior()}, {wheels});
+    filter.initialize(testing::level_prior(0));
+    ResidualFactor factor = observation(column, VectorXd::Constant(1, 1e305), 1.);
+    factor.H(0, 0) = 1e-5;  // a gain of 1e5
+    ASSERT_EQ(filter.apply(factor), FactorResult::kApplied);
+    EXPECT_EQ(filter.failure(), "the calibration of the wheels is not finite any more") << column;
+  }
+}
+
+}  // namespace
+}  // namespace viwo
