@@ -189,6 +189,36 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsForTheRecordings) {
                "--set", set});
 }
 
+TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfTheFilter) {
+  // runs/viwo_log.yaml: FilterTest.
+  const std::string shorter = "sensors.simulator0.duration_s=5";
+  expect_done({"run", kConfigs + "runs/viwo_swerve.yaml", "--out", "run", "--set", shorter});
+  EXPECT_EQ(summary("run").at("status"), "ok");
+  expect_done({"run", kConfigs + "runs/viwo_swerve.yaml", "--out", "pinhole", "--set", shorter,
+               "--set", "sensors.simulator0.cameras=" + kConfigs + "cameras/pinhole.yaml", "--set",
+               "sensors.simulator0.n_cameras=1", "--set",
+               "cameras.kalibr=" + kConfigs + "cameras/pinhole.yaml"});
+  EXPECT_EQ(summary("pinhole").at("status"), "ok");
+  expect_done({"experiment", kConfigs + "experiments/paper_accuracy.yaml", "--seeds", "1", "--out",
+               "paper", "--set", shorter});
+  const nlohmann::json variants = summary("paper").at("variants");
+  for (const char* variant : {"true_init_calib_on", "true_init_calib_off", "bad_init_calib_on",
+                              "bad_init_calib_off", "bad_init_twist_only"}) {
+    EXPECT_TRUE(variants.contains(variant)) << variant;
+  }
+}
+
+TEST_F(ResultsTest, OfTheDeliveredConfigurationForOpenVinsMeasurements) {
+  const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/openvins_sim";
+  if (!fs::exists(data)) GTEST_SKIP() << "the measurements are not here";
+  const std::string set = "placeholders.data=" + fs::canonical(data).string();
+  expect_done({"run", kConfigs + "runs/openvins_sim.yaml", "--out", "run", "--set", set});
+  // OpenVINS itself: 0.594 deg and 0.144 m.
+  const nlohmann::json accuracy = summary("run").at("accuracy");
+  EXPECT_LT(accuracy.at("ate_deg").get<double>(), 0.594);
+  EXPECT_LT(accuracy.at("ate_m").get<double>(), 0.144);
+}
+
 TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
   std::set<std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(kConfigs)) {
@@ -196,11 +226,13 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
       files.insert(fs::relative(entry.path(), kConfigs).string());
     }
   }
-  EXPECT_EQ(files, (std::set<std::string>{
-                       "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
-                       "experiments/demo.yaml", "experiments/nominal_dead_reckoning.yaml",
-                       "experiments/three_models.yaml", "runs/recording.yaml",
-                       "runs/simulated_swerve.yaml"}))
+  EXPECT_EQ(files,
+            (std::set<std::string>{
+                "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
+                "cameras/pinhole.yaml", "cameras/t265_like.yaml", "experiments/demo.yaml",
+                "experiments/nominal_dead_reckoning.yaml", "experiments/paper_accuracy.yaml",
+                "experiments/three_models.yaml", "runs/openvins_sim.yaml", "runs/recording.yaml",
+                "runs/simulated_swerve.yaml", "runs/viwo_log.yaml", "runs/viwo_swerve.yaml"}))
       << "name the new file in a test above";
 }
 

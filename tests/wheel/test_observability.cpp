@@ -112,6 +112,36 @@ TEST(Observability, TwistAndParityTellEverythingUnderGeneralMotion) {
   }
 }
 
+/// Null space of the twist's Jacobians, accumulated over a general motion with noisy encoders.
+int null_dimension_with_noise(const std::string& yaml, bool fitted_jacobian) {
+  const auto model = load_model(yaml);
+  TwistSolver solver(model, {.fitted_jacobian = fitted_jacobian, .rank_tolerance = 1e-6});
+  const int n = model->n_intrinsics();
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
+  std::mt19937_64 rng(5);
+  EncoderSample clean;
+  for (int i = 0; i < 400; ++i) {
+    const Twist xi = general(0.02 * i);
+    follow(*model, xi, clean);
+    const EncoderSample y = testing::with_noise(*model, xi, clean, 1., rng);
+    TwistSolution solution;
+    EXPECT_EQ(solver.solve(y, solution), Status::kOk);
+    normal += solution.J_xi_WI.transpose() * solution.J_xi_WI;
+  }
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(normal).eigenvalues();
+  int null = 0;
+  while (null < n && eigenvalues[null] < 1e-13 * eigenvalues[n - 1]) ++null;
+  return null;
+}
+
+TEST(Observability, NoiseIsNoInformationWhenTheTwistIsDifferentiatedAtItsOwnSignal) {
+  EXPECT_EQ(null_dimension_with_noise(swerve("four_wis_wid"), true), 9);
+  EXPECT_EQ(null_dimension_with_noise(swerve("four_wis_wid_drive_only"), true), 4);
+  EXPECT_LT(null_dimension_with_noise(swerve("four_wis_wid"), false), 9);
+  EXPECT_LT(null_dimension_with_noise(swerve("four_wis_wid_drive_only"), false), 4);
+}
+
 /// x_WI of the same robot with O moved to `o` = [theta, x, y], given in the old O.
 Intrinsics seen_from(const Intrinsics& x, const Eigen::Vector3d& o) {
   Intrinsics moved = x;

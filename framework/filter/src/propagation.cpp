@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 Vector3d vector(const std::array<double, 3>& values) { return {values[0], values[1], values[2]}; }
 
 /// One step between two samples, in an error state whose orientation error is in G
-/// (phi = R_ItoG dtheta): there the orientation's own transition is the identity (F-3).
+/// (phi = R_ItoG dtheta): there the orientation's own transition is the identity (F-3, F-4).
 struct Step {
   double dt;
   Matrix3d R_bg;  // d phi = -R_bg dbg

@@ -77,9 +77,14 @@ std::optional<ImuPrior> start_from_standstill(std::span<const ImuSample> imu,
   prior.state.gyro_bias = gyro.mean;
 
   // Errors at the start (F-10): accel.mean = R_GtoI g e3 + ba + noise. The accelerometer bias is
-  // taken as zero, so that tilt and bias err together: dtheta = [z]x (ba + noise) / g.
+  // taken as zero, so that tilt and bias err together: dtheta = [z]x (ba + noise) / g. The noise
+  // is also the walk of the biases: their means over the window are not their values at its end.
   const double bias_variance = squared(options.sigma_accel_bias_m_per_s2);
-  const double noise_variance = squared(options.noise.accel_m_per_s2_sqrt_hz) / span_s;
+  const auto noise_of_mean = [&](double density, double walk) {
+    return squared(density) / span_s + squared(walk) * span_s / 3.;
+  };
+  const double noise_variance = noise_of_mean(options.noise.accel_m_per_s2_sqrt_hz,
+                                              options.noise.accel_walk_m_per_s3_sqrt_hz);
   const Matrix3d tilt = skew(z) / options.gravity_m_per_s2;
   ImuMatrix& P = prior.P;
   P.block<3, 3>(kThetaColumn, kThetaColumn) =
@@ -93,8 +98,8 @@ std::optional<ImuPrior> start_from_standstill(std::span<const ImuSample> imu,
   P.diagonal().segment<3>(kVelocityColumn).setConstant(squared(0.01));
   P.diagonal()
       .segment<3>(kGyroBiasColumn)
-      .setConstant(squared(options.noise.gyro_rad_per_s_sqrt_hz) / span_s +
-                   squared(options.noise.gyro_walk_rad_per_s2_sqrt_hz) * span_s);
+      .setConstant(noise_of_mean(options.noise.gyro_rad_per_s_sqrt_hz,
+                                 options.noise.gyro_walk_rad_per_s2_sqrt_hz));
   return prior;
 }
 

@@ -26,7 +26,11 @@ using testing::wheels_prior;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kPeriodNs = 100'000'000;
 // Three clones and the newest one.
-constexpr FilterOptions kOptions{.clones = 3};
+const FilterOptions kOptions = [] {
+  FilterOptions options;
+  options.clones = 3;
+  return options;
+}();
 constexpr int kClones = kImuSize;
 constexpr int kCameraExtrinsics = kClones + 4 * kPoseSize;
 constexpr int kCameraIntrinsics = kCameraExtrinsics + 6;
@@ -141,7 +145,9 @@ TEST(Filter, RefusesPriorsAndSizesThatMakeNoSense) {
   EXPECT_EQ(refusal(kOptions, camera_prior(), wheels),
             "each intrinsic of a wheel set needs a prior sigma");
   for (const int clones : {-1, 0, 1, 101}) {
-    EXPECT_EQ(refusal({.clones = clones}, camera_prior(), wheels_prior()),
+    FilterOptions options;
+    options.clones = clones;
+    EXPECT_EQ(refusal(options, camera_prior(), wheels_prior()),
               "the number of clones must be within 2 .. 100");
   }
 }
@@ -265,12 +271,14 @@ TEST(Filter, CorrectsEveryBlockThroughItsBoxplus) {
   Filter filter = running_filter(random, 3);
   const std::vector<CloneView> clones(filter.clones().begin(), filter.clones().end());
   const ImuView imu = filter.imu();
-  // The information factor correlates calibration and motion first.
+  // The information factor correlates calibration and motion first. (Not of the present pose: the
+  // newest clone is that.)
   InformationFactor information;
-  information.columns.add(0, kSize);
-  const MatrixXd A = random.matrix(kSize + 20, kSize);
+  information.columns.add(kVelocityColumn, kSize - kVelocityColumn);
+  const int n = information.columns.size();
+  const MatrixXd A = random.matrix(n + 20, n);
   information.Lambda = A.transpose() * A;
-  information.eta = VectorXd::Zero(kSize);
+  information.eta = VectorXd::Zero(n);
   ASSERT_EQ(filter.apply(information), FactorResult::kApplied);
   EXPECT_EQ(filter.imu().p_IinG, imu.p_IinG);  // eta was zero
 
@@ -416,8 +424,7 @@ TEST(Filter, SaysWhyItCannotGoOn) {
     factor.Lambda = Matrix3d::Identity();
     factor.eta = Vector3d::Zero();
     EXPECT_EQ(filter.apply(factor), FactorResult::kFailed);
-    EXPECT_EQ(filter.failure(),
-              "the covariance of the clones is not positive definite any more");
+    EXPECT_EQ(filter.failure(), "the covariance of the clones is not positive definite any more");
   }
 }
 

@@ -143,8 +143,13 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   out.e = fit.e;
   out.rank_deficient = fit.rank < 3;
   // With weights, W e takes the place of e in (W-4).
-  model.intrinsic_derivatives(y, x_WI_, rows_, rows_.b, fit.xi,
-                              options_.noise_weighted ? We_ : fit.e, by_x_);
+  if (options_.fitted_jacobian) {
+    no_residual_.setZero(fit.e.size());
+    model.intrinsic_derivatives(y, x_WI_, rows_, fit.b, fit.xi, no_residual_, by_x_);
+  } else {
+    model.intrinsic_derivatives(y, x_WI_, rows_, rows_.b, fit.xi,
+                                options_.noise_weighted ? We_ : fit.e, by_x_);
+  }
   with_block_size(model_->description().noise_block, [&](auto size) {
     constexpr int kSize = decltype(size)::value;
     twist_jacobian<kSize>(fit, out.J_xi_WI);

@@ -130,6 +130,7 @@ class WheelOdometry final : public Update {
     options_.twist.noise_weighted = params.text("twist") == "noise_weighted";
     options_.parity_gate_probability = params.number("sample_gate_probability");
     options_.parity = false;
+    options_.twist.fitted_jacobian = true;
   }
 
   UpdateKind kind() const override { return UpdateKind::kWheels; }

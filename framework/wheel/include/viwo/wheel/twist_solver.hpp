@@ -21,6 +21,11 @@ struct TwistOptions {
   /// Rows weighted by the inverse of their noise instead of equally. Twist and parity noise are
   /// then independent.
   bool noise_weighted = false;
+  /// Sensitivities of the twist at the signal that the twist itself predicts, as those of the
+  /// parity residual always are (W-9): what the measured residual would add is noise for a filter
+  /// that sums up thousands of samples, and counted as information about directions that the twist
+  /// cannot show.
+  bool fitted_jacobian = false;
   /// Smallest ratio of the singular values of A (yaw rate scaled to the size of the velocities)
   /// that counts as full rank. For rolling rows it is about the spread of the wheel directions in
   /// rad; below it the velocity that the rows cannot tell is taken as zero.
@@ -146,6 +151,7 @@ class TwistSolver {
   RowLanes A_plus_;                              // column i: what row i gives to the twist
   Eigen::Matrix<double, kMaxRows, kMaxRows> W_;  // block by block: rows i.. begin at (0, i)
   RowVector We_;                                 // of the weighted fit
+  RowVector no_residual_;                        // zero
   double weighted_chi2_ = 0.;
   IntrinsicDerivatives by_x_;
   NoiseDerivatives by_n_;
