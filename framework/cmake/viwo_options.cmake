@@ -20,7 +20,8 @@ set(VIWO_WARNINGS -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Woverl
     $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
 # GCC 12 warns falsely: about its own AVX-512 headers when Eigen is inlined, and about std::string
 # (bug 105651).
-list(APPEND VIWO_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>
+list(APPEND VIWO_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>
+     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>
      $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized>)
 if(VIWO_WERROR)
   list(APPEND VIWO_WARNINGS -Werror)

@@ -181,7 +181,8 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsForTheRecordings) {
   if (!fs::exists(data)) GTEST_SKIP() << "the recordings are not here";
   const std::string set = "placeholders.data=" + fs::canonical(data).string();
   expect_done({"run", kConfigs + "runs/recording.yaml", "--out", "run", "--set", set});
-  for (const char* name : {"nominal_dead_reckoning", "three_models"}) {
+  expect_done({"run", kConfigs + "runs/hybrid.yaml", "--out", "hybrid_run", "--set", set});
+  for (const char* name : {"nominal_dead_reckoning", "three_models", "hybrid"}) {
     expect_done(
         {"experiment", kConfigs + "experiments/" + name + ".yaml", "--out", name, "--set", set});
   }
@@ -203,7 +204,7 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfTheFilter) {
                "paper", "--set", shorter});
   const nlohmann::json variants = summary("paper").at("variants");
   for (const char* variant : {"true_init_calib_on", "true_init_calib_off", "bad_init_calib_on",
-                              "bad_init_calib_off", "bad_init_twist_only"}) {
+                              "bad_init_calib_off", "bad_init_twist_only", "bad_init_drive_only"}) {
     EXPECT_TRUE(variants.contains(variant)) << variant;
   }
 }
@@ -230,8 +231,9 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
             (std::set<std::string>{
                 "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
                 "cameras/pinhole.yaml", "cameras/t265_like.yaml", "experiments/demo.yaml",
-                "experiments/nominal_dead_reckoning.yaml", "experiments/paper_accuracy.yaml",
-                "experiments/three_models.yaml", "runs/openvins_sim.yaml", "runs/recording.yaml",
+                "experiments/hybrid.yaml", "experiments/nominal_dead_reckoning.yaml",
+                "experiments/paper_accuracy.yaml", "experiments/three_models.yaml",
+                "runs/hybrid.yaml", "runs/openvins_sim.yaml", "runs/recording.yaml",
                 "runs/simulated_swerve.yaml", "runs/viwo_log.yaml", "runs/viwo_swerve.yaml"}))
       << "name the new file in a test above";
 }

@@ -1,14 +1,12 @@
 // Cost of preintegration per encoder sample, for every model, plain and noise-weighted, and the
 // same as a ratio to a matrix product of this run, which can be compared between machines.
-#include <algorithm>
-#include <cstdio>
-#include <limits>
-#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <benchmark/benchmark.h>
 
+#include "ratio_reporter.hpp"
 #include "viwo/wheel/preintegration.hpp"
 #include "wheel_fixture.hpp"
 
@@ -132,37 +130,6 @@ void register_all() {
   }
 }
 
-/// Prints as usual and keeps the least time of each benchmark: disturbances only add.
-class Reporter final : public benchmark::ConsoleReporter {
- public:
-  void ReportRuns(const std::vector<Run>& runs) override {
-    ConsoleReporter::ReportRuns(runs);
-    for (const Run& run : runs) {
-      if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
-      const auto counter = run.counters.find(kPerSample);
-      const double ns =
-          counter != run.counters.end() ? 1e9 * counter->second.value : run.GetAdjustedCPUTime();
-      auto [entry, is_new] = least_ns_.emplace(run.run_name.function_name, ns);
-      if (is_new) order_.push_back(entry->first);
-      entry->second = std::min(entry->second, ns);
-    }
-  }
-
-  void print_ratios() const {
-    const auto reference = least_ns_.find(kReference);
-    if (reference == least_ns_.end()) return;
-    std::printf("\n%-60s %10s %12s\n", "least time", "ns", "/ reference");
-    for (const std::string& name : order_) {
-      const double ns = least_ns_.at(name);
-      std::printf("%-60s %10.1f %12.5f\n", name.c_str(), ns, ns / reference->second);
-    }
-  }
-
- private:
-  std::map<std::string, double> least_ns_;
-  std::vector<std::string> order_;
-};
-
 }  // namespace
 }  // namespace viwo
 
@@ -170,7 +137,7 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   viwo::register_all();
-  viwo::Reporter reporter;
+  viwo::testing::RatioReporter reporter(viwo::kReference, viwo::kPerSample);
   benchmark::RunSpecifiedBenchmarks(&reporter);
   reporter.print_ratios();
   return 0;

@@ -14,11 +14,13 @@ namespace {
 using namespace experiment;
 using testing::registry;
 
-/// A simulated swerve robot with wheels and IMU for ten seconds.
+/// A simulated swerve robot for ten seconds; images only make the epochs.
 RunSetup inertia_and_wheels() {
   const config::Node run = config::parse(
       "sensors:\n"
-      "  simulator0: {type: simulator, motion: circle, duration_s: 10, n_cameras: 0, "
+      "  simulator0: {type: simulator, motion: circle, duration_s: 10, features: 10, "
+      "cameras: " VIWO_TEST_SOURCE_DIR
+      "/configs/cameras/pinhole.yaml, "
       "robot: {type: four_wis_wid, " +
           testing::kSwerve +
           "}}\n"

@@ -186,7 +186,7 @@ TEST(Simulate, WritesALogThatPlaysBackToTheSameBits) {
   const auto direct = testing::run(simulated("icr_sweep"));
   RunSetup setup = read_run(simulated("icr_sweep"), registry());
   const auto written = write_log(setup, folder);
-  EXPECT_EQ(written.encoder_samples, 2001);
+  EXPECT_EQ(written.counts[Measurement(EncoderSample()).index()], 2001);
   auto replay = simulated("icr_sweep");
   replay.set("sensors",
              config::parse("wheels0: {type: asl_encoders, path: " + (folder / "wheels0").string() +

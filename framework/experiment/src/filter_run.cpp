@@ -9,6 +9,7 @@
 #include "held_gauge.hpp"
 #include "viwo/eval/consistency.hpp"
 #include "viwo/experiment/run.hpp"
+#include "viwo/filter/moving_start.hpp"
 #include "viwo/filter/standstill_start.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/random.hpp"
@@ -56,6 +57,27 @@ ImuPrior start_from_reference(const FilterSetup& setup, const StateSample& truth
   return prior;
 }
 
+/// From the motion of the first wheel set.
+void start_moving(Estimator& estimator, const FilterSetup& setup) {
+  if (setup.wheels.empty()) {
+    throw InputError("estimator.start: moving needs wheels - choose standstill or reference");
+  }
+  MovingStartOptions options;
+  options.window_s = setup.start.window_s;
+  options.noise = setup.options.filter.imu_noise;
+  options.gravity_m_per_s2 = setup.options.filter.gravity_m_per_s2;
+  options.sigma_position_m = setup.start.sigma_position_m;
+  options.sigma_yaw_rad = setup.start.sigma_orientation_rad;
+  options.sigma_gyro_bias_rad_per_s = setup.start.sigma_gyro_bias_rad_per_s;
+  options.sigma_accel_bias_m_per_s2 = setup.start.sigma_accel_bias_m_per_s2;
+  options.sigma_velocity_m_per_s = setup.start.sigma_velocity_m_per_s;
+  options.model = setup.wheels.front().model;
+  options.wheels = setup.wheels.front().prior;
+  estimator.start([options](auto imu, auto encoders) {
+    return start_from_motion(imu, encoders.front(), options);
+  });
+}
+
 void start(Estimator& estimator, const RunSetup& run, const RunData& data) {
   const FilterSetup& setup = *run.filter;
   switch (setup.start.mode) {
@@ -82,7 +104,8 @@ void start(Estimator& estimator, const RunSetup& run, const RunData& data) {
       return;
     }
     case StartMode::kMoving:
-      throw InputError("estimator.start: moving is not there yet");
+      start_moving(estimator, setup);
+      return;
   }
 }
 
@@ -158,7 +181,10 @@ class Recorder {
     return truth;
   }
 
+  /// (F-11).
   void add_nees(const Filter& filter, double t_s) {
+    // Only then is G that of the reference: else the two poses are not in one frame.
+    if (setup_.start.mode != StartMode::kReference) return;
     const auto truth = interpolate(truth_, filter.t_ns(), 0.2);
     if (!truth) return;
     const ImuView& imu = filter.imu();

@@ -126,6 +126,8 @@ RunData collect(RunSetup& setup) {
   if (data.samples.empty()) {
     config::fail(setup.sensors_mark, "no sensor of this run gave encoder samples");
   }
+  // States are those of the IMU: then it is the reference body.
+  if (!data.states.empty() && setup.O_in_I) setup.extrinsics = *setup.O_in_I;
   for (const StateSample& state : data.states) {
     data.reference.push_back(
         planar_pose(state.t_ns, state.p_IinG_m, quaternion(state.q_ItoG_xyzw)));

@@ -1,5 +1,6 @@
 // Reading a run configuration.
 #include <array>
+#include <cmath>
 
 #include "calibration_file.hpp"
 #include "viwo/config/params.hpp"
@@ -174,6 +175,13 @@ void read_options(const Node& run, RunSetup& setup, config::Errors& errors) {
   setup.resolved.set("evaluation", config::write_params(kEvaluationParams, e));
 }
 
+/// Pose of O in I, seen from above, as a wheel set's mount says.
+PlanarExtrinsics planar_mount(const WheelsView& wheels) {
+  const Eigen::Matrix3d R_OtoI = wheels.R_ItoO.transpose();
+  const Eigen::Vector3d p_OinI = -(R_OtoI * wheels.p_IinO);
+  return {p_OinI.x(), p_OinI.y(), std::atan2(R_OtoI(1, 0), R_OtoI(0, 0))};
+}
+
 }  // namespace
 
 RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed) {
@@ -198,6 +206,7 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
     // Read also when the wheels run alone: what is wrong in it is wrong.
     FilterSetup filter = read_filter(run, setup.model, setup.x_WI, setup.sigma, setup.seed, plugins,
                                      setup.resolved, errors);
+    if (!filter.wheels.empty()) setup.O_in_I = planar_mount(filter.wheels.front().prior.wheels);
     if (wants_filter(run)) setup.filter = std::move(filter);
   }
   read_sensors(run, plugins, setup, errors);

@@ -32,6 +32,7 @@ Covariance::Covariance(int size)
   order_.reserve(static_cast<std::size_t>(size));
   factor_index_.reserve(static_cast<std::size_t>(size));
   gates_.reserve(64);
+  runs_.reserve(static_cast<std::size_t>(size));
 }
 
 void Covariance::set_block(int first, const Eigen::MatrixXd& block) {
@@ -130,8 +131,17 @@ void Covariance::collect_columns(const FactorColumns& columns) {
     }
     start += block.count;
   }
+  const auto m = order_.size();
   for (int column = 0; column < size(); ++column) {
     if (!in_factor_[static_cast<std::size_t>(column)]) order_.push_back(column);
+  }
+  // Neighbours that are neighbours in the state, too; a run is of the factor or of the others.
+  runs_.clear();
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    if (i == 0 || i == m || order_[i] != order_[i - 1] + 1) {
+      runs_.push_back({static_cast<int>(i), order_[i], 0});
+    }
+    ++runs_.back().count;
   }
 }
 
@@ -172,8 +182,12 @@ FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd&
 
   auto Y = Y_.topLeftCorner(m, n);
   Y.leftCols(m) = C.transpose();
-  for (Index j = m; j < n; ++j) {
-    for (Index i = 0; i < m; ++i) Y(i, j) = P_(at(order_, i), at(order_, j));
+  for (const Run& rows : runs_) {
+    for (const Run& cols : runs_) {
+      if (rows.start >= m || cols.start < m) continue;
+      Y.block(rows.start, cols.start, rows.count, cols.count) =
+          P_.block(rows.column, cols.column, rows.count, cols.count);
+    }
   }
   auto Y_others = Y.rightCols(n - m);
   C.triangularView<Eigen::Lower>().solveInPlace(Y_others);
@@ -182,7 +196,9 @@ FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd&
   T.triangularView<Eigen::Lower>().solveInPlace(Z);
 
   // dx = P_:c (I + Lambda P_cc)^-1 eta = Z^T L^-1 C^T eta.
-  y = (C.transpose().triangularView<Eigen::Upper>() * y).eval();
+  auto product = G_.col(0).head(m);  // y cannot be both sides, and a temporary would be allocated
+  product.noalias() = C.transpose().triangularView<Eigen::Upper>() * y;
+  y = product;
   T.triangularView<Eigen::Lower>().solveInPlace(y);
   auto G = G_.topLeftCorner(n, n);
   G.triangularView<Eigen::Lower>().setZero();
@@ -190,16 +206,20 @@ FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd&
   // What the factor does not see directly: P_oo - Y_o^T Y_o + Z_o^T Z_o.
   auto G_others = G.bottomRightCorner(n - m, n - m);
   G_others.selfadjointView<Eigen::Lower>().rankUpdate(Y_others.transpose(), -1.);
-  for (Index j = 0; j < n; ++j) {
-    const int col = at(order_, j);
-    double correction = 0.;
-    for (Index i = 0; i < m; ++i) correction += Z(i, j) * y[i];
-    dx[col] = correction;
-    for (Index i = j; i < n; ++i) {
-      const int row = at(order_, i);
-      const double value = G(i, j) + (j >= m ? P_(row, col) : 0.);
-      P_(row, col) = value;
-      P_(col, row) = value;
+  auto correction = W_.col(0).head(n);
+  correction.noalias() = Z.transpose() * y;
+  G.triangularView<Eigen::StrictlyUpper>() = G.transpose();
+  // Back into the order of the state, run by run.
+  for (const Run& cols : runs_) {
+    dx.segment(cols.column, cols.count) = correction.segment(cols.start, cols.count);
+    for (const Run& rows : runs_) {
+      auto P_block = P_.block(rows.column, cols.column, rows.count, cols.count);
+      const auto G_block = G.block(rows.start, cols.start, rows.count, cols.count);
+      if (rows.start < m || cols.start < m) {
+        P_block = G_block;
+      } else {
+        P_block += G_block;
+      }
     }
   }
   return FactorResult::kApplied;

@@ -94,4 +94,53 @@ inline ResidualFactor observation(int column, const Eigen::VectorXd& residual, d
   return factor;
 }
 
+inline constexpr std::int64_t kPeriodNs = 100'000'000;
+// Three clones and the newest one.
+inline const FilterOptions kOptions = [] {
+  FilterOptions options;
+  options.clones = 3;
+  return options;
+}();
+inline constexpr int kClones = kImuSize;
+inline constexpr int kCameraExtrinsics = kClones + 4 * kPoseSize;
+inline constexpr int kCameraIntrinsics = kCameraExtrinsics + 6;
+inline constexpr int kWheelsExtrinsics = kCameraIntrinsics + 8;
+inline constexpr int kTimeOffset = kWheelsExtrinsics + 6;
+inline constexpr int kIntrinsics = kTimeOffset + 1;
+inline constexpr int kSize = kIntrinsics + 3;
+
+inline Filter make_filter(const FilterOptions& options = kOptions) {
+  return {options, {camera_prior()}, {wheels_prior()}};
+}
+
+/// Propagates by one period with random readings and clones.
+inline void step(Filter& filter, Random& random) {
+  const ImuSample samples[] = {imu_sample(filter.t_ns(), random),
+                               imu_sample(filter.t_ns() + kPeriodNs / 2, random),
+                               imu_sample(filter.t_ns() + kPeriodNs, random)};
+  filter.propagate(samples);
+  filter.clone(samples[2]);
+}
+
+/// A filter that has been started and has `clones` clones.
+inline Filter running_filter(Random& random, int clones, const FilterOptions& options = kOptions) {
+  Filter filter = make_filter(options);
+  filter.initialize(imu_prior(random));
+  for (int i = 0; i < clones; ++i) step(filter, random);
+  return filter;
+}
+
+/// A factor that looks at a bit of everything.
+inline ResidualFactor random_factor(Random& random) {
+  ResidualFactor factor;
+  factor.columns.add(0, kImuSize);
+  factor.columns.add(kClones, 2 * kPoseSize);
+  factor.columns.add(kCameraExtrinsics, kSize - kCameraExtrinsics);
+  factor.set_rows(5);
+  factor.H = random.matrix(5, factor.columns.size());
+  factor.residual = 0.05 * random.matrix(5, 1);
+  factor.R.setIdentity();
+  return factor;
+}
+
 }  // namespace viwo::testing

@@ -30,6 +30,7 @@ struct RunSetup {
   Intrinsics x_WI;                          ///< to run with: nominal, or from a calibration file
   Intrinsics sigma;  ///< how well they are known; 0 where the gauge holds an entry
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
+  std::optional<PlanarExtrinsics> O_in_I;  ///< of the section `wheels`: where states are reference
   std::vector<std::pair<std::string, Loaded<Sensor>>> sensors;
   PreintegrationOptions preintegration;
   double epoch_s = 0.1;

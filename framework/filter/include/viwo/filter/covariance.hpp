@@ -52,6 +52,12 @@ class Covariance {
   std::vector<int> order_;         // columns of P in this order
   std::vector<int> factor_index_;  // of the first of them, in the factor
   std::vector<bool> in_factor_;
+  struct Run {
+    int start;   ///< in order_
+    int column;  ///< in P
+    int count;
+  };
+  std::vector<Run> runs_;  // order_ in pieces that are contiguous in both
   Eigen::MatrixXd C_, T_, Y_, Z_, G_, W_;
   Eigen::VectorXd y_;
   struct Gate {

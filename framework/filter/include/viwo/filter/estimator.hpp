@@ -80,7 +80,7 @@ class Estimator {
 
   /// Stages of an epoch: "propagate", the updates, "marginalise".
   std::vector<std::string> stage_names() const;
-  /// Time that each stage of the last epoch took, ms.
+  /// CPU time of the thread that each stage of the last epoch took, ms.
   std::span<const double> stage_ms() const { return stage_ms_; }
 
  private:

@@ -1,0 +1,97 @@
+// Runs of the delivered configurations, whole or measurement by measurement.
+#pragma once
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "viwo/experiment/configuration.hpp"
+#include "viwo/experiment/experiment.hpp"
+#include "viwo/experiment/run.hpp"
+
+namespace viwo::testing {
+
+inline PluginRegistry& registry() {
+  static PluginRegistry plugins({VIWO_TEST_PLUGIN_DIR});
+  return plugins;
+}
+
+inline std::filesystem::path configuration(const std::string& name) {
+  return std::filesystem::path(VIWO_TEST_SOURCE_DIR) / "configs" / name;
+}
+
+/// A run of a delivered configuration, with assignments as --set would give them.
+inline experiment::RunSetup run_setup(const std::string& name,
+                                      const std::vector<std::string>& assignments,
+                                      std::uint64_t seed = 1) {
+  const auto run = experiment::load_run_configuration(configuration(name), assignments);
+  return experiment::read_run(experiment::resolve_placeholders(run), registry(), seed);
+}
+
+/// One variant of configs/experiments/paper_accuracy.yaml over the seeds 1 .. `seeds`.
+inline std::vector<experiment::RunResult> paper_runs(const std::string& variant, int seeds,
+                                                     std::vector<std::string> assignments) {
+  experiment::ExperimentOptions options;
+  options.seeds = seeds;
+  options.assignments = std::move(assignments);
+  auto setup =
+      experiment::read_experiment(configuration("experiments/paper_accuracy.yaml"), options);
+  std::erase_if(setup.variants, [&](const auto& v) { return v.name != variant; });
+  auto result = experiment::run_experiment(setup, options, registry(), {});
+  std::vector<experiment::RunResult> runs;
+  for (experiment::ExperimentRun& run : result.runs) runs.push_back(std::move(run.result));
+  return runs;
+}
+
+/// The estimator of a run that starts at the first true state.
+inline Estimator make_estimator(const experiment::RunSetup& run, const StateSample& truth) {
+  const experiment::FilterSetup& setup = *run.filter;
+  std::vector<WheelsPrior> wheels;
+  for (const auto& set : setup.wheels) wheels.push_back(set.prior);
+  std::vector<UpdateEntry> updates;
+  for (const auto& entry : setup.updates) {
+    updates.push_back({entry.name, entry.update.object, entry.wheels});
+  }
+  Estimator estimator(setup.options, setup.cameras, wheels, updates);
+  const auto& q = truth.q_ItoG_xyzw;
+  const auto vector = [](const std::array<double, 3>& v) { return Eigen::Vector3d(v.data()); };
+  ImuPrior prior;
+  prior.t_ns = truth.t_ns;
+  prior.state.R_GtoI = Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix().transpose();
+  prior.state.p_IinG = vector(truth.p_IinG_m);
+  prior.state.v_IinG = vector(truth.v_IinG_m_per_s);
+  prior.state.gyro_bias = vector(truth.gyro_bias_rad_per_s);
+  prior.state.accel_bias = vector(truth.accel_bias_m_per_s2);
+  const auto put = [&](int column, double sigma) {
+    prior.P.diagonal().segment<3>(column).setConstant(sigma * sigma);
+  };
+  put(kThetaColumn, setup.start.sigma_orientation_rad);
+  put(kPositionColumn, setup.start.sigma_position_m);
+  put(kVelocityColumn, setup.start.sigma_velocity_m_per_s);
+  put(kGyroBiasColumn, setup.start.sigma_gyro_bias_rad_per_s);
+  put(kAccelBiasColumn, setup.start.sigma_accel_bias_m_per_s2);
+  estimator.start(prior);
+  return estimator;
+}
+
+/// IMU samples, encoder samples and images of a run in the order of their stamps.
+inline std::vector<Measurement> in_time_order(const experiment::RunData& data) {
+  std::vector<Measurement> all;
+  for (const auto& sample : data.imu) all.emplace_back(sample);
+  for (const auto& sample : data.samples) all.emplace_back(sample);
+  for (const auto& image : data.images) all.emplace_back(image);
+  std::stable_sort(all.begin(), all.end(), [](const Measurement& a, const Measurement& b) {
+    return stamp_ns(a) < stamp_ns(b);
+  });
+  return all;
+}
+
+inline void add(Estimator& estimator, const Measurement& measurement) {
+  if (const auto* imu = std::get_if<ImuSample>(&measurement)) estimator.add(*imu);
+  if (const auto* image = std::get_if<FeatureSample>(&measurement)) estimator.add(*image);
+  if (const auto* encoder = std::get_if<EncoderSample>(&measurement)) estimator.add(*encoder, 0);
+}
+
+}  // namespace viwo::testing

@@ -1,0 +1,85 @@
+// An epoch of the whole filter does not touch the heap in the steady state.
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include <gtest/gtest.h>
+
+#include "filter_runs.hpp"
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+// Eigen allocates with malloc, not with operator new: count there. Sanitizers need malloc
+// themselves, glibc offers the original under this name.
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+constexpr bool kCountsMalloc = true;
+extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+#else
+constexpr bool kCountsMalloc = false;
+#endif
+
+namespace viwo {
+namespace {
+
+/// Allocations after the first `warm_up_s` of a run, and how many epochs there were then.
+struct Counted {
+  long allocations = 0;
+  std::int64_t epochs = 0;
+  std::int64_t applied = 0;
+};
+Counted count(const std::vector<std::string>& assignments, double warm_up_s) {
+  auto setup = testing::run_setup("runs/viwo_swerve.yaml", assignments);
+  const auto data = experiment::collect(setup);
+  const auto measurements = testing::in_time_order(data);
+  Estimator estimator = testing::make_estimator(setup, data.states.front());
+  Counted counted;
+  for (const Measurement& measurement : measurements) {
+    const bool warm =
+        seconds_between(stamp_ns(measurements.front()), stamp_ns(measurement)) > warm_up_s;
+    const long before = allocations;
+    testing::add(estimator, measurement);
+    while (estimator.step()) counted.epochs += warm ? 1 : 0;
+    if (warm) counted.allocations += allocations - before;
+  }
+  EXPECT_EQ(estimator.failure(), "");
+  EXPECT_EQ(estimator.filter().clones().size(), 11u);
+  counted.applied = estimator.counts().front().applied;
+  for (const UpdateCounts& counts : estimator.counts()) EXPECT_GT(counts.applied, 0);
+  return counted;
+}
+
+TEST(FilterAllocations, ThereAreNoneInTheSteadyStateWithVisionAndWheels) {
+  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  const Counted counted = count({"sensors.simulator0.duration_s=12"}, 4.);
+  EXPECT_EQ(counted.allocations, 0);
+  EXPECT_GT(counted.epochs, 70);
+  EXPECT_GT(counted.applied, 1000);
+}
+
+TEST(FilterAllocations, ThereAreNoneWithFewFeaturesAndOneCamera) {
+  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  const Counted counted =
+      count({"sensors.simulator0.duration_s=12", "sensors.simulator0.features=30",
+             "sensors.simulator0.n_cameras=1", "cameras.use=1"},
+            4.);
+  EXPECT_EQ(counted.allocations, 0);
+  EXPECT_GT(counted.epochs, 70);
+}
+
+TEST(FilterAllocations, CountingSeesAnAllocationOfEigen) {
+  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  const long before = allocations;
+  Eigen::MatrixXd matrix(50, 50);
+  matrix.setZero();
+  EXPECT_EQ(matrix.sum(), 0.);
+  EXPECT_GT(allocations - before, 0);
+}
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,88 @@
+// Is the covariance of the whole filter honest: simulated robot, real updates, many seeds.
+//
+// The errors of one run are correlated over its whole length (a wrong yaw stays wrong), so its mean
+// NEES is not that of many independent numbers, and its spread is not known beforehand. What is
+// independent is one instant over the seeds: the sum of NEES there is chi-square with 6 degrees of
+// freedom per seed, exactly. Several instants are tested, each with its share of the error
+// probability (Bonferroni), which holds whatever their correlation.
+#include <cmath>
+#include <sstream>
+
+#include <gtest/gtest.h>
+
+#include "filter_runs.hpp"
+#include "viwo/eval/consistency.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr int kSeeds = 8;
+constexpr double kErrorProbability = 0.001;
+const std::vector<double> kInstants{5., 10., 15., 19.5};
+const std::vector<std::string> kTwentySeconds{"sensors.simulator0.duration_s=20"};
+
+/// Empty when the pose is consistent at all instants, else what is not.
+std::string inconsistency(const std::vector<experiment::RunResult>& runs) {
+  std::ostringstream out;
+  const int n = static_cast<int>(runs.size());
+  const auto bounds =
+      eval::mean_nees_bounds(6, n, 1. - kErrorProbability / static_cast<double>(kInstants.size()));
+  for (const double instant : kInstants) {
+    double mean = 0.;
+    for (const auto& run : runs) {
+      const auto& series = run.nees.series;
+      const auto at = std::find_if(series.begin(), series.end(),
+                                   [&](const auto& entry) { return entry.first >= instant; });
+      if (at == series.end()) return "a run ended early: " + run.cause;
+      mean += at->second / n;
+    }
+    if (mean > bounds.low && mean < bounds.high) continue;
+    out << "at " << instant << " s: mean NEES " << mean << " outside of " << bounds.low << " .. "
+        << bounds.high << "\n";
+  }
+  return out.str();
+}
+
+std::vector<std::string> with(std::vector<std::string> more) {
+  more.insert(more.begin(), kTwentySeconds.begin(), kTwentySeconds.end());
+  return more;
+}
+
+TEST(FilterConsistency, PoseIsConsistentWhileAllOfTheCalibrationIsFound) {
+  EXPECT_EQ(inconsistency(testing::paper_runs("bad_init_calib_on", kSeeds, kTwentySeconds)), "");
+}
+
+TEST(FilterConsistency, PoseIsConsistentWithTheTrueCalibrationHeld) {
+  EXPECT_EQ(inconsistency(testing::paper_runs("true_init_calib_off", kSeeds, kTwentySeconds)), "");
+}
+
+TEST(FilterConsistency, CheckSeesPixelsThatAreTwiceAsNoisyAsTheFilterThinks) {
+  EXPECT_NE(inconsistency(testing::paper_runs("bad_init_calib_on", kSeeds,
+                                              with({"updates.visual_features.sigma_px=0.5"}))),
+            "");
+}
+
+TEST(FilterConsistency, CheckSeesAWrongSignOfTheExtrinsics) {
+  EXPECT_NE(inconsistency(testing::paper_runs("true_init_calib_off", kSeeds,
+                                              with({"wheels.p_IinO_m=[-0.05, -0.02, 0.15]"}))),
+            "");
+}
+
+TEST(FilterConsistency, SameSeedGivesTheSameBits) {
+  const std::vector<std::string> three_seconds{"sensors.simulator0.duration_s=3"};
+  const auto first = testing::paper_runs("bad_init_calib_on", 2, three_seconds);
+  const auto second = testing::paper_runs("bad_init_calib_on", 2, three_seconds);
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    ASSERT_GT(first[i].epochs, 20);
+    ASSERT_EQ(first[i].estimate.size(), second[i].estimate.size());
+    EXPECT_EQ(first[i].estimate.back().p_BinW, second[i].estimate.back().p_BinW);
+    EXPECT_EQ(first[i].nees.series, second[i].nees.series);
+    for (std::size_t k = 0; k < first[i].calibration.size(); ++k) {
+      EXPECT_EQ(first[i].calibration[k].estimate, second[i].calibration[k].estimate);
+    }
+  }
+  EXPECT_NE(first[0].estimate.back().p_BinW, first[1].estimate.back().p_BinW);
+}
+
+}  // namespace
+}  // namespace viwo
