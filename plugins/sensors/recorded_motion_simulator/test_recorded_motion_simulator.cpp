@@ -14,7 +14,8 @@ const std::string kCameras =
 /// A circle of 1 m radius at 0.2 rad/s, at 50 Hz for `duration_s`, tilted by 10 mrad about x and
 /// rising: what planar mode leaves out.
 std::filesystem::path write_circle(double duration_s) {
-  const auto file = std::filesystem::path(::testing::TempDir()) / "viwo_circle.csv";
+  const auto file = std::filesystem::path(::testing::TempDir()) /
+                    ("viwo_circle_" + std::to_string(::getpid()) + ".csv");
   std::ofstream out(file);
   out << "time;.header.seq;.header.stamp.secs;.header.stamp.nsecs;.header.frame_id;"
          ".pose.position.x;.pose.position.y;.pose.position.z;.pose.orientation.x;"

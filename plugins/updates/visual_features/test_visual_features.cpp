@@ -248,7 +248,7 @@ TEST(VisualFeatures, CountsBadDataAndGoesOn) {
 TEST(VisualFeatures, SurvivesNothingAtAllAndBrokenEstimates) {
   Random random(28);
   Scene scene = testing::make_scene({.n_clones = 5}, 30, random);
-  VisualFeatures update = update_with({});
+  VisualFeatures update = update_with({{"min_observations", std::int64_t{4}}});
   update.start(scene.setup());
   FactorSink sink = sink_for(scene);
   FilterView empty = scene.view(0);
@@ -272,7 +272,7 @@ TEST(VisualFeatures, SurvivesNothingAtAllAndBrokenEstimates) {
 }
 
 TEST(VisualFeatures, RefusesImpossibleConfigurations) {
-  EXPECT_THROW(update_with({{"min_distance_m", 70.}}), ParamError);
+  EXPECT_THROW(update_with({{"min_distance_m", 2000.}}), ParamError);
   Random random(29);
   const Scene scene = testing::make_scene({.n_clones = 5}, 0, random);
   VisualFeatures update = update_with({});

@@ -62,7 +62,8 @@ TEST_F(ParityInterval, HasTheGradientOfTheParityCostAndLeavesOutTheGauge) {
   // A tight prior: the factor is linearised at the estimate.
   filter_.P *= 1e-8;
   const auto update = testing::load_update(
-      "{type: wheel_parity, max_iterations: 1, second_order_noise: false, gate_probability: 0}");
+      "{type: wheel_parity, period_s: 0, max_iterations: 1, second_order_noise: false, "
+      "gate_probability: 0}");
   filter_.wheels.x_WI = sim::perturbed_intrinsics(model_->description(), 0.02, 4);
   FactorSink sink(1, 60);
   run(*update, filter_, sink);
@@ -112,19 +113,19 @@ TEST_F(ParityInterval, LandsWhereThePriorAndTheWheelsMeetAndNeverMovesTheGauge) 
 TEST_F(ParityInterval, GatesASlippingWheelButNotWrongIntrinsics) {
   filter_.wheels.x_WI = sim::perturbed_intrinsics(model_->description(), 1., 9);
   FactorSink sink(1, 60);
-  run(*testing::load_update("{type: wheel_parity}"), filter_, sink);
+  run(*testing::load_update("{type: wheel_parity, period_s: 0}"), filter_, sink);
   EXPECT_EQ(sink.applied(), 1);
   EXPECT_EQ(sink.rejected(), 0);
   for (std::size_t i = 110; i < 130; ++i) encoders_[i].drive_rad_per_s[2] *= 1.1;
   sink.clear();
-  run(*testing::load_update("{type: wheel_parity}"), filter_, sink);
+  run(*testing::load_update("{type: wheel_parity, period_s: 0}"), filter_, sink);
   EXPECT_EQ(sink.applied(), 0);
   EXPECT_EQ(sink.rejected(), 1);
   EXPECT_EQ(sink.information(), nullptr);
 }
 
 TEST_F(ParityInterval, DoesNotAllocateInTheSteadyState) {
-  const auto update = testing::load_update("{type: wheel_parity}");
+  const auto update = testing::load_update("{type: wheel_parity, period_s: 0}");
   filter_.wheels.x_WI = sim::perturbed_intrinsics(model_->description(), 1., 9);
   update->start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = &filter_.wheels});
   FactorSink sink(1, 60);
@@ -149,7 +150,7 @@ TEST_F(ParityInterval, DoesNotAllocateInTheSteadyState) {
 TEST(WheelParity, IsConsistentWithTheRelativePoseAndNotAsAPlainUpdateOrWithAWrongNoise) {
   const std::string odometry = "{type: wheel_odometry}";
   const auto result = testing::run_calibration(
-      {.updates = {odometry, "{type: wheel_parity}"}, .extrinsics = false});
+      {.updates = {odometry, "{type: wheel_parity, period_s: 0}"}, .extrinsics = false});
   // 99 % bounds of chi-square / dof for 12 seeds of 13.
   EXPECT_GT(result.nees_intrinsics, 0.73);
   EXPECT_LT(result.nees_intrinsics, 1.32);
@@ -160,13 +161,15 @@ TEST(WheelParity, IsConsistentWithTheRelativePoseAndNotAsAPlainUpdateOrWithAWron
   RecordProperty("microseconds", static_cast<int>(result.microseconds));
 
   const auto plain = testing::run_calibration(
-      {.updates = {odometry,
-                   "{type: wheel_parity, max_iterations: 1, second_order_noise: false, "
-                   "gate_probability: 0}"},
+      {.updates =
+           {odometry,
+            "{type: wheel_parity, period_s: 0, max_iterations: 1, second_order_noise: false, "
+            "gate_probability: 0}"},
        .extrinsics = false});
   EXPECT_GT(plain.nees_intrinsics, 2.);
   const auto wrong_noise = testing::run_calibration(
-      {.updates = {odometry, "{type: wheel_parity, noise_scale: 0.5, gate_probability: 0}"},
+      {.updates = {odometry,
+                   "{type: wheel_parity, period_s: 0, noise_scale: 0.5, gate_probability: 0}"},
        .extrinsics = false});
   EXPECT_GT(wrong_noise.nees_intrinsics, 2.);
 }

@@ -94,7 +94,8 @@ class WheelParity final : public Update {
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
     if (filter.wheels == nullptr || filter.clones.empty()) return;
-    const std::optional<EncoderInterval> interval = intervals_.next(filter, data, period_s_ - kPeriodSlackS);
+    const std::optional<EncoderInterval> interval =
+        intervals_.next(filter, data, period_s_ - kPeriodSlackS);
     if (!interval.has_value() || filter.wheels->intrinsics_column < 0) return;
     preintegrator_->model().require_channels(data.encoders.back(), "the wheel set");
     find_free(filter);

@@ -2,15 +2,16 @@
 // measurements do not allow it.
 #include <cmath>
 #include <memory>
+#include <random>
 #include <string>
 #include <vector>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
-#include "filter_fixture.hpp"
 #include "viwo/filter/moving_start.hpp"
 #include "viwo/math/chi2.hpp"
+#include "viwo/math/so3.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/imu_simulator.hpp"
@@ -22,7 +23,18 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using testing::Random;
+
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  VectorXd vector(Eigen::Index size) {
+    return VectorXd::NullaryExpr(size, [this] { return normal_(engine_); });
+  }
+
+ private:
+  std::mt19937_64 engine_;
+  std::normal_distribution<double> normal_;
+};
 
 /// Three omni wheels: every planar twist, A constant, the radii are the intrinsics.
 class OmniBase final : public KinematicModel {
@@ -100,9 +112,9 @@ constexpr std::int64_t kStartNs = 3'000'000'000;
 /// `error_scale`.
 Drive simulate(const sim::BodyTrajectory& trajectory, const MovingStartOptions& options,
                std::uint64_t seed, double duration_s, double error_scale = 1., bool noise = true) {
-  Random random(static_cast<unsigned>(seed));
+  Random random(seed);
   const WheelsPrior& prior = options.wheels;
-  const VectorXd draw = error_scale * random.matrix(7, 1);
+  const VectorXd draw = error_scale * random.vector(7);
   Drive drive;
   drive.mounting.R_ItoO =
       exp_so3(-prior.sigma_extrinsics.head<3>().cwiseProduct(draw.head<3>())) * prior.wheels.R_ItoO;
@@ -113,8 +125,8 @@ Drive simulate(const sim::BodyTrajectory& trajectory, const MovingStartOptions& 
   imu.start_ns = kStartNs;
   imu.noise = noise;
   imu.densities = options.noise;
-  imu.gyro_bias = error_scale * options.sigma_gyro_bias_rad_per_s * random.vector3();
-  imu.accel_bias = error_scale * options.sigma_accel_bias_m_per_s2 * random.vector3();
+  imu.gyro_bias = error_scale * options.sigma_gyro_bias_rad_per_s * random.vector(3);
+  imu.accel_bias = error_scale * options.sigma_accel_bias_m_per_s2 * random.vector(3);
   sim::SimulatedImu simulated = sim::simulate_imu(trajectory, drive.mounting, imu, seed);
   drive.imu = std::move(simulated.samples);
   drive.biases = std::move(simulated.biases);
