@@ -1,5 +1,5 @@
 // Online calibration over a minute of the icr_sweep: everything is found, and known as well as it
-// is claimed. Long: label nightly.
+// is claimed.
 #include <cmath>
 #include <map>
 

@@ -23,6 +23,12 @@ inline constexpr std::array kEstimatorParams{
               .type = ParamType::kBool,
               .fallback = "true",
               .help = "Jacobians at first estimates (FEJ), which keeps the filter consistent"},
+    ParamSpec{.name = "growing_window",
+              .type = ParamType::kBool,
+              .fallback = "true",
+              .help =
+                  "begin with three clones, one more every third epoch: for a start that may be "
+                  "wrong; false: for one that is right"},
     ParamSpec{.name = "gravity_m_per_s2",
               .type = ParamType::kNumber,
               .unit = "m/s^2",

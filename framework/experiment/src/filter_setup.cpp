@@ -48,6 +48,7 @@ void read_estimator(const ParamSet& p, FilterSetup& setup) {
   setup.options.filter.clones = static_cast<int>(p.integer("clones"));
   setup.options.filter.first_estimates = p.flag("first_estimates");
   setup.options.filter.gravity_m_per_s2 = p.number("gravity_m_per_s2");
+  setup.options.growing_window = p.flag("growing_window");
   setup.options.max_epoch_s = p.number("max_epoch_s");
   setup.options.max_wait_s = p.number("max_wait_s");
   setup.options.max_imu_gap_s = p.number("max_imu_gap_s");

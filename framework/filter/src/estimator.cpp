@@ -9,6 +9,8 @@ namespace viwo {
 namespace {
 
 constexpr int kMaxFactorsPerUpdate = 16;
+constexpr std::size_t kFirstWindow = 3;
+constexpr std::size_t kEpochsPerClone = 3;
 
 /// CPU time of this thread: what an epoch costs, however busy the machine is with other things.
 double thread_ms() {
@@ -309,6 +311,9 @@ bool Estimator::step() {
   data.end_ns = *t_ns;
   take_images(*t_ns);
   cut_imu(*t_ns);
+  if (options_.growing_window) {
+    filter_.limit_window(kFirstWindow + static_cast<std::size_t>(epochs_) / kEpochsPerClone);
+  }
   filter_.propagate(cut_);
   filter_.clone(cut_.back());
   data.imu = cut_;

@@ -198,6 +198,7 @@ TEST(Estimator, TellsUpdatesWhatTheStateLooksLike) {
 TEST(Estimator, DropsTheOldestCloneWhenTheWindowIsFull) {
   EstimatorOptions options;
   options.filter.clones = 3;
+  options.growing_window = false;
   Rig rig(false, {}, options);
   rig.imu(-10, 700);
   for (std::int64_t t = 100; t <= 600; t += 100) rig.image(t);
@@ -209,6 +210,22 @@ TEST(Estimator, DropsTheOldestCloneWhenTheWindowIsFull) {
     EXPECT_EQ(seen.clones.front(), kStart + (k < 4 ? 100 : 100 * (static_cast<int>(k) - 2)) * kMs);
   }
   EXPECT_EQ(rig.estimator.filter().clones().size(), 3u);
+}
+
+TEST(Estimator, BeginsWithThreeClonesAndAddsOneEveryThirdEpoch) {
+  EstimatorOptions options;
+  options.filter.clones = 5;
+  Rig rig(false, {}, options);
+  rig.imu(-10, 1600);
+  for (std::int64_t t = 100; t <= 1500; t += 100) rig.image(t);
+  ASSERT_EQ(rig.steps(), 15);
+  const std::vector<std::size_t> expected{1, 2, 3, 3, 4, 4, 4, 5, 5, 5, 6, 6, 6, 6, 6};
+  for (std::size_t k = 0; k < 15; ++k) {
+    const Seen& seen = rig.update->seen[k];
+    EXPECT_EQ(seen.clones.size(), expected[k]) << k;
+    EXPECT_EQ(seen.oldest_leaves, k >= 2 && expected[k] == std::min<std::size_t>(3 + k / 3, 6))
+        << k;
+  }
 }
 
 TEST(Estimator, FactorsOfOneCallAreOneJointUpdate) {

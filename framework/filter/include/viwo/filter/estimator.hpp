@@ -17,6 +17,11 @@ namespace viwo {
 
 struct EstimatorOptions {
   FilterOptions filter;
+  /// Begin with a window of three clones that grows by one every third epoch. Were the window full
+  /// before the first tracks are used, the IMU alone would have carried a start that is a little
+  /// wrong for more than a second, and tracks of near points would be linearised centimetres off.
+  /// A start that is right is better off with the whole window: short ones lose yaw for good.
+  bool growing_window = true;
   /// Without an image for this long an epoch is made without one.
   double max_epoch_s = 0.25;
   /// How long (in stamps) an epoch waits for encoder samples that reach its end.

@@ -2,7 +2,9 @@
 // nothing of cameras or wheels beyond where their errors stand in the state.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -63,7 +65,10 @@ class Filter {
   /// oldest clone first).
   void clone(const ImuSample& sample);
   void drop_oldest_clone();
-  bool window_full() const { return clones_.size() == slots_.size(); }
+  /// True when the oldest clone is to leave: as many exist as fit, or as the limit allows.
+  bool window_full() const { return clones_.size() >= std::min(slots_.size(), window_limit_); }
+  /// Makes the window shorter than there is room for; at least 2.
+  void limit_window(std::size_t clones) { window_limit_ = std::max<std::size_t>(clones, 2); }
 
   /// Applies a factor and corrects the estimate.
   FactorResult apply(const ResidualFactor& factor);
@@ -97,6 +102,7 @@ class Filter {
   ImuView imu_;
   std::vector<CloneView> clones_;  // oldest first
   std::vector<bool> slots_;        // taken
+  std::size_t window_limit_ = std::numeric_limits<std::size_t>::max();
   std::vector<CameraView> cameras_;
   std::vector<WheelsView> wheels_;
   Covariance covariance_;
