@@ -49,6 +49,9 @@ constexpr std::array kBaseParams{
               .fallback = "3", .min = 0.1, .max = 1000., .help = "of the waves of uneven ground"},
     ParamSpec{.name = "start_ns", .type = ParamType::kInt, .unit = "ns", .fallback = "0",
               .min = 0., .max = 4e18, .help = "stamp at which the motion starts"},
+    ParamSpec{.name = "wheel_set", .type = ParamType::kString, .fallback = "''",
+              .help = "for a second simulator, the wheel set (wheel_sets.NAME) that it stands for: "
+                      "its truth is told as NAME.r_1 and so on, true states are left to the first"},
     ParamSpec{.name = "wheels", .type = ParamType::kBool, .fallback = "true",
               .help = "whether there are encoder samples"},
     ParamSpec{.name = "wheel_rate_hz", .type = ParamType::kNumber, .unit = "Hz", .fallback = "100",
@@ -142,7 +145,16 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
   log::Recording<Measurement> out;
   out.samples =
       calibration_truth(description, x_WI, rig.mounting, params.number("t_OtoI_s"), start_ns);
+  const std::string& wheel_set = params.text("wheel_set");
+  for (Measurement& sample : out.samples) {
+    auto& truth = std::get<CalibrationSample>(sample);
+    if (!wheel_set.empty()) truth.name = wheel_set + "." + truth.name;
+  }
   auto from_rig = sim::simulate_rig(trajectory, rig, services.seed);
+  if (!wheel_set.empty()) {
+    std::erase_if(from_rig,
+                  [](const Measurement& m) { return std::holds_alternative<StateSample>(m); });
+  }
   std::move(from_rig.begin(), from_rig.end(), std::back_inserter(out.samples));
   if (params.flag("wheels")) {
     try {
