@@ -62,6 +62,32 @@ TEST_F(ExperimentFile, RunsEveryVariantWithEveryMotionAndSeedWhateverTheJobs) {
   EXPECT_TRUE(summary["variants"]["redundant"]["rpe"].contains("10"));
 }
 
+TEST(FilterExperiment, GivesTheSameBitsForAnyNumberOfJobsAndTwiceInARow) {
+  std::vector<ExperimentResult> results;
+  for (const int jobs : {1, 2, 2}) {
+    ExperimentOptions options;
+    options.jobs = jobs;
+    options.seeds = 2;
+    options.assignments = {"sensors.simulator0.duration_s=5"};
+    results.push_back(run_experiment(
+        read_experiment(VIWO_TEST_SOURCE_DIR "/configs/experiments/paper_accuracy.yaml", options),
+        options, registry(), {}));
+  }
+  for (std::size_t i = 0; i < results[0].runs.size(); ++i) {
+    const RunResult& first = results[0].runs[i].result;
+    ASSERT_EQ(first.status, RunStatus::kOk) << first.cause;
+    ASSERT_GT(first.calibration.size(), 20u);
+    for (const auto* other : {&results[1].runs[i].result, &results[2].runs[i].result}) {
+      EXPECT_EQ(first.estimate.back().p_BinW, other->estimate.back().p_BinW);
+      EXPECT_EQ(first.nees.pose, other->nees.pose);
+      for (std::size_t k = 0; k < first.calibration.size(); ++k) {
+        EXPECT_EQ(first.calibration[k].estimate, other->calibration[k].estimate);
+        EXPECT_EQ(first.calibration[k].sigma, other->calibration[k].sigma);
+      }
+    }
+  }
+}
+
 TEST_F(ExperimentFile, GivesEverySeedTheSameSensorsInEveryVariant) {
   ExperimentOptions options;
   const auto file = write(
