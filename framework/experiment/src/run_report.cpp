@@ -99,8 +99,14 @@ report::Document report_of(const RunSetup& setup, const RunResult& result) {
     }
   }
   document.sections.push_back({"Result", {facts}});
-  for (const std::string& line : describe_rejections(result)) {
-    document.sections.back().blocks.emplace_back(Paragraph{line, Paragraph::Tone::kWarning});
+  if (!result.rejections.empty()) {
+    Table table;
+    table.caption = "Not used";
+    table.columns = {{"count"}, {"source"}, {"reason"}, {"first"}};
+    for (const auto& [source, rejection] : result.rejections) {
+      table.rows.push_back({rejection.count, source, rejection.reason, rejection.first});
+    }
+    document.sections.back().blocks.emplace_back(std::move(table));
   }
   Plot top{"Trajectory, seen from above", "x [m]", "y [m]"};
   top.equal_axes = true;

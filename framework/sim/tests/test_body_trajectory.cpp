@@ -176,7 +176,8 @@ TEST(BodyTrajectory, TwistIsTheNumericalDerivativeOfThePoseSeenFromTheBase) {
 std::vector<PoseSample> poses_in_space(double noise_m) {
   std::mt19937_64 engine(3);
   std::uniform_real_distribution<double> step(0.002, 0.03);
-  std::normal_distribution<double> noise(0., noise_m);
+  std::normal_distribution<double> unit;
+  const auto noise = [&](auto& random) { return noise_m * unit(random); };
   std::vector<PoseSample> out;
   for (double t = 0.; t < 20.; t += step(engine)) {
     const Eigen::Quaterniond q(rotation_from_euler(0.7 * t, 0.2 * std::sin(t), 0.1 * std::cos(t)));
