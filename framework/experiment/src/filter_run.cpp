@@ -11,6 +11,7 @@
 #include "viwo/experiment/run.hpp"
 #include "viwo/filter/moving_start.hpp"
 #include "viwo/filter/standstill_start.hpp"
+#include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/random.hpp"
 
@@ -20,16 +21,13 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-Vector3d vector(const std::array<double, 3>& values) { return {values[0], values[1], values[2]}; }
-
 /// R_GtoI of a reference state.
 Matrix3d R_GtoI(const StateSample& state) {
-  const auto& q = state.q_ItoG_xyzw;
-  return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized().toRotationMatrix().transpose();
+  return to_quaternion(state.q_ItoG_xyzw).normalized().toRotationMatrix().transpose();
 }
 
 StampedPose pose_of(const StateSample& state) {
-  return {state.t_ns, vector(state.p_IinG_m), Eigen::Quaterniond(R_GtoI(state).transpose())};
+  return {state.t_ns, to_vector(state.p_IinG_m), Eigen::Quaterniond(R_GtoI(state).transpose())};
 }
 
 /// Start at the first state of the reference, off by draws from the prior if asked for.
@@ -47,22 +45,20 @@ ImuPrior start_from_reference(const FilterSetup& setup, const StateSample& truth
   };
   const Vector3d turn = place(kThetaColumn, start.sigma_orientation_rad);
   prior.state.R_GtoI = exp_so3(turn) * R_GtoI(truth);
-  prior.state.p_IinG = vector(truth.p_IinG_m) - place(kPositionColumn, start.sigma_position_m);
+  prior.state.p_IinG = to_vector(truth.p_IinG_m) - place(kPositionColumn, start.sigma_position_m);
   prior.state.v_IinG =
-      vector(truth.v_IinG_m_per_s) - place(kVelocityColumn, start.sigma_velocity_m_per_s);
-  prior.state.gyro_bias =
-      vector(truth.gyro_bias_rad_per_s) - place(kGyroBiasColumn, start.sigma_gyro_bias_rad_per_s);
-  prior.state.accel_bias =
-      vector(truth.accel_bias_m_per_s2) - place(kAccelBiasColumn, start.sigma_accel_bias_m_per_s2);
+      to_vector(truth.v_IinG_m_per_s) - place(kVelocityColumn, start.sigma_velocity_m_per_s);
+  prior.state.gyro_bias = to_vector(truth.gyro_bias_rad_per_s) -
+                          place(kGyroBiasColumn, start.sigma_gyro_bias_rad_per_s);
+  prior.state.accel_bias = to_vector(truth.accel_bias_m_per_s2) -
+                           place(kAccelBiasColumn, start.sigma_accel_bias_m_per_s2);
   return prior;
 }
 
-/// From the motion of the first wheel set.
-void start_moving(Estimator& estimator, const FilterSetup& setup) {
-  if (setup.wheels.empty()) {
-    throw InputError("estimator.start: moving needs wheels - choose standstill or reference");
-  }
-  MovingStartOptions options;
+/// What both ways to start without a reference are told.
+template <class Options>
+Options start_options(const FilterSetup& setup) {
+  Options options;
   options.window_s = setup.start.window_s;
   options.noise = setup.options.filter.imu_noise;
   options.gravity_m_per_s2 = setup.options.filter.gravity_m_per_s2;
@@ -70,6 +66,15 @@ void start_moving(Estimator& estimator, const FilterSetup& setup) {
   options.sigma_yaw_rad = setup.start.sigma_orientation_rad;
   options.sigma_gyro_bias_rad_per_s = setup.start.sigma_gyro_bias_rad_per_s;
   options.sigma_accel_bias_m_per_s2 = setup.start.sigma_accel_bias_m_per_s2;
+  return options;
+}
+
+/// From the motion of the first wheel set.
+void start_moving(Estimator& estimator, const FilterSetup& setup) {
+  if (setup.wheels.empty()) {
+    throw InputError("estimator.start: moving needs wheels - choose standstill or reference");
+  }
+  auto options = start_options<MovingStartOptions>(setup);
   options.sigma_velocity_m_per_s = setup.start.sigma_velocity_m_per_s;
   options.model = setup.wheels.front().model;
   options.wheels = setup.wheels.front().prior;
@@ -89,20 +94,11 @@ void start(Estimator& estimator, const RunSetup& run, const RunData& data) {
       }
       estimator.start(start_from_reference(setup, data.states.front(), run.seed));
       return;
-    case StartMode::kStandstill: {
-      StandstillOptions options;
-      options.window_s = setup.start.window_s;
-      options.noise = setup.options.filter.imu_noise;
-      options.gravity_m_per_s2 = setup.options.filter.gravity_m_per_s2;
-      options.sigma_position_m = setup.start.sigma_position_m;
-      options.sigma_yaw_rad = setup.start.sigma_orientation_rad;
-      options.sigma_gyro_bias_rad_per_s = setup.start.sigma_gyro_bias_rad_per_s;
-      options.sigma_accel_bias_m_per_s2 = setup.start.sigma_accel_bias_m_per_s2;
-      estimator.start([options](auto imu, auto encoders) {
+    case StartMode::kStandstill:
+      estimator.start([options = start_options<StandstillOptions>(setup)](auto imu, auto encoders) {
         return start_from_standstill(imu, encoders, options);
       });
       return;
-    }
     case StartMode::kMoving:
       start_moving(estimator, setup);
       return;

@@ -1,10 +1,12 @@
 #include "viwo/experiment/filter_setup.hpp"
 
 #include "filter_params.hpp"
+#include "section.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/log/kalibr.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/random.hpp"
 
 namespace viwo::experiment {
@@ -13,11 +15,6 @@ namespace {
 using config::Errors;
 using config::Node;
 using Eigen::Vector3d;
-
-Node section_or_empty(const Node& parent, const char* key) {
-  const Node* section = parent.find(key);
-  return section != nullptr ? *section : Node::empty_map(parent.mark());
-}
 
 /// The values of a section, resolved; nothing if something in it is wrong.
 std::optional<ParamSet> read_section(const Node& section, const std::string& path,
@@ -38,10 +35,6 @@ std::optional<Vector3d> three(const ParamSet& params, const char* key, const Nod
   errors.add(node != nullptr ? node->mark() : section.mark(),
              "wheels." + std::string(key) + " needs three numbers");
   return std::nullopt;
-}
-
-Eigen::Matrix3d from_rpy(const Vector3d& rpy) {
-  return exp_so3({0., 0., rpy[2]}) * exp_so3({0., rpy[1], 0.}) * exp_so3({rpy[0], 0., 0.});
 }
 
 void read_estimator(const ParamSet& p, FilterSetup& setup) {
@@ -123,7 +116,7 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double er
   set.sensor = p.text("sensor");
   WheelsPrior& prior = set.prior;
   prior.wheels.model = &set.model->model();
-  prior.wheels.R_ItoO = from_rpy(*rpy);
+  prior.wheels.R_ItoO = sim::rotation_from_euler(rpy->z(), rpy->y(), rpy->x());
   prior.wheels.p_IinO = *p_IinO;
   prior.wheels.t_OtoI_s = p.number("t_OtoI_s");
   prior.sigma_extrinsics << *sigma_R, *sigma_p;

@@ -9,6 +9,7 @@
 #include <Eigen/Dense>
 
 #include "viwo/eval/consistency.hpp"
+#include "viwo/math/arrays.hpp"
 #include "viwo/math/se2.hpp"
 
 namespace viwo::experiment {
@@ -26,10 +27,6 @@ const char* name(RunStatus status) {
 }
 
 namespace {
-
-Eigen::Quaterniond quaternion(const std::array<double, 4>& xyzw) {
-  return {xyzw[3], xyzw[0], xyzw[1], xyzw[2]};
-}
 
 StampedPose planar_pose(std::int64_t t_ns, const std::array<double, 3>& p,
                         const Eigen::Quaterniond& q) {
@@ -100,7 +97,7 @@ RunData collect(RunSetup& setup) {
         } else if (const auto* pose = std::get_if<PoseSample>(&measurement)) {
           claim(reference_name, name, "reference poses");
           data.reference.push_back(
-              planar_pose(pose->t_ns, pose->p_BinW_m, quaternion(pose->q_BtoW_xyzw)));
+              planar_pose(pose->t_ns, pose->p_BinW_m, to_quaternion(pose->q_BtoW_xyzw)));
         } else if (const auto* imu = std::get_if<ImuSample>(&measurement)) {
           claim(imu_name, name, "IMU samples");
           data.imu.push_back(*imu);
@@ -130,7 +127,7 @@ RunData collect(RunSetup& setup) {
   if (!data.states.empty() && setup.O_in_I) setup.extrinsics = *setup.O_in_I;
   for (const StateSample& state : data.states) {
     data.reference.push_back(
-        planar_pose(state.t_ns, state.p_IinG_m, quaternion(state.q_ItoG_xyzw)));
+        planar_pose(state.t_ns, state.p_IinG_m, to_quaternion(state.q_ItoG_xyzw)));
   }
   return data;
 }

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "calibration_file.hpp"
+#include "section.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/experiment/run.hpp"
 
@@ -80,12 +81,6 @@ constexpr std::array kEvaluationParams{
               .min_exclusive = true,
               .help = "longest gap of the reference that is interpolated over"},
 };
-
-/// The section `key`, or an empty one at the position of the whole.
-Node section_or_empty(const Node& run, const char* key) {
-  const Node* section = run.find(key);
-  return section != nullptr ? *section : Node::empty_map(run.mark());
-}
 
 void read_sensors(const Node& run, PluginRegistry& plugins, RunSetup& setup,
                   config::Errors& errors) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
@@ -106,8 +107,7 @@ void Filter::clone(const ImuSample& sample) {
   clone.column = kImuSize + kPoseSize * clone.slot;
   clone.R_GtoI = clone.R_GtoI_fej = imu_.R_GtoI;
   clone.p_IinG = clone.p_IinG_fej = imu_.p_IinG;
-  const auto& gyro = sample.gyro_rad_per_s;
-  clone.w_IinI = Eigen::Vector3d(gyro[0], gyro[1], gyro[2]) - imu_.gyro_bias;
+  clone.w_IinI = to_vector(sample.gyro_rad_per_s) - imu_.gyro_bias;
   clone.v_IinG = imu_.v_IinG;
   clones_.push_back(clone);
   covariance_.clone_pose(clone.column);

@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include "viwo/math/arrays.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/wheel/preintegration.hpp"
@@ -41,7 +42,6 @@ enum Offset : Eigen::Index {
 enum Output : Eigen::Index { kUp = 0, kVelocity = 3, kBias = 6, kGravity = 9, kOutputs = 10 };
 using Outputs = Eigen::Matrix<double, kOutputs, 1>;
 
-Vector3d vector(const std::array<double, 3>& values) { return {values[0], values[1], values[2]}; }
 double squared(double x) { return x * x; }
 
 class Window {
@@ -177,8 +177,8 @@ class Window {
     return options;
   }
   static std::int64_t to_ns(double seconds) { return std::llround(seconds * 1e9); }
-  Vector3d gyro(std::size_t i) const { return vector(imu_[i].gyro_rad_per_s); }
-  Vector3d accel(std::size_t i) const { return vector(imu_[i].accel_m_per_s2); }
+  Vector3d gyro(std::size_t i) const { return to_vector(imu_[i].gyro_rad_per_s); }
+  Vector3d accel(std::size_t i) const { return to_vector(imu_[i].accel_m_per_s2); }
 
   bool integrate(const VectorXd& offset) {
     const WheelsView& wheels = options_.wheels.wheels;

@@ -1,5 +1,6 @@
 #include "viwo/filter/propagation.hpp"
 
+#include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
@@ -7,8 +8,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-Vector3d vector(const std::array<double, 3>& values) { return {values[0], values[1], values[2]}; }
 
 /// One step between two samples, in an error state whose orientation error is in G
 /// (phi = R_ItoG dtheta): there the orientation's own transition is the identity (F-3, F-4).
@@ -65,10 +64,10 @@ struct Step {
 /// Moves the mean over one step (F-1, F-2) and describes the step for the errors.
 Step integrate(const ImuSample& from, const ImuSample& to, double gravity, ImuView& imu) {
   const double dt = seconds_between(from.t_ns, to.t_ns);
-  const Vector3d w0 = vector(from.gyro_rad_per_s) - imu.gyro_bias;
-  const Vector3d w1 = vector(to.gyro_rad_per_s) - imu.gyro_bias;
-  const Vector3d a0 = vector(from.accel_m_per_s2) - imu.accel_bias;
-  const Vector3d a1 = vector(to.accel_m_per_s2) - imu.accel_bias;
+  const Vector3d w0 = to_vector(from.gyro_rad_per_s) - imu.gyro_bias;
+  const Vector3d w1 = to_vector(to.gyro_rad_per_s) - imu.gyro_bias;
+  const Vector3d a0 = to_vector(from.accel_m_per_s2) - imu.accel_bias;
+  const Vector3d a1 = to_vector(to.accel_m_per_s2) - imu.accel_bias;
   // Fourth-order Magnus expansion for a rate that is linear in time.
   const Vector3d half_turn = dt * (0.375 * w0 + 0.125 * w1) + (dt * dt / 48.) * w0.cross(w1);
   const Vector3d turn = 0.5 * dt * (w0 + w1) + (dt * dt / 12.) * w0.cross(w1);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
@@ -9,8 +10,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-Vector3d vector(const std::array<double, 3>& values) { return {values[0], values[1], values[2]}; }
 
 struct Moments {
   Vector3d mean = Vector3d::Zero();
@@ -21,9 +20,9 @@ template <class Get>
 Moments moments(std::span<const ImuSample> samples, const Get& get) {
   Moments m;
   const double n = static_cast<double>(samples.size());
-  for (const ImuSample& sample : samples) m.mean += vector(get(sample)) / n;
+  for (const ImuSample& sample : samples) m.mean += to_vector(get(sample)) / n;
   for (const ImuSample& sample : samples) {
-    m.variance += (vector(get(sample)) - m.mean).squaredNorm() / (3. * (n - 1.));
+    m.variance += (to_vector(get(sample)) - m.mean).squaredNorm() / (3. * (n - 1.));
   }
   return m;
 }
