@@ -35,9 +35,12 @@ struct Geometry {
 
 }  // namespace
 
-Vector3d relative_pose(const MovingPose& first, const MovingPose& last, const Mount& mount) {
+Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last, const Mount& mount,
+                              Eigen::Vector2d* tilt) {
   const Geometry g(first, last, mount);
-  return {-log_so3(g.M).z(), g.d.x(), g.d.y()};  // (WO-5)
+  const Vector3d turn = -log_so3(g.M);
+  if (tilt != nullptr) *tilt = turn.head<2>();
+  return {turn.z(), g.d.x(), g.d.y()};  // (WO-5)
 }
 
 PoseJacobian relative_pose_jacobian(const MovingPose& first, const MovingPose& last,
@@ -72,10 +75,6 @@ Motion complete_motion(const Vector3d& g, const Eigen::Vector2d& tilt) {
   const Vector3d planar = log_se2(g);
   const Vector3d turn(tilt.x(), tilt.y(), planar[0]);
   return {exp_so3(-turn), right_jacobian_so3(-turn) * Vector3d(planar[1], planar[2], 0.)};
-}
-
-Eigen::Vector2d relative_tilt(const MovingPose& first, const MovingPose& last, const Mount& mount) {
-  return -log_so3(Geometry(first, last, mount).M).head<2>();
 }
 
 Eigen::Matrix<double, 3, 6> mount_jacobian(const Motion& motion, const Vector3d& p_IinO) {

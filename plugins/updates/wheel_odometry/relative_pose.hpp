@@ -32,8 +32,11 @@ inline constexpr int kTimeOffset = 18;
 inline constexpr int kGeometrySize = 19;
 using PoseJacobian = Eigen::Matrix<double, 3, kGeometrySize>;
 
-/// [yaw, x, y] of O at `last` in O at `first`: rad, m, m. Yaw in (-pi, pi).
-Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last, const Mount& mount);
+/// [yaw, x, y] of O at `last` in O at `first`: rad, m, m. Yaw in (-pi, pi). `tilt`, if not null,
+/// becomes [roll, pitch] that O turns by on the side: the first two entries of the rotation vector
+/// that yaw is the last one of.
+Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last, const Mount& mount,
+                              Eigen::Vector2d* tilt = nullptr);
 
 /// Its derivative by the errors of both poses (R = Exp(-dtheta) R_hat), of the mount, and by the
 /// time offset that moves both instants; rates and velocities are held.
@@ -49,9 +52,6 @@ struct Motion {
 /// The motion with constant twist that O made if the wheels measured g = [yaw, x, y] while O turned
 /// by `tilt` = [roll, pitch] (rad, in the axes of O) on the side; O moves along its own x-y plane.
 Motion complete_motion(const Eigen::Vector3d& g, const Eigen::Vector2d& tilt);
-
-/// [roll, pitch] that O turns by from `first` to `last`, as a rotation vector's first two entries.
-Eigen::Vector2d relative_tilt(const MovingPose& first, const MovingPose& last, const Mount& mount);
 
 /// The columns of the mount in relative_pose_jacobian(), for a given motion of O.
 Eigen::Matrix<double, 3, 6> mount_jacobian(const Motion& motion, const Eigen::Vector3d& p_IinO);

@@ -169,9 +169,10 @@ class WheelOdometry final : public Update {
 
   /// (WO-8): residual and Jacobian at at_, and the noise of pose_.
   void linearise() {
-    const Eigen::Vector2d tilt = relative_tilt(at_.first, at_.last, at_.mount);
-    residual_ = pose_.g - relative_pose(at_.first, at_.last, at_.mount);
-    residual_.tail<2>() += complete_motion(pose_.g, tilt).d.head<2>() - pose_.g.tail<2>();
+    Eigen::Vector2d tilt;
+    residual_ = pose_.g - relative_pose(at_.first, at_.last, at_.mount, &tilt);
+    const Motion motion = complete_motion(pose_.g, tilt);
+    residual_.tail<2>() += motion.d.head<2>() - pose_.g.tail<2>();
     residual_[0] = std::remainder(residual_[0], 2. * M_PI);
     MovingPose first = first_fej_;
     MovingPose last = last_fej_;
@@ -181,8 +182,7 @@ class WheelOdometry final : public Update {
     // What the mount shows is proportional to the motion. Taken at the noisy first estimates it
     // would count their noise as motion, and so as information: it is taken at the motion that the
     // wheels measured, with the tilt of the iterate (WO-12).
-    geometry_jacobian_.middleCols<6>(kMountTheta) =
-        mount_jacobian(complete_motion(pose_.g, tilt), at_.mount.p_IinO);
+    geometry_jacobian_.middleCols<6>(kMountTheta) = mount_jacobian(motion, at_.mount.p_IinO);
     geometry_jacobian_.col(kTimeOffset) = g_rate_;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "viwo/api/params.hpp"
+#include "wheel_params.hpp"
 
 namespace viwo::wheel_odometry {
 
@@ -14,12 +15,7 @@ inline constexpr std::array kParams{
               .choices = "plain|noise_weighted",
               .help = "least squares of the wheel rows: plain, or weighted by their noise (then "
                       "independent of the parity residual)"},
-    ParamSpec{.name = "gate_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0.001",
-              .min = 0.,
-              .max = 0.5,
-              .help = "intervals less likely than this are left out; 0: none"},
+    kIntervalGateParam,
     ParamSpec{.name = "sample_gate_probability",
               .type = ParamType::kNumber,
               .fallback = "0",
@@ -67,10 +63,7 @@ inline constexpr std::array kParams{
               .min = 1,
               .max = 20,
               .help = "linearisations per interval at most; 1: a plain EKF update"},
-    ParamSpec{.name = "second_order_noise",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "adds what the linearisation leaves out, as far as the prior is uncertain"},
+    kSecondOrderNoiseParam,
     ParamSpec{.name = "max_bridged_s",
               .type = ParamType::kNumber,
               .unit = "s",

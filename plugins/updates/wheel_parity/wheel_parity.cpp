@@ -12,17 +12,13 @@
 #include "encoder_intervals.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/chi2.hpp"
+#include "wheel_params.hpp"
 
 namespace viwo {
 namespace {
 
 constexpr std::array kParams{
-    ParamSpec{.name = "gate_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0.001",
-              .min = 0.,
-              .max = 0.5,
-              .help = "intervals less likely than this are left out; 0: none"},
+    kIntervalGateParam,
     ParamSpec{.name = "sample_gate_probability",
               .type = ParamType::kNumber,
               .fallback = "0",
@@ -50,10 +46,7 @@ constexpr std::array kParams{
               .min = 1,
               .max = 20,
               .help = "linearisations per interval at most; 1: a plain EKF update"},
-    ParamSpec{.name = "second_order_noise",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "adds what the linearisation leaves out, as far as the prior is uncertain"},
+    kSecondOrderNoiseParam,
 };
 
 using Square = IntrinsicMatrix;
