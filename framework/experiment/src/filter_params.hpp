@@ -226,6 +226,11 @@ inline constexpr std::array kWheelsParams{
               .fallback = "0.01",
               .min = 0.,
               .help = "prior of t_OtoI"},
+    ParamSpec{.name = "hold_gauge",
+              .type = ParamType::kBool,
+              .fallback = "true",
+              .help = "hold the intrinsics that place O on the base; false leaves three directions "
+                      "unobservable, to be looked at (viwo observability)"},
     ParamSpec{.name = "calibrate_intrinsics",
               .type = ParamType::kBool,
               .fallback = "true",

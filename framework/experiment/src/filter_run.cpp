@@ -126,8 +126,10 @@ class Recorder {
     const double t_s = seconds_between(begin_ns_, filter.t_ns());
     result_.estimate.push_back(
         {filter.t_ns(), imu.p_IinG, Eigen::Quaterniond(imu.R_GtoI.transpose())});
-    add_nees(filter, t_s);
-    add_calibration(filter, t_s);
+    result_.epoch_t_s.push_back(t_s);
+    add_error(filter, t_s);
+    add_calibration(filter);
+    add_counts(estimator);
     const auto stages = estimator.stage_ms();
     stage_ms_.resize(stages.size());
     for (std::size_t i = 0; i < stages.size(); ++i) stage_ms_[i].push_back(stages[i]);
@@ -142,9 +144,6 @@ class Recorder {
     std::vector<double> total;
     for (const auto& [t_s, ms] : result_.epoch_ms) total.push_back(ms);
     result_.total_ms = stage_time(total);
-    for (std::size_t i = 0; i < estimator.updates().size(); ++i) {
-      result_.updates.emplace_back(estimator.updates()[i].name, estimator.counts()[i]);
-    }
     for (const RejectionCount& rejection : estimator.rejections()) {
       result_.rejections.emplace_back("estimator", rejection);
     }
@@ -178,7 +177,7 @@ class Recorder {
   }
 
   /// (F-11).
-  void add_nees(const Filter& filter, double t_s) {
+  void add_error(const Filter& filter, double t_s) {
     // Only then is G that of the reference: else the two poses are not in one frame.
     if (setup_.start.mode != StartMode::kReference) return;
     const auto truth = interpolate(truth_, filter.t_ns(), 0.2);
@@ -189,6 +188,15 @@ class Recorder {
         -log_so3(truth->q_BtoW.toRotationMatrix().transpose() * imu.R_GtoI.transpose());
     error.tail<3>() = truth->p_BinW - imu.p_IinG;
     const auto& P = filter.covariance();
+    const Vector3d up_in_I = imu.R_GtoI.col(2);
+    PoseError sample;
+    sample.t_s = t_s;
+    sample.position_m = -error.tail<3>();
+    sample.position_sigma_m = P.diagonal().segment<3>(3).cwiseSqrt();
+    // R_GtoI = Exp(-dtheta) R_GtoI_hat: the true body is turned by dtheta further, in I.
+    sample.yaw_rad = -up_in_I.dot(error.head<3>());
+    sample.yaw_sigma_rad = std::sqrt(up_in_I.dot(P.topLeftCorner<3, 3>() * up_in_I));
+    result_.errors.push_back(sample);
     const double pose = eval::nees(error, P.topLeftCorner<6, 6>());
     if (!std::isfinite(pose)) return;
     sum_pose_ += pose;
@@ -198,8 +206,22 @@ class Recorder {
     result_.nees.series.emplace_back(t_s, pose);
   }
 
-  void add_calibration(const Filter& filter, double t_s) {
-    result_.calibration_t_s.push_back(t_s);
+  void add_counts(const Estimator& estimator) {
+    if (result_.updates.empty()) {
+      for (const UpdateEntry& entry : estimator.updates()) {
+        result_.updates.push_back({entry.name, {}, {}, {}});
+      }
+    }
+    for (std::size_t i = 0; i < result_.updates.size(); ++i) {
+      UpdateTrack& track = result_.updates[i];
+      const UpdateCounts& total = estimator.counts()[i];
+      track.applied.push_back(static_cast<int>(total.applied - track.total.applied));
+      track.rejected.push_back(static_cast<int>(total.rejected - track.total.rejected));
+      track.total = total;
+    }
+  }
+
+  void add_calibration(const Filter& filter) {
     auto track = result_.calibration.begin();
     for (std::size_t k = 0; k < setup_.wheels.size(); ++k) {
       const WheelsView& wheels = filter.wheels()[k];

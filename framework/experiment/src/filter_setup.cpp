@@ -121,6 +121,12 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double er
   prior.wheels.t_OtoI_s = p.number("t_OtoI_s");
   prior.sigma_extrinsics << *sigma_R, *sigma_p;
   prior.sigma_time_offset_s = p.number("sigma_t_OtoI_s");
+  if (!p.flag("hold_gauge")) {
+    for (Eigen::Index i = 0; i < prior.sigma_intrinsics.size(); ++i) {
+      const IntrinsicSpec& spec = set.model->description().intrinsics[static_cast<std::size_t>(i)];
+      if (spec.gauge_fixed) prior.sigma_intrinsics[i] = spec.prior_sigma;
+    }
+  }
 
   // A start that is wrong is wrong in the same way whether it is then calibrated or not.
   sim::RandomStream random(seed, sim::Stream::kCalibrationError, setup.wheels.size());

@@ -254,7 +254,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   result.total_ms = stage_time(spent_ms);
   result.stages = {{"preintegration", result.total_ms}};
   // Nothing is estimated while running here: the same at the start and at the end.
-  result.calibration_t_s = {0., result.duration_s};
+  result.epoch_t_s = {0., result.duration_s};
   for (int i = 0; i < setup.model->n_intrinsics(); ++i) {
     CalibrationTrack track;
     track.name = setup.model->description().intrinsics[static_cast<std::size_t>(i)].name;

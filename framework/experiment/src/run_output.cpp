@@ -26,9 +26,9 @@ std::string calibration_csv(const RunResult& result) {
   std::ostringstream csv;
   csv.precision(17);
   csv << "time_s,name,estimate,sigma,truth\n";
-  for (std::size_t k = 0; k < result.calibration_t_s.size(); ++k) {
+  for (std::size_t k = 0; k < result.epoch_t_s.size(); ++k) {
     for (const CalibrationTrack& track : result.calibration) {
-      csv << result.calibration_t_s[k] << ',' << track.name << ',' << track.estimate[k] << ','
+      csv << result.epoch_t_s[k] << ',' << track.name << ',' << track.estimate[k] << ','
           << track.sigma[k] << ',';
       if (std::isfinite(track.truth)) csv << track.truth;
       csv << '\n';
@@ -85,8 +85,8 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
         {{"reason", rejection.reason}, {"count", rejection.count}, {"first", rejection.first}});
   }
   json updates = json::object();
-  for (const auto& [update, counts] : result.updates) {
-    updates[update] = {{"applied", counts.applied}, {"rejected", counts.rejected}};
+  for (const UpdateTrack& update : result.updates) {
+    updates[update.name] = {{"applied", update.total.applied}, {"rejected", update.total.rejected}};
   }
   json timing = json::object();
   for (const auto& [stage, time] : result.stages) timing[stage] = stage_json(time);
@@ -144,9 +144,9 @@ std::string describe(const RunResult& result) {
     describe_odometry(result.total, out);
   } else {
     out << result.epochs << " epochs";
-    for (const auto& [update, counts] : result.updates) {
-      out << "; " << update << " " << counts.applied;
-      if (counts.rejected > 0) out << " (" << counts.rejected << " rejected)";
+    for (const UpdateTrack& update : result.updates) {
+      out << "; " << update.name << " " << update.total.applied;
+      if (update.total.rejected > 0) out << " (" << update.total.rejected << " rejected)";
     }
   }
   if (result.wall_s > 0.) {

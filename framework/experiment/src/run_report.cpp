@@ -18,14 +18,14 @@ report::Plot calibration_plot(const RunResult& result, const CalibrationTrack& t
   const std::size_t n = track.estimate.size();
   const std::size_t step = std::max<std::size_t>(1, n / 300);
   for (std::size_t i = 0; i < n; i += step) {
-    estimate.x.push_back(result.calibration_t_s[i]);
+    estimate.x.push_back(result.epoch_t_s[i]);
     estimate.y.push_back(track.estimate[i]);
     estimate.y_low.push_back(track.estimate[i] - 3. * track.sigma[i]);
     estimate.y_high.push_back(track.estimate[i] + 3. * track.sigma[i]);
   }
   plot.series.push_back(estimate);
   if (std::isfinite(track.truth)) {
-    truth.x = {result.calibration_t_s.front(), result.calibration_t_s.back()};
+    truth.x = {result.epoch_t_s.front(), result.epoch_t_s.back()};
     truth.y = {track.truth, track.truth};
     plot.series.push_back(truth);
   }
@@ -38,8 +38,8 @@ void add_filter_sections(const RunResult& result, report::Document& document) {
   Table updates;
   updates.caption = "Updates";
   updates.columns = {{"update"}, {"applied"}, {"rejected"}};
-  for (const auto& [name, counts] : result.updates) {
-    updates.rows.push_back({name, counts.applied, counts.rejected});
+  for (const UpdateTrack& update : result.updates) {
+    updates.rows.push_back({update.name, update.total.applied, update.total.rejected});
   }
   document.sections[0].blocks.emplace_back(updates);
   if (!result.nees.series.empty()) {

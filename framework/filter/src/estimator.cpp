@@ -266,11 +266,13 @@ void Estimator::run_update(std::size_t index, const EpochData& data) {
   bool has_moved = false;
   for (const ResidualFactor& factor : sink_.residuals()) {
     const ResidualFactor* next = &factor;
-    if (has_moved) {
+    if (has_moved || options_.frozen) {
       residual_factor_ = factor;
-      take_off(moved_, residual_factor_);
+      if (has_moved) take_off(moved_, residual_factor_);
+      if (options_.frozen) residual_factor_.residual.setZero();
       next = &residual_factor_;
     }
+    if (observer_ != nullptr) observer_->on_factor(filter_, entry, *next);
     const bool applied = filter_.apply(*next) == FactorResult::kApplied;
     ++(applied ? counts.applied : counts.rejected);
     if (!applied) continue;
@@ -279,11 +281,13 @@ void Estimator::run_update(std::size_t index, const EpochData& data) {
     moved_ += filter_.correction();
   }
   if (const InformationFactor* information = sink_.information()) {
-    if (has_moved) {
+    if (has_moved || options_.frozen) {
       information_factor_ = *information;
-      take_off(moved_, information_factor_);
+      if (has_moved) take_off(moved_, information_factor_);
+      if (options_.frozen) information_factor_.eta.setZero();
       information = &information_factor_;
     }
+    if (observer_ != nullptr) observer_->on_factor(filter_, entry, *information);
     if (filter_.apply(*information) == FactorResult::kRejected) {
       reject((entry.name + ": information that is not finite or empty").c_str(), filter_.t_ns());
     }
@@ -314,8 +318,9 @@ bool Estimator::step() {
   if (options_.growing_window) {
     filter_.limit_window(kFirstWindow + static_cast<std::size_t>(epochs_) / kEpochsPerClone);
   }
-  filter_.propagate(cut_);
+  const ImuTransition transition = filter_.propagate(cut_);
   filter_.clone(cut_.back());
+  if (observer_ != nullptr) observer_->on_clone(filter_, transition.Phi);
   data.imu = cut_;
   data.features = {images_.data(), n_images_};
   stage_done(stage_ms_.front());

@@ -85,16 +85,18 @@ void Filter::initialize(const ImuPrior& prior) {
   covariance_.set_block(0, prior.P);
 }
 
-void Filter::propagate(std::span<const ImuSample> samples) {
-  if (samples.empty()) return;
+ImuTransition Filter::propagate(std::span<const ImuSample> samples) {
+  if (samples.empty()) return {ImuMatrix::Identity(), ImuMatrix::Zero()};
   if (!options_.first_estimates) {
     imu_.R_GtoI_fej = imu_.R_GtoI;
     imu_.p_IinG_fej = imu_.p_IinG;
     imu_.v_IinG_fej = imu_.v_IinG;
   }
-  covariance_.propagate(
-      viwo::propagate(samples, options_.imu_noise, options_.gravity_m_per_s2, imu_));
+  const ImuTransition transition =
+      viwo::propagate(samples, options_.imu_noise, options_.gravity_m_per_s2, imu_);
+  covariance_.propagate(transition);
   t_ns_ = samples.back().t_ns;
+  return transition;
 }
 
 void Filter::clone(const ImuSample& sample) {

@@ -79,7 +79,7 @@ const char* name(RunStatus status);
 /// One calibration parameter over a run.
 struct CalibrationTrack {
   std::string name;
-  std::vector<double> estimate;  ///< at RunResult::calibration_t_s
+  std::vector<double> estimate;  ///< at RunResult::epoch_t_s
   std::vector<double> sigma;
   /// In the gauge that the estimate holds; NaN: not known.
   double truth = std::numeric_limits<double>::quiet_NaN();
@@ -93,6 +93,41 @@ struct PoseNees {
   double position = std::numeric_limits<double>::quiet_NaN();     ///< 3
   double orientation = std::numeric_limits<double>::quiet_NaN();  ///< 3
   std::vector<std::pair<double, double>> series;                  ///< time [s], pose
+};
+
+/// Error of the filter's estimate at an epoch, with its own sigmas.
+struct PoseError {
+  double t_s = 0.;
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< estimate - truth, in G
+  Eigen::Vector3d position_sigma_m = Eigen::Vector3d::Zero();
+  double yaw_rad = 0.;  ///< estimate - truth, about the vertical
+  double yaw_sigma_rad = 0.;
+};
+
+/// What became of the factors of one update.
+struct UpdateTrack {
+  std::string name;
+  UpdateCounts total;
+  std::vector<int> applied;   ///< in each epoch, at RunResult::epoch_t_s
+  std::vector<int> rejected;  ///< likewise: by a gate, or not finite
+};
+
+/// Something that the estimator has to tell its user while it runs.
+struct MonitorWarning {
+  double t_s = 0.;
+  std::string text;                     ///< "no yaw rate for 5 s: ... - turn"
+  std::vector<std::string> parameters;  ///< which of the calibration it concerns
+};
+
+/// What the recent motion told about the calibration, now and then.
+struct MonitorTrack {
+  std::vector<double> t_s;
+  std::vector<std::string> parameters;
+  /// For each parameter over time: the sigma that the window alone would leave of the prior sigma,
+  /// 1: nothing was learned.
+  std::vector<std::vector<double>> sigma_ratio;
+  std::vector<int> held;  ///< over time: how many directions are held
+  std::vector<MonitorWarning> warnings;
 };
 
 struct RunResult {
@@ -114,9 +149,11 @@ struct RunResult {
 
   // Of the filter.
   PoseNees nees;
-  std::vector<double> calibration_t_s;
+  std::vector<PoseError> errors;  ///< where the reference is in the frame of the estimate
+  std::vector<double> epoch_t_s;
   std::vector<CalibrationTrack> calibration;
-  std::vector<std::pair<std::string, UpdateCounts>> updates;
+  std::vector<UpdateTrack> updates;
+  MonitorTrack monitor;
 };
 
 /// Integrates the wheels from the first to the last common instant, starting at the reference pose

@@ -28,6 +28,9 @@ struct EstimatorOptions {
   double max_wait_s = 0.2;
   /// Longer spacings of the IMU are counted.
   double max_imu_gap_s = 0.05;
+  /// Residuals are taken as zero: the estimate is only propagated, its covariance is that of a
+  /// filter. For analyses along a motion that is known.
+  bool frozen = false;
 };
 
 /// An update as the estimator runs it. For kind kWheels: `wheels` is the index of its wheel set.
@@ -50,6 +53,19 @@ class UpdateFailure : public std::runtime_error {
       : std::runtime_error("update '" + update + "' failed: " + text) {}
 };
 
+/// Watches an estimator at work; called from step(), in this order.
+class EstimatorObserver {
+ public:
+  virtual ~EstimatorObserver() = default;
+  /// The inertial state has moved by `Phi` and its newest clone exists.
+  virtual void on_clone(const Filter& /*filter*/, const ImuMatrix& /*Phi*/) {}
+  /// Before a factor of an update is applied.
+  virtual void on_factor(const Filter& /*filter*/, const UpdateEntry& /*update*/,
+                         const ResidualFactor& /*factor*/) {}
+  virtual void on_factor(const Filter& /*filter*/, const UpdateEntry& /*update*/,
+                         const InformationFactor& /*factor*/) {}
+};
+
 /// Finds a state to start from, given everything that was measured so far. Nothing: not yet.
 using Initializer = std::function<std::optional<ImuPrior>(
     std::span<const ImuSample> imu, std::span<const std::vector<EncoderSample>> encoders)>;
@@ -63,6 +79,9 @@ class Estimator {
   /// Where to start: a state, or a way to find one.
   void start(const ImuPrior& prior);
   void start(Initializer initializer) { initializer_ = std::move(initializer); }
+
+  /// Whom to tell what happens; nullptr: nobody. It must outlive the calls of step().
+  void observe(EstimatorObserver* observer) { observer_ = observer; }
 
   /// Measurements of one kind must come in time order; others are counted and dropped, as are
   /// values that are not finite and images before the start.
@@ -109,6 +128,7 @@ class Estimator {
   ResidualFactor residual_factor_;
   InformationFactor information_factor_;
   Initializer initializer_;
+  EstimatorObserver* observer_ = nullptr;
 
   std::vector<ImuSample> imu_;                        // from the last epoch on
   std::vector<std::vector<EncoderSample>> encoders_;  // from the oldest clone on, per wheel set

@@ -59,8 +59,9 @@ class Filter {
   void initialize(const ImuPrior& prior);
   bool initialized() const { return t_ns_ != kNever; }
 
-  /// Moves the inertial state to the stamp of the last sample; the first one is at t_ns().
-  void propagate(std::span<const ImuSample> samples);
+  /// Moves the inertial state to the stamp of the last sample; the first one is at t_ns(). Returns
+  /// the transition (identity, without noise, for no samples).
+  ImuTransition propagate(std::span<const ImuSample> samples);
   /// Appends the present pose; `sample` is the IMU reading at t_ns(). There must be room (drop the
   /// oldest clone first).
   void clone(const ImuSample& sample);
