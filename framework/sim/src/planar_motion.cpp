@@ -60,6 +60,11 @@ const std::vector<PlanarMotion::Entry>& PlanarMotion::entries() {
          return (1. + 0.5 * wave(kDirectionHz, t)) *
                 Twist(o.speed_m_per_s, 0., o.yaw_rate_rad_per_s);
        }},
+      {"pivot",
+       [](double t, const MotionOptions& o) -> Twist {
+         return o.yaw_rate_rad_per_s * (1. + 0.5 * wave(kDirectionHz, t)) *
+                Twist(o.pivot_m.y(), -o.pivot_m.x(), 1.);
+       }},
   };
   return kEntries;
 }

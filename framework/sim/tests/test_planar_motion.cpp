@@ -168,6 +168,18 @@ TEST(PoseIntegrator, GivesTheSamePoseInOneCallOrMany) {
   EXPECT_THROW(integrator.advance_to(29.), std::logic_error);
 }
 
+TEST(PlanarMotion, ThePivotDoesNotMove) {
+  MotionOptions options = kNoRamp;
+  options.pivot_m = {0.1125, -0.07};
+  const PlanarMotion motion("pivot", options);
+  for (const double t : {0., 1.7, 4.2}) {
+    const Twist xi = motion.twist(t);
+    EXPECT_GT(xi.z(), 0.2);
+    EXPECT_NEAR(xi.x() - options.pivot_m.y() * xi.z(), 0., 1e-15);
+    EXPECT_NEAR(xi.y() + options.pivot_m.x() * xi.z(), 0., 1e-15);
+  }
+}
+
 TEST(PlanarMotion, UnknownNamesAreRefusedWithTheKnownOnes) {
   try {
     PlanarMotion("sideways");
@@ -175,7 +187,7 @@ TEST(PlanarMotion, UnknownNamesAreRefusedWithTheKnownOnes) {
   } catch (const InputError& error) {
     EXPECT_EQ(std::string(error.what()),
               "no motion 'sideways' - there are: icr_sweep, straight, lateral, circle, stationary, "
-              "figure_eight, crab_varying, spin, constant_steering");
+              "figure_eight, crab_varying, spin, constant_steering, pivot");
   }
 }
 

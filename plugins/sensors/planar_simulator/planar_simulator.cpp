@@ -21,7 +21,7 @@ constexpr std::array kParams{
               .type = ParamType::kString,
               .fallback = "icr_sweep",
               .choices = "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
-                         "spin|constant_steering",
+                         "spin|constant_steering|pivot",
               .help = "how the base moves"},
     ParamSpec{.name = "duration_s",
               .type = ParamType::kNumber,
@@ -41,6 +41,11 @@ constexpr std::array kParams{
               .unit = "rad/s",
               .fallback = "0.6",
               .help = "constant or peak yaw rate of the motions that turn"},
+    ParamSpec{.name = "pivot_m",
+              .type = ParamType::kNumbers,
+              .unit = "m",
+              .fallback = "[0, 0]",
+              .help = "point of the base that motion pivot turns about"},
     ParamSpec{.name = "ramp_s",
               .type = ParamType::kNumber,
               .unit = "s",
@@ -180,9 +185,12 @@ std::vector<PoseSample> poses(const ParamSet& params, const sim::PlanarMotion& m
 }
 
 log::Recording<Measurement> simulate(const ParamSet& params, const HostServices& services) {
-  const sim::PlanarMotion motion(
-      params.text("motion"), {params.number("speed_m_per_s"), params.number("yaw_rate_rad_per_s"),
-                              params.number("ramp_s")});
+  const auto pivot = params.numbers("pivot_m");
+  if (pivot.size() != 2) throw ParamError("pivot_m", "needs two numbers");
+  const sim::PlanarMotion motion(params.text("motion"), {params.number("speed_m_per_s"),
+                                                         params.number("yaw_rate_rad_per_s"),
+                                                         params.number("ramp_s"),
+                                                         {pivot[0], pivot[1]}});
   log::Recording<Measurement> out;
   const auto from_wheels = encoders(params, motion, services.seed);
   const auto from_reference = poses(params, motion);

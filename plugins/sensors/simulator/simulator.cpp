@@ -30,7 +30,7 @@ constexpr std::array kBaseParams{
               .help = "0: the nominal intrinsics are true; s: nominal + s * prior sigma * gaussian"},
     ParamSpec{.name = "motion", .type = ParamType::kString, .fallback = "icr_sweep",
               .choices = "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
-                         "spin|constant_steering",
+                         "spin|constant_steering|pivot",
               .help = "how the base moves"},
     ParamSpec{.name = "duration_s", .type = ParamType::kNumber, .unit = "s", .fallback = "60",
               .min = 0., .max = 7200., .min_exclusive = true, .help = "how long"},
@@ -39,6 +39,8 @@ constexpr std::array kBaseParams{
     ParamSpec{.name = "yaw_rate_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
               .fallback = "0.6", .min = -6., .max = 6.,
               .help = "constant or peak yaw rate of the motions that turn"},
+    ParamSpec{.name = "pivot_m", .type = ParamType::kNumbers, .unit = "m", .fallback = "[0, 0]",
+              .help = "point of the base that motion pivot turns about"},
     ParamSpec{.name = "ramp_s", .type = ParamType::kNumber, .unit = "s", .fallback = "1", .min = 0.,
               .max = 3600., .help = "smooth start from rest; 0: at speed from the beginning"},
     ParamSpec{.name = "ground", .type = ParamType::kString, .fallback = "flat",
@@ -105,9 +107,12 @@ sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
 }
 
 sim::BodyTrajectory trajectory_from(const ParamSet& params, const sim::RigSimulation& rig) {
-  const sim::PlanarMotion motion(
-      params.text("motion"), {params.number("speed_m_per_s"), params.number("yaw_rate_rad_per_s"),
-                              params.number("ramp_s")});
+  const auto pivot = params.numbers("pivot_m");
+  if (pivot.size() != 2) throw ParamError("pivot_m", "needs two numbers");
+  const sim::PlanarMotion motion(params.text("motion"), {params.number("speed_m_per_s"),
+                                                         params.number("yaw_rate_rad_per_s"),
+                                                         params.number("ramp_s"),
+                                                         {pivot[0], pivot[1]}});
   const bool uneven = params.text("ground") == "uneven";
   const sim::Ground ground = uneven ? sim::Ground::uneven(params.number("ground_amplitude_m"),
                                                           params.number("ground_wavelength_m"))

@@ -15,6 +15,7 @@ struct MotionOptions {
   double speed_m_per_s = 0.5;
   double yaw_rate_rad_per_s = 0.6;  ///< constant or peak rate of the motions that turn
   double ramp_s = 1.;               ///< smooth start from rest; 0: at speed from the beginning
+  Eigen::Vector2d pivot_m = Eigen::Vector2d::Zero();  ///< what `pivot` turns about, in O
 };
 
 /// One of the motions below, by name. With v the speed and w the yaw rate:
@@ -29,6 +30,7 @@ struct MotionOptions {
 ///   crab_varying       speed v in a direction that swings, no rotation
 ///   spin               [0, 0, w]
 ///   constant_steering  [v, 0, w] (1 + 0.5 sin): a circle at varying speed
+///   pivot              w (1 + 0.5 sin) about a point of the base: a wheel there does not roll
 ///
 /// The ramp slows the beginning of a motion down and leaves the path as it is: the motion at time t
 /// is that without a ramp at progress(t).
