@@ -143,6 +143,32 @@ TEST_F(OneInterval, HasTheDerivativesOfItsResidualWithAndWithoutFirstEstimates) 
   EXPECT_LT((no_fej.H - fej.H).rightCols(7).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+TEST_F(OneInterval, CannotTellWhereOIsOnTheBaseThoughItTilts) {
+  // O rolls and pitches on the side; the intrinsics do not know (WO-14).
+  testing::SmallFilter tilted = truth_;
+  tilted.clones[1].R_GtoI = exp_so3({0.02, -0.01, 0.}) * tilted.clones[1].R_GtoI;
+  const ResidualFactor factor_ = factor(tilted, ", max_iterations: 1, twist: plain");
+  const Eigen::MatrixXd mount = factor_.H.middleCols(12, 6);
+  const Eigen::MatrixXd intrinsics = factor_.H.rightCols(16);
+  const Eigen::Vector3d p = tilted.wheels.p_IinO;
+  for (int k = 0; k < 3; ++k) {
+    constexpr double kStep = 1e-5;
+    Intrinsics plus = tilted.wheels.x_WI, minus = plus;
+    ASSERT_EQ(model_->model().move_frame(kStep * Eigen::Vector3d::Unit(k), plus), Status::kOk);
+    ASSERT_EQ(model_->model().move_frame(-kStep * Eigen::Vector3d::Unit(k), minus), Status::kOk);
+    Eigen::VectorXd moved = Eigen::VectorXd::Zero(6);
+    if (k == 0) {
+      moved << Eigen::Vector3d::UnitZ(), p.cross(Eigen::Vector3d::UnitZ());
+    } else {
+      moved.tail<3>() = -Eigen::Vector3d::Unit(k - 1);
+    }
+    const Eigen::Vector3d by_intrinsics = intrinsics * ((plus - minus) / (2. * kStep));
+    const Eigen::Vector3d by_mount = mount * moved;
+    EXPECT_GT(by_mount.norm(), 1e-3) << k;
+    EXPECT_LT((by_intrinsics + by_mount).norm(), 1e-8) << k;
+  }
+}
+
 TEST_F(OneInterval, LeavesOutWhatTheFilterHolds) {
   testing::SmallFilter filter = truth_;
   filter.wheels.extrinsics_column = -1;

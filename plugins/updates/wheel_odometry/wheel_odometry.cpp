@@ -183,6 +183,11 @@ class WheelOdometry final : public Update {
     // would count their noise as motion, and so as information: it is taken at the motion that the
     // wheels measured, with the tilt of the iterate (WO-12).
     geometry_jacobian_.middleCols<6>(kMountTheta) = mount_jacobian(motion, at_.mount.p_IinO);
+    // Where O is on the base cannot be told: exactly so, as the intrinsics do not know of tilts
+    // (WO-14).
+    const Eigen::Matrix<double, 3, 6> planar =
+        mount_jacobian(complete_motion(pose_.g, Eigen::Vector2d::Zero()), at_.mount.p_IinO);
+    for (const int k : {2, 3, 4}) geometry_jacobian_.col(kMountTheta + k) = planar.col(k);
     geometry_jacobian_.col(kTimeOffset) = g_rate_;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
