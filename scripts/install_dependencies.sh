@@ -47,6 +47,7 @@ if [ "${1:-}" = --tests ]; then
   required=("${missing[@]}")
   missing=()
   need_command clang-format-14 clang-format-14
+  need_command gnuplot-nox gnuplot
   # On Ubuntu Chromium is a snap, which cannot be had in a container: the test is skipped there.
   if ! grep -qsx 'ID=ubuntu' /etc/os-release; then
     need_command chromium chromium chromium-browser google-chrome

@@ -155,6 +155,12 @@ void add(const Image& image, Page& page) {
   page.html += "</figure>\n";
 }
 
+void add(const Details& details, Page& page) {
+  // HTML drops a newline right after <pre>; the one here is it, so that the text keeps its own.
+  page.html += "<details>\n<summary>" + escaped(details.summary) + "</summary>\n<pre>\n" +
+               escaped(details.text) + "</pre>\n</details>\n";
+}
+
 std::string section_id(std::size_t i) { return "section-" + std::to_string(i + 1); }
 
 std::string contents(const Document& document) {

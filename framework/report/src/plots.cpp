@@ -36,6 +36,8 @@ std::string_view text_of(Draw draw) {
       return "markers";
     case Draw::kLinesAndMarkers:
       return "lines+markers";
+    case Draw::kBars:
+      return "bars";
   }
   throw std::invalid_argument("report: not a drawing style");
 }
@@ -45,9 +47,10 @@ const std::string& group_of(const Series& series) {
 }
 
 nlohmann::json series_json(const Series& series, const std::string& plot_title, Colours& colours) {
-  const std::size_t n = series.x.size();
+  const bool named = !series.categories.empty();
+  const std::size_t n = named ? series.categories.size() : series.x.size();
   const bool has_band = !series.y_low.empty() || !series.y_high.empty();
-  if (series.y.size() != n ||
+  if (series.y.size() != n || (named && !series.x.empty()) ||
       (has_band && (series.y_low.size() != n || series.y_high.size() != n))) {
     throw std::invalid_argument("report: plot '" + plot_title + "', series '" + series.name +
                                 "': x, y and the band differ in size");
@@ -58,8 +61,14 @@ nlohmann::json series_json(const Series& series, const std::string& plot_title, 
                          {"dash", text_of(series.reference ? Dash::kDashed : series.dash)},
                          {"draw", text_of(series.draw)},
                          {"reference", series.reference},
-                         {"x", series.x},
+                         {"width", series.width},
+                         {"opacity", series.opacity},
                          {"y", series.y}};
+  if (named) {
+    json["x"] = series.categories;
+  } else {
+    json["x"] = series.x;
+  }
   if (has_band) {
     json["y_low"] = series.y_low;
     json["y_high"] = series.y_high;
@@ -118,9 +127,12 @@ nlohmann::json plot_json(const Plot& plot, Colours& colours) {
   }
   for (const ReferenceLine& line : plot.lines) {
     const bool horizontal = line.direction == ReferenceLine::Direction::kHorizontal;
-    json["lines"].push_back(
-        {{"axis", horizontal ? "y" : "x"}, {"value", line.value}, {"label", line.label}});
+    json["lines"].push_back({{"axis", horizontal ? "y" : "x"},
+                             {"value", line.value},
+                             {"label", line.label},
+                             {"dash", text_of(line.dash)}});
   }
+  if (plot.y_range) json["y_range"] = {plot.y_range->first, plot.y_range->second};
   if (plot.heat_map) json["heat_map"] = heat_map_json(*plot.heat_map, plot.title);
   return json;
 }

@@ -116,6 +116,39 @@ Section calibration() {
   return section;
 }
 
+Section effort() {
+  Section section{"Effort"};
+  Plot stages{.title = "Time of an epoch by stage", .x_label = "", .y_label = "time [ms]"};
+  stages.half_width = true;
+  stages.series = {{.name = "mean",
+                    .x = {},
+                    .y = {0.05, 0.12, 0.8},
+                    .draw = Draw::kBars,
+                    .categories = {"propagation", "cloning", "visual_features & more"}},
+                   {.name = "95 %",
+                    .x = {},
+                    .y = {0.07, 0.2, 1.4},
+                    .draw = Draw::kBars,
+                    .y_low = {0.06, 0.15, kNaN},
+                    .y_high = {0.09, 0.3, 1.7},
+                    .categories = {"propagation", "cloning", "visual_features & more"}}};
+  section.blocks.push_back(stages);
+  Plot gates{.title = "Gate", .x_label = "time [s]", .y_label = "rejected [1/s]"};
+  gates.half_width = true;
+  gates.series = {{.name = "rejected", .x = {0.5, 1.5, 2.5}, .y = {3., 0., 7.}},
+                  {.name = "worst", .x = {0.5, 1.5, 2.5}, .y = {30., 10., 20.}}};
+  gates.series[0].draw = Draw::kBars;
+  gates.series[1].draw = Draw::kMarkers;
+  gates.series[1].y_low = {25., 5., 15.};
+  gates.series[1].y_high = {35., 15., 25.};
+  gates.series[1].opacity = 0.5;
+  gates.y_range = {0., 40.};
+  section.blocks.push_back(gates);
+  section.blocks.push_back(
+      Details{"Configuration <resolved>", "\nname: a\nlist: [1, 2] # </pre>\n"});
+  return section;
+}
+
 Section nasty() {
   Section section{"Odd <characters> & \"quotes\""};
   Plot plot{.title = "</script><script>alert(1)</script>",
@@ -136,7 +169,7 @@ Section nasty() {
 Document sample_document() {
   return {"Wheel odometry: three estimators",
           "figure eight, 20 seeds",
-          {summary(), trajectories(), errors(), calibration(), nasty()}};
+          {summary(), trajectories(), errors(), calibration(), effort(), nasty()}};
 }
 
 }  // namespace viwo::report

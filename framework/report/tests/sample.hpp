@@ -5,7 +5,7 @@
 
 namespace viwo::report {
 
-inline constexpr int kSamplePlots = 5;
+inline constexpr int kSamplePlots = 7;
 
 Document sample_document();
 

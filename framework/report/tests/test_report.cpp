@@ -114,7 +114,7 @@ TEST(Report, HasTheBlocksInOrder) {
   const std::string html = own_part(sample_document());
   EXPECT_THAT(html, HasSubstr("<title>Wheel odometry: three estimators</title>"));
   EXPECT_THAT(html, HasSubstr("<p class=\"subtitle\">figure eight, 20 seeds</p>"));
-  EXPECT_EQ(count(html, "<section id="), 5);
+  EXPECT_EQ(count(html, "<section id="), 6);
   EXPECT_EQ(count(html, "<figure class=\"plot"), kSamplePlots);
   EXPECT_THAT(html, HasSubstr("<dt>path length [m]</dt><dd>38.2144</dd>"));
   EXPECT_LT(html.find("<dl>"), html.find("<table>"));
@@ -140,15 +140,17 @@ TEST(Report, EscapesTextInEveryPlace) {
   EXPECT_THAT(html, Not(HasSubstr("<!-- <script>")));
   const std::string bad = "<x>\"&";
   Document document{bad, bad, {{bad}}};
-  document.sections[0].blocks = {Paragraph{bad}, KeyValues{{{bad, bad}}},
+  document.sections[0].blocks = {Paragraph{bad},
+                                 KeyValues{{{bad, bad}}},
                                  Table{bad, {{bad}}, {{bad}}},
                                  Plot{.title = bad, .x_label = bad, .y_label = bad, .caption = bad},
-                                 Image{bad, bad, "image/png", bad}};
+                                 Image{bad, bad, "image/png", bad},
+                                 Details{bad, bad}};
   const std::string all = own_part(document);
   EXPECT_EQ(count(all, "<x>"), 0);
   // title twice, subtitle, heading, paragraph, key, value, caption, column, cell, title and caption
-  // of the plot, alternative and caption of the image
-  EXPECT_EQ(count(all, "&lt;x&gt;&quot;&amp;"), 14);
+  // of the plot, alternative and caption of the image, summary and text of the details
+  EXPECT_EQ(count(all, "&lt;x&gt;&quot;&amp;"), 16);
 }
 
 TEST(Report, TextThatLooksLikeAPlaceholderStaysText) {
@@ -199,7 +201,36 @@ TEST(Report, PlotDataReadsBackBitForBit) {
   EXPECT_EQ(json.at("x_label"), "x [m]");
   EXPECT_EQ(json.at("equal_axes"), true);
   EXPECT_EQ(json.at("lines").at(0),
-            nlohmann::json({{"axis", "x"}, {"value", 0.1}, {"label", "here"}}));
+            nlohmann::json({{"axis", "x"}, {"value", 0.1}, {"label", "here"}, {"dash", "dot"}}));
+}
+
+TEST(Report, ShowsDetailsAsTheyAreWhenAskedFor) {
+  const std::string html = own_part(one_block(Details{"Configuration", "\na:\n  - <b>\n"}));
+  // The first newline belongs to the tag: HTML drops it.
+  EXPECT_THAT(html, HasSubstr("<details>\n<summary>Configuration</summary>\n<pre>\n\na:\n  - "
+                              "&lt;b&gt;\n</pre>\n</details>\n"));
+}
+
+TEST(Report, PlotDataTellsHowASeriesIsDrawn) {
+  Plot plot{.title = "t", .x_label = "", .y_label = "y"};
+  plot.series = {{.name = "s", .x = {}, .y = {1., 2.}, .draw = Draw::kBars}};
+  plot.series[0].categories = {"first", "second"};
+  plot.series[0].width = 0.5;
+  plot.series[0].opacity = 0.25;
+  plot.lines = {{ReferenceLine::Direction::kHorizontal, 3., "", Dash::kSolid}};
+  plot.y_range = {-1., 4.};
+  const nlohmann::json json = first_plot(one_block(plot));
+  const nlohmann::json& series = json.at("series").at(0);
+  EXPECT_EQ(series.at("draw"), "bars");
+  EXPECT_EQ(series.at("x"), nlohmann::json({"first", "second"}));
+  EXPECT_EQ(series.at("y"), nlohmann::json({1., 2.}));
+  EXPECT_EQ(series.at("width"), 0.5);
+  EXPECT_EQ(series.at("opacity"), 0.25);
+  EXPECT_FALSE(series.contains("y_low"));
+  EXPECT_EQ(json.at("lines").at(0).at("dash"), "solid");
+  EXPECT_EQ(json.at("y_range"), nlohmann::json({-1., 4.}));
+  plot.y_range.reset();
+  EXPECT_FALSE(first_plot(one_block(plot)).contains("y_range"));
 }
 
 TEST(Report, PlotDataCannotEndItsScript) {
@@ -249,6 +280,9 @@ TEST(Report, NamesWhatDoesNotFit) {
   EXPECT_EQ(message_of(one_block(plot)),
             "report: plot 'Path', series 's': x, y and the band differ in size");
   plot.series = {{.name = "s", .x = {1.}, .y = {1.}, .y_low = {0.}}};
+  EXPECT_EQ(message_of(one_block(plot)),
+            "report: plot 'Path', series 's': x, y and the band differ in size");
+  plot.series = {{.name = "s", .x = {1.}, .y = {1.}, .categories = {"both"}}};
   EXPECT_EQ(message_of(one_block(plot)),
             "report: plot 'Path', series 's': x, y and the band differ in size");
   plot.series.clear();

@@ -1,19 +1,10 @@
 // The page in a real browser: every plot is drawn, no script fails, nothing injected runs.
-#include <array>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <memory>
-#include <regex>
-#include <stdexcept>
 #include <string>
-#include <system_error>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include "browser.hpp"
 #include "sample.hpp"
 #include "viwo/report/html.hpp"
 
@@ -21,65 +12,6 @@ namespace viwo::report {
 namespace {
 
 using ::testing::HasSubstr;
-
-std::string output_of(const std::string& command) {
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(command.c_str(), "r"), &pclose);
-  std::string output;
-  std::array<char, 65536> buffer{};
-  while (pipe != nullptr) {
-    const std::size_t n = std::fread(buffer.data(), 1, buffer.size(), pipe.get());
-    if (n == 0) break;
-    output.append(buffer.data(), n);
-  }
-  return output;
-}
-
-/// Path of an installed Chromium or Chrome; empty when there is none.
-std::string browser() {
-  std::string path = output_of(
-      "for b in chromium chromium-browser google-chrome; do command -v $b && break; done");
-  if (!path.empty()) path.pop_back();  // the end of the line
-  return path;
-}
-
-/// A new empty folder, removed at the end.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = testing::TempDir() + "viwo_browser_XXXXXX";
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot create a folder");
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
-/// The page as it is after its scripts have run.
-std::string rendered(const std::string& program, const std::string& html) {
-  const TemporaryFolder folder;
-  const std::filesystem::path page = folder.path() / "report.html";
-  std::ofstream(page, std::ios::binary) << html;
-  return output_of("timeout 120 '" + program +
-                   "' --headless --no-sandbox --disable-gpu --disable-quic --no-first-run"
-                   " --disable-background-networking --disable-component-update --disable-sync"
-                   " --user-data-dir='" +
-                   (folder.path() / "profile").string() +
-                   "' --virtual-time-budget=10000 --dump-dom 'file://" + page.string() +
-                   "' 2>/dev/null");
-}
-
-std::string body_tag(const std::string& dom) {
-  std::smatch match;
-  return std::regex_search(dom, match, std::regex("<body[^>]*>")) ? match.str() : "no body";
-}
 
 int count(const std::string& text, const std::string& part) {
   int n = 0;
@@ -102,6 +34,11 @@ TEST(ReportInBrowser, DrawsEveryPlotWithoutAScriptError) {
     ++n_figures;
   }
   EXPECT_EQ(n_figures, kSamplePlots);
+
+  // Bars of three series; error bars of one of them and of the markers.
+  EXPECT_EQ(count(dom, "class=\"trace bars\""), 3);
+  EXPECT_EQ(count(dom, "class=\"errorbar\""), 6);
+  EXPECT_THAT(dom, HasSubstr("<summary>Configuration &lt;resolved&gt;</summary>"));
 
   // Curves of the top view; names and labels as text, not as markup.
   EXPECT_GE(count(dom, "class=\"trace scatter"), 12);

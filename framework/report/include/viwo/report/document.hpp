@@ -68,7 +68,12 @@ struct Table {
 };
 
 enum class Dash { kSolid, kDashed, kDotted };
-enum class Draw { kLines, kMarkers, kLinesAndMarkers };
+enum class Draw {
+  kLines,
+  kMarkers,
+  kLinesAndMarkers,
+  kBars,  ///< from zero; the bars of several series stand side by side
+};
 
 /// One curve. Points that are not finite interrupt it.
 struct Series {
@@ -81,9 +86,15 @@ struct Series {
   std::optional<int> colour = {};  ///< index into the palette instead of the group's colour
   Dash dash = Dash::kSolid;
   Draw draw = Draw::kLines;
-  bool reference = false;          ///< the truth: black and dashed
-  std::vector<double> y_low = {};  ///< with y_high: a band around the curve; as many as x
+  bool reference = false;  ///< the truth: black and dashed
+  /// With y_high: a band, of curves as an area, of markers and bars as error bars. As many as x.
+  std::vector<double> y_low = {};
   std::vector<double> y_high = {};
+  double width = 1.8;   ///< of the line, in pixels
+  double opacity = 1.;  ///< of the line and of its band; 0 to 1
+  /// Instead of x, for bars: one name per y, in the order of the axis. Then x is empty, and so it
+  /// is in every other series of the plot.
+  std::vector<std::string> categories = {};
 };
 
 /// A straight line across the plot.
@@ -92,6 +103,7 @@ struct ReferenceLine {
   Direction direction = Direction::kHorizontal;
   double value = 0.;
   std::string label = {};
+  Dash dash = Dash::kDotted;
 };
 
 /// A matrix of coloured cells; the first row of `z` is on top.
@@ -117,6 +129,8 @@ struct Plot {
   bool half_width = false;  ///< two such plots in sequence stand side by side
   int height_px = 0;        ///< 0: a height that suits the plot
   std::string caption = {};
+  /// What is shown of y at first; a reader can zoom out. Without: everything.
+  std::optional<std::pair<double, double>> y_range = {};
 };
 
 struct Image {
@@ -126,7 +140,13 @@ struct Image {
   std::string bytes;        ///< the file
 };
 
-using Block = std::variant<Paragraph, KeyValues, Table, Plot, Image>;
+/// Text that is only shown when the reader asks for it.
+struct Details {
+  std::string summary;  ///< what is always shown
+  std::string text;     ///< as it is, in a typewriter face
+};
+
+using Block = std::variant<Paragraph, KeyValues, Table, Plot, Image, Details>;
 
 struct Section {
   std::string heading;

@@ -1,0 +1,66 @@
+#include "viwo/report/figures.hpp"
+
+#include <cerrno>
+#include <fstream>
+#include <stdexcept>
+#include <system_error>
+
+#include "gnuplot.hpp"
+
+namespace viwo::report {
+namespace {
+
+/// A title as part of a file name: small letters and digits of ASCII, '_' for everything else.
+std::string slug(const std::string& title) {
+  constexpr std::size_t kMaxSize = 60;
+  std::string result;
+  for (const char c : title) {
+    const bool upper = c >= 'A' && c <= 'Z';
+    if (upper || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) {
+      result += upper ? static_cast<char>(c - 'A' + 'a') : c;
+    } else if (!result.empty() && result.back() != '_') {
+      result += '_';
+    }
+    if (result.size() == kMaxSize) break;
+  }
+  while (!result.empty() && result.back() == '_') result.pop_back();
+  return result.empty() ? "plot" : result;
+}
+
+void write(const std::filesystem::path& path, const std::string& text) {
+  errno = 0;
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file << text;
+  file.close();
+  if (!file) {
+    throw std::runtime_error("cannot write figure '" + path.string() +
+                             "': " + std::generic_category().message(errno));
+  }
+}
+
+}  // namespace
+
+void write_figures(const std::filesystem::path& folder, const Document& document,
+                   FigureFormat format) {
+  require_gnuplot();
+  Colours colours;
+  int n = 0;
+  for (const Section& section : document.sections) {
+    for (const Block& block : section.blocks) {
+      const auto* plot = std::get_if<Plot>(&block);
+      if (plot == nullptr) continue;
+      // Checks the sizes, and hands out the colours in the order in which the page does.
+      plot_json(*plot, colours);
+      ++n;
+      const std::string name = (n < 10 ? "0" : "") + std::to_string(n) + "_" + slug(plot->title);
+      const GnuplotFigure figure = plot->heat_map ? gnuplot_heat_map(*plot, name, format)
+                                                  : gnuplot_curves(*plot, name, format, colours);
+      if (figure.script.empty()) continue;
+      write(folder / (name + ".dat"), figure.data);
+      write(folder / (name + ".gp"), figure.script);
+      run_gnuplot(folder, name + ".gp");
+    }
+  }
+}
+
+}  // namespace viwo::report
