@@ -72,6 +72,17 @@ TEST(FilterAllocations, ThereAreNoneWithFewFeaturesAndOneCamera) {
   EXPECT_GT(counted.epochs, 70);
 }
 
+TEST(FilterAllocations, ThereAreNoneWhileUnexcitedDirectionsAreHeld) {
+  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  // The straight begins at 20 s; its warnings are given by 30 s.
+  const Counted counted =
+      count({"sensors.simulator0.duration_s=40", "sensors.simulator0.motion=sweep_then_straight",
+             "estimator.hold_unexcited=true"},
+            30.);
+  EXPECT_EQ(counted.allocations, 0);
+  EXPECT_GT(counted.epochs, 90);
+}
+
 TEST(FilterAllocations, CountingSeesAnAllocationOfEigen) {
   if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
   const long before = allocations;

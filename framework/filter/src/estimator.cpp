@@ -56,7 +56,7 @@ void take_off(const Eigen::VectorXd& dx, InformationFactor& factor) {
 Estimator::Estimator(const EstimatorOptions& options, std::vector<CameraPrior> cameras,
                      std::vector<WheelsPrior> wheels, std::vector<UpdateEntry> updates)
     : options_(options),
-      filter_(options.filter, std::move(cameras), std::move(wheels)),
+      filter_(options.filter, std::move(cameras), wheels),
       updates_(std::move(updates)),
       counts_(updates_.size()),
       sink_(kMaxFactorsPerUpdate, filter_.size()),
@@ -66,6 +66,13 @@ Estimator::Estimator(const EstimatorOptions& options, std::vector<CameraPrior> c
                           Eigen::VectorXd::Zero(filter_.size())},
       encoders_(filter_.wheels().size()),
       stage_ms_(updates_.size() + 2, 0.) {
+  for (std::size_t i = 0; options.monitor.enabled && i < wheels.size(); ++i) {
+    wheels[i].wheels = filter_.wheels()[i];
+    ExcitationMonitor monitor(options.monitor, wheels[i]);
+    if (monitor.parameters().empty()) continue;
+    monitors_.push_back(std::move(monitor));
+    monitored_.push_back(i);
+  }
   imu_.reserve(4096);
   cut_.reserve(4096);
   for (auto& samples : encoders_) samples.reserve(4096);
@@ -250,6 +257,27 @@ bool Estimator::try_to_initialize() {
   return true;
 }
 
+template <class Factor>
+FactorResult Estimator::apply(const UpdateEntry& update, const Factor& factor) {
+  if (observer_ != nullptr) observer_->on_factor(filter_, update, factor);
+  for (ExcitationMonitor& monitor : monitors_) monitor.before(filter_, factor);
+  const FactorResult result = filter_.apply(factor);
+  if (result == FactorResult::kApplied) {
+    for (ExcitationMonitor& monitor : monitors_) monitor.applied();
+  }
+  return result;
+}
+
+void Estimator::update_monitors() {
+  bool any_new = false;
+  for (std::size_t i = 0; i < monitors_.size(); ++i) {
+    if (monitors_[i].epoch(filter_, filter_.wheels()[monitored_[i]], cut_)) any_new = true;
+  }
+  if (!any_new || !options_.monitor.hold) return;
+  filter_.held().clear();
+  for (const ExcitationMonitor& monitor : monitors_) monitor.hold(filter_.held());
+}
+
 void Estimator::run_update(std::size_t index, const EpochData& data) {
   const UpdateEntry& entry = updates_[index];
   sink_.clear();
@@ -272,8 +300,7 @@ void Estimator::run_update(std::size_t index, const EpochData& data) {
       if (options_.frozen) residual_factor_.residual.setZero();
       next = &residual_factor_;
     }
-    if (observer_ != nullptr) observer_->on_factor(filter_, entry, *next);
-    const bool applied = filter_.apply(*next) == FactorResult::kApplied;
+    const bool applied = apply(entry, *next) == FactorResult::kApplied;
     ++(applied ? counts.applied : counts.rejected);
     if (!applied) continue;
     if (!has_moved) moved_.setZero();
@@ -287,8 +314,7 @@ void Estimator::run_update(std::size_t index, const EpochData& data) {
       if (options_.frozen) information_factor_.eta.setZero();
       information = &information_factor_;
     }
-    if (observer_ != nullptr) observer_->on_factor(filter_, entry, *information);
-    if (filter_.apply(*information) == FactorResult::kRejected) {
+    if (apply(entry, *information) == FactorResult::kRejected) {
       reject((entry.name + ": information that is not finite or empty").c_str(), filter_.t_ns());
     }
   }
@@ -330,6 +356,7 @@ bool Estimator::step() {
     run_update(i, data);
     stage_done(stage_ms_[i + 1]);
   }
+  update_monitors();
   if (filter_.window_full()) filter_.drop_oldest_clone();
   forget_used();
   failure_ = filter_.failure();

@@ -65,6 +65,7 @@ Filter::Filter(const FilterOptions& options, std::vector<CameraPrior> cameras,
     prior.camera.intrinsics_column = place(prior.sigma_intrinsics, next);
     cameras_.push_back(prior.camera);
   }
+  held_ = HeldDirections(next, size() - next);  // the wheels come last
   for (WheelsPrior& prior : wheels) {
     prior.wheels.extrinsics_column = place(prior.sigma_extrinsics, next);
     prior.wheels.time_offset_column =
@@ -123,15 +124,21 @@ void Filter::drop_oldest_clone() {
   clones_.erase(clones_.begin());
 }
 
-FactorResult Filter::apply(const ResidualFactor& factor) {
+template <class Factor>
+FactorResult Filter::apply_factor(const Factor& factor) {
+  held_.before(covariance_.matrix());
   const FactorResult result = covariance_.apply(factor, dx_);
-  if (result == FactorResult::kApplied) correct();
+  if (result == FactorResult::kApplied) {
+    covariance_.hold(held_, dx_);
+    correct();
+  }
   return result;
 }
 
+FactorResult Filter::apply(const ResidualFactor& factor) { return apply_factor(factor); }
+
 FactorResult Filter::apply(const InformationFactor& factor) {
-  const FactorResult result = covariance_.apply(factor, dx_);
-  if (result == FactorResult::kApplied) correct();
+  const FactorResult result = apply_factor(factor);
   if (result == FactorResult::kFailed) covariance_failed_ = true;
   return result;
 }

@@ -16,11 +16,26 @@ constexpr double kDirectionHz = 0.11;
 constexpr double kYawRateHz = 0.07;
 constexpr double kSpeedHz = 0.043;
 constexpr double kDirectionSwing = 1.5;  // rad
+constexpr double kSweepS = 20.;
+constexpr double kStraightenS = 2.;
 
 double wave(double hz, double t) { return std::sin(2. * M_PI * hz * t); }
 
 Twist along(double speed, double direction, double omega) {
   return {speed * std::cos(direction), speed * std::sin(direction), omega};
+}
+
+/// From 0 to 1 within [0, 1], twice continuously differentiable.
+double smooth_step(double u) {
+  u = std::clamp(u, 0., 1.);
+  return u * u * u * (10. + u * (6. * u - 15.));
+}
+
+/// The swings of an ICR sweep, each times `amplitude`.
+Twist sweep(double t, const MotionOptions& o, double amplitude) {
+  return along(o.speed_m_per_s * (1. + amplitude * 0.3 * wave(kSpeedHz, t)),
+               amplitude * kDirectionSwing * wave(kDirectionHz, t),
+               amplitude * o.yaw_rate_rad_per_s * wave(kYawRateHz, t));
 }
 
 }  // namespace
@@ -32,12 +47,7 @@ struct PlanarMotion::Entry {
 
 const std::vector<PlanarMotion::Entry>& PlanarMotion::entries() {
   static const std::vector<Entry> kEntries = {
-      {"icr_sweep",
-       [](double t, const MotionOptions& o) {
-         return along(o.speed_m_per_s * (1. + 0.3 * wave(kSpeedHz, t)),
-                      kDirectionSwing * wave(kDirectionHz, t),
-                      o.yaw_rate_rad_per_s * wave(kYawRateHz, t));
-       }},
+      {"icr_sweep", [](double t, const MotionOptions& o) { return sweep(t, o, 1.); }},
       {"straight", [](double, const MotionOptions& o) { return Twist(o.speed_m_per_s, 0., 0.); }},
       {"lateral", [](double, const MotionOptions& o) { return Twist(0., o.speed_m_per_s, 0.); }},
       {"circle",
@@ -64,6 +74,10 @@ const std::vector<PlanarMotion::Entry>& PlanarMotion::entries() {
        [](double t, const MotionOptions& o) -> Twist {
          return o.yaw_rate_rad_per_s * (1. + 0.5 * wave(kDirectionHz, t)) *
                 Twist(o.pivot_m.y(), -o.pivot_m.x(), 1.);
+       }},
+      {"sweep_then_straight",
+       [](double t, const MotionOptions& o) {
+         return sweep(t, o, 1. - smooth_step((t - kSweepS) / kStraightenS));
        }},
   };
   return kEntries;
@@ -100,8 +114,7 @@ double PlanarMotion::progress(double t) const {
 Twist PlanarMotion::twist(double t) const {
   double ramp = 1.;
   if (options_.ramp_s > 0.) {
-    const double u = std::clamp(t / options_.ramp_s, 0., 1.);
-    ramp = u * u * u * (10. + u * (6. * u - 15.));
+    ramp = smooth_step(t / options_.ramp_s);
   }
   return ramp * profile_(progress(t), options_);
 }

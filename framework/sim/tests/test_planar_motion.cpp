@@ -180,6 +180,20 @@ TEST(PlanarMotion, ThePivotDoesNotMove) {
   }
 }
 
+TEST(PlanarMotion, SweepThenStraightIsTheSweepThenAStraightLineAndSmoothBetween) {
+  const PlanarMotion motion("sweep_then_straight", kNoRamp), sweep("icr_sweep", kNoRamp);
+  for (const double t : {0., 7.3, 20.}) EXPECT_EQ(motion.twist(t), sweep.twist(t));
+  for (const double t : {22., 31.7, 60.}) EXPECT_EQ(motion.twist(t), Twist(kV, 0., 0.));
+  // Second differences change as little as those of a curve with a third derivative do.
+  constexpr double h = 1e-3;
+  const auto second = [&](double t) -> Twist {
+    return (motion.twist(t + h) - 2. * motion.twist(t) + motion.twist(t - h)) / (h * h);
+  };
+  for (double t = 19.9; t < 22.1; t += h) {
+    EXPECT_LT((second(t + h) - second(t)).norm(), 0.05) << t;
+  }
+}
+
 TEST(PlanarMotion, UnknownNamesAreRefusedWithTheKnownOnes) {
   try {
     PlanarMotion("sideways");
@@ -187,7 +201,8 @@ TEST(PlanarMotion, UnknownNamesAreRefusedWithTheKnownOnes) {
   } catch (const InputError& error) {
     EXPECT_EQ(std::string(error.what()),
               "no motion 'sideways' - there are: icr_sweep, straight, lateral, circle, stationary, "
-              "figure_eight, crab_varying, spin, constant_steering, pivot");
+              "figure_eight, crab_varying, spin, constant_steering, pivot, "
+              "sweep_then_straight");
   }
 }
 

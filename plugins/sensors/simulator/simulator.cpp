@@ -30,7 +30,7 @@ constexpr std::array kBaseParams{
               .help = "0: the nominal intrinsics are true; s: nominal + s * prior sigma * gaussian"},
     ParamSpec{.name = "motion", .type = ParamType::kString, .fallback = "icr_sweep",
               .choices = "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
-                         "spin|constant_steering|pivot",
+                         "spin|constant_steering|pivot|sweep_then_straight",
               .help = "how the base moves"},
     ParamSpec{.name = "duration_s", .type = ParamType::kNumber, .unit = "s", .fallback = "60",
               .min = 0., .max = 7200., .min_exclusive = true, .help = "how long"},

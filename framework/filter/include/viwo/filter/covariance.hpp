@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "viwo/api/update.hpp"
+#include "viwo/filter/held_directions.hpp"
 #include "viwo/filter/propagation.hpp"
 
 namespace viwo {
@@ -41,6 +42,8 @@ class Covariance {
   FactorResult apply(const ResidualFactor& factor, Eigen::VectorXd& dx);
   /// Update by normal equations (F-8). Columns without variance are left out.
   FactorResult apply(const InformationFactor& factor, Eigen::VectorXd& dx);
+  /// Takes from what apply() did what it did to the directions; held.before() came before it.
+  void hold(HeldDirections& held, Eigen::VectorXd& dx) { held.after(dx, P_); }
 
  private:
   double gate(int rows, double probability);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "viwo/api/update.hpp"
+#include "viwo/filter/excitation_monitor.hpp"
 #include "viwo/filter/filter.hpp"
 
 namespace viwo {
@@ -31,6 +32,7 @@ struct EstimatorOptions {
   /// Residuals are taken as zero: the estimate is only propagated, its covariance is that of a
   /// filter. For analyses along a motion that is known.
   bool frozen = false;
+  MonitorOptions monitor;
 };
 
 /// An update as the estimator runs it. For kind kWheels: `wheels` is the index of its wheel set.
@@ -101,6 +103,8 @@ class Estimator {
   std::span<const UpdateCounts> counts() const { return counts_; }
   std::vector<RejectionCount> rejections() const;
   std::int64_t epochs() const { return epochs_; }
+  /// One for each wheel set of which something is estimated; none if they are turned off.
+  std::span<const ExcitationMonitor> monitors() const { return monitors_; }
 
   /// Stages of an epoch: "propagate", the updates, "marginalise".
   std::vector<std::string> stage_names() const;
@@ -115,6 +119,9 @@ class Estimator {
   void forget_used();
   bool try_to_initialize();
   void run_update(std::size_t index, const EpochData& data);
+  template <class Factor>
+  FactorResult apply(const UpdateEntry& update, const Factor& factor);
+  void update_monitors();
   void reject(const char* reason, std::int64_t t_ns);
 
   EstimatorOptions options_;
@@ -129,6 +136,8 @@ class Estimator {
   InformationFactor information_factor_;
   Initializer initializer_;
   EstimatorObserver* observer_ = nullptr;
+  std::vector<ExcitationMonitor> monitors_;
+  std::vector<std::size_t> monitored_;  // wheel set of each
 
   std::vector<ImuSample> imu_;                        // from the last epoch on
   std::vector<std::vector<EncoderSample>> encoders_;  // from the oldest clone on, per wheel set

@@ -13,6 +13,7 @@
 
 #include "viwo/api/update.hpp"
 #include "viwo/filter/covariance.hpp"
+#include "viwo/filter/held_directions.hpp"
 
 namespace viwo {
 
@@ -36,6 +37,7 @@ struct CameraPrior {
 /// A wheel set with the prior of its calibration; all-zero sigmas hold a block, single zeros hold
 /// an entry.
 struct WheelsPrior {
+  std::string name;  ///< in front of its parameters; "" for nothing
   WheelsView wheels;
   Vector6d sigma_extrinsics = Vector6d::Zero();  ///< rad x 3, m x 3
   double sigma_time_offset_s = 0.;
@@ -74,6 +76,9 @@ class Filter {
   /// Applies a factor and corrects the estimate.
   FactorResult apply(const ResidualFactor& factor);
   FactorResult apply(const InformationFactor& factor);
+  /// What of the calibration of the wheels the factors to come are to leave alone.
+  HeldDirections& held() { return held_; }
+  const HeldDirections& held() const { return held_; }
   /// What the last apply() corrected the estimate by; zero unless its factor was applied.
   const Eigen::VectorXd& correction() const { return dx_; }
 
@@ -96,6 +101,8 @@ class Filter {
   static int state_size(const FilterOptions& options, std::span<const CameraPrior> cameras,
                         std::span<const WheelsPrior> wheels);
   int place(const Eigen::VectorXd& sigma, int& next);
+  template <class Factor>
+  FactorResult apply_factor(const Factor& factor);
   void correct();
 
   FilterOptions options_;
@@ -107,6 +114,7 @@ class Filter {
   std::vector<CameraView> cameras_;
   std::vector<WheelsView> wheels_;
   Covariance covariance_;
+  HeldDirections held_;
   Eigen::VectorXd dx_;
   bool covariance_failed_ = false;
 };
