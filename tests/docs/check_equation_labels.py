@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Equation labels of the mathematics pages against their citations in the code.
 
-A page (*.md under docs/math or plugins) defines a label with \\tag{S-2}; a comment of the C++ code
+A page (*.md under docs or plugins) defines a label with \\tag{S-2}; a comment of the C++ code
 under framework or plugins cites it as (S-2), or as "..., W-9)". Fails when a label is cited but not
 defined, defined but never cited in code, defined twice, or when two pages share a prefix.
 
@@ -64,7 +64,7 @@ def citations(text, prefixes):
 def check(root):
     """Returns the errors as lines "file:line: what"."""
     errors = []
-    pages = files(root, ["docs/math", "plugins"], {".md"})
+    pages = files(root, ["docs", "plugins"], {".md"})
     defined = read_definitions(root, pages, errors)
     prefixes = {label.split("-")[0] for label in defined}
     cited = set()

@@ -1,0 +1,116 @@
+#include "viwo/observability/null_space.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <Eigen/SVD>
+
+namespace viwo {
+namespace {
+
+/// Columns shorter than this part of the longest one are rounding.
+constexpr double kZeroColumn = 1e-10;
+
+/// What of `a` lies outside of `b`: its singular values are the sines of the angles, which tell
+/// small ones better than the cosines.
+Eigen::MatrixXd outside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return a - b * (b.transpose() * a);
+}
+
+}  // namespace
+
+NullSpace null_space(const Eigen::MatrixXd& M, double tolerance) {
+  if (M.cols() == 0 || !M.allFinite()) {
+    throw std::invalid_argument("null_space() needs a finite matrix with columns");
+  }
+  const auto n = M.cols();
+  NullSpace out;
+  Eigen::VectorXd length = M.colwise().norm();
+  const double longest = length.maxCoeff();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!(length[i] > kZeroColumn * longest)) length[i] = std::numeric_limits<double>::infinity();
+  }
+  const Eigen::MatrixXd scaled = M * length.cwiseInverse().asDiagonal();
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(scaled, Eigen::ComputeFullV);
+  out.singular_values = Eigen::VectorXd::Zero(n);
+  out.singular_values.head(svd.singularValues().size()) = svd.singularValues();
+  const double threshold = tolerance * out.singular_values[0];
+  while (out.rank < n && out.singular_values[out.rank] > threshold) ++out.rank;
+  const double dropped = out.rank < n ? out.singular_values[out.rank] : 0.;
+  out.gap = out.rank > 0 && dropped > 0. ? out.singular_values[out.rank - 1] / dropped
+                                         : std::numeric_limits<double>::infinity();
+  // Back to the columns as they were. Zero columns are in the null space by themselves.
+  Eigen::MatrixXd basis = svd.matrixV().rightCols(n - out.rank);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (std::isfinite(length[i])) basis.row(i) /= length[i] / longest;
+  }
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
+  out.basis = qr.householderQ() * Eigen::MatrixXd::Identity(n, n - out.rank);
+  return out;
+}
+
+double largest_angle(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  if (a.cols() == 0) return 0.;
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(outside(a, b));
+  return std::asin(std::min(svd.singularValues()[0], 1.));
+}
+
+Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& A, double tolerance) {
+  if (A.cols() == 0) return A;
+  const Eigen::MatrixXd unit = A.colwise().normalized();
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(unit, Eigen::ComputeThinU);
+  Eigen::Index rank = 0;
+  while (rank < svd.singularValues().size() && svd.singularValues()[rank] > tolerance) ++rank;
+  return svd.matrixU().leftCols(rank);
+}
+
+Eigen::MatrixXd intersection(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double angle_rad) {
+  if (a.cols() == 0 || b.cols() == 0) return Eigen::MatrixXd(a.rows(), 0);
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(outside(a, b), Eigen::ComputeFullV);
+  Eigen::Index kept = 0;
+  const auto n = a.cols();
+  const double limit = std::sin(angle_rad);
+  while (kept < n && !(svd.singularValues()[n - 1 - kept] > limit)) ++kept;
+  return a * svd.matrixV().rightCols(kept);
+}
+
+Eigen::MatrixXd readable(const Eigen::MatrixXd& a) {
+  if (a.cols() == 0) return a;
+  // Reduced row echelon form of a^T with complete pivoting.
+  Eigen::MatrixXd rows = a.transpose();
+  Eigen::Index done = 0;
+  std::vector<bool> used(static_cast<std::size_t>(rows.cols()), false);
+  for (; done < rows.rows(); ++done) {
+    Eigen::Index row = done, col = 0;
+    double best = 0.;
+    for (Eigen::Index i = done; i < rows.rows(); ++i) {
+      for (Eigen::Index k = 0; k < rows.cols(); ++k) {
+        if (used[static_cast<std::size_t>(k)] || std::abs(rows(i, k)) <= best) continue;
+        best = std::abs(rows(i, k));
+        row = i;
+        col = k;
+      }
+    }
+    if (!(best > 0.)) break;
+    used[static_cast<std::size_t>(col)] = true;
+    rows.row(done).swap(rows.row(row));
+    rows.row(done) /= rows(done, col);
+    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+      if (i != done) rows.row(i) -= rows(i, col) * rows.row(done);
+    }
+  }
+  Eigen::MatrixXd out = rows.topRows(done).transpose();
+  for (Eigen::Index i = 0; i < out.cols(); ++i) {
+    Eigen::Index largest = 0;
+    out.col(i).cwiseAbs().maxCoeff(&largest);
+    out.col(i) /= out(largest, i);
+  }
+  return out;
+}
+
+}  // namespace viwo

@@ -1,0 +1,50 @@
+// Analyses of delivered configurations, and what is looked up in them.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "viwo/experiment/observability.hpp"
+
+namespace viwo::testing {
+
+inline PluginRegistry& registry() {
+  static PluginRegistry plugins({VIWO_TEST_PLUGIN_DIR});
+  return plugins;
+}
+
+inline std::filesystem::path configuration(const std::string& name) {
+  return std::filesystem::path(VIWO_TEST_SOURCE_DIR) / "configs" / name;
+}
+
+inline experiment::ObservabilityReport analyse(const std::string& name,
+                                               std::vector<std::string> assignments = {}) {
+  experiment::ExperimentOptions options;
+  options.assignments = std::move(assignments);
+  return experiment::analyse(experiment::read_observability(configuration(name), options),
+                             registry());
+}
+
+inline const experiment::ObservabilityResult& find(const experiment::ObservabilityReport& report,
+                                                   const std::string& motion,
+                                                   const std::string& variant) {
+  for (const experiment::ObservabilityResult& result : report.results) {
+    if (report.setup.recordings[result.motion].name == motion &&
+        report.setup.variants[result.variant].name == variant) {
+      return result;
+    }
+  }
+  throw std::invalid_argument("no " + motion + " " + variant);
+}
+
+/// The named set, as it lies to the null space of a state.
+inline const experiment::ExplainedDirections& find(const experiment::Observability& state,
+                                                   const std::string& set) {
+  for (const experiment::ExplainedDirections& explained : state.explained) {
+    if (explained.name == set) return explained;
+  }
+  throw std::invalid_argument("no " + set);
+}
+
+}  // namespace viwo::testing
