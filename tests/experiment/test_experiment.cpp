@@ -1,41 +1,18 @@
 // Experiments: axes, checks before the first run, independence of the number of jobs.
-#include <filesystem>
-#include <fstream>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "simulated.hpp"
-#include "viwo/experiment/experiment.hpp"
+#include "experiment_file.hpp"
 
 namespace viwo {
 namespace {
 
 using namespace experiment;
 using testing::error_of;
+using testing::ExperimentFile;
 using ::testing::HasSubstr;
+using testing::kVariants;
 using testing::registry;
-
-class ExperimentFile : public ::testing::Test {
- protected:
-  void SetUp() override {
-    folder_ =
-        std::filesystem::path(::testing::TempDir()) /
-        ("viwo_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-    std::ofstream(folder_ / "run.yaml") << config::to_yaml(testing::simulated("'{motion}'"));
-  }
-  std::filesystem::path write(const std::string& text) {
-    std::ofstream(folder_ / "experiment.yaml") << text;
-    return folder_ / "experiment.yaml";
-  }
-  std::filesystem::path folder_;
-};
-
-constexpr const char* kVariants =
-    "experiment: test\nbase: run.yaml\nseeds: 2\nmotions: [circle, lateral]\n"
-    "variants:\n  redundant:\n  drive_only: {kinematics.type: four_wis_wid_drive_only}\n";
 
 TEST_F(ExperimentFile, RunsEveryVariantWithEveryMotionAndSeedWhateverTheJobs) {
   const auto file = write(kVariants);
@@ -148,6 +125,8 @@ TEST_F(ExperimentFile, SaysWhatIsWrongWithItsAxes) {
       error(head + "variants: {../a: }\n"),
       "experiment.yaml:3:12  '../a' must be usable as a file name: letters, digits, '_', '-', "
       "'+' and '.'");
+  EXPECT_EQ(error(head + "baseline: b\nvariants: {a: , bb: }\n"),
+            "experiment.yaml:3:11  baseline: there is no variant 'b' - did you mean 'bb'?");
   EXPECT_EQ(error(head + "variants: {a: 5}\n"),
             "experiment.yaml:3:15  variant 'a' must be a section of overrides");
   EXPECT_EQ(

@@ -31,6 +31,11 @@ void add_option(const std::string& name, po::options_description& options) {
         "overrides a value of the run configuration, e.g. --set odometry.epoch_s=0.05");
   } else if (name == "keep-runs") {
     add("keep-runs", "one folder with all files for each run");
+  } else if (name == "resume") {
+    add("resume", "goes on with an experiment that was interrupted");
+  } else if (name == "figures") {
+    add("figures", po::value<std::string>()->value_name("FORMAT"),
+        "every plot also as a static figure for a paper: svg or pdf (needs gnuplot)");
   } else if (name == "reference") {
     add("reference", po::value<std::string>()->value_name("A.tum")->required(), "true trajectory");
   } else if (name == "estimate") {
@@ -82,6 +87,10 @@ void check_ranges(const Command& command, const po::variables_map& values) {
   if (values.contains("jobs") && values["jobs"].as<int>() < 0) {
     refuse(command, "--jobs must not be negative");
   }
+  if (values.contains("figures") && values["figures"].as<std::string>() != "svg" &&
+      values["figures"].as<std::string>() != "pdf") {
+    refuse(command, "--figures takes svg or pdf");
+  }
   if (values.contains("out") && values["out"].as<std::string>().empty()) {
     refuse(command, "--out needs the name of a folder");
   }
@@ -122,6 +131,8 @@ Arguments arguments_of(const po::variables_map& values) {
   if (values.contains("seeds")) arguments.seeds = values["seeds"].as<int>();
   if (values.contains("jobs")) arguments.jobs = values["jobs"].as<int>();
   arguments.keep_runs = values.contains("keep-runs");
+  arguments.resume = values.contains("resume");
+  arguments.figures = text("figures");
   arguments.reference = text("reference");
   arguments.estimate = text("estimate");
   arguments.align = text("align");

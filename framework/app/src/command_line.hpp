@@ -22,6 +22,8 @@ struct Arguments {
   std::optional<int> seeds;
   int jobs = 0;
   bool keep_runs = false;
+  bool resume = false;
+  std::string figures;  ///< "svg", "pdf" or none
   std::string reference, estimate, align;
 };
 
@@ -43,6 +45,7 @@ PluginRegistry make_registry(const Arguments& arguments);
 
 int run_command(const Arguments& arguments);
 int experiment_command(const Arguments& arguments);
+int observability_command(const Arguments& arguments);
 int evaluate_command(const Arguments& arguments);
 int simulate_command(const Arguments& arguments);
 int calibrate_command(const Arguments& arguments);

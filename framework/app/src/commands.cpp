@@ -5,10 +5,13 @@
 #include "viwo/eval/accuracy.hpp"
 #include "viwo/experiment/calibrate.hpp"
 #include "viwo/experiment/experiment.hpp"
+#include "viwo/experiment/interrupt.hpp"
+#include "viwo/experiment/observability.hpp"
 #include "viwo/experiment/output.hpp"
 #include "viwo/experiment/progress.hpp"
 #include "viwo/experiment/simulate.hpp"
 #include "viwo/log/tum.hpp"
+#include "viwo/report/figures.hpp"
 
 namespace viwo::app {
 namespace {
@@ -20,6 +23,29 @@ std::filesystem::path out_folder(const Arguments& arguments) {
   if (arguments.out) return *arguments.out;
   return std::filesystem::path("results") / std::filesystem::path(arguments.positional[0]).stem();
 }
+
+/// --figures: the plots of a page, beside it.
+class Figures {
+ public:
+  /// Throws InputError when they are wanted and cannot be drawn, before any work.
+  Figures(const Arguments& arguments, const std::filesystem::path& folder)
+      : wanted_(!arguments.figures.empty()),
+        format_(arguments.figures == "pdf" ? report::FigureFormat::kPdf
+                                           : report::FigureFormat::kSvg),
+        folder_(folder / "figures") {
+    if (!wanted_) return;
+    make_folder(folder_);
+    report::write_figures(folder_, {}, format_);
+  }
+  void write(const report::Document& document) const {
+    if (wanted_) report::write_figures(folder_, document, format_);
+  }
+
+ private:
+  bool wanted_;
+  report::FigureFormat format_;
+  std::filesystem::path folder_;
+};
 
 RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
   const config::Node configuration =
@@ -35,12 +61,14 @@ int run_command(const Arguments& arguments) {
   const RunData data = collect(setup);
   const auto folder = out_folder(arguments);
   make_folder(folder);  // whether results can be written shows before the work
+  const Figures figures(arguments, folder);
   RunResult result;
   {
     TimeProgress progress(setup.name);  // gone before anything else is printed
     result = experiment::run(setup, data, [&](double fraction) { progress.at(fraction); });
   }
   write_run(folder, setup, result);
+  figures.write(report_of(setup, result));
   std::cout << describe(result) << "report: " << (folder / "report.html").string() << "\n";
   return result.status == RunStatus::kOk ? 0 : 1;
 }
@@ -52,16 +80,38 @@ int experiment_command(const Arguments& arguments) {
   options.seeds = arguments.seeds;
   options.keep_runs = arguments.keep_runs;
   options.assignments = arguments.assignments;
+  options.resume = arguments.resume;
+  const InterruptSignal interrupt;
+  options.interrupted = [&interrupt] { return interrupt.raised(); };
   const ExperimentSetup setup = read_experiment(arguments.positional[0], options);
   const auto folder = out_folder(arguments);
+  const Figures figures(arguments, folder);
   const ExperimentResult result = run_experiment(setup, options, plugins, folder);
   write_experiment(folder, result);
+  figures.write(report_of(result));
   std::cout << describe(result) << "\n"
             << result.runs.size() << " runs in " << significant(result.wall_s, 3)
             << " s; report: " << (folder / "report.html").string() << "\n";
   for (const ExperimentRun& run : result.runs) {
     if (run.result.status != RunStatus::kOk) return 1;
   }
+  return 0;
+}
+
+int observability_command(const Arguments& arguments) {
+  PluginRegistry plugins = make_registry(arguments);
+  ExperimentOptions options;
+  options.assignments = arguments.assignments;
+  const ExperimentSetup setup = read_observability(arguments.positional[0], options);
+  const auto folder = out_folder(arguments);
+  make_folder(folder);
+  const Figures figures(arguments, folder);
+  const ObservabilityReport report = analyse(setup, plugins);
+  write_observability(folder, report);
+  figures.write(report_of(report));
+  std::cout << describe(report) << "\n"
+            << report.results.size() << " analyses in " << significant(report.wall_s, 3)
+            << " s; report: " << (folder / "report.html").string() << "\n";
   return 0;
 }
 

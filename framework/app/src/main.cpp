@@ -18,10 +18,15 @@ constexpr Command kCommands[] = {
     {"run", "run CONFIG [--out DIR] [--seed N] [--set KEY=VALUE]...",
      "Runs one configuration, the filter or wheel odometry alone; writes trajectory, summary.json "
      "and report.html.",
-     "out seed set", 1, run_command},
-    {"experiment", "experiment EXPERIMENT [--out DIR] [--jobs N] [--seeds N] [--set KEY=VALUE]...",
+     "out seed set figures", 1, run_command},
+    {"experiment",
+     "experiment EXPERIMENT [--out DIR] [--jobs N] [--seeds N] [--resume] [--set KEY=VALUE]...",
      "Runs variants x recordings x seeds side by side and writes tables and report.html.",
-     "out jobs seeds set keep-runs", 1, experiment_command},
+     "out jobs seeds set keep-runs resume figures", 1, experiment_command},
+    {"observability", "observability CONFIG [--out DIR] [--set KEY=VALUE]...",
+     "Tells which directions of the state and of the calibration a run's motion and updates can "
+     "observe; CONFIG is a run or an experiment (variants x motions).",
+     "out set figures", 1, observability_command},
     {"calibrate", "calibrate CONFIG [--out DIR] [--set KEY=VALUE]...",
      "Estimates the wheel intrinsics from encoder logs and a reference trajectory.", "out set", 1,
      calibrate_command},

@@ -94,10 +94,7 @@ std::vector<Recording> read_recordings(const Node& section) {
   std::set<std::string> names;
   for (const Node& item : list->items()) {
     Recording recording = read_recording(item);
-    if (list == motions) {
-      if (!item.is_scalar()) config::fail(item.mark(), "a motion is a name");
-      recording.labels = {{"motion", recording.name}};
-    }
+    if (list == motions && item.is_scalar()) recording.labels = {{"motion", recording.name}};
     require_file_name(recording.name, item.mark());
     if (!names.insert(recording.name).second) {
       config::fail(item.mark(), "'" + recording.name + "' is in this list twice");

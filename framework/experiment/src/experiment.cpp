@@ -1,15 +1,20 @@
 #include "viwo/experiment/experiment.hpp"
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "run_journal.hpp"
+#include "run_record.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/params.hpp"
+#include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/experiment/output.hpp"
 #include "viwo/experiment/progress.hpp"
@@ -33,6 +38,10 @@ constexpr std::array kExperimentParams{
               .type = ParamType::kStrings,
               .fallback = "[]",
               .help = "labels of the recordings to break the tables down by"},
+    ParamSpec{.name = "baseline",
+              .type = ParamType::kString,
+              .fallback = "''",
+              .help = "variant that the others are compared with; the first if not given"},
 };
 
 void read_variants(const Node& file, ExperimentSetup& setup) {
@@ -51,15 +60,16 @@ void read_variants(const Node& file, ExperimentSetup& setup) {
   }
 }
 
-/// The run configuration of one cell, placeholders replaced.
-Node configuration_of(const ExperimentSetup& setup, const Variant& variant,
-                      const Recording& recording) {
-  Node run = setup.base;
-  config::merge(run, variant.overrides);
-  Node resolved = resolve_placeholders(run, recording.labels);
-  resolved.set(
-      "name", Node::scalar_of(variant.name + (recording.name.empty() ? "" : "_" + recording.name)));
-  return resolved;
+void find_baseline(const Node& file, const std::string& name, ExperimentSetup& setup) {
+  if (name.empty()) return;
+  std::vector<std::string> names;
+  for (const Variant& variant : setup.variants) names.push_back(variant.name);
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) {
+    config::fail(file.find("baseline")->mark(), "baseline: there is no variant '" + name + "'" +
+                                                    config::did_you_mean(name, names));
+  }
+  setup.baseline = static_cast<std::size_t>(found - names.begin());
 }
 
 std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
@@ -84,7 +94,182 @@ std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
   return line;
 }
 
+/// All that decides the result of a cell, but for its seed and for the contents of its logs.
+std::string text_of(const RunSetup& run) {
+  std::string text = std::string("viwo ") + viwo_version() + "\n";
+  const auto add = [&](const PluginInfo& info) {
+    text += info.kind + " " + info.name + " " + info.version + "\n";
+  };
+  if (run.kinematics.object) add(run.kinematics.info);
+  for (const auto& [name, sensor] : run.sensors) add(sensor.info);
+  if (run.filter) {
+    for (const auto& entry : run.filter->updates) add(entry.update.info);
+  }
+  return text + config::to_yaml(run.resolved);
+}
+
+void add_units(const RunSetup& run, std::map<std::string, std::string>& units) {
+  if (!run.filter) return;
+  const auto all = calibration_units(run);
+  auto unit = all.begin();
+  for (const WheelSet& wheels : run.filter->wheels) {
+    for (const std::string& name : calibration_names(wheels)) units[name] = *unit++;
+  }
+}
+
+/// Thrown out of a run that the user does not wait for any more.
+struct Stopped {};
+
+/// The runs of an experiment, one at a time.
+class Runner {
+ public:
+  Runner(const ExperimentOptions& options, PluginRegistry& plugins,
+         const std::filesystem::path& folder, ExperimentResult& result)
+      : setup_(result.setup),
+        options_(options),
+        plugins_(plugins),
+        folder_(folder),
+        journal_(folder),
+        result_(result) {}
+
+  /// Wrong input is found here, before anything has run: sensors read their logs when made.
+  void check() {
+    for (std::size_t v = 0; v < setup_.variants.size(); ++v) {
+      for (std::size_t r = 0; r < setup_.recordings.size(); ++r) {
+        RunSetup check = read_run(configuration(v, r), plugins_);
+        if (v == 0 || r == 0) collect(check);
+        configurations_.push_back(text_of(check));
+        add_units(check, result_.units);
+        for (int s = 0; s < setup_.seeds; ++s) {
+          const auto seed = setup_.seeds > 1 ? static_cast<std::uint64_t>(s) + 1 : check.seed;
+          result_.runs.push_back({v, r, seed, {}});
+        }
+        if (stopped()) throw Interrupted("interrupted before the first run");
+      }
+    }
+  }
+
+  /// Takes over what the journal has, or throws it away.
+  void open_journal(Progress& progress) {
+    const int there = folder_.empty() ? 0 : journal_.size();
+    if (there == 0) return;
+    if (!options_.resume) {
+      journal_.remove();
+      std::fprintf(stderr,
+                   "%d runs of an interrupted experiment are discarded (not --resume): %s\n", there,
+                   journal_.folder().c_str());
+      return;
+    }
+    int taken = 0;
+    for (ExperimentRun& run : result_.runs) {
+      if (options_.keep_runs && !exists(run_folder(run) / "summary.json")) continue;
+      std::optional<RunResult> kept = journal_.read(key_of(run));
+      if (!kept) continue;
+      run.result = std::move(*kept);
+      run.taken_over = true;
+      ++taken;
+    }
+    finished_ = taken;
+    const std::string of = " of " + std::to_string(result_.runs.size());
+    progress.skipped(
+        taken, std::to_string(taken) + of + " runs taken over from an interrupted experiment");
+    if (there > taken) {
+      std::fprintf(stderr,
+                   "%d of %d files in %s are not used: damaged, of another configuration, seed or "
+                   "version, or without the folder that --keep-runs wants\n",
+                   there - taken, there, journal_.folder().c_str());
+    }
+  }
+
+  /// Runs a cell; false if that was interrupted.
+  bool run(ExperimentRun& run) {
+    if (stopped()) return false;
+    try {
+      RunSetup setup = read_run(configuration(run.variant, run.recording), plugins_, run.seed);
+      run.result = experiment::run(setup, collect(setup), [this](double) {
+        if (stopped()) throw Stopped();
+      });
+      write_run_of(run, setup);
+    } catch (const Stopped&) {
+      return false;
+    } catch (const Unwritable& error) {
+      throw std::runtime_error(error.text);
+    } catch (const std::exception& error) {
+      fail(run, error.what());
+    } catch (...) {
+      fail(run, "something was thrown that is not a std::exception");
+    }
+    thin(run.result);
+    // A run that failed may do better once its cause is mended.
+    if (!folder_.empty() && run.result.status != RunStatus::kFailed) {
+      journal_.write(key_of(run), run.result);
+    }
+    ++finished_;
+    return true;
+  }
+
+  bool stopped() const { return options_.interrupted && options_.interrupted(); }
+  int finished() const { return finished_; }
+
+ private:
+  /// Results that cannot be written are no fault of the run.
+  struct Unwritable {
+    std::string text;
+  };
+
+  static void fail(ExperimentRun& run, const std::string& cause) {
+    run.result = {};
+    run.result.status = RunStatus::kFailed;
+    run.result.cause = cause;
+  }
+
+  Node configuration(std::size_t variant, std::size_t recording) const {
+    return configuration_of(setup_, setup_.variants[variant], setup_.recordings[recording]);
+  }
+
+  RunKey key_of(const ExperimentRun& run) const {
+    return {setup_.variants[run.variant].name, setup_.recordings[run.recording].name, run.seed,
+            configurations_[run.variant * setup_.recordings.size() + run.recording]};
+  }
+
+  std::filesystem::path run_folder(const ExperimentRun& run) const {
+    const std::string& recording = setup_.recordings[run.recording].name;
+    std::string name = setup_.variants[run.variant].name;
+    if (!recording.empty()) name += "_" + recording;
+    if (setup_.seeds > 1) name += "_" + std::to_string(run.seed);
+    return folder_ / "runs" / name;
+  }
+
+  void write_run_of(const ExperimentRun& run, const RunSetup& setup) const {
+    if (!options_.keep_runs) return;
+    try {
+      write_run(run_folder(run), setup, run.result);
+    } catch (const std::exception& error) {
+      throw Unwritable{error.what()};
+    }
+  }
+
+  const ExperimentSetup& setup_;
+  const ExperimentOptions& options_;
+  PluginRegistry& plugins_;
+  std::filesystem::path folder_;
+  RunJournal journal_;
+  ExperimentResult& result_;
+  std::vector<std::string> configurations_;  // by variant, recording
+  std::atomic<int> finished_ = 0;
+};
+
 }  // namespace
+
+Node configuration_of(const ExperimentSetup& setup, const Variant& variant,
+                      const Recording& recording) {
+  Node run = setup.base;
+  config::merge(run, variant.overrides);
+  Node resolved = resolve_placeholders(run, recording.labels);
+  resolved.set(
+      "name", Node::scalar_of(variant.name + (recording.name.empty() ? "" : "_" + recording.name)));
+  return resolved;
+}
 
 ExperimentSetup read_experiment(const std::filesystem::path& path,
                                 const ExperimentOptions& options) {
@@ -100,10 +285,12 @@ ExperimentSetup read_experiment(const std::filesystem::path& path,
   if (setup.seeds < 1) throw InputError("--seeds must be at least 1");
   const auto report_by = params.texts("report_by");
   setup.report_by.assign(report_by.begin(), report_by.end());
+  setup.base_file = params.text("base");
   setup.base = load_base(file, options.assignments);
   setup.recordings = read_recordings(file);
   require_labels(setup.report_by, setup.recordings, file, "report_by");
   read_variants(file, setup);
+  find_baseline(file, params.text("baseline"), setup);
   return setup;
 }
 
@@ -111,43 +298,27 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
                                 PluginRegistry& plugins, const std::filesystem::path& folder) {
   ExperimentResult result;
   result.setup = setup;
-  for (std::size_t v = 0; v < setup.variants.size(); ++v) {
-    for (std::size_t r = 0; r < setup.recordings.size(); ++r) {
-      // Wrong input is found here, before anything has run: sensors read their logs when made.
-      RunSetup check =
-          read_run(configuration_of(setup, setup.variants[v], setup.recordings[r]), plugins);
-      if (v == 0 || r == 0) collect(check);
-      for (int s = 0; s < setup.seeds; ++s) {
-        const std::uint64_t seed = setup.seeds > 1 ? static_cast<std::uint64_t>(s) + 1 : check.seed;
-        result.runs.push_back({v, r, seed, {}});
-      }
-    }
-  }
+  Runner runner(options, plugins, folder, result);
+  runner.check();
   // Whether results can be written shows before the work, too.
   if (!folder.empty()) make_folder(folder);
   const auto begin = std::chrono::steady_clock::now();
-  const int jobs = options.jobs > 0 ? options.jobs : tbb::this_task_arena::max_concurrency();
+  result.jobs = options.jobs > 0 ? options.jobs : tbb::this_task_arena::max_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                                  static_cast<std::size_t>(jobs));
-  Progress progress(setup.name, static_cast<int>(result.runs.size()));
-  tbb::parallel_for(std::size_t{0}, result.runs.size(), [&](std::size_t i) {
-    ExperimentRun& run = result.runs[i];
-    try {
-      const Node configuration =
-          configuration_of(setup, setup.variants[run.variant], setup.recordings[run.recording]);
-      RunSetup run_setup = read_run(configuration, plugins, run.seed);
-      run.result = experiment::run(run_setup, collect(run_setup));
-      if (options.keep_runs) {
-        std::string name = run_setup.name;
-        if (setup.seeds > 1) name += "_" + std::to_string(run.seed);
-        write_run(folder / "runs" / name, run_setup, run.result);
-      }
-    } catch (const std::exception& error) {
-      run.result.status = RunStatus::kFailed;
-      run.result.cause = error.what();
-    }
-    progress.done(line_of(setup, run));
-  });
+                                  static_cast<std::size_t>(result.jobs));
+  {
+    Progress progress(setup.name, static_cast<int>(result.runs.size()));
+    runner.open_journal(progress);
+    tbb::parallel_for(std::size_t{0}, result.runs.size(), [&](std::size_t i) {
+      ExperimentRun& run = result.runs[i];
+      if (!run.taken_over && runner.run(run)) progress.done(line_of(setup, run));
+    });
+  }
+  if (runner.finished() < static_cast<int>(result.runs.size())) {
+    throw Interrupted("interrupted after " + std::to_string(runner.finished()) + " of " +
+                      std::to_string(result.runs.size()) + " runs" +
+                      (folder.empty() ? "" : "; continue with --resume"));
+  }
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "held_gauge.hpp"
+#include "monitor_record.hpp"
 #include "viwo/eval/consistency.hpp"
 #include "viwo/experiment/run.hpp"
 #include "viwo/filter/moving_start.hpp"
@@ -130,6 +131,7 @@ class Recorder {
     add_error(filter, t_s);
     add_calibration(filter);
     add_counts(estimator);
+    record_monitors(estimator, t_s, result_.monitor);
     const auto stages = estimator.stage_ms();
     stage_ms_.resize(stages.size());
     for (std::size_t i = 0; i < stages.size(); ++i) stage_ms_[i].push_back(stages[i]);
@@ -320,11 +322,13 @@ Estimator make_estimator(const FilterSetup& setup) {
 
 }  // namespace
 
-RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgress& progress) {
+RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgress& progress,
+                     const OnStart& on_start) {
   RunResult result;
   result.rejections = data.rejections;
   Estimator estimator = make_estimator(*setup.filter);
   start(estimator, setup, data);
+  if (on_start) estimator.observe(on_start(estimator));
   Recorder recorder(setup, data, result);
   Feed feed(setup, data);
   const double log_s = seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);

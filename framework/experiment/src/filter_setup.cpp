@@ -45,6 +45,10 @@ void read_estimator(const ParamSet& p, FilterSetup& setup) {
   setup.options.max_epoch_s = p.number("max_epoch_s");
   setup.options.max_wait_s = p.number("max_wait_s");
   setup.options.max_imu_gap_s = p.number("max_imu_gap_s");
+  setup.options.monitor.enabled = p.flag("monitor");
+  setup.options.monitor.window_s = p.number("monitor_window_s");
+  setup.options.monitor.min_information = p.number("monitor_min_information");
+  setup.options.monitor.hold = p.flag("hold_unexcited");
   StartSetup& start = setup.start;
   start.mode = p.text("start") == "standstill" ? StartMode::kStandstill
                : p.text("start") == "moving"   ? StartMode::kMoving
@@ -115,6 +119,7 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double er
   if (!p_IinO || !rpy || !sigma_p || !sigma_R) return;
   set.sensor = p.text("sensor");
   WheelsPrior& prior = set.prior;
+  prior.name = set.name;
   prior.wheels.model = &set.model->model();
   prior.wheels.R_ItoO = sim::rotation_from_euler(rpy->z(), rpy->y(), rpy->x());
   prior.wheels.p_IinO = *p_IinO;
@@ -301,16 +306,7 @@ bool wants_filter(const Node& run) {
 }
 
 std::vector<std::string> calibration_names(const WheelSet& wheels) {
-  const std::string prefix = wheels.name.empty() ? "" : wheels.name + ".";
-  std::vector<std::string> names;
-  for (const char* name : {"theta_ItoO_x", "theta_ItoO_y", "theta_ItoO_z", "p_IinO_x", "p_IinO_y",
-                           "p_IinO_z", "t_OtoI"}) {
-    names.push_back(prefix + name);
-  }
-  for (const IntrinsicSpec& spec : wheels.model->description().intrinsics) {
-    names.push_back(prefix + spec.name);
-  }
-  return names;
+  return viwo::calibration_names(wheels.name, wheels.model->description().intrinsics);
 }
 
 FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>& model,
@@ -326,6 +322,10 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
   double error_scale = 0.;
   if (const auto params = read("estimator", kEstimatorParams)) {
     read_estimator(*params, setup);
+    if (setup.options.monitor.hold && !setup.options.monitor.enabled) {
+      errors.add(run.find("estimator")->mark(),
+                 "estimator.hold_unexcited needs estimator.monitor: true");
+    }
     error_scale = params->number("calibration_error_scale");
   }
   if (const auto params = read("imu", kImuParams)) {

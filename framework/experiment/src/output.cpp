@@ -36,6 +36,29 @@ std::string significant(double value, int digits) {
   return text.data();
 }
 
+const char* viwo_version() { return VIWO_VERSION; }
+
+DisplayUnit display_unit(const std::string& si_unit, double magnitude) {
+  const bool has_prefixes = si_unit == "m" || si_unit == "rad" || si_unit == "s" ||
+                            si_unit == "m/s" || si_unit == "rad/s";
+  if (has_prefixes && magnitude < 0.1) return {"m" + si_unit, 1e3};
+  return {si_unit, 1.};
+}
+
+std::string with_unit(const std::string& heading, const std::string& unit) {
+  return unit.empty() ? heading : heading + " [" + unit + "]";
+}
+
+std::vector<std::string> calibration_units(const RunSetup& setup) {
+  std::vector<std::string> units;
+  if (!setup.filter) return units;
+  for (const WheelSet& wheels : setup.filter->wheels) {
+    for (const char* unit : {"rad", "rad", "rad", "m", "m", "m", "s"}) units.emplace_back(unit);
+    for (const auto& spec : wheels.model->description().intrinsics) units.push_back(spec.unit);
+  }
+  return units;
+}
+
 namespace {
 
 /// Every k-th index so that at most `max_points` remain, and the last.
@@ -47,6 +70,45 @@ void thinned(std::size_t size, std::size_t max_points, const F& take) {
 }
 
 }  // namespace
+
+namespace {
+
+/// The band is around the curve, or around zero.
+report::Series banded(const std::string& name, const CurveData& data, bool around_zero,
+                      std::size_t max_points) {
+  report::Series series;
+  series.name = name;
+  thinned(data.x.size(), max_points, [&](std::size_t i) {
+    const double y = data.scale * data.y[i];
+    series.x.push_back(data.x[i]);
+    series.y.push_back(y);
+    if (data.sigma.empty()) return;
+    const double middle = around_zero ? 0. : y;
+    const double band = kBandSigmas * data.scale * data.sigma[i];
+    series.y_low.push_back(middle - band);
+    series.y_high.push_back(middle + band);
+  });
+  return series;
+}
+
+}  // namespace
+
+report::Series curve(const std::string& name, const CurveData& data, std::size_t max_points) {
+  return banded(name, data, false, max_points);
+}
+
+report::Series error_curve(const std::string& name, const CurveData& data, std::size_t max_points) {
+  return banded(name, data, true, max_points);
+}
+
+report::Series truth_line(double begin, double end, double truth) {
+  report::Series series;
+  series.name = "truth";
+  series.reference = true;
+  series.x = {begin, end};
+  series.y = {truth, truth};
+  return series;
+}
 
 report::Series trajectory_series(const std::string& name, const Trajectory& trajectory,
                                  std::size_t max_points) {

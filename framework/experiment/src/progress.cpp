@@ -11,15 +11,13 @@ namespace viwo::experiment {
 namespace {
 
 /// One line that replaces itself: "what [####....] text, about 3 s left".
-void draw_bar(const std::string& what, double fraction, const std::string& text, double spent_s) {
+/// `left_s` is negative when nothing is known about it.
+void draw_bar(const std::string& what, double fraction, const std::string& text, double left_s) {
   constexpr int kWidth = 30;
   std::string bar(static_cast<std::size_t>(kWidth * std::clamp(fraction, 0., 1.)), '#');
   bar.resize(kWidth, '.');
   std::fprintf(stderr, "\r\033[K%s [%s] %s", what.c_str(), bar.c_str(), text.c_str());
-  if (fraction > 0.) {
-    const double left_s = spent_s / fraction * (1. - fraction);
-    std::fprintf(stderr, ", about %.0f s left", std::ceil(left_s));
-  }
+  if (left_s >= 0.) std::fprintf(stderr, ", about %.0f s left", std::ceil(left_s));
   std::fflush(stderr);
 }
 
@@ -37,9 +35,20 @@ Progress::~Progress() {
   if (terminal_) std::fprintf(stderr, "\r\033[K");
 }
 
+void Progress::skipped(int count, const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  skipped_ += count;
+  count_ += count;
+  show(line);
+}
+
 void Progress::done(const std::string& line) {
   const std::lock_guard lock(mutex_);
   ++count_;
+  show(line);
+}
+
+void Progress::show(const std::string& line) const {
   if (!terminal_) {
     std::fprintf(stderr, "[%d/%d] %s\n", count_, total_, line.c_str());
     return;
@@ -51,7 +60,9 @@ void Progress::done(const std::string& line) {
 void Progress::draw() const {
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
   const double fraction = total_ > 0 ? static_cast<double>(count_) / total_ : 1.;
-  draw_bar(what_, fraction, std::to_string(count_) + "/" + std::to_string(total_), spent.count());
+  const int done = count_ - skipped_;
+  const double left_s = done > 0 ? spent.count() / done * (total_ - count_) : -1.;
+  draw_bar(what_, fraction, std::to_string(count_) + "/" + std::to_string(total_), left_s);
 }
 
 TimeProgress::TimeProgress(std::string what)
@@ -70,7 +81,8 @@ void TimeProgress::at(double fraction) {
   const int percent = static_cast<int>(100. * std::min(fraction, 1.));
   const std::string text = std::to_string(percent) + " %";
   if (terminal_) {
-    draw_bar(what_, percent / 100., text, std::chrono::duration<double>(now - start_).count());
+    const double spent_s = std::chrono::duration<double>(now - start_).count();
+    draw_bar(what_, percent / 100., text, fraction > 0. ? spent_s * (1. / fraction - 1.) : -1.);
     drawn_ = true;
     next_ = now + std::chrono::milliseconds(100);
   } else if (percent >= shown_percent_ + 10) {

@@ -57,6 +57,24 @@ nlohmann::json calibration_json(const RunResult& result) {
   return calibration;
 }
 
+bool has_monitor(const MonitorTrack& monitor) {
+  return !monitor.t_s.empty() || !monitor.warnings.empty();
+}
+
+nlohmann::json monitor_json(const MonitorTrack& monitor) {
+  nlohmann::json warnings = nlohmann::json::array();
+  for (const MonitorWarning& warning : monitor.warnings) {
+    warnings.push_back(
+        {{"time_s", warning.t_s}, {"text", warning.text}, {"parameters", warning.parameters}});
+  }
+  nlohmann::json last = nlohmann::json::object();
+  for (std::size_t i = 0; i < monitor.parameters.size(); ++i) {
+    if (monitor.sigma_ratio[i].empty()) continue;
+    last[monitor.parameters[i]] = number_or_null(monitor.sigma_ratio[i].back());
+  }
+  return {{"warnings", warnings}, {"sigma_ratio", last}};
+}
+
 /// What the wheels of a run without filter gave.
 nlohmann::json wheels_json(const RunSetup& setup, const PreintegratedPose& total) {
   return {{"model", setup.kinematics.info.name},
@@ -92,6 +110,7 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
   for (const auto& [stage, time] : result.stages) timing[stage] = stage_json(time);
   timing["total"] = stage_json(result.total_ms);
   json summary = {
+      {"viwo_version", viwo_version()},
       {"status", name(result.status)},
       {"cause", result.cause},
       {"name", setup.name},
@@ -107,6 +126,7 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
       {"realtime_factor",
        number_or_null(result.wall_s > 0. ? result.duration_s / result.wall_s : std::nan(""))},
       {"peak_rss_mb", peak_rss_mb()}};
+  if (has_monitor(result.monitor)) summary["monitor"] = monitor_json(result.monitor);
   if (!setup.filter) summary["wheels"] = wheels_json(setup, result.total);
   return summary;
 }
@@ -164,6 +184,9 @@ std::string describe(const RunResult& result) {
     out << "NEES of the pose " << significant(result.nees.pose, 3) << " (6 is consistent); epoch "
         << significant(result.total_ms.mean_ms, 3) << " ms mean, "
         << significant(result.total_ms.p95_ms, 3) << " ms p95\n";
+  }
+  for (const MonitorWarning& warning : result.monitor.warnings) {
+    out << "at " << significant(warning.t_s, 4) << " s: " << warning.text << "\n";
   }
   for (const std::string& line : describe_rejections(result)) out << line << "\n";
   return out.str();

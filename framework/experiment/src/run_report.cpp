@@ -1,131 +1,171 @@
-// The page of a run.
-#include <algorithm>
+// The page of a run: what ran, how accurate it was, and with which configuration.
+#include "run_report.hpp"
+
 #include <cmath>
 
+#include "viwo/config/yaml.hpp"
 #include "viwo/experiment/output.hpp"
 
 namespace viwo::experiment {
 namespace {
 
-/// Estimate with its three-sigma band and the truth, thinned.
-report::Plot calibration_plot(const RunResult& result, const CalibrationTrack& track) {
-  report::Plot plot{track.name, "time [s]", track.name};
-  plot.half_width = true;
-  report::Series estimate, truth;
-  estimate.name = "estimate, 3 sigma";
-  truth.name = "truth";
-  truth.reference = true;
-  const std::size_t n = track.estimate.size();
-  const std::size_t step = std::max<std::size_t>(1, n / 300);
-  for (std::size_t i = 0; i < n; i += step) {
-    estimate.x.push_back(result.epoch_t_s[i]);
-    estimate.y.push_back(track.estimate[i]);
-    estimate.y_low.push_back(track.estimate[i] - 3. * track.sigma[i]);
-    estimate.y_high.push_back(track.estimate[i] + 3. * track.sigma[i]);
+using namespace report;
+
+/// Height of the top view, and of what stands beside it.
+constexpr int kTopViewHeight = 460;
+
+KeyValues facts_of(const RunSetup& setup, const RunResult& result) {
+  KeyValues facts;
+  facts.entries = {{"status", name(result.status)},
+                   {"seed", static_cast<double>(setup.seed)},
+                   {"duration [s]", result.duration_s},
+                   {"epochs", result.epochs}};
+  if (result.wall_s > 0.) {
+    facts.entries.push_back(
+        {"real-time factor", significant(result.duration_s / result.wall_s, 3)});
   }
-  plot.series.push_back(estimate);
-  if (std::isfinite(track.truth)) {
-    truth.x = {result.epoch_t_s.front(), result.epoch_t_s.back()};
-    truth.y = {track.truth, track.truth};
-    plot.series.push_back(truth);
+  facts.entries.push_back({"epoch, mean [ms]", significant(result.total_ms.mean_ms, 3)});
+  if (result.accuracy) facts.entries.push_back({"path length [m]", result.accuracy->path_length_m});
+  if (setup.filter) {
+    if (std::isfinite(result.nees.pose)) {
+      facts.entries.push_back({"pose NEES (consistent: 6)", significant(result.nees.pose, 3)});
+    }
+    return facts;
   }
-  return plot;
+  if (std::isfinite(result.nees_planar)) {
+    facts.entries.push_back({"planar NEES (consistent: 3)", significant(result.nees_planar, 3)});
+  }
+  const PreintegratedPose& total = result.total;
+  facts.entries.push_back({"encoder samples", total.samples});
+  facts.entries.push_back({"not believed (parity gate)", total.gated});
+  facts.entries.push_back({"rejected by the model", total.rejected});
+  facts.entries.push_back({"rank-deficient", total.rank_deficient});
+  facts.entries.push_back({"bridged [s]", total.bridged_s});
+  return facts;
 }
 
-/// What only the filter has: consistency, updates, calibration over time.
-void add_filter_sections(const RunResult& result, report::Document& document) {
-  using namespace report;
-  Table updates;
-  updates.caption = "Updates";
-  updates.columns = {{"update"}, {"applied"}, {"rejected"}};
-  for (const UpdateTrack& update : result.updates) {
-    updates.rows.push_back({update.name, update.total.applied, update.total.rejected});
+std::string alignment_text(eval::Alignment alignment) {
+  switch (alignment) {
+    case eval::Alignment::kNone:
+      return "not aligned";
+    case eval::Alignment::kStart:
+      return "aligned at the start";
+    case eval::Alignment::kYawPosition:
+      return "aligned in yaw and position";
+    case eval::Alignment::kSe3:
+      return "aligned in six degrees of freedom";
   }
-  document.sections[0].blocks.emplace_back(updates);
-  if (!result.nees.series.empty()) {
-    Plot nees{"Normalised estimation error squared of the pose", "time [s]", "NEES"};
-    nees.half_width = true;
-    nees.lines = {{ReferenceLine::Direction::kHorizontal, 6., "consistent"}};
-    Series series;
-    series.name = "NEES";
-    for (const auto& [t_s, value] : result.nees.series) {
-      series.x.push_back(t_s);
-      series.y.push_back(value);
+  return {};
+}
+
+Table accuracy_table(const eval::Accuracy& accuracy) {
+  Table table;
+  table.caption = "Accuracy against the reference";
+  table.columns = {{"error"}, {"position [mm]"}, {"orientation [deg]"}, {"over"}};
+  table.rows.push_back({"ATE: rms, " + alignment_text(accuracy.alignment), 1e3 * accuracy.ate_m,
+                        accuracy.ate_deg, std::to_string(accuracy.n_poses) + " poses"});
+  for (const eval::SegmentErrors& segment : accuracy.rpe) {
+    if (segment.count == 0) continue;
+    table.rows.push_back({"RPE over " + significant(segment.length_m, 4) + " m: mean",
+                          1e3 * segment.mean_m, segment.mean_deg,
+                          std::to_string(segment.count) + " segments"});
+  }
+  table.rows.push_back({"at the end, aligned at the start", 1e3 * accuracy.end_m, accuracy.end_deg,
+                        significant(accuracy.path_length_m, 4) + " m"});
+  return table;
+}
+
+void add_result_section(const RunSetup& setup, const RunResult& result, Document& document) {
+  Section section{"Result", {}};
+  if (result.status != RunStatus::kOk) {
+    section.blocks.emplace_back(Paragraph{std::string(name(result.status)) + ": " + result.cause,
+                                          Paragraph::Tone::kWarning});
+  }
+  section.blocks.emplace_back(facts_of(setup, result));
+  if (result.accuracy) {
+    section.blocks.emplace_back(accuracy_table(*result.accuracy));
+  } else if (result.reference.empty()) {
+    section.blocks.emplace_back(Paragraph{
+        "There is no reference: nothing to compare the estimate with.", Paragraph::Tone::kNote});
+  }
+  document.sections.push_back(std::move(section));
+}
+
+void add_trajectory_section(const RunResult& result, Document& document) {
+  if (result.estimate.empty()) return;
+  Section section{"Trajectory", {}};
+  Plot top{"Seen from above", "x [m]", "y [m]"};
+  top.equal_axes = true;
+  top.height_px = kTopViewHeight;
+  top.series.push_back(trajectory_series("estimate", result.estimate, kMaxCurvePoints));
+  top.series.back().colour = kEstimateColour;
+  if (!result.reference.empty()) {
+    top.series.push_back(trajectory_series("truth", result.reference, kMaxCurvePoints));
+    top.series.back().reference = true;
+  }
+  if (!result.accuracy) {
+    section.blocks.emplace_back(std::move(top));
+    document.sections.push_back(std::move(section));
+    return;
+  }
+  top.half_width = true;
+  const eval::ErrorSeries& series = result.accuracy->series;
+  Plot position{"Position error over the way", "path length [m]", "error [mm]"};
+  position.half_width = true;
+  position.height_px = kTopViewHeight;
+  position.series.push_back(error_series("error", *result.accuracy, kMaxCurvePoints));
+  position.series.back().colour = kEstimateColour;
+  position.caption = "Distance to the truth after aligning the first poses.";
+  section.blocks.emplace_back(std::move(top));
+  section.blocks.emplace_back(std::move(position));
+  if (result.errors.empty()) {  // else the yaw is shown with its band
+    Plot yaw{"Yaw error", "time [s]", "error [deg]"};
+    yaw.series.push_back(curve("error", {series.t_s, series.yaw_error_deg}));
+    yaw.series.back().colour = kEstimateColour;
+    yaw.height_px = 300;
+    section.blocks.emplace_back(std::move(yaw));
+  }
+  document.sections.push_back(std::move(section));
+}
+
+void add_configuration_section(const RunSetup& setup, Document& document) {
+  Table plugins;
+  plugins.caption = "Plugins of this run, with viwo " + std::string(viwo_version());
+  plugins.columns = {{"used as"}, {"plugin"}, {"version"}, {"what it is"}};
+  const auto add = [&](const std::string& use, const PluginInfo& info) {
+    plugins.rows.push_back({use, info.name, info.version, info.summary});
+  };
+  if (setup.kinematics.object) add("kinematics", setup.kinematics.info);
+  for (const auto& [sensor, loaded] : setup.sensors) add("sensor " + sensor, loaded.info);
+  if (setup.filter) {
+    for (const FilterSetup::Entry& entry : setup.filter->updates) {
+      add("update " + entry.name, entry.update.info);
     }
-    nees.series.push_back(series);
-    document.sections[1].blocks.emplace_back(nees);
   }
-  Section calibration{"Calibration", {}};
-  for (const CalibrationTrack& track : result.calibration) {
-    const bool estimated = !track.sigma.empty() && track.sigma.front() > 0.;
-    if (estimated) calibration.blocks.emplace_back(calibration_plot(result, track));
-  }
-  if (!calibration.blocks.empty()) document.sections.push_back(calibration);
+  document.sections.push_back(
+      {"Configuration",
+       {std::move(plugins), Details{"The resolved configuration, a valid run configuration",
+                                    config::to_yaml(setup.resolved)}}});
 }
 
 }  // namespace
 
-report::Document report_of(const RunSetup& setup, const RunResult& result) {
-  using namespace report;
+Document report_of(const RunSetup& setup, const RunResult& result) {
   const std::string model =
       setup.model ? setup.kinematics.info.name + " " + setup.kinematics.info.version : "no wheels";
   Document document{setup.name,
-                    setup.filter ? "filter over vision, inertia and wheels (" + model + ")"
-                                 : "wheel odometry with " + model,
+                    (setup.filter ? "filter over vision, inertia and wheels (" + model + ")"
+                                  : "wheel odometry with " + model) +
+                        ", viwo " + viwo_version(),
                     {}};
-  KeyValues facts;
-  facts.entries = {{"status", std::string(name(result.status)) +
-                                  (result.cause.empty() ? "" : ": " + result.cause)},
-                   {"seed", static_cast<double>(setup.seed)},
-                   {"duration [s]", result.duration_s},
-                   {"epochs", result.epochs},
-                   {"mean time of an epoch [ms]", result.total_ms.mean_ms}};
-  if (!setup.filter) {
-    const PreintegratedPose& total = result.total;
-    facts.entries.push_back({"samples", total.samples});
-    facts.entries.push_back({"samples not believed (parity gate)", total.gated});
-    facts.entries.push_back({"rank-deficient samples", total.rank_deficient});
-    facts.entries.push_back({"bridged [s]", total.bridged_s});
-  }
-  if (result.accuracy) {
-    facts.entries.push_back({"path length [m]", result.accuracy->path_length_m});
-    facts.entries.push_back({"end position error [mm]", 1e3 * result.accuracy->end_m});
-    facts.entries.push_back({"end yaw error [deg]", result.accuracy->end_yaw_deg});
-    facts.entries.push_back({"ATE [mm]", 1e3 * result.accuracy->ate_m});
-    if (setup.filter) {
-      facts.entries.push_back({"pose NEES (6 is consistent)", result.nees.pose});
-    } else {
-      facts.entries.push_back({"planar NEES (3 is consistent)", result.nees_planar});
-    }
-  }
-  document.sections.push_back({"Result", {facts}});
-  if (!result.rejections.empty()) {
-    Table table;
-    table.caption = "Not used";
-    table.columns = {{"count"}, {"source"}, {"reason"}, {"first"}};
-    for (const auto& [source, rejection] : result.rejections) {
-      table.rows.push_back({rejection.count, source, rejection.reason, rejection.first});
-    }
-    document.sections.back().blocks.emplace_back(std::move(table));
-  }
-  Plot top{"Trajectory, seen from above", "x [m]", "y [m]"};
-  top.equal_axes = true;
-  top.half_width = true;
-  top.series.push_back(trajectory_series("estimate", result.estimate));
-  if (!result.reference.empty()) {
-    top.series.push_back(trajectory_series("reference", result.reference));
-    top.series.back().reference = true;
-  }
-  document.sections.push_back({"Trajectory", {top}});
-  if (result.accuracy) {
-    Plot error{"Position error", "path length [m]", "error [mm]"};
-    error.half_width = true;
-    error.series.push_back(error_series("estimate", *result.accuracy));
-    document.sections.back().blocks.emplace_back(error);
-  }
-  if (setup.filter) add_filter_sections(result, document);
-  document.sections.push_back(
-      {"Configuration", {Paragraph{"The resolved configuration is in config.resolved.yaml."}}});
+  add_result_section(setup, result, document);
+  add_trajectory_section(result, document);
+  add_error_section(result, document);
+  add_calibration_section(setup, result, document);
+  add_excitation_section(result, document);
+  add_measurements_section(result, document);
+  add_time_section(result, document);
+  add_configuration_section(setup, document);
   return document;
 }
 

@@ -27,8 +27,9 @@ config::Node load_run_configuration(const std::filesystem::path& file,
 config::Node resolve_placeholders(const config::Node& run,
                                   const std::map<std::string, std::string>& labels = {});
 
-/// The list `recordings` (names, numbers or maps of labels) or `motions` (names) of an experiment
-/// or a calibration; one element without labels if there is neither. Throws InputError.
+/// The list `recordings` (names, numbers or maps of labels) or `motions` (names, or maps of labels)
+/// of an experiment or a calibration; one element without labels if there is neither. Throws
+/// InputError.
 std::vector<Recording> read_recordings(const config::Node& section);
 
 /// The run configuration that an experiment or a calibration is based on: its file `base` (relative

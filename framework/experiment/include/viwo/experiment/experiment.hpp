@@ -2,12 +2,16 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "viwo/experiment/configuration.hpp"
 #include "viwo/experiment/run.hpp"
+#include "viwo/report/document.hpp"
 
 namespace viwo::experiment {
 
@@ -19,11 +23,13 @@ struct Variant {
 /// An experiment file, read, with its base configuration.
 struct ExperimentSetup {
   std::string name;
+  std::filesystem::path base_file;
   config::Node base;  ///< run configuration with placeholders
   std::vector<Variant> variants;
   std::vector<Recording> recordings;
   int seeds = 1;
   std::vector<std::string> report_by;  ///< labels over which the tables are broken down
+  std::size_t baseline = 0;            ///< variant that the others are compared with
 };
 
 struct ExperimentOptions {
@@ -31,6 +37,15 @@ struct ExperimentOptions {
   std::optional<int> seeds;              ///< overrules the file
   bool keep_runs = false;                ///< one folder per run
   std::vector<std::string> assignments;  ///< --set, applied to the base configuration
+  bool resume = false;                   ///< take over the runs of an interrupted experiment
+  /// Asked from any thread, often; once it says true the experiment ends as soon as it can.
+  std::function<bool()> interrupted;
+};
+
+/// The experiment was interrupted: how far it came and how to continue.
+class Interrupted : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 /// One cell of the experiment.
@@ -38,14 +53,22 @@ struct ExperimentRun {
   std::size_t variant = 0;
   std::size_t recording = 0;
   std::uint64_t seed = 1;
-  RunResult result;
+  RunResult result;         ///< its series thinned
+  bool taken_over = false;  ///< from the journal of an interrupted experiment
 };
 
 struct ExperimentResult {
   ExperimentSetup setup;
   std::vector<ExperimentRun> runs;  ///< by variant, recording, seed
-  double wall_s = 0.;
+  int jobs = 1;
+  double wall_s = 0.;  ///< without the time of runs that were taken over
+  /// "m", "rad", "s" of the calibration parameters, by name.
+  std::map<std::string, std::string> units;
 };
+
+/// The run configuration of one cell, placeholders replaced. Throws InputError.
+config::Node configuration_of(const ExperimentSetup& setup, const Variant& variant,
+                              const Recording& recording);
 
 /// Throws InputError.
 ExperimentSetup read_experiment(const std::filesystem::path& file,
@@ -53,15 +76,22 @@ ExperimentSetup read_experiment(const std::filesystem::path& file,
 
 /// Checks every variant with every recording before the first run starts (InputError), then runs
 /// all of them in parallel. A run that fails is kept with its cause and does not stop the others.
-/// The result does not depend on the number of jobs. With keep_runs, each run is written below
-/// `folder`/runs.
+/// The result does not depend on the number of jobs, nor on whether the experiment was interrupted
+/// and resumed. With keep_runs, each run is written below `folder`/runs.
+///
+/// Each run that is done is kept in `folder`/journal until write_experiment() has written the
+/// results; without a folder there is no journal. Throws Interrupted, and std::runtime_error when
+/// something cannot be written.
 ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOptions& options,
                                 PluginRegistry& plugins, const std::filesystem::path& folder);
 
-/// Writes runs.csv, summary.json and report.html.
+/// report.html of an experiment, as a document.
+report::Document report_of(const ExperimentResult& result);
+
+/// Writes runs.csv, summary.json and report.html, then removes the journal.
 void write_experiment(const std::filesystem::path& folder, const ExperimentResult& result);
 
-/// The table of variants (and labels) for the terminal.
+/// The tables of variants (and labels) for the terminal.
 std::string describe(const ExperimentResult& result);
 
 }  // namespace viwo::experiment

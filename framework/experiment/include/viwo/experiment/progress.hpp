@@ -15,16 +15,21 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
+  /// `count` pieces need not be done again, for the reason that `line` says.
+  void skipped(int count, const std::string& line);
+
   /// One more piece is done; `line` says what came out (shown above the bar, or as a line).
   void done(const std::string& line);
 
  private:
   void draw() const;
+  void show(const std::string& line) const;
 
   std::mutex mutex_;
   std::string what_;
   int total_;
   int count_ = 0;
+  int skipped_ = 0;
   bool terminal_;
   std::chrono::steady_clock::time_point start_;
 };

@@ -163,9 +163,13 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data);
 /// Called now and then with the part of the log's time that is done, 0 to 1.
 using OnProgress = std::function<void(double)>;
 
+/// Called when the estimator is about to begin; returns who is to watch it, or nullptr.
+using OnStart = std::function<EstimatorObserver*(const Estimator&)>;
+
 /// Runs the filter over all measurements and evaluates. A filter that diverges ends the run with
 /// the epoch and the cause.
-RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgress& progress = {});
+RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgress& progress = {},
+                     const OnStart& on_start = {});
 
 /// What the configuration asks for.
 inline RunResult run(const RunSetup& setup, const RunData& data, const OnProgress& progress = {}) {

@@ -1,0 +1,174 @@
+#include "experiment_statistics.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "viwo/experiment/output.hpp"
+
+namespace viwo::experiment {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+const Metric kMetrics[] = {
+    {"end_m", "end [mm]", 1e3,
+     [](const RunResult& r) { return r.accuracy ? r.accuracy->end_m : kNan; }},
+    {"end_yaw_abs_rad", "end yaw [mrad]", 1e3,
+     [](const RunResult& r) {
+       return r.accuracy ? std::abs(r.accuracy->end_yaw_deg) * M_PI / 180. : kNan;
+     }},
+    {"ate_m", "ATE [mm]", 1e3,
+     [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_m : kNan; }},
+    {"ate_deg", "ATE [deg]", 1.,
+     [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_deg : kNan; }},
+    {"rpe_10_m", "RPE 10 m [mm]", 1e3, [](const RunResult& r) { return rpe(r, 10., false); }},
+    {"rpe_10_deg", "RPE 10 m [deg]", 1., [](const RunResult& r) { return rpe(r, 10., true); }},
+    {"rpe_25_m", "RPE 25 m [mm]", 1e3, [](const RunResult& r) { return rpe(r, 25., false); }},
+    {"rpe_25_deg", "RPE 25 m [deg]", 1., [](const RunResult& r) { return rpe(r, 25., true); }},
+    {"nees_planar", "NEES (3)", 1., [](const RunResult& r) { return r.nees_planar; }, 3.},
+    {"nees_pose", "NEES (6)", 1., [](const RunResult& r) { return r.nees.pose; }, 6.},
+    {"nees_position", "NEES pos (3)", 1., [](const RunResult& r) { return r.nees.position; }, 3.},
+    {"nees_orientation", "NEES ori (3)", 1., [](const RunResult& r) { return r.nees.orientation; },
+     3.},
+    {"epoch_ms", "epoch [ms]", 1.,
+     [](const RunResult& r) { return r.updates.empty() ? kNan : r.total_ms.mean_ms; }},
+};
+
+}  // namespace
+
+std::span<const Metric> all_metrics() { return kMetrics; }
+
+std::vector<Metric> metrics_of(const ExperimentResult& result) {
+  std::vector<Metric> metrics;
+  for (const Metric& metric : kMetrics) {
+    if (std::any_of(result.runs.begin(), result.runs.end(), [&](const ExperimentRun& run) {
+          return std::isfinite(metric.of(run.result));
+        })) {
+      metrics.push_back(metric);
+    }
+  }
+  return metrics;
+}
+
+double rpe(const RunResult& run, double length_m, bool degrees) {
+  if (!run.accuracy) return kNan;
+  for (const auto& segment : run.accuracy->rpe) {
+    if (segment.length_m == length_m) return degrees ? segment.mean_deg : segment.mean_m;
+  }
+  return kNan;
+}
+
+std::vector<Group> groups_of(const ExperimentResult& result) {
+  std::vector<Group> groups{{"", "all", [](const ExperimentRun&) { return true; }}};
+  const auto& recordings = result.setup.recordings;
+  for (const std::string& label : result.setup.report_by) {
+    std::vector<std::string> seen;
+    for (const Recording& recording : recordings) {
+      const auto found = recording.labels.find(label);
+      if (found == recording.labels.end()) continue;
+      if (std::find(seen.begin(), seen.end(), found->second) != seen.end()) continue;
+      seen.push_back(found->second);
+      groups.push_back({label, found->second,
+                        [&recordings, label, value = found->second](const ExperimentRun& run) {
+                          const auto& labels = recordings[run.recording].labels;
+                          const auto at = labels.find(label);
+                          return at != labels.end() && at->second == value;
+                        }});
+    }
+  }
+  return groups;
+}
+
+std::vector<double> values_of(const ExperimentResult& result, std::size_t variant,
+                              const Metric& metric, const Group& group) {
+  std::vector<double> values;
+  for (const ExperimentRun& run : result.runs) {
+    if (run.variant != variant || !group.passes(run)) continue;
+    const double value = metric.of(run.result);
+    if (std::isfinite(value)) values.push_back(value);
+  }
+  return values;
+}
+
+RunCounts counts_of(const ExperimentResult& result, std::size_t variant, const Group& group) {
+  RunCounts counts;
+  for (const ExperimentRun& run : result.runs) {
+    if (run.variant != variant || !group.passes(run)) continue;
+    ++counts.runs;
+    counts.diverged += run.result.status == RunStatus::kDiverged;
+    counts.failed += run.result.status == RunStatus::kFailed;
+  }
+  return counts;
+}
+
+eval::PairedDifference paired(const ExperimentResult& result, std::size_t variant,
+                              const Metric& metric, const Group& group) {
+  std::vector<double> values, baseline;
+  for (const ExperimentRun& run : result.runs) {
+    if (run.variant != variant || !group.passes(run)) continue;
+    const auto other =
+        std::find_if(result.runs.begin(), result.runs.end(), [&](const ExperimentRun& b) {
+          return b.variant == result.setup.baseline && b.recording == run.recording &&
+                 b.seed == run.seed;
+        });
+    if (other == result.runs.end()) continue;
+    values.push_back(metric.of(run.result));
+    baseline.push_back(metric.of(other->result));
+  }
+  return eval::paired_difference(values, baseline, kConfidence);
+}
+
+bool is_significant(const eval::PairedDifference& difference) {
+  return difference.low > 0. || difference.high < 0.;
+}
+
+bool is_estimated(const RunResult& run, const CalibrationTrack& track) {
+  return !run.updates.empty() && !track.sigma.empty() && track.sigma.front() > 0. &&
+         track.sigma.back() > 0.;
+}
+
+std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,
+                                                          std::size_t variant) {
+  std::vector<CalibrationStatistics> all;
+  for (const ExperimentRun& run : result.runs) {
+    if (run.variant != variant || run.result.status != RunStatus::kOk) continue;
+    for (const CalibrationTrack& track : run.result.calibration) {
+      if (!is_estimated(run.result, track) || !std::isfinite(track.final_error)) continue;
+      auto at =
+          std::find_if(all.begin(), all.end(), [&](const auto& c) { return c.name == track.name; });
+      if (at == all.end()) at = all.insert(all.end(), {track.name});
+      const double e = track.final_error, sigma = track.sigma.back();
+      ++at->runs;
+      at->rmse += e * e;
+      at->mean_sigma += sigma;
+      at->prior_sigma += track.sigma.front();
+      at->nees += e * e / (sigma * sigma);
+    }
+  }
+  for (CalibrationStatistics& c : all) {
+    c.rmse = std::sqrt(c.rmse / c.runs);
+    c.mean_sigma /= c.runs;
+    c.prior_sigma /= c.runs;
+    c.nees /= c.runs;
+  }
+  return all;
+}
+
+std::string compact(double value, int digits) {
+  const double size = std::abs(value);
+  const bool whole = size >= std::pow(10., digits) && size < 1e6;
+  return whole ? std::to_string(std::llround(value)) : significant(value, digits);
+}
+
+RealtimeFactors realtime_factors(const ExperimentResult& result) {
+  double duration_s = 0., wall_s = 0., new_duration_s = 0.;
+  for (const ExperimentRun& run : result.runs) {
+    duration_s += run.result.duration_s;
+    wall_s += run.result.wall_s;
+    if (!run.taken_over) new_duration_s += run.result.duration_s;
+  }
+  return {wall_s > 0. ? duration_s / wall_s : kNan,
+          result.wall_s > 0. && new_duration_s > 0. ? new_duration_s / result.wall_s : kNan};
+}
+
+}  // namespace viwo::experiment

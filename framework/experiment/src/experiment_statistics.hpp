@@ -1,0 +1,84 @@
+// The numbers that an experiment is judged by, over groups of its runs.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "viwo/eval/statistics.hpp"
+#include "viwo/experiment/experiment.hpp"
+
+namespace viwo::experiment {
+
+inline constexpr double kConfidence = 0.95;  ///< of the intervals of paired differences
+
+/// A number of a run that tables show; NaN where a run has none.
+struct Metric {
+  const char* key;      ///< in summary.json and runs.csv, in SI units
+  const char* heading;  ///< of a table
+  double table_scale;   ///< from SI to the unit of the table
+  double (*of)(const RunResult&);
+  double target = 0.;  ///< best value; 0: the lower the better
+};
+
+std::span<const Metric> all_metrics();
+
+/// Those that at least one run has.
+std::vector<Metric> metrics_of(const ExperimentResult& result);
+
+/// Mean relative pose error over segments of a length, m or degrees; NaN if it was not evaluated.
+double rpe(const RunResult& run, double length_m, bool degrees);
+
+/// Some of the runs, with a name. Must not outlive the result that it is of.
+struct Group {
+  std::string label;  ///< one of report_by; empty: all runs
+  std::string value;  ///< of the label
+  std::function<bool(const ExperimentRun&)> passes;
+};
+
+/// All runs, then one group per value of each label in report_by, in order of appearance.
+std::vector<Group> groups_of(const ExperimentResult& result);
+
+/// Finite values of a metric over the runs of a variant in a group.
+std::vector<double> values_of(const ExperimentResult& result, std::size_t variant,
+                              const Metric& metric, const Group& group);
+
+struct RunCounts {
+  int runs = 0, diverged = 0, failed = 0;
+  int not_ok() const { return diverged + failed; }
+};
+RunCounts counts_of(const ExperimentResult& result, std::size_t variant, const Group& group);
+
+/// Variant minus baseline over the pairs of runs with the same recording and seed.
+eval::PairedDifference paired(const ExperimentResult& result, std::size_t variant,
+                              const Metric& metric, const Group& group);
+
+/// Whether the interval does not reach zero.
+bool is_significant(const eval::PairedDifference& difference);
+
+/// Final errors of one calibration parameter over the runs of a variant that estimated it.
+struct CalibrationStatistics {
+  std::string name;
+  int runs = 0;
+  double rmse = 0., mean_sigma = 0., prior_sigma = 0.;
+  double nees = 0.;  ///< mean squared normalised error
+};
+std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,
+                                                          std::size_t variant);
+
+/// Whether a run of the filter estimated this parameter of its own, and still had a variance at
+/// its end.
+bool is_estimated(const RunResult& run, const CalibrationTrack& track);
+
+/// A number for a table: `digits` significant digits, and whole from there up to a million.
+std::string compact(double value, int digits);
+
+/// How many seconds of the robot's time pass in one second.
+struct RealtimeFactors {
+  double core = 0.;     ///< of the computing of one core, without reading or simulating
+  double overall = 0.;  ///< on the clock, all jobs together, without runs that were taken over
+};
+RealtimeFactors realtime_factors(const ExperimentResult& result);
+
+}  // namespace viwo::experiment

@@ -1,0 +1,103 @@
+// The tables of an experiment on the terminal.
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "experiment_statistics.hpp"
+#include "viwo/experiment/output.hpp"
+
+namespace viwo::experiment {
+namespace {
+
+std::string padded(const std::string& text, std::size_t width) {
+  return text + std::string(width > text.size() ? width - text.size() : 0, ' ');
+}
+
+std::string right(const std::string& text, std::size_t width) {
+  return "  " + std::string(width > text.size() ? width - text.size() : 0, ' ') + text;
+}
+
+void add_means(const ExperimentResult& result, const Group& group, std::ostream& out) {
+  std::size_t width = 8;
+  for (const Variant& variant : result.setup.variants) width = std::max(width, variant.name.size());
+  width = std::max(width, group.value.size());
+  const auto metrics = metrics_of(result);
+  out << "\n" << padded(group.value, width) << right("not ok", 6);
+  for (const Metric& metric : metrics) out << right(metric.heading, 14);
+  out << "\n";
+  for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
+    out << padded(result.setup.variants[v].name, width)
+        << right(std::to_string(counts_of(result, v, group).not_ok()), 6);
+    for (const Metric& metric : metrics) {
+      const double mean = eval::mean(values_of(result, v, metric, group));
+      out << right(compact(metric.table_scale * mean, 4), 14);
+    }
+    out << "\n";
+  }
+}
+
+/// A row for each metric: how much more of it each variant has than the baseline.
+void add_paired(const ExperimentResult& result, const Group& all, std::ostream& out) {
+  const ExperimentSetup& setup = result.setup;
+  if (setup.variants.size() < 2) return;
+  out << "\ndifference to " << setup.variants[setup.baseline].name
+      << " over pairs of runs, 95 % interval (* without zero)\n"
+      << padded("", 16);
+  std::vector<std::size_t> widths;
+  for (const Variant& variant : setup.variants) {
+    widths.push_back(std::max<std::size_t>(22, variant.name.size()));
+    if (widths.size() - 1 != setup.baseline) out << right(variant.name, widths.back());
+  }
+  out << "\n";
+  for (const Metric& metric : metrics_of(result)) {
+    out << padded(metric.heading, 16);
+    for (std::size_t v = 0; v < setup.variants.size(); ++v) {
+      if (v == setup.baseline) continue;
+      const eval::PairedDifference d = paired(result, v, metric, all);
+      std::string text = compact(metric.table_scale * d.mean, 3);
+      if (std::isfinite(d.high)) {
+        text += " +- " + compact(metric.table_scale * (d.high - d.mean), 2);
+      }
+      out << right(text + (is_significant(d) ? " *" : "  "), widths[v]);
+    }
+    out << "\n";
+  }
+}
+
+void add_calibration(const ExperimentResult& result, std::ostream& out) {
+  for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
+    const auto statistics = calibration_statistics(result, v);
+    if (statistics.empty()) continue;
+    out << "\ncalibration of " << result.setup.variants[v].name
+        << ": rmse at the end (part of the prior sigma; NEES, 1 is consistent)\n";
+    std::size_t column = 0;
+    for (const CalibrationStatistics& c : statistics) {
+      const std::string text = "  " + c.name + " " + significant(c.rmse, 3) + " (" +
+                               significant(100. * c.rmse / c.prior_sigma, 3) + " %; " +
+                               significant(c.nees, 3) + ")";
+      out << padded(text, std::max<std::size_t>(42, text.size() + 1));
+      if (++column % 3 == 0) out << "\n";
+    }
+    if (column % 3 != 0) out << "\n";
+  }
+}
+
+}  // namespace
+
+std::string describe(const ExperimentResult& result) {
+  std::ostringstream out;
+  const auto groups = groups_of(result);
+  for (const Group& group : groups) add_means(result, group, out);
+  add_paired(result, groups.front(), out);
+  add_calibration(result, out);
+  const RealtimeFactors factors = realtime_factors(result);
+  out << "\none core runs " << compact(factors.core, 3) << " times faster than real time";
+  if (std::isfinite(factors.overall)) {
+    out << "; the experiment with " << result.jobs << (result.jobs == 1 ? " job " : " jobs ")
+        << compact(factors.overall, 3) << " times";
+  }
+  out << "\n";
+  return out.str();
+}
+
+}  // namespace viwo::experiment

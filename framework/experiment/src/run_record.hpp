@@ -1,0 +1,23 @@
+// A run's result for keeping: thinned, and as JSON from which it comes back bit for bit.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "viwo/experiment/run.hpp"
+
+namespace viwo::experiment {
+
+/// Points that are kept of each series of a run in an experiment.
+inline constexpr std::size_t kRecordPoints = 150;
+
+/// Thins all series of a run to about `max_points`, first and last kept; counts of factors are
+/// summed over what is left out. Matrices of the run's odometry are dropped.
+void thin(RunResult& run, std::size_t max_points = kRecordPoints);
+
+/// All that thin() leaves. Numbers that are not finite stay what they are.
+nlohmann::json to_record(const RunResult& run);
+
+/// Throws nlohmann::json::exception for something that to_record() did not make.
+RunResult from_record(const nlohmann::json& record);
+
+}  // namespace viwo::experiment
