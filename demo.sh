@@ -12,8 +12,8 @@ cmake --preset release -DVIWO_WERROR="${VIWO_WERROR:-OFF}"
 echo "== Building with $(nproc) cores"
 cmake --build --preset release --parallel "$(nproc)" --target viwo viwo_plugins
 
-echo "== Running the experiment configs/experiments/demo.yaml"
-build/bin/viwo experiment configs/experiments/demo.yaml --out results/demo
+echo "== Running configs/experiments/drive_only_twist_full.yaml with 5 seeds (20 without --seeds)"
+build/bin/viwo experiment configs/experiments/drive_only_twist_full.yaml --seeds 5 --out results/demo
 
 echo
 echo "The report: $PWD/results/demo/report.html"

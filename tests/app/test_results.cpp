@@ -166,7 +166,8 @@ TEST_F(ResultsTest, AreWrittenForARunThatDiverges) {
 TEST_F(ResultsTest, OfTheDeliveredSimulatedConfigurations) {
   expect_done({"run", kConfigs + "runs/simulated_swerve.yaml", "--out", "run"});
   EXPECT_EQ(summary("run").at("status"), "ok");
-  expect_done({"experiment", kConfigs + "experiments/demo.yaml", "--seeds", "1", "--out", "demo"});
+  expect_done({"experiment", kConfigs + "experiments/simulated_dead_reckoning.yaml", "--seeds", "1",
+               "--out", "demo"});
   const nlohmann::json variants = summary("demo").at("variants");
   for (const char* variant : {"drive_only", "redundant", "redundant_weighted"}) {
     EXPECT_TRUE(variants.contains(variant)) << variant;
@@ -202,10 +203,24 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfTheFilter) {
   EXPECT_EQ(summary("pinhole").at("status"), "ok");
   expect_done({"experiment", kConfigs + "experiments/paper_accuracy.yaml", "--seeds", "1", "--out",
                "paper", "--set", shorter});
+  expect_done({"experiment", kConfigs + "experiments/drive_only_twist_full.yaml", "--seeds", "1",
+               "--out", "lateral", "--set", shorter});
+  EXPECT_TRUE(summary("lateral").at("by").at("motion").contains("figure_eight"));
   const nlohmann::json variants = summary("paper").at("variants");
   for (const char* variant : {"true_init_calib_on", "true_init_calib_off", "bad_init_calib_on",
                               "bad_init_calib_off", "bad_init_twist_only", "bad_init_drive_only"}) {
     EXPECT_TRUE(variants.contains(variant)) << variant;
+  }
+}
+
+TEST_F(ResultsTest, OfTheDeliveredConfigurationsForObservability) {
+  for (const std::string name : {"degenerate_motions", "differential"}) {
+    expect_done({"observability", kConfigs + "observability/" + name + ".yaml", "--out", name,
+                 "--set", "sensors.simulator0.duration_s=2"});
+    std::ifstream in(at(name) / "observability.json");
+    const auto motions = nlohmann::json::parse(in).at("motions");
+    EXPECT_TRUE(motions.contains("general"));
+    EXPECT_TRUE(motions.contains("stationary"));
   }
 }
 
@@ -230,9 +245,11 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
   EXPECT_EQ(files,
             (std::set<std::string>{
                 "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
-                "cameras/pinhole.yaml", "cameras/t265_like.yaml", "experiments/demo.yaml",
-                "experiments/hybrid.yaml", "experiments/nominal_dead_reckoning.yaml",
-                "experiments/paper_accuracy.yaml", "experiments/three_models.yaml",
+                "cameras/pinhole.yaml", "cameras/t265_like.yaml",
+                "experiments/drive_only_twist_full.yaml", "experiments/hybrid.yaml",
+                "experiments/nominal_dead_reckoning.yaml", "experiments/paper_accuracy.yaml",
+                "experiments/simulated_dead_reckoning.yaml", "experiments/three_models.yaml",
+                "observability/degenerate_motions.yaml", "observability/differential.yaml",
                 "runs/hybrid.yaml", "runs/openvins_sim.yaml", "runs/recording.yaml",
                 "runs/simulated_swerve.yaml", "runs/viwo_log.yaml", "runs/viwo_swerve.yaml"}))
       << "name the new file in a test above";

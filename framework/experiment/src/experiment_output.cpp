@@ -66,6 +66,18 @@ json rpe_json(const ExperimentResult& result, std::size_t variant) {
   return all;
 }
 
+json calibration_json(const ExperimentResult& result, std::size_t variant, const Group& group) {
+  json calibration = json::object();
+  for (const CalibrationStatistics& c : calibration_statistics(result, variant, group)) {
+    calibration[c.name] = {{"runs", c.runs},
+                           {"rmse", number_or_null(c.rmse)},
+                           {"mean_sigma", number_or_null(c.mean_sigma)},
+                           {"prior_sigma", number_or_null(c.prior_sigma)},
+                           {"nees", number_or_null(c.nees)}};
+  }
+  return calibration;
+}
+
 json variant_json(const ExperimentResult& result, std::size_t variant, const Group& all) {
   json entry = counts_json(result, variant, all);
   std::int64_t rank_deficient = 0;
@@ -79,14 +91,7 @@ json variant_json(const ExperimentResult& result, std::size_t variant, const Gro
   entry["rpe"] = rpe_json(result, variant);
   entry["nees_pose"] = number_or_null(eval::mean(nees));
   entry["nees_pose_median"] = number_or_null(eval::median(nees));
-  entry["calibration"] = json::object();
-  for (const CalibrationStatistics& c : calibration_statistics(result, variant)) {
-    entry["calibration"][c.name] = {{"runs", c.runs},
-                                    {"rmse", number_or_null(c.rmse)},
-                                    {"mean_sigma", number_or_null(c.mean_sigma)},
-                                    {"prior_sigma", number_or_null(c.prior_sigma)},
-                                    {"nees", number_or_null(c.nees)}};
-  }
+  entry["calibration"] = calibration_json(result, variant, all);
   entry["metrics"] = metrics_json(result, variant, all);
   return entry;
 }
@@ -103,6 +108,7 @@ json summary_of(const ExperimentResult& result) {
     for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
       json entry = counts_json(result, v, groups[g]);
       entry["metrics"] = metrics_json(result, v, groups[g]);
+      entry["calibration"] = calibration_json(result, v, groups[g]);
       group["variants"][result.setup.variants[v].name] = entry;
     }
     group["paired"] = paired_json(result, groups[g]);

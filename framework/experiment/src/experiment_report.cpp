@@ -185,8 +185,40 @@ void add_failures(const ExperimentResult& result, Section& section) {
   section.blocks.emplace_back(std::move(table));
 }
 
+/// A row per value of a label and variant, a column per kind of parameter: how much of the prior
+/// is left.
+void add_calibration_by(const ExperimentResult& result, const std::string& label,
+                        Section& section) {
+  Table table;
+  for (const Group& group : groups_of(result)) {
+    if (group.label != label) continue;
+    for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
+      const auto families = calibration_families(result, v, group);
+      if (families.empty()) continue;
+      if (table.columns.empty()) {
+        table.columns = {{label}, {"variant"}};
+        for (const CalibrationFamily& family : families) table.columns.push_back({family.name});
+      }
+      // A variant that calibrates other parameters has a place in the other tables.
+      if (families.size() + 2 != table.columns.size()) continue;
+      std::vector<Cell> row{group.value, result.setup.variants[v].name};
+      for (const CalibrationFamily& family : families) {
+        row.emplace_back(
+            unbroken(compact(100. * family.left, 3) + " % (" + compact(family.nees, 2) + ")"));
+      }
+      table.rows.push_back(std::move(row));
+    }
+  }
+  if (table.rows.empty()) return;
+  table.caption = "Calibration at the end by " + label +
+                  ": root mean square error as part of the prior sigma, in brackets the mean "
+                  "normalised squared "
+                  "error (1 is consistent)";
+  section.blocks.emplace_back(std::move(table));
+}
+
 /// A row per parameter: the prior, then rmse and NEES of each variant that estimated something.
-void add_calibration_table(const ExperimentResult& result, Section& section) {
+void add_calibration_table(const ExperimentResult& result, const Group& all, Section& section) {
   Table table;
   table.caption =
       "Calibration at the end: root mean square error over the runs, in brackets the mean "
@@ -195,7 +227,7 @@ void add_calibration_table(const ExperimentResult& result, Section& section) {
   std::vector<std::string> names;
   std::vector<std::vector<CalibrationStatistics>> columns;
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
-    columns.push_back(calibration_statistics(result, v));
+    columns.push_back(calibration_statistics(result, v, all));
     if (columns.back().empty()) {
       columns.pop_back();
       continue;
@@ -303,7 +335,10 @@ Document report_of(const ExperimentResult& result) {
     add(std::move(section));
   }
   Section calibration{"Calibration", {}};
-  add_calibration_table(result, calibration);
+  for (const std::string& label : result.setup.report_by) {
+    add_calibration_by(result, label, calibration);
+  }
+  add_calibration_table(result, groups.front(), calibration);
   append(sigma_ratio_maps(result), calibration);
   append(calibration_plots(result), calibration);
   for (Section& section : recording_sections(result)) add(std::move(section));

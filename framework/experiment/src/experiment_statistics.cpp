@@ -128,10 +128,11 @@ bool is_estimated(const RunResult& run, const CalibrationTrack& track) {
 }
 
 std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,
-                                                          std::size_t variant) {
+                                                          std::size_t variant, const Group& group) {
   std::vector<CalibrationStatistics> all;
   for (const ExperimentRun& run : result.runs) {
-    if (run.variant != variant || run.result.status != RunStatus::kOk) continue;
+    if (run.variant != variant || !group.passes(run)) continue;
+    if (run.result.status != RunStatus::kOk) continue;
     for (const CalibrationTrack& track : run.result.calibration) {
       if (!is_estimated(run.result, track) || !std::isfinite(track.final_error)) continue;
       auto at =
@@ -152,6 +153,41 @@ std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult
     c.nees /= c.runs;
   }
   return all;
+}
+
+/// "r" of "r_2", "delta_o" of "delta_o3", "p_IinO" of "p_IinO_x".
+static std::string family_of(std::string name) {
+  const auto number = name.find_last_not_of("0123456789");
+  if (number + 1 < name.size()) {
+    name.resize(number + 1);
+  } else if (name.ends_with("_x") || name.ends_with("_y") || name.ends_with("_z")) {
+    name.resize(name.size() - 2);
+  }
+  while (name.ends_with('_')) name.pop_back();
+  return name;
+}
+
+std::vector<CalibrationFamily> calibration_families(const ExperimentResult& result,
+                                                    std::size_t variant, const Group& group) {
+  std::vector<CalibrationFamily> families;
+  std::vector<int> counts;
+  for (const CalibrationStatistics& c : calibration_statistics(result, variant, group)) {
+    const std::string name = family_of(c.name);
+    std::size_t i = 0;
+    while (i < families.size() && families[i].name != name) ++i;
+    if (i == families.size()) {
+      families.push_back({name});
+      counts.push_back(0);
+    }
+    families[i].left += c.rmse * c.rmse / (c.prior_sigma * c.prior_sigma);
+    families[i].nees += c.nees;
+    ++counts[i];
+  }
+  for (std::size_t i = 0; i < families.size(); ++i) {
+    families[i].left = std::sqrt(families[i].left / counts[i]);
+    families[i].nees /= counts[i];
+  }
+  return families;
 }
 
 std::string compact(double value, int digits) {

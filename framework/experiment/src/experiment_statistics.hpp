@@ -65,7 +65,16 @@ struct CalibrationStatistics {
   double nees = 0.;  ///< mean squared normalised error
 };
 std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,
-                                                          std::size_t variant);
+                                                          std::size_t variant, const Group& group);
+
+/// Parameters of one kind, "r" for r_1, r_2, ..., together.
+struct CalibrationFamily {
+  std::string name;
+  double left = 0.;  ///< root mean square of rmse / prior sigma
+  double nees = 0.;  ///< mean
+};
+std::vector<CalibrationFamily> calibration_families(const ExperimentResult& result,
+                                                    std::size_t variant, const Group& group);
 
 /// Whether a run of the filter estimated this parameter of its own, and still had a variance at
 /// its end.

@@ -64,9 +64,42 @@ void add_paired(const ExperimentResult& result, const Group& all, std::ostream& 
   }
 }
 
-void add_calibration(const ExperimentResult& result, std::ostream& out) {
+/// A row per group and variant, a column per kind of parameter: how much of the prior is left.
+void add_calibration_by_group(const ExperimentResult& result, const std::vector<Group>& groups,
+                              std::ostream& out) {
+  std::size_t width = 8;
+  for (const Variant& variant : result.setup.variants) {
+    width = std::max(width, variant.name.size() + 2);
+  }
+  std::vector<std::string> shown;
+  for (std::size_t g = 1; g < groups.size(); ++g) {
+    bool named = false;
+    for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
+      const auto families = calibration_families(result, v, groups[g]);
+      if (families.empty()) continue;
+      std::vector<std::string> names;
+      for (const CalibrationFamily& family : families) names.push_back(family.name);
+      if (names != shown) {
+        out << "\ncalibration: rmse at the end, % of the prior sigma (NEES, 1 is consistent)\n"
+            << padded("", width);
+        for (const std::string& name : names) out << right(name, 14);
+        out << "\n";
+        shown = names;
+      }
+      if (!named) out << groups[g].value << "\n";
+      named = true;
+      out << padded("  " + result.setup.variants[v].name, width);
+      for (const CalibrationFamily& family : families) {
+        out << right(compact(100. * family.left, 3) + " (" + compact(family.nees, 2) + ")", 14);
+      }
+      out << "\n";
+    }
+  }
+}
+
+void add_calibration(const ExperimentResult& result, const Group& all, std::ostream& out) {
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
-    const auto statistics = calibration_statistics(result, v);
+    const auto statistics = calibration_statistics(result, v, all);
     if (statistics.empty()) continue;
     out << "\ncalibration of " << result.setup.variants[v].name
         << ": rmse at the end (part of the prior sigma; NEES, 1 is consistent)\n";
@@ -89,7 +122,11 @@ std::string describe(const ExperimentResult& result) {
   const auto groups = groups_of(result);
   for (const Group& group : groups) add_means(result, group, out);
   add_paired(result, groups.front(), out);
-  add_calibration(result, out);
+  if (groups.size() > 1) {
+    add_calibration_by_group(result, groups, out);
+  } else {
+    add_calibration(result, groups.front(), out);
+  }
   const RealtimeFactors factors = realtime_factors(result);
   out << "\none core runs " << compact(factors.core, 3) << " times faster than real time";
   if (std::isfinite(factors.overall)) {
