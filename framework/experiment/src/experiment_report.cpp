@@ -210,10 +210,8 @@ void add_calibration_by(const ExperimentResult& result, const std::string& label
     }
   }
   if (table.rows.empty()) return;
-  table.caption = "Calibration at the end by " + label +
-                  ": root mean square error as part of the prior sigma, in brackets the mean "
-                  "normalised squared "
-                  "error (1 is consistent)";
+  table.caption =
+      "Calibration by " + label + ": rmse at the end / prior sigma (NEES; 1 is consistent)";
   section.blocks.emplace_back(std::move(table));
 }
 
@@ -317,6 +315,9 @@ Document report_of(const ExperimentResult& result) {
   if (result.setup.variants.size() > 1) {
     summary.blocks.emplace_back(paired_table(result, groups.front()));
   }
+  for (const std::string& label : result.setup.report_by) {
+    add_calibration_by(result, label, summary);
+  }
   summary.blocks.emplace_back(spread_table(result, groups.front()));
   add_failures(result, summary);
   add(std::move(summary));
@@ -335,9 +336,6 @@ Document report_of(const ExperimentResult& result) {
     add(std::move(section));
   }
   Section calibration{"Calibration", {}};
-  for (const std::string& label : result.setup.report_by) {
-    add_calibration_by(result, label, calibration);
-  }
   add_calibration_table(result, groups.front(), calibration);
   append(sigma_ratio_maps(result), calibration);
   append(calibration_plots(result), calibration);

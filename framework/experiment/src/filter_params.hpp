@@ -55,6 +55,13 @@ inline constexpr std::array kEstimatorParams{
               .min = 0.,
               .min_exclusive = true,
               .help = "longer spacings of the IMU are counted"},
+    ParamSpec{.name = "max_update_failures",
+              .type = ParamType::kInt,
+              .fallback = "10",
+              .min = 1.,
+              .max = 1e9,
+              .help = "an update that has thrown in this many epochs is turned off; until then it "
+                      "is skipped when it throws"},
     ParamSpec{.name = "monitor",
               .type = ParamType::kBool,
               .fallback = "true",

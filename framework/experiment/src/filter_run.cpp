@@ -211,7 +211,7 @@ class Recorder {
   void add_counts(const Estimator& estimator) {
     if (result_.updates.empty()) {
       for (const UpdateEntry& entry : estimator.updates()) {
-        result_.updates.push_back({entry.name, {}, {}, {}});
+        result_.updates.push_back({entry.name, {}, {}, {}, {}});
       }
     }
     for (std::size_t i = 0; i < result_.updates.size(); ++i) {
@@ -220,6 +220,7 @@ class Recorder {
       track.applied.push_back(static_cast<int>(total.applied - track.total.applied));
       track.rejected.push_back(static_cast<int>(total.rejected - track.total.rejected));
       track.total = total;
+      track.failures = estimator.failures()[i];
     }
   }
 
@@ -276,6 +277,14 @@ class Feed {
       wheels_.push_back(other != data.other_wheels.end() ? &other->second : &data.samples);
     }
     next_wheel_.resize(wheels_.size(), 0);
+    poses_.resize(setup.filter->pose_sensors.size(), nullptr);
+    for (const FilterSetup::Entry& update : setup.filter->updates) {
+      if (update.poses < 0) continue;
+      const auto stream = static_cast<std::size_t>(update.poses);
+      const auto found = data.poses.find(setup.filter->pose_sensors[stream]);
+      if (found != data.poses.end()) poses_[stream] = &found->second;
+    }
+    next_pose_.resize(poses_.size(), 0);
   }
 
   /// False when there is nothing left.
@@ -288,7 +297,16 @@ class Feed {
     for (std::size_t k = 0; k < wheels_.size(); ++k) {
       first = std::min(first, stamp(*wheels_[k], next_wheel_[k]));
     }
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      if (poses_[k] != nullptr) first = std::min(first, stamp(*poses_[k], next_pose_[k]));
+    }
     if (first == kNone) return false;
+    // Before the IMU of the same stamp: nothing waits for poses.
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      if (poses_[k] == nullptr || stamp(*poses_[k], next_pose_[k]) != first) continue;
+      estimator.add((*poses_[k])[next_pose_[k]++], static_cast<int>(k));
+      return true;
+    }
     if (stamp(data_.imu, next_imu_) == first) {
       estimator.add(data_.imu[next_imu_++]);
       return true;
@@ -306,16 +324,28 @@ class Feed {
   const RunData& data_;
   std::vector<const std::vector<EncoderSample>*> wheels_;
   std::vector<std::size_t> next_wheel_;
+  std::vector<const std::vector<PoseSample>*> poses_;  // null: none, or nobody uses them
+  std::vector<std::size_t> next_pose_;
   std::size_t next_imu_ = 0;
   std::size_t next_image_ = 0;
 };
+
+/// Estimator::step(); what a kinematic model throws becomes the cause of a run that failed.
+bool step(Estimator& estimator, std::string& cause) {
+  try {
+    return estimator.step();
+  } catch (const PluginFailure& failure) {
+    cause = std::string(failure.what()) + " (epoch " + std::to_string(estimator.epochs() + 1) + ")";
+    return false;
+  }
+}
 
 Estimator make_estimator(const FilterSetup& setup) {
   std::vector<WheelsPrior> wheels;
   for (const WheelSet& set : setup.wheels) wheels.push_back(set.prior);
   std::vector<UpdateEntry> updates;
   for (const auto& entry : setup.updates) {
-    updates.push_back({entry.name, entry.update.object, entry.wheels});
+    updates.push_back({entry.name, entry.update.object, entry.wheels, entry.poses});
   }
   return {setup.options, setup.cameras, wheels, updates};
 }
@@ -334,12 +364,12 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgres
   const double log_s = seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);
   double wall_s = 0.;
   bool more = true;
-  while (more && estimator.failure().empty()) {
+  while (more && estimator.failure().empty() && result.cause.empty()) {
     more = feed.next(estimator);
     if (!more) estimator.finish();
     for (;;) {
       const auto begin = std::chrono::steady_clock::now();
-      const bool stepped = estimator.step();
+      const bool stepped = step(estimator, result.cause);
       wall_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       if (!stepped) break;
       recorder.record(estimator);
@@ -354,7 +384,9 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgres
   if (!result.estimate.empty()) {
     result.duration_s = seconds_between(result.estimate.front().t_ns, result.estimate.back().t_ns);
   }
-  if (!estimator.failure().empty()) {
+  if (!result.cause.empty()) {
+    result.status = RunStatus::kFailed;
+  } else if (!estimator.failure().empty()) {
     result.status = RunStatus::kDiverged;
     result.cause = estimator.failure() + " (epoch " + std::to_string(result.epochs) + ", " +
                    std::to_string(result.duration_s) + " s)";

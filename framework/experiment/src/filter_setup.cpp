@@ -1,5 +1,7 @@
 #include "viwo/experiment/filter_setup.hpp"
 
+#include <algorithm>
+
 #include "filter_params.hpp"
 #include "section.hpp"
 #include "viwo/config/params.hpp"
@@ -45,6 +47,7 @@ void read_estimator(const ParamSet& p, FilterSetup& setup) {
   setup.options.max_epoch_s = p.number("max_epoch_s");
   setup.options.max_wait_s = p.number("max_wait_s");
   setup.options.max_imu_gap_s = p.number("max_imu_gap_s");
+  setup.options.max_update_failures = static_cast<int>(p.integer("max_update_failures"));
   setup.options.monitor.enabled = p.flag("monitor");
   setup.options.monitor.window_s = p.number("monitor_window_s");
   setup.options.monitor.min_information = p.number("monitor_min_information");
@@ -228,6 +231,39 @@ void check_wheel_sensors(const Node& run, const FilterSetup& setup, Errors& erro
   }
 }
 
+/// Index of the sensor that an update of kind kPoses names, also one that is turned off; -1 for
+/// other updates.
+int read_pose_sensor(const Node& run, const Node& section, const std::string& path, bool wants_one,
+                     FilterSetup& setup, Errors& errors) {
+  const Node* sensor = section.find("sensor");
+  if (!wants_one) {
+    if (sensor != nullptr) {
+      errors.add(sensor->mark(), path + ".sensor: only updates that measure with poses have one");
+    }
+    return -1;
+  }
+  const Node* sensors = run.find("sensors");
+  std::vector<std::string> names;
+  if (sensors != nullptr && sensors->is_map()) {
+    for (const auto& entry : sensors->entries()) names.push_back(entry.key);
+  }
+  if (sensor == nullptr || !sensor->is_scalar()) {
+    errors.add(section.mark(), path + " needs the sensor that gives its poses (sensor: NAME)");
+    return -1;
+  }
+  const std::string& name = sensor->scalar();
+  if (std::find(names.begin(), names.end(), name) == names.end()) {
+    errors.add(sensor->mark(),
+               path + ".sensor: no sensor '" + name + "'" + config::did_you_mean(name, names));
+    return -1;
+  }
+  auto& known = setup.pose_sensors;
+  const auto found = std::find(known.begin(), known.end(), name);
+  const auto index = static_cast<int>(found - known.begin());
+  if (found == known.end()) known.push_back(name);
+  return index;
+}
+
 void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, Node& resolved,
                   Errors& errors) {
   const Node* updates = run.find("updates");
@@ -255,21 +291,25 @@ void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, 
     // The name says which update it is unless it says so itself.
     if (section.find("type") == nullptr)
       section.set("type", Node::scalar_of(entry.key, entry.key_mark));
-    constexpr std::string_view kHostKeys[] = {"enabled"};
+    constexpr std::string_view kHostKeys[] = {"enabled", "sensor"};
     // One instance per wheel set; the first also tells which kind it is.
     auto loaded = plugins.make_update(section, path, errors, kHostKeys);
     if (!loaded.object) continue;
     Node resolved_update = loaded.resolved;
     resolved_update.set("enabled", Node::scalar_of(enabled ? "true" : "false"));
+    const UpdateKind kind = loaded.object->kind();
+    const int poses =
+        read_pose_sensor(run, section, path, kind == UpdateKind::kPoses, setup, errors);
+    if (const Node* sensor = section.find("sensor")) resolved_update.set("sensor", *sensor);
     resolved_updates.set(entry.key, resolved_update, entry.key_mark);
     if (!enabled) continue;
-    const int wheels = loaded.object->kind() == UpdateKind::kWheels ? 0 : -1;
+    const int wheels = kind == UpdateKind::kWheels ? 0 : -1;
     if (errors.empty() && (wheels < 0 || !setup.wheels.empty())) {
       const auto trial = plugins.make_update(section, path, errors, kHostKeys);
       try_update(setup, trial.object, wheels, entry.key_mark, path, errors);
     }
-    if (loaded.object->kind() == UpdateKind::kBody) {
-      setup.updates.push_back({entry.key, std::move(loaded), -1});
+    if (kind != UpdateKind::kWheels) {
+      setup.updates.push_back({entry.key, std::move(loaded), -1, poses});
       continue;
     }
     if (run.find("kinematics") == nullptr && run.find("wheel_sets") == nullptr) {

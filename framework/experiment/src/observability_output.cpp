@@ -125,6 +125,13 @@ std::vector<std::string> parameter_names(const ObservabilityReport& report) {
   return names;
 }
 
+/// "0.14", "✗" for what cannot be told, "✗ 0.6" where its prior still shrinks.
+std::string cell_text(const ObservedParameter& parameter) {
+  const double ratio = parameter.sigma_ratio;
+  if (parameter.observable) return significant(ratio, ratio < 0.01 ? 1 : 2);
+  return ratio > 0.95 ? "✗" : "✗ " + significant(ratio, 1);
+}
+
 /// Parameters over motions for one variant: log10 of the sigma ratio, marked where unobservable.
 report::Plot heat_map(const ObservabilityReport& report, std::size_t variant) {
   report::Plot plot{report.setup.variants[variant].name, "", ""};
@@ -141,7 +148,7 @@ report::Plot heat_map(const ObservabilityReport& report, std::size_t variant) {
       for (const ObservedParameter& parameter : result.parameters) {
         if (parameter.name != map.y[i]) continue;
         ratio = parameter.sigma_ratio;
-        text = (parameter.observable ? "" : "✗ ") + significant(ratio, 2);
+        text = cell_text(parameter);
       }
       map.z[i].push_back(std::log10(ratio));
       map.text[i].push_back(text);

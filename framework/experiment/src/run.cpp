@@ -95,6 +95,11 @@ RunData collect(RunSetup& setup) {
           }
           data.samples.push_back(*encoders);
         } else if (const auto* pose = std::get_if<PoseSample>(&measurement)) {
+          const auto& measured = setup.measured_poses;
+          if (std::find(measured.begin(), measured.end(), name) != measured.end()) {
+            data.poses[name].push_back(*pose);
+            continue;
+          }
           claim(reference_name, name, "reference poses");
           data.reference.push_back(
               planar_pose(pose->t_ns, pose->p_BinW_m, to_quaternion(pose->q_BtoW_xyzw)));
@@ -116,6 +121,8 @@ RunData collect(RunSetup& setup) {
       for (RejectionCount& rejection : rejections) data.rejections.emplace_back(name, rejection);
     });
   }
+  // Of a sensor that also knows the states, poses are measurements, here without an update.
+  if (!data.states.empty()) data.reference.clear();
   if (setup.filter) {
     require_what_the_filter_needs(setup, data);
     return data;
@@ -224,8 +231,13 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   const auto wall_begin = std::chrono::steady_clock::now();
   for (std::size_t k = 1; k < stamps.size() && result.status == RunStatus::kOk; ++k) {
     const auto epoch_begin = std::chrono::steady_clock::now();
-    guarded(setup.kinematics.info, "preintegration",
-            [&] { preintegrator.integrate(data.samples, stamps[k - 1], stamps[k], interval); });
+    try {
+      preintegrator.integrate(data.samples, stamps[k - 1], stamps[k], interval);
+    } catch (const PluginFailure& failure) {
+      result.status = RunStatus::kFailed;
+      result.cause = std::string(failure.what()) + " (epoch " + std::to_string(k) + ")";
+      break;
+    }
     append(result.total, interval);
     const std::chrono::duration<double, std::milli> spent =
         std::chrono::steady_clock::now() - epoch_begin;

@@ -104,7 +104,11 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
   }
   json updates = json::object();
   for (const UpdateTrack& update : result.updates) {
-    updates[update.name] = {{"applied", update.total.applied}, {"rejected", update.total.rejected}};
+    updates[update.name] = {{"applied", update.total.applied},
+                            {"rejected", update.total.rejected},
+                            {"failed", update.failures.count},
+                            {"disabled", update.failures.disabled}};
+    if (update.failures.count > 0) updates[update.name]["cause"] = update.failures.cause;
   }
   json timing = json::object();
   for (const auto& [stage, time] : result.stages) timing[stage] = stage_json(time);
@@ -188,8 +192,22 @@ std::string describe(const RunResult& result) {
   for (const MonitorWarning& warning : result.monitor.warnings) {
     out << "at " << significant(warning.t_s, 4) << " s: " << warning.text << "\n";
   }
+  for (const std::string& line : describe_failures(result)) out << "warning: " << line << "\n";
   for (const std::string& line : describe_rejections(result)) out << line << "\n";
   return out.str();
+}
+
+std::vector<std::string> describe_failures(const RunResult& result) {
+  std::vector<std::string> lines;
+  for (const UpdateTrack& update : result.updates) {
+    const UpdateFailures& failures = update.failures;
+    if (failures.count == 0) continue;
+    lines.push_back("update '" + update.name + "' failed in " + std::to_string(failures.count) +
+                    (failures.count == 1 ? " epoch" : " epochs") +
+                    (failures.disabled ? " and was disabled: " : ", which it skipped: ") +
+                    failures.cause);
+  }
+  return lines;
 }
 
 std::vector<std::string> describe_rejections(const RunResult& result) {

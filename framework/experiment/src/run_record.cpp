@@ -17,6 +17,7 @@ namespace viwo {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RejectionCount, reason, count, first)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateCounts, applied, rejected)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateFailures, count, disabled, cause)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PreintegratedPose, g, duration_s, path_length_m, bridged_s,
                                    samples, gated, rejected, rank_deficient)
 
@@ -53,7 +54,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CalibrationTrack, name, estimate, sigma, trut
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PoseNees, pose, position, orientation, series)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PoseError, t_s, position_m, position_sigma_m, yaw_rad,
                                    yaw_sigma_rad)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateTrack, name, total, applied, rejected)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateTrack, name, total, failures, applied, rejected)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MonitorWarning, t_s, text, parameters)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MonitorTrack, t_s, parameters, sigma_ratio, held, warnings)
 // `accuracy` is optional: see below.

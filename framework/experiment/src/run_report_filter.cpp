@@ -318,6 +318,9 @@ void add_excitation_section(const RunResult& result, Document& document) {
 
 void add_measurements_section(const RunResult& result, Document& document) {
   Section section{"Updates and gates", {}};
+  for (const std::string& line : describe_failures(result)) {
+    section.blocks.emplace_back(Paragraph{line, Paragraph::Tone::kWarning});
+  }
   if (!result.updates.empty() && !result.epoch_t_s.empty()) {
     Table table;
     table.caption = "Factors of each update";

@@ -202,6 +202,7 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
     FilterSetup filter = read_filter(run, setup.model, setup.x_WI, setup.sigma, setup.seed, plugins,
                                      setup.resolved, errors);
     if (!filter.wheels.empty()) setup.O_in_I = planar_mount(filter.wheels.front().prior.wheels);
+    setup.measured_poses = filter.pose_sensors;
     if (wants_filter(run)) setup.filter = std::move(filter);
   }
   read_sensors(run, plugins, setup, errors);

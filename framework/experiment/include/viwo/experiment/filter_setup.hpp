@@ -48,8 +48,12 @@ struct FilterSetup {
     std::string name;
     Loaded<Update> update;
     int wheels = -1;
+    int poses = -1;  ///< index into pose_sensors
   };
   std::vector<Entry> updates;
+  /// Sensors that updates name as `sensor`, also updates that are turned off: what they give is
+  /// measurement and not reference.
+  std::vector<std::string> pose_sensors;
 };
 
 /// Names of a wheel set's calibration parameters in the order of its columns: extrinsics

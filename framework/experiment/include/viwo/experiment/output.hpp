@@ -43,6 +43,9 @@ std::string describe(const RunResult& result);
 /// "sensor: 3 x reason, first at odom_1.csv.gz:17" for everything that was dropped.
 std::vector<std::string> describe_rejections(const RunResult& result);
 
+/// "wheels failed in 10 epochs and was disabled: cause" for every update that threw.
+std::vector<std::string> describe_failures(const RunResult& result);
+
 /// Points of a curve that a page shows without getting slow.
 inline constexpr std::size_t kMaxCurvePoints = 1200;
 

@@ -37,6 +37,8 @@ struct RunSetup {
   double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
   double reference_max_gap_s = 0.5;
   eval::Options evaluation;
+  /// Sensors whose poses are measurements (updates.NAME.sensor), not reference.
+  std::vector<std::string> measured_poses;
   std::optional<FilterSetup> filter;           ///< nothing: dead reckoning from the wheels alone
   config::Mark kinematics_mark, sensors_mark;  ///< where the sections are written
   config::Node resolved;  ///< all of it, with defaults: a valid run configuration
@@ -58,6 +60,8 @@ struct RunData {
   std::map<std::string, double> calibration;  ///< true values, if known
   /// Encoder samples of further wheel sets, by sensor.
   std::map<std::string, std::vector<EncoderSample>> other_wheels;
+  /// Poses that an update measures with, by sensor; no part of the reference.
+  std::map<std::string, std::vector<PoseSample>> poses;
   std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor
 };
 
@@ -108,6 +112,7 @@ struct PoseError {
 struct UpdateTrack {
   std::string name;
   UpdateCounts total;
+  UpdateFailures failures;
   std::vector<int> applied;   ///< in each epoch, at RunResult::epoch_t_s
   std::vector<int> rejected;  ///< likewise: by a gate, or not finite
 };
@@ -157,7 +162,8 @@ struct RunResult {
 };
 
 /// Integrates the wheels from the first to the last common instant, starting at the reference pose
-/// (or at the origin), and evaluates. Throws PluginFailure when the model misbehaves.
+/// (or at the origin), and evaluates. A model that throws ends the run with the epoch and the
+/// cause.
 RunResult run_odometry(const RunSetup& setup, const RunData& data);
 
 /// Called now and then with the part of the log's time that is done, 0 to 1.
@@ -166,8 +172,8 @@ using OnProgress = std::function<void(double)>;
 /// Called when the estimator is about to begin; returns who is to watch it, or nullptr.
 using OnStart = std::function<EstimatorObserver*(const Estimator&)>;
 
-/// Runs the filter over all measurements and evaluates. A filter that diverges ends the run with
-/// the epoch and the cause.
+/// Runs the filter over all measurements and evaluates. A filter that diverges, or a kinematic
+/// model that throws, ends the run with the epoch and the cause.
 RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgress& progress = {},
                      const OnStart& on_start = {});
 
