@@ -3,17 +3,13 @@
 
 #include <string>
 
+#include "registry.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/experiment/configuration.hpp"
 #include "viwo/experiment/run.hpp"
 
 namespace viwo::testing {
-
-inline PluginRegistry& registry() {
-  static PluginRegistry plugins({VIWO_TEST_PLUGIN_DIR});
-  return plugins;
-}
 
 inline const std::string kSwerve =
     "x_m: [0.1125, -0.1125, -0.1125, 0.1125], y_m: [0.1125, 0.1125, -0.1125, -0.1125], "

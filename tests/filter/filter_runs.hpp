@@ -2,25 +2,16 @@
 #pragma once
 
 #include <algorithm>
-#include <filesystem>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "registry.hpp"
 #include "viwo/experiment/configuration.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/experiment/run.hpp"
 
 namespace viwo::testing {
-
-inline PluginRegistry& registry() {
-  static PluginRegistry plugins({VIWO_TEST_PLUGIN_DIR});
-  return plugins;
-}
-
-inline std::filesystem::path configuration(const std::string& name) {
-  return std::filesystem::path(VIWO_TEST_SOURCE_DIR) / "configs" / name;
-}
 
 /// A run of a delivered configuration, with assignments as --set would give them.
 inline experiment::RunSetup run_setup(const std::string& name,

@@ -1,22 +1,13 @@
 // Analyses of delivered configurations, and what is looked up in them.
 #pragma once
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "registry.hpp"
 #include "viwo/experiment/observability.hpp"
 
 namespace viwo::testing {
-
-inline PluginRegistry& registry() {
-  static PluginRegistry plugins({VIWO_TEST_PLUGIN_DIR});
-  return plugins;
-}
-
-inline std::filesystem::path configuration(const std::string& name) {
-  return std::filesystem::path(VIWO_TEST_SOURCE_DIR) / "configs" / name;
-}
 
 inline experiment::ObservabilityReport analyse(const std::string& name,
                                                std::vector<std::string> assignments = {}) {

@@ -55,6 +55,13 @@ Node load_run_configuration(const std::filesystem::path& file,
                             const std::vector<std::string>& assignments) {
   Node run = config::load_file(file);
   if (!run.is_map()) config::fail(run.mark(), "a run configuration is a section of keys");
+  for (const char* kind : {"experiment", "calibration"}) {
+    if (run.find(kind) == nullptr || run.find("base") == nullptr) continue;
+    config::fail(run.find_entry(kind)->key_mark,
+                 std::string("this is ") + (kind[0] == 'e' ? "an experiment" : "a calibration") +
+                     ", not a run: viwo " + (kind[0] == 'e' ? "experiment" : "calibrate") +
+                     " takes it");
+  }
   apply(run, assignments);
   return run;
 }

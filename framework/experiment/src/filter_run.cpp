@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include "feed.hpp"
 #include "held_gauge.hpp"
 #include "monitor_record.hpp"
 #include "viwo/eval/consistency.hpp"
@@ -267,78 +268,6 @@ class Recorder {
   double sum_pose_ = 0., sum_position_ = 0., sum_orientation_ = 0.;
   int n_nees_ = 0;
 };
-
-/// All measurements in the order of their stamps, each handed to `take`.
-class Feed {
- public:
-  Feed(const RunSetup& setup, const RunData& data) : data_(data) {
-    for (const WheelSet& wheels : setup.filter->wheels) {
-      const auto other = data.other_wheels.find(wheels.sensor);
-      wheels_.push_back(other != data.other_wheels.end() ? &other->second : &data.samples);
-    }
-    next_wheel_.resize(wheels_.size(), 0);
-    poses_.resize(setup.filter->pose_sensors.size(), nullptr);
-    for (const FilterSetup::Entry& update : setup.filter->updates) {
-      if (update.poses < 0) continue;
-      const auto stream = static_cast<std::size_t>(update.poses);
-      const auto found = data.poses.find(setup.filter->pose_sensors[stream]);
-      if (found != data.poses.end()) poses_[stream] = &found->second;
-    }
-    next_pose_.resize(poses_.size(), 0);
-  }
-
-  /// False when there is nothing left.
-  bool next(Estimator& estimator) {
-    constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::max();
-    const auto stamp = [](const auto& samples, std::size_t i) {
-      return i < samples.size() ? samples[i].t_ns : kNone;
-    };
-    std::int64_t first = std::min(stamp(data_.imu, next_imu_), stamp(data_.images, next_image_));
-    for (std::size_t k = 0; k < wheels_.size(); ++k) {
-      first = std::min(first, stamp(*wheels_[k], next_wheel_[k]));
-    }
-    for (std::size_t k = 0; k < poses_.size(); ++k) {
-      if (poses_[k] != nullptr) first = std::min(first, stamp(*poses_[k], next_pose_[k]));
-    }
-    if (first == kNone) return false;
-    // Before the IMU of the same stamp: nothing waits for poses.
-    for (std::size_t k = 0; k < poses_.size(); ++k) {
-      if (poses_[k] == nullptr || stamp(*poses_[k], next_pose_[k]) != first) continue;
-      estimator.add((*poses_[k])[next_pose_[k]++], static_cast<int>(k));
-      return true;
-    }
-    if (stamp(data_.imu, next_imu_) == first) {
-      estimator.add(data_.imu[next_imu_++]);
-      return true;
-    }
-    for (std::size_t k = 0; k < wheels_.size(); ++k) {
-      if (stamp(*wheels_[k], next_wheel_[k]) != first) continue;
-      estimator.add((*wheels_[k])[next_wheel_[k]++], static_cast<int>(k));
-      return true;
-    }
-    estimator.add(data_.images[next_image_++]);
-    return true;
-  }
-
- private:
-  const RunData& data_;
-  std::vector<const std::vector<EncoderSample>*> wheels_;
-  std::vector<std::size_t> next_wheel_;
-  std::vector<const std::vector<PoseSample>*> poses_;  // null: none, or nobody uses them
-  std::vector<std::size_t> next_pose_;
-  std::size_t next_imu_ = 0;
-  std::size_t next_image_ = 0;
-};
-
-/// Estimator::step(); what a kinematic model throws becomes the cause of a run that failed.
-bool step(Estimator& estimator, std::string& cause) {
-  try {
-    return estimator.step();
-  } catch (const PluginFailure& failure) {
-    cause = std::string(failure.what()) + " (epoch " + std::to_string(estimator.epochs() + 1) + ")";
-    return false;
-  }
-}
 
 Estimator make_estimator(const FilterSetup& setup) {
   std::vector<WheelsPrior> wheels;

@@ -182,9 +182,9 @@ PlanarExtrinsics planar_mount(const WheelsView& wheels) {
 RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed) {
   RunSetup setup;
   config::Errors errors;
-  constexpr std::string_view kSections[] = {"sensors", "kinematics", "odometry", "evaluation",
-                                            "imu",     "cameras",    "wheels",   "wheel_sets",
-                                            "updates", "estimator"};
+  constexpr std::string_view kSections[] = {"sensors", "kinematics", "odometry",    "evaluation",
+                                            "imu",     "cameras",    "wheels",      "wheel_sets",
+                                            "updates", "estimator",  "placeholders"};
   const ParamSet top =
       config::read_params(run, run.mark(), "run", kRunParams, kSections, {}, errors);
   if (errors.empty()) {

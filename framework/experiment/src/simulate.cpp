@@ -22,8 +22,17 @@ SimulateResult write_log(RunSetup& setup, const std::filesystem::path& folder) {
                    [](const auto& a, const auto& b) { return stamp_ns(a) < stamp_ns(b); });
   SimulateResult result;
   log::AslWriter writer(folder);
+  // Beside true states, poses are measurements, and have a table of their own.
+  const bool has_states = std::any_of(measurements.begin(), measurements.end(), [](const auto& m) {
+    return std::holds_alternative<StateSample>(m);
+  });
   for (const Measurement& measurement : measurements) {
-    writer.write(measurement);
+    const auto* pose = std::get_if<PoseSample>(&measurement);
+    if (has_states && pose != nullptr) {
+      writer.write_measured(*pose);
+    } else {
+      writer.write(measurement);
+    }
     ++result.counts[measurement.index()];
   }
   writer.close();
@@ -38,12 +47,16 @@ std::string describe(const SimulateResult& result) {
   };
   // `index` is that of the kind in Measurement.
   static_assert(std::variant_size_v<Measurement> == 6);
-  constexpr Kind kKinds[] = {
-      {2, "IMU sample", "IMU samples"},           {3, "image", "images"},
-      {0, "encoder sample", "encoder samples"},   {1, "reference pose", "reference poses"},
-      {4, "reference state", "reference states"}, {5, "true parameter", "true parameters"}};
+  const bool measured = result.counts[4] > 0;  // poses beside true states
+  const Kind kinds[] = {{2, "IMU sample", "IMU samples"},
+                        {3, "image", "images"},
+                        {0, "encoder sample", "encoder samples"},
+                        {1, measured ? "measured pose" : "reference pose",
+                         measured ? "measured poses" : "reference poses"},
+                        {4, "reference state", "reference states"},
+                        {5, "true parameter", "true parameters"}};
   std::vector<std::string> parts;
-  for (const Kind& kind : kKinds) {
+  for (const Kind& kind : kinds) {
     const std::int64_t n = result.counts[kind.index];
     if (n > 0) parts.push_back(std::to_string(n) + " " + (n == 1 ? kind.one : kind.many));
   }

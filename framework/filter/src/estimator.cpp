@@ -28,29 +28,6 @@ std::int64_t to_ns(double seconds) {
   return static_cast<std::int64_t>(std::llround(seconds * 1e9));
 }
 
-/// residual -= H dx: the factor as it would be at an estimate that has moved by dx since.
-void take_off(const Eigen::VectorXd& dx, ResidualFactor& factor) {
-  int start = 0;
-  for (const ColumnRange& block : factor.columns.blocks()) {
-    factor.residual.noalias() -=
-        factor.H.middleCols(start, block.count).lazyProduct(dx.segment(block.first, block.count));
-    start += block.count;
-  }
-}
-
-/// eta -= Lambda dx, likewise.
-void take_off(const Eigen::VectorXd& dx, InformationFactor& factor) {
-  int col = 0;
-  for (const ColumnRange& block : factor.columns.blocks()) {
-    for (int i = 0; i < block.count; ++i, ++col) {
-      const double step = dx[block.first + i];
-      for (int row = 0; row < factor.columns.size(); ++row) {
-        factor.eta[row] -= step * factor.Lambda(std::max(row, col), std::min(row, col));
-      }
-    }
-  }
-}
-
 }  // namespace
 
 Estimator::Estimator(const EstimatorOptions& options, std::vector<CameraPrior> cameras,
@@ -59,6 +36,7 @@ Estimator::Estimator(const EstimatorOptions& options, std::vector<CameraPrior> c
       filter_(options.filter, std::move(cameras), wheels),
       updates_(std::move(updates)),
       counts_(updates_.size()),
+      failures_(updates_.size()),
       sink_(kMaxFactorsPerUpdate, filter_.size()),
       moved_(Eigen::VectorXd::Zero(filter_.size())),
       information_factor_{{},
@@ -82,7 +60,14 @@ Estimator::Estimator(const EstimatorOptions& options, std::vector<CameraPrior> c
     setup.max_state_size = filter_.size();
     setup.cameras = filter_.cameras();
     if (entry.wheels >= 0) setup.wheels = &filter_.wheels()[static_cast<std::size_t>(entry.wheels)];
-    entry.update->start(setup);
+    if (entry.poses >= 0) {
+      poses_.resize(std::max(poses_.size(), static_cast<std::size_t>(entry.poses) + 1));
+    }
+    start_update(entry, setup);
+  }
+  for (PoseStream& stream : poses_) {
+    stream.waiting.reserve(1024);
+    stream.taken.reserve(1024);
   }
 }
 
@@ -167,6 +152,16 @@ void Estimator::add(const EncoderSample& sample, int wheels) {
   latest_ns_ = std::max(latest_ns_, sample.t_ns + to_ns(t_OtoI_s));
 }
 
+void Estimator::add(const PoseSample& pose, int stream) {
+  PoseStream& poses = poses_.at(static_cast<std::size_t>(stream));
+  if (!finite(pose.p_BinW_m) || !finite(pose.q_BtoW_xyzw)) {
+    return reject("pose that is not finite", pose.t_ns);
+  }
+  if (pose.t_ns <= poses.last_ns) return reject("pose stamp not after the last", pose.t_ns);
+  poses.last_ns = pose.t_ns;
+  poses.waiting.push_back(pose);
+}
+
 bool Estimator::encoders_reach(std::int64_t t_ns) const {
   for (std::size_t i = 0; i < encoders_.size(); ++i) {
     const std::int64_t t_wheel = t_ns - to_ns(filter_.wheels()[i].t_OtoI_s);
@@ -231,6 +226,15 @@ void Estimator::take_images(std::int64_t t_ns) {
   n_waiting_ -= taken;
 }
 
+void Estimator::take_poses(std::int64_t t_ns) {
+  for (PoseStream& stream : poses_) {
+    const auto end = std::find_if(stream.waiting.begin(), stream.waiting.end(),
+                                  [t_ns](const PoseSample& pose) { return pose.t_ns > t_ns; });
+    stream.taken.assign(stream.waiting.begin(), end);
+    stream.waiting.erase(stream.waiting.begin(), end);
+  }
+}
+
 void Estimator::forget_used() {
   // The IMU from the last sample at or before now on, encoders from the oldest clone on.
   std::size_t first = 0;
@@ -257,17 +261,6 @@ bool Estimator::try_to_initialize() {
   return true;
 }
 
-template <class Factor>
-FactorResult Estimator::apply(const UpdateEntry& update, const Factor& factor) {
-  if (observer_ != nullptr) observer_->on_factor(filter_, update, factor);
-  for (ExcitationMonitor& monitor : monitors_) monitor.before(filter_, factor);
-  const FactorResult result = filter_.apply(factor);
-  if (result == FactorResult::kApplied) {
-    for (ExcitationMonitor& monitor : monitors_) monitor.applied();
-  }
-  return result;
-}
-
 void Estimator::update_monitors() {
   bool any_new = false;
   for (std::size_t i = 0; i < monitors_.size(); ++i) {
@@ -276,48 +269,6 @@ void Estimator::update_monitors() {
   if (!any_new || !options_.monitor.hold) return;
   filter_.held().clear();
   for (const ExcitationMonitor& monitor : monitors_) monitor.hold(filter_.held());
-}
-
-void Estimator::run_update(std::size_t index, const EpochData& data) {
-  const UpdateEntry& entry = updates_[index];
-  sink_.clear();
-  try {
-    entry.update->update(filter_.view(entry.wheels), data, sink_);
-  } catch (const std::exception& error) {
-    throw UpdateFailure(entry.name, error.what());
-  } catch (...) {
-    throw UpdateFailure(entry.name, "threw something that is not a std::exception");
-  }
-  UpdateCounts& counts = counts_[index];
-  counts.applied += sink_.applied();
-  counts.rejected += sink_.rejected();
-  bool has_moved = false;
-  for (const ResidualFactor& factor : sink_.residuals()) {
-    const ResidualFactor* next = &factor;
-    if (has_moved || options_.frozen) {
-      residual_factor_ = factor;
-      if (has_moved) take_off(moved_, residual_factor_);
-      if (options_.frozen) residual_factor_.residual.setZero();
-      next = &residual_factor_;
-    }
-    const bool applied = apply(entry, *next) == FactorResult::kApplied;
-    ++(applied ? counts.applied : counts.rejected);
-    if (!applied) continue;
-    if (!has_moved) moved_.setZero();
-    has_moved = true;
-    moved_ += filter_.correction();
-  }
-  if (const InformationFactor* information = sink_.information()) {
-    if (has_moved || options_.frozen) {
-      information_factor_ = *information;
-      if (has_moved) take_off(moved_, information_factor_);
-      if (options_.frozen) information_factor_.eta.setZero();
-      information = &information_factor_;
-    }
-    if (apply(entry, *information) == FactorResult::kRejected) {
-      reject((entry.name + ": information that is not finite or empty").c_str(), filter_.t_ns());
-    }
-  }
 }
 
 bool Estimator::step() {
@@ -340,6 +291,7 @@ bool Estimator::step() {
   data.begin_ns = filter_.t_ns();
   data.end_ns = *t_ns;
   take_images(*t_ns);
+  take_poses(*t_ns);
   cut_imu(*t_ns);
   if (options_.growing_window) {
     filter_.limit_window(kFirstWindow + static_cast<std::size_t>(epochs_) / kEpochsPerClone);
@@ -353,6 +305,10 @@ bool Estimator::step() {
   for (std::size_t i = 0; i < updates_.size(); ++i) {
     const int wheels = updates_[i].wheels;
     if (wheels >= 0) data.encoders = encoders_[static_cast<std::size_t>(wheels)];
+    data.poses = {};
+    if (updates_[i].poses >= 0) {
+      data.poses = poses_[static_cast<std::size_t>(updates_[i].poses)].taken;
+    }
     run_update(i, data);
     stage_done(stage_ms_[i + 1]);
   }

@@ -10,6 +10,7 @@
 
 #include "estimator_fixture.hpp"
 #include "viwo/filter/estimator.hpp"
+#include "viwo/plugin_host/plugin_info.hpp"
 
 namespace viwo {
 namespace {
@@ -113,9 +114,63 @@ TEST(Estimator, MakesEpochsInDarkness) {
   EXPECT_EQ(images, (std::vector<std::size_t>{0, 0, 1, 0, 0}));
 }
 
-TEST(Estimator, NamesTheUpdateThatThrew) {
+TEST(Estimator, SkipsAnUpdateThatThrowsAndDisablesItAfterACount) {
+  int calls = 0;
+  EstimatorOptions options;
+  options.max_update_failures = 3;
+  Rig rig(
+      false,
+      [&](const FilterView&, FactorSink& sink) {
+        ++calls;
+        sink.count(5, 0);
+        sink.add_residual() = observation(kPositionColumn, Eigen::Vector3d::Constant(1.), 1e-3);
+        if (calls == 2) return;
+        if (calls == 1) throw std::runtime_error("no wheels here");
+        throw 42;
+      },
+      options);
+  rig.imu(-10, 1000);
+  for (int t = 100; t <= 800; t += 100) rig.image(t);
+  EXPECT_EQ(rig.steps(), 8) << "the run goes on";
+  EXPECT_EQ(calls, 4) << "the third failure is in the fourth call";
+  const UpdateFailures& failures = rig.estimator.failures()[0];
+  EXPECT_EQ(failures.count, 3);
+  EXPECT_TRUE(failures.disabled);
+  EXPECT_EQ(failures.cause, "no wheels here") << "the first cause is the one to mend";
+  EXPECT_EQ(rig.estimator.counts()[0].applied, 5 + 1) << "nothing of an epoch that failed is used";
+}
+
+TEST(Estimator, KeepsAnUpdateThatFailsLessOftenThanTheLimit) {
+  int calls = 0;
+  Rig rig(false, [&](auto&, auto&) {
+    if (++calls <= 9) throw std::runtime_error("not yet");
+  });
+  rig.imu(-10, 1600);
+  for (int t = 100; t <= 1500; t += 100) rig.image(t);
+  EXPECT_EQ(rig.steps(), 15);
+  EXPECT_EQ(calls, 15);
+  EXPECT_EQ(rig.estimator.failures()[0].count, 9);
+  EXPECT_FALSE(rig.estimator.failures()[0].disabled);
+}
+
+TEST(Estimator, EndsWhenAKinematicModelThrows) {
+  const PluginInfo info{"kinematics", "odd", "1", "", "", "odd.so", {}};
+  Rig rig(false, [&](auto&, auto&) { throw PluginFailure(info, "rows", "seven wheels"); });
+  rig.imu(-10, 200);
+  rig.image(100);
+  try {
+    rig.steps();
+    FAIL() << "nothing thrown";
+  } catch (const PluginFailure& failure) {
+    EXPECT_STREQ(failure.what(), "kinematics plugin 'odd' 1 (odd.so) failed in rows: seven wheels");
+  }
+}
+
+TEST(Estimator, NamesTheUpdateThatThrewInAnAnalysis) {
   const auto failure_of = [](const FakeUpdate::Emit& emit) -> std::string {
-    Rig rig(false, emit);
+    EstimatorOptions options;
+    options.frozen = true;
+    Rig rig(false, emit, options);
     rig.imu(-10, 200);
     rig.image(100);
     try {

@@ -18,9 +18,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Index into kFolders.
-enum Table : std::size_t { kWheels, kImu, kFeatures, kTruth, kCalibration, kTables };
+enum Table : std::size_t { kWheels, kImu, kFeatures, kTruth, kCalibration, kPoses, kTables };
 constexpr std::array<const char*, kTables> kFolders = {
-    "wheels0", "imu0", "features0", "state_groundtruth_estimate0", "calibration_groundtruth0"};
+    "wheels0", "imu0", "features0", "state_groundtruth_estimate0", "calibration_groundtruth0",
+    "poses0"};
 
 constexpr const char* kData = "data.csv";
 constexpr const char* kImuHeader =
@@ -31,6 +32,10 @@ constexpr const char* kTruthHeader =
     "q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], "
     "b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1], "
     "b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]\n";
+
+constexpr const char* kPosesHeader =
+    "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+    "q_RS_z []\n";
 
 /// Velocity and biases of a pose: a reader of states must not take them for zero.
 constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
@@ -91,6 +96,7 @@ struct AslWriter::Tables {
 
   void write(const EncoderSample& sample);
   void write(const PoseSample& pose);
+  void write_measured(const PoseSample& pose);
   void write(const ImuSample& imu);
   void write(const FeatureSample& image);
   void write(const StateSample& state);
@@ -151,6 +157,14 @@ void AslWriter::Tables::write(const PoseSample& pose) {
   out << "\n";
 }
 
+void AslWriter::Tables::write_measured(const PoseSample& pose) {
+  const auto& q = pose.q_BtoW_xyzw;
+  TextWriter& out = open(kPoses, kPosesHeader);
+  out << pose.t_ns;
+  append(out, pose.p_BinW_m);
+  out << "," << q[3] << "," << q[0] << "," << q[1] << "," << q[2] << "\n";
+}
+
 void AslWriter::Tables::write(const StateSample& state) {
   has_states = true;
   TextWriter& out = truth_row(state.t_ns, state.p_IinG_m, state.q_ItoG_xyzw);
@@ -203,6 +217,8 @@ AslWriter::~AslWriter() = default;
 void AslWriter::write(const Measurement& measurement) {
   std::visit([this](const auto& sample) { tables_->write(sample); }, measurement);
 }
+
+void AslWriter::write_measured(const PoseSample& pose) { tables_->write_measured(pose); }
 
 void AslWriter::close() {
   for (auto& writer : tables_->writers) {

@@ -57,7 +57,7 @@ struct Remedy {
   std::string_view field_prefix;
   std::string_view text;
 };
-constexpr std::array<Remedy, 9> kRemedies = {{
+constexpr std::array<Remedy, 10> kRemedies = {{
     {"api", "it is for another version of the plugin API: rebuild it against this viwo"},
     {"compiler", "rebuild it with the compiler of this viwo, and with viwo_add_plugin()"},
     {"gxx_abi", "rebuild it with the compiler of this viwo, and with viwo_add_plugin()"},
@@ -68,6 +68,9 @@ constexpr std::array<Remedy, 9> kRemedies = {{
      "rebuild it without -ffast-math and -Ofast: they change the arithmetic of the "
      "whole process"},
     {"eigen_ma",
+     "the instruction sets differ: rebuild it with viwo_add_plugin() of this viwo, "
+     "without -march or -mavx of its own"},
+    {"eigen_vector4d",
      "the instruction sets differ: rebuild it with viwo_add_plugin() of this viwo, "
      "without -march or -mavx of its own"},
     {"", "rebuild it with viwo_add_plugin() of this viwo"},

@@ -3,6 +3,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "guarded_model.hpp"
 #include "library.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/config/params.hpp"
@@ -141,6 +142,9 @@ Loaded<Interface> PluginRegistry::make(const Node& section, const std::string& p
       });
   for (const Node::Entry& entry : written.entries()) resolved.set(entry.key, entry.value);
   std::shared_ptr<Interface> object(instance, static_cast<Interface*>(instance->object));
+  if constexpr (std::is_same_v<Interface, KinematicModel>) {
+    object = std::make_shared<GuardedModel>(std::move(object), info);
+  }
   return {std::move(object), info, instance->params, std::move(resolved)};
 }
 

@@ -237,7 +237,28 @@ TEST_F(Guarded, CallsTurnExceptionsIntoFailures) {
 }
 
 TEST_F(Guarded, CallsLetInputErrorsPass) {
-  EXPECT_EQ(rows_of("rows_input"), "input: the sample is wrong");
+  EXPECT_EQ(error_of([] { guarded(PluginInfo{}, "start", [] { throw InputError("no camera"); }); }),
+            "no camera");
+}
+
+TEST_F(Guarded, ModelsThatRunHaveNoInputThatTheUserCouldMend) {
+  EXPECT_EQ(rows_of("rows_input"),
+            "moody|1.2.0|libviwo_kinematics_moody.so|rows|the sample is wrong");
+}
+
+TEST(Make, WhatAModelThrowsNamesItWhoeverCalls) {
+  PluginRegistry registry({kBadPlugins});
+  Errors errors;
+  const auto loaded =
+      registry.make_kinematics(section("{type: moody, mood: rows_int}"), "k", errors);
+  RowSystem out;
+  try {
+    loaded.object->rows({}, Intrinsics::Constant(1, 0.1), false, out);
+    FAIL() << "nothing thrown";
+  } catch (const PluginFailure& failure) {
+    EXPECT_EQ(failure.phase(), "rows");
+    EXPECT_EQ(failure.text(), "threw something that is not a std::exception");
+  }
 }
 
 }  // namespace

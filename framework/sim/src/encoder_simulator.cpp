@@ -129,9 +129,7 @@ class Base {
     RowVector slip = RowVector::Zero(m);
     for (Eigen::Index i = 0; i < n.size(); ++i) {
       if (n[i] == 0.) continue;
-      const RowRange range = description_.noises[static_cast<std::size_t>(i)].rows;
-      slip.segment(range.first, range.count) +=
-          by_noise.J.col(i).segment(range.first, range.count) * n[i];
+      slip += by_noise.J.col(i) * n[i];
     }
     EncoderSample slipping = y_;
     if (invert(xi, slip, slipping) != Status::kOk) return y_;

@@ -55,8 +55,7 @@ class InverseProblem {
       const NoiseSpec& spec = description_.noises[static_cast<std::size_t>(i)];
       if (spec.kind == NoiseKind::kSlip) continue;
       const int offset = spec.kind == NoiseKind::kSteer ? description_.n_drive : 0;
-      J.col(offset + spec.channel).segment(spec.rows.first, spec.rows.count) =
-          by_noise.J.col(i).segment(spec.rows.first, spec.rows.count);
+      J.col(offset + spec.channel) = by_noise.J.col(i);
     }
     return J;
   }

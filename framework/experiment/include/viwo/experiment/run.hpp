@@ -112,9 +112,9 @@ struct PoseError {
 struct UpdateTrack {
   std::string name;
   UpdateCounts total;
-  UpdateFailures failures;
   std::vector<int> applied;   ///< in each epoch, at RunResult::epoch_t_s
   std::vector<int> rejected;  ///< likewise: by a gate, or not finite
+  UpdateFailures failures{};
 };
 
 /// Something that the estimator has to tell its user while it runs.

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -32,14 +33,19 @@ struct EstimatorOptions {
   /// Residuals are taken as zero: the estimate is only propagated, its covariance is that of a
   /// filter. For analyses along a motion that is known.
   bool frozen = false;
+  /// An update that has thrown this often is turned off; at least 1.
+  int max_update_failures = 10;
   MonitorOptions monitor;
 };
 
-/// An update as the estimator runs it. For kind kWheels: `wheels` is the index of its wheel set.
+/// An update as the estimator runs it. For kind kWheels: `wheels` is the index of its wheel set;
+/// for kPoses: `poses` is the index of its stream of poses, as in add(). Streams are counted from
+/// 0.
 struct UpdateEntry {
   std::string name;
   std::shared_ptr<Update> update;
   int wheels = -1;
+  int poses = -1;
 };
 
 /// How often an update's factors, or the measurements in them, were applied and rejected.
@@ -48,7 +54,15 @@ struct UpdateCounts {
   std::int64_t rejected = 0;
 };
 
-/// An update that threw. The estimator is unusable after it.
+/// How an update failed while the filter ran: what it threw was caught, its epochs were skipped.
+struct UpdateFailures {
+  std::int64_t count = 0;
+  bool disabled = false;  ///< too many: it is not called any more
+  std::string cause;      ///< what it threw first
+};
+
+/// An update that threw where that ends the run: at its start, or in an analysis (frozen) that
+/// would be wrong without it. The estimator is unusable after it.
 class UpdateFailure : public std::runtime_error {
  public:
   UpdateFailure(const std::string& update, const std::string& text)
@@ -74,7 +88,8 @@ using Initializer = std::function<std::optional<ImuPrior>(
 
 class Estimator {
  public:
-  /// Starts the updates (InputError when one of them cannot work with this configuration).
+  /// Starts the updates (InputError when one of them cannot work with this configuration,
+  /// UpdateFailure for anything else that one throws).
   Estimator(const EstimatorOptions& options, std::vector<CameraPrior> cameras,
             std::vector<WheelsPrior> wheels, std::vector<UpdateEntry> updates);
 
@@ -90,10 +105,14 @@ class Estimator {
   void add(const ImuSample& sample);
   void add(const FeatureSample& image);
   void add(const EncoderSample& sample, int wheels);
+  void add(const PoseSample& pose, int stream);
   /// No further measurement will come: what waits for others is done without them.
   void finish() { finished_ = true; }
 
-  /// Runs one epoch when the measurements suffice, else returns false. UpdateFailure.
+  /// Runs one epoch when the measurements suffice, else returns false. Throws what a kinematic
+  /// model has thrown (PluginFailure): without its wheels there is nothing to go on with. What an
+  /// update throws is counted in failures(), unless the estimator is frozen: then it is an
+  /// UpdateFailure.
   bool step();
   /// Why the filter cannot go on (it has diverged); empty as long as it can.
   const std::string& failure() const { return failure_; }
@@ -101,6 +120,7 @@ class Estimator {
   const Filter& filter() const { return filter_; }
   std::span<const UpdateEntry> updates() const { return updates_; }
   std::span<const UpdateCounts> counts() const { return counts_; }
+  std::span<const UpdateFailures> failures() const { return failures_; }
   std::vector<RejectionCount> rejections() const;
   std::int64_t epochs() const { return epochs_; }
   /// One for each wheel set of which something is estimated; none if they are turned off.
@@ -116,8 +136,11 @@ class Estimator {
   bool encoders_reach(std::int64_t t_ns) const;
   void cut_imu(std::int64_t end_ns);
   void take_images(std::int64_t t_ns);
+  void take_poses(std::int64_t t_ns);
   void forget_used();
   bool try_to_initialize();
+  static void start_update(const UpdateEntry& entry, const UpdateSetup& setup);
+  bool call_update(std::size_t index, const EpochData& data);
   void run_update(std::size_t index, const EpochData& data);
   template <class Factor>
   FactorResult apply(const UpdateEntry& update, const Factor& factor);
@@ -128,6 +151,7 @@ class Estimator {
   Filter filter_;
   std::vector<UpdateEntry> updates_;
   std::vector<UpdateCounts> counts_;
+  std::vector<UpdateFailures> failures_;
   FactorSink sink_;
   // Factors of one call are linearised at one estimate: what those before them have corrected, and
   // room for a factor with that taken off.
@@ -145,6 +169,13 @@ class Estimator {
   std::size_t n_waiting_ = 0;
   std::vector<FeatureSample> images_;  // of the present epoch; spare ones behind
   std::size_t n_images_ = 0;
+  /// Poses of one sensor; nothing waits for them.
+  struct PoseStream {
+    std::vector<PoseSample> waiting;  // in time order
+    std::vector<PoseSample> taken;    // of the present epoch
+    std::int64_t last_ns = std::numeric_limits<std::int64_t>::min();
+  };
+  std::vector<PoseStream> poses_;
   std::vector<ImuSample> cut_;  // IMU of the present epoch, interpolated at its ends
   std::int64_t latest_ns_ = 0;  // largest stamp of anything
   bool finished_ = false;

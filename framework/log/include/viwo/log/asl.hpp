@@ -57,6 +57,8 @@ class AslWriter {
   /// encoder samples change their number of channels, or for a name that a table cannot hold;
   /// InputError when poses and states, which share a table, are both to be written.
   void write(const Measurement& measurement);
+  /// A pose that is a measurement and no reference: into poses0, which asl_pose reads.
+  void write_measured(const PoseSample& pose);
   /// Must be called at the end: the last bytes may fail, too.
   void close();
 

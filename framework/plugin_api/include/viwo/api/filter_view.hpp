@@ -114,6 +114,9 @@ struct EpochData {
   std::span<const ImuSample> imu;  ///< from begin to end, both included (interpolated there)
   /// Of the wheel set: everything since the oldest clone that the filter has, in the wheel clock.
   std::span<const EncoderSample> encoders;
+  /// Of the sensor that a kPoses update is for: what came since the last epoch, up to now, in time
+  /// order. Each sample is given once; one that came late has its old stamp (IMU clock).
+  std::span<const PoseSample> poses;
 };
 
 }  // namespace viwo

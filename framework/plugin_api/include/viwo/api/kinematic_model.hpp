@@ -49,7 +49,7 @@ struct IntrinsicSpec {
   double nominal = 0.;       ///< in `unit`
   double prior_sigma = 0.;   ///< in `unit`, > 0: how well the nominal value is known
   bool gauge_fixed = false;  ///< held to place the odometry frame O on the body
-  RowRange rows;             ///< rows whose derivative by this entry is not zero
+  RowRange rows{};           ///< rows whose derivative by this entry is not zero
 };
 
 /// What n_i in y = y_true + n_i (encoder channels) or in b (slip) a noise source is.
@@ -60,7 +60,7 @@ struct NoiseSpec {
   NoiseKind kind = NoiseKind::kDrive;
   int channel = 0;    ///< drive or steering channel; wheel index for slip
   double sigma = 0.;  ///< rad/s, rad, m/s; > 0
-  RowRange rows;      ///< rows it enters
+  RowRange rows{};    ///< rows it enters
 };
 
 /// What never changes about a model; filled once by describe().

@@ -59,7 +59,8 @@ struct FeatureSample {
   std::vector<FeaturePoint> points;  ///< ids are unique within a sample
 };
 
-/// A pose from a reference system (motion capture, simulator truth): body B in world W.
+/// A pose of body B in world W: of a reference system (simulator truth, motion capture), or a
+/// measurement, for an update that names the sensor; then the stamp must be in the IMU clock.
 struct PoseSample {
   std::int64_t t_ns = 0;                              ///< stamp in the clock of the reference
   std::array<double, 3> p_BinW_m{};                   ///< position of B's origin in W

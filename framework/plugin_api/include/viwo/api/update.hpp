@@ -114,8 +114,9 @@ struct UpdateSetup {
 
 /// What the host gives to an update.
 enum class UpdateKind : std::uint8_t {
-  kBody,   ///< one instance: IMU, features
-  kWheels  ///< one instance for each wheel set, with its encoder samples
+  kBody,    ///< one instance: IMU, features
+  kWheels,  ///< one instance for each wheel set, with its encoder samples
+  kPoses    ///< one instance, with the poses of the sensor that its section names (`sensor: NAME`)
 };
 
 /// Calls are serialised by the host: start() once, then update() once per epoch, in time order.

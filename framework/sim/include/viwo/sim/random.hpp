@@ -26,6 +26,8 @@ enum class Stream : std::uint64_t {
   kFeatureDropouts,
   kCalibrationError,
   kStartError,
+  kPoseNoise,
+  kPoseOutliers,
 };
 
 /// A stream of independent numbers; equal seed, purpose and index give equal numbers. `index`
