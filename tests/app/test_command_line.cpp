@@ -17,7 +17,7 @@ TEST_F(CommandLineTest, WithoutArgumentsPrintsTheHelpAndFails) {
   for (const char* command :
        {"run CONFIG", "experiment EXPERIMENT", "calibrate CONFIG", "simulate CONFIG --out DIR",
         "evaluate --reference A.tum --estimate B.tum",
-        "plugins list | describe NAME | check FILE"}) {
+        "plugins list | describe NAME | check FILE | new KIND NAME [--out DIR]"}) {
     EXPECT_NE(help.out.find("\n  viwo " + std::string(command)), std::string::npos) << command;
   }
 }
@@ -34,7 +34,7 @@ TEST_F(CommandLineTest, EveryCommandExplainsItself) {
       {"calibrate", {"--out", "--set"}},
       {"simulate", {"--out", "--seed", "--set"}},
       {"evaluate", {"--reference", "--estimate", "--align", "--out"}},
-      {"plugins", {}}};
+      {"plugins", {"--out"}}};
   for (const auto& [command, options] : commands) {
     const Outcome help = expect_done({command, "--help"});
     EXPECT_EQ(help.out.find("Usage: viwo " + command + " "), 0U) << help.out;
@@ -85,7 +85,7 @@ TEST_F(CommandLineTest, RefusesMissingAndSuperfluousArguments) {
                  "evaluate --help)");
   expect_refused({"plugins"},
                  "viwo plugins: what to do is missing - usage: viwo plugins list | describe NAME | "
-                 "check FILE (see viwo plugins --help)");
+                 "check FILE | new KIND NAME [--out DIR] (see viwo plugins --help)");
 }
 
 TEST_F(CommandLineTest, RefusesOptionValuesThatMakeNoSense) {
@@ -124,7 +124,8 @@ TEST_F(CommandLineTest, ListsAndDescribesPlugins) {
                  "no plugin 'diferential' - did you mean 'differential'?");
   expect_refused({"plugins", "lst"}, "viwo plugins: unknown 'lst' - did you mean 'list'?");
   expect_refused({"plugins", "describe"},
-                 "viwo plugins: usage: viwo plugins list | describe NAME | check FILE");
+                 "viwo plugins: usage: viwo plugins list | describe NAME | check FILE | new KIND "
+                 "NAME [--out DIR]");
 }
 
 TEST_F(CommandLineTest, ChecksAPluginFile) {

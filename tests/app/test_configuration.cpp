@@ -56,6 +56,12 @@ TEST_F(ConfigurationTest, MustBeAFileOfYaml) {
   run("list.yaml", "list.yaml:1:1  a run configuration is a section of keys");
   write("empty.yaml", "");
   run("empty.yaml", "empty.yaml:1:1  a run configuration is a section of keys");
+  write("experiment.yaml", "experiment: e\nbase: run.yaml\nvariants: {a: }\n");
+  run("experiment.yaml",
+      "experiment.yaml:1:1  this is an experiment, not a run: viwo experiment takes it");
+  write("calibration.yaml", "base: run.yaml\ncalibration: c\n");
+  run("calibration.yaml",
+      "calibration.yaml:2:1  this is a calibration, not a run: viwo calibrate takes it");
   write("binary.yaml", std::string("\x7f\0\1", 3));
   run("binary.yaml", "binary.yaml  is not a text file");
 }
@@ -63,6 +69,8 @@ TEST_F(ConfigurationTest, MustBeAFileOfYaml) {
 TEST_F(ConfigurationTest, RefusesUnknownKeys) {
   refuse_run("name: small", "nmae: small",
              "run.yaml:1:1  run: unknown key 'nmae' - did you mean 'name'?");
+  refuse_run("name: small", "placeholder: {a: 1}",
+             "run.yaml:1:1  run: unknown key 'placeholder' - did you mean 'placeholders'?");
   refuse_run("    duration_s", "    duration",
              "run.yaml:11:5  sensors.sim (planar_simulator): unknown key 'duration' - duration is "
              "in s, did you mean 'duration_s'?");

@@ -1,6 +1,7 @@
 // Results: files, reproducibility, and what happens when they cannot be written. Also: every
 // configuration that is delivered loads.
 #include <algorithm>
+#include <map>
 #include <set>
 #include <sstream>
 
@@ -214,7 +215,8 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfTheFilter) {
 }
 
 TEST_F(ResultsTest, OfTheDeliveredConfigurationsForObservability) {
-  for (const std::string name : {"degenerate_motions", "differential"}) {
+  for (const std::string name :
+       {"degenerate_motions", "differential", "ackermann", "skid_steer", "mecanum", "swerve"}) {
     expect_done({"observability", kConfigs + "observability/" + name + ".yaml", "--out", name,
                  "--set", "sensors.simulator0.duration_s=2"});
     std::ifstream in(at(name) / "observability.json");
@@ -222,6 +224,34 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsForObservability) {
     EXPECT_TRUE(motions.contains("general"));
     EXPECT_TRUE(motions.contains("stationary"));
   }
+}
+
+TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfOtherBases) {
+  const std::string shorter = "sensors.simulator0.duration_s=5";
+  const std::map<std::string, std::vector<std::string>> variants{
+      {"ackermann", {"rear_and_centre", "all_and_centre", "rear_and_both"}},
+      {"skid_steer", {"held_frame", "known_mounting"}},
+      {"mecanum", {"twist_only", "full"}},
+      {"swerve", {"three_wheels", "four_wheels", "six_wheels"}}};
+  for (const auto& [base, names] : variants) {
+    const std::string run = "runs/viwo_" + base + ".yaml";
+    expect_done({"run", kConfigs + run, "--out", base, "--set", shorter});
+    EXPECT_EQ(summary(base).at("status"), "ok") << base;
+    expect_done({"experiment", kConfigs + "experiments/calibrate_" + base + ".yaml", "--seeds", "1",
+                 "--out", base + "_experiment", "--set", shorter});
+    const nlohmann::json results = summary(base + "_experiment").at("variants");
+    EXPECT_EQ(results.size(), names.size()) << base;
+    for (const std::string& name : names) EXPECT_EQ(results.at(name).at("runs"), 1) << name;
+  }
+}
+
+TEST_F(ResultsTest, OfTheDeliveredConfigurationsWithAPoseReference) {
+  const std::string shorter = "sensors.simulator0.duration_s=5";
+  expect_done({"run", kConfigs + "runs/viwo_gnss.yaml", "--out", "run", "--set", shorter});
+  EXPECT_EQ(summary("run").at("status"), "ok");
+  expect_done({"experiment", kConfigs + "experiments/plane_and_gnss.yaml", "--seeds", "1", "--out",
+               "experiment", "--set", shorter});
+  EXPECT_TRUE(summary("experiment").at("variants").contains("wheels_plane_gnss"));
 }
 
 TEST_F(ResultsTest, OfTheDeliveredConfigurationForOpenVinsMeasurements) {
@@ -242,16 +272,37 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
       files.insert(fs::relative(entry.path(), kConfigs).string());
     }
   }
-  EXPECT_EQ(files,
-            (std::set<std::string>{
-                "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
-                "cameras/pinhole.yaml", "cameras/t265_like.yaml",
-                "experiments/drive_only_twist_full.yaml", "experiments/hybrid.yaml",
-                "experiments/nominal_dead_reckoning.yaml", "experiments/paper_accuracy.yaml",
-                "experiments/simulated_dead_reckoning.yaml", "experiments/three_models.yaml",
-                "observability/degenerate_motions.yaml", "observability/differential.yaml",
-                "runs/hybrid.yaml", "runs/openvins_sim.yaml", "runs/recording.yaml",
-                "runs/simulated_swerve.yaml", "runs/viwo_log.yaml", "runs/viwo_swerve.yaml"}))
+  EXPECT_EQ(files, (std::set<std::string>{"calibrations/recordings.yaml",
+                                          "calibrations/simulated_swerve.yaml",
+                                          "cameras/pinhole.yaml",
+                                          "cameras/t265_like.yaml",
+                                          "experiments/calibrate_ackermann.yaml",
+                                          "experiments/calibrate_mecanum.yaml",
+                                          "experiments/calibrate_skid_steer.yaml",
+                                          "experiments/calibrate_swerve.yaml",
+                                          "experiments/drive_only_twist_full.yaml",
+                                          "experiments/hybrid.yaml",
+                                          "experiments/nominal_dead_reckoning.yaml",
+                                          "experiments/paper_accuracy.yaml",
+                                          "experiments/plane_and_gnss.yaml",
+                                          "experiments/simulated_dead_reckoning.yaml",
+                                          "experiments/three_models.yaml",
+                                          "observability/ackermann.yaml",
+                                          "observability/mecanum.yaml",
+                                          "observability/skid_steer.yaml",
+                                          "observability/swerve.yaml",
+                                          "observability/degenerate_motions.yaml",
+                                          "observability/differential.yaml",
+                                          "runs/hybrid.yaml",
+                                          "runs/openvins_sim.yaml",
+                                          "runs/recording.yaml",
+                                          "runs/simulated_swerve.yaml",
+                                          "runs/viwo_ackermann.yaml",
+                                          "runs/viwo_gnss.yaml",
+                                          "runs/viwo_log.yaml",
+                                          "runs/viwo_mecanum.yaml",
+                                          "runs/viwo_skid_steer.yaml",
+                                          "runs/viwo_swerve.yaml"}))
       << "name the new file in a test above";
 }
 

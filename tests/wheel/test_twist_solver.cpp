@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "more_bases.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/testing/jacobian.hpp"
 #include "viwo/wheel/twist_solver.hpp"
@@ -38,6 +39,17 @@ const Case kDifferentialCases[] = {{"rest", {0., 0., 0.}},
                                    {"spin", {0., 0., 0.8}},
                                    {"arc", {0.4, 0., 0.6}},
                                    {"reverse", {-0.5, 0., -0.3}}};
+const Case kCarCases[] = {{"rest", {0., 0., 0.}},
+                          {"straight", {0.5, 0., 0.}},
+                          {"arc", {0.4, 0., 0.6}},
+                          {"steering limit", {0.21, 0., -1.}},
+                          {"reverse", {-0.5, 0., -0.3}}};
+// v_y = -x_icr omega, with the x_icr of skid_steer().
+const Case kSkidCases[] = {{"rest", {0., 0., 0.}},
+                           {"straight", {0.5, 0., 0.}},
+                           {"spin", {0., 0.04, 0.8}},
+                           {"arc", {0.4, 0.03, 0.6}},
+                           {"reverse", {-0.5, -0.015, -0.3}}};
 
 std::vector<std::string> intrinsic_names(const WheelModel& model) {
   std::vector<std::string> names;
@@ -59,6 +71,9 @@ class EveryModel : public ::testing::TestWithParam<std::string> {
  protected:
   std::shared_ptr<const WheelModel> model_ = load_model(GetParam());
   std::span<const Case> cases() const {
+    if (GetParam().find("skid_steer") != std::string::npos) return kSkidCases;
+    if (GetParam().find("ackermann") != std::string::npos) return kCarCases;
+    if (GetParam().find("mecanum") != std::string::npos) return kSwerveCases;
     return model_->description().n_steer == 0 ? std::span<const Case>(kDifferentialCases)
                                               : std::span<const Case>(kSwerveCases);
   }
@@ -68,6 +83,8 @@ INSTANTIATE_TEST_SUITE_P(
     , EveryModel,
     ::testing::Values(swerve("four_wis_wid"), swerve("four_wis_wid_drive_only"), differential(),
                       differential(", left_drives: [1, 4], right_drives: [2, 3]")));
+
+INSTANTIATE_TEST_SUITE_P(More, EveryModel, ::testing::ValuesIn(testing::more_bases()));
 
 TEST_P(EveryModel, GivesBackTheTwistOfASlipFreeSample) {
   TwistSolver solver(model_, {.rank_tolerance = 1e-9});
@@ -142,9 +159,9 @@ TEST_P(EveryModel, PropagatesTheNoiseOfCentralDifferences) {
     for (const NoiseSpec& noise : model_->description().noises) {
       if (noise.kind != NoiseKind::kSlip) continue;
       Eigen::VectorXd direction = Eigen::VectorXd::Zero(model_->n_rows());
-      if (model_->description().n_steer > 0) {
+      if (noise.rows.count == 2) {  // a steered wheel, written in O
         const double delta = y.steer_rad[static_cast<std::size_t>(noise.channel)] -
-                             model_->nominal()[12 + noise.channel];
+                             model_->nominal()[3 * y.n_steer + noise.channel];
         direction.segment<2>(noise.rows.first) << -std::sin(delta), std::cos(delta);
       } else {
         direction[noise.rows.first] = 1.;

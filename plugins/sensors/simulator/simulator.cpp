@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "pose_simulator.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
 #include "viwo/sim/body_trajectory.hpp"
@@ -79,7 +80,7 @@ constexpr std::array kBaseParams{
 };
 // clang-format on
 
-constexpr auto kParams = sim::joined(kBaseParams, sim::kRigParams);
+constexpr auto kParams = sim::joined(kBaseParams, kPoseParams, sim::kRigParams);
 
 sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
                                                const ModelDescription& robot) {
@@ -161,6 +162,9 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
                   [](const Measurement& m) { return std::holds_alternative<StateSample>(m); });
   }
   std::move(from_rig.begin(), from_rig.end(), std::back_inserter(out.samples));
+  const auto poses =
+      simulate_poses(trajectory, rig.mounting, pose_simulation_from(params), services.seed);
+  out.samples.insert(out.samples.end(), poses.begin(), poses.end());
   if (params.flag("wheels")) {
     try {
       const auto from_wheels = sim::simulate_encoders(

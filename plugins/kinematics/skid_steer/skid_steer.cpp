@@ -1,0 +1,238 @@
+// Skid-steered base: one or more driven wheels (or a track) per side, with the instantaneous
+// centres of rotation (ICR) of the sides and of the base. Equations: model.md beside this file.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "viwo/api/plugin.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr std::array kParams{
+    ParamSpec{.name = "radius_left_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "effective radius of the left side: slip factor times radius"},
+    ParamSpec{.name = "radius_right_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "effective radius of the right side: slip factor times radius"},
+    ParamSpec{.name = "y_icr_left_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .help = "ICR of the left side along y, left of y_icr_right_m and, on a base that "
+                      "skids, outside of its contact line"},
+    ParamSpec{.name = "y_icr_right_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .help = "ICR of the right side along y"},
+    ParamSpec{.name = "x_icr_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0",
+              .help = "ICR of the base along x: the point that does not move sideways"},
+    ParamSpec{.name = "left_drives",
+              .type = ParamType::kNumbers,
+              .fallback = "[1]",
+              .min = 1.,
+              .max = kMaxDrives,
+              .help = "drive channels on the left, counted from 1"},
+    ParamSpec{.name = "right_drives",
+              .type = ParamType::kNumbers,
+              .fallback = "[2]",
+              .min = 1.,
+              .max = kMaxDrives,
+              .help = "drive channels on the right, counted from 1"},
+    ParamSpec{.name = "hold_frame",
+              .type = ParamType::kBool,
+              .fallback = "true",
+              .help = "hold x_icr and y_icr_left, which places O on the base; false: the mounting "
+                      "of the IMU is known and places it (wheels.sigma_p_IinO_m 0 in x and y)"},
+    ParamSpec{.name = "prior_sigma_radius_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0.003",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "how well the effective radii are known"},
+    ParamSpec{.name = "prior_sigma_icr_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0.05",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "how well each coordinate of an ICR is known"},
+    ParamSpec{.name = "sigma_drive_rad_per_s",
+              .type = ParamType::kNumber,
+              .unit = "rad/s",
+              .fallback = "0.001",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "noise of a drive rate, per sample"},
+    ParamSpec{.name = "sigma_slip_m_per_s",
+              .type = ParamType::kNumber,
+              .unit = "m/s",
+              .fallback = "0.001",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "what a side slips along besides its slip factor, per sample"},
+    ParamSpec{.name = "sigma_lateral_m_per_s",
+              .type = ParamType::kNumber,
+              .unit = "m/s",
+              .fallback = "0.001",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "sideways velocity of the ICR of the base, per sample"},
+};
+
+class SkidSteer final : public KinematicModel {
+ public:
+  SkidSteer(const ParamSet& params, const HostServices& /*services*/)
+      : nominal_{params.number("radius_left_m"), params.number("radius_right_m"),
+                 params.number("y_icr_left_m"), params.number("y_icr_right_m"),
+                 params.number("x_icr_m")},
+        hold_frame_(params.flag("hold_frame")),
+        prior_sigma_radius_m_(params.number("prior_sigma_radius_m")),
+        prior_sigma_icr_m_(params.number("prior_sigma_icr_m")),
+        sigma_drive_rad_per_s_(params.number("sigma_drive_rad_per_s")),
+        sigma_slip_m_per_s_(params.number("sigma_slip_m_per_s")),
+        sigma_lateral_m_per_s_(params.number("sigma_lateral_m_per_s")) {
+    if (!(nominal_[kYLeft] > nominal_[kYRight])) {
+      throw ParamError("y_icr_left_m", "must be greater than y_icr_right_m: y is to the left");
+    }
+    for (const double number : params.numbers("left_drives")) add_channel("left_drives", number);
+    n_left_ = static_cast<int>(channels_.size());
+    for (const double number : params.numbers("right_drives")) add_channel("right_drives", number);
+    std::vector<std::size_t> sorted = channels_;
+    std::sort(sorted.begin(), sorted.end());
+    for (std::size_t i = 0; i < sorted.size(); ++i) {
+      if (sorted[i] == i) continue;
+      throw ParamError("right_drives",
+                       "left_drives and right_drives together must name each channel from 1 to " +
+                           std::to_string(sorted.size()) + " once");
+    }
+    if (n_left_ == 0 || n_left_ == n_drive()) {
+      throw ParamError("left_drives", "each side needs at least one drive channel");
+    }
+  }
+
+  void describe(ModelDescription& out) const override {
+    const int n = n_drive();
+    const RowRange left{0, n_left_}, right{n_left_, n - n_left_};
+    out.n_drive = n;
+    out.n_rows = n + 1;
+    out.constant_A = true;
+    out.intrinsics = {
+        {"r_left", "m", nominal_[kRLeft], prior_sigma_radius_m_, false, left},
+        {"r_right", "m", nominal_[kRRight], prior_sigma_radius_m_, false, right},
+        {"y_icr_left", "m", nominal_[kYLeft], prior_sigma_icr_m_, hold_frame_, left},  // (K-7)
+        {"y_icr_right", "m", nominal_[kYRight], prior_sigma_icr_m_, false, right},
+        {"x_icr", "m", nominal_[kX], prior_sigma_icr_m_, hold_frame_, {n, 1}}};
+    for (int i = 0; i < n; ++i) {
+      const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
+      out.noises.push_back({NoiseKind::kDrive, channel, sigma_drive_rad_per_s_, {i, 1}});
+    }
+    for (int i = 0; i < n; ++i) {
+      const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
+      out.noises.push_back({NoiseKind::kSlip, channel, sigma_slip_m_per_s_, {i, 1}});
+    }
+    out.noises.push_back({NoiseKind::kSlip, n, sigma_lateral_m_per_s_, {n, 1}});
+  }
+
+  Status rows(const EncoderSample& sample, const Intrinsics& x_WI, bool A_is_current,
+              RowSystem& out) const override {
+    const int n = n_drive();
+    for (int i = 0; i < n; ++i) {
+      out.b[i] = x_WI[r(i)] * sample.drive_rad_per_s[channels_[static_cast<std::size_t>(i)]];
+      if (!A_is_current) out.A.row(i) << 1., 0., -x_WI[y(i)];  // (K-1)
+    }
+    out.b[n] = 0.;
+    if (!A_is_current) out.A.row(n) << 0., 1., x_WI[kX];  // (K-2)
+    return Status::kOk;
+  }
+
+  void intrinsic_derivatives(const EncoderSample& /*sample*/, const Intrinsics& x_WI,
+                             const RowSystem& /*rows*/, const RowVector& b, const Twist& xi,
+                             const RowVector& e, IntrinsicDerivatives& out) const override {
+    const int n = n_drive();
+    out.DtE.setZero();
+    for (int i = 0; i < n; ++i) {
+      out.J(i, r(i)) = b[i] / x_WI[r(i)];  // (K-3)
+      out.J(i, y(i)) = xi.z();             // (K-4)
+      out.DtE(2, y(i)) -= e[i];            // (K-5)
+    }
+    out.J(n, kX) = -xi.z();
+    out.DtE(2, kX) = e[n];
+  }
+
+  void noise_derivatives(const EncoderSample& /*sample*/, const Intrinsics& x_WI,
+                         const RowSystem& /*rows*/, const RowVector& /*b*/, const Twist& /*xi*/,
+                         const RowVector& /*e*/, NoiseDerivatives& out) const override {
+    const int n = n_drive();
+    for (int i = 0; i < n; ++i) {
+      out.J(i, i) = x_WI[r(i)];  // (K-6)
+      out.J(i, n + i) = 1.;
+    }
+    out.J(n, 2 * n) = 1.;
+    out.DtE.setZero();
+  }
+
+  Status inverse(const Twist& xi, const Intrinsics& x_WI, const RowVector& slip,
+                 EncoderSample& sample) const override {
+    const int n = n_drive();
+    // Sideways its ICR moves by slip alone; this base can make no other motion.
+    const double sideways = xi.y() + x_WI[kX] * xi.z();
+    if (std::abs(sideways + slip[n]) > 1e-9 && std::abs(sideways) > 1e-9) return Status::kRejected;
+    sample.n_drive = n;
+    sample.n_steer = 0;
+    for (int i = 0; i < n; ++i) {
+      const double v = xi.x() - x_WI[y(i)] * xi.z() + slip[i];  // (K-8)
+      sample.drive_rad_per_s[channels_[static_cast<std::size_t>(i)]] = v / x_WI[r(i)];
+    }
+    return Status::kOk;
+  }
+
+  Status move_frame(const Eigen::Vector3d& g, Intrinsics& x_WI) const override {
+    // The rolling rows have no sideways part: they hold the direction of x. With nothing held the
+    // mounting places O, not this model.
+    if (!hold_frame_ || g[0] != 0.) return Status::kUnsupported;
+    x_WI[kX] -= g[1];  // (K-7)
+    x_WI[kYLeft] -= g[2];
+    x_WI[kYRight] -= g[2];
+    return Status::kOk;
+  }
+
+ private:
+  static constexpr int kRLeft = 0, kRRight = 1, kYLeft = 2, kYRight = 3, kX = 4;
+
+  void add_channel(const char* key, double number) {
+    if (number != std::floor(number)) throw ParamError(key, "channels are whole numbers from 1");
+    channels_.push_back(static_cast<std::size_t>(number) - 1);
+  }
+
+  int n_drive() const { return static_cast<int>(channels_.size()); }
+  /// Of row i: indices of its radius and of its ICR.
+  int r(int i) const { return i < n_left_ ? kRLeft : kRRight; }
+  int y(int i) const { return i < n_left_ ? kYLeft : kYRight; }
+
+  std::array<double, 5> nominal_;
+  bool hold_frame_;
+  double prior_sigma_radius_m_, prior_sigma_icr_m_;
+  double sigma_drive_rad_per_s_, sigma_slip_m_per_s_, sigma_lateral_m_per_s_;
+  std::vector<std::size_t> channels_;  ///< drive channel of each row, left ones first
+  int n_left_ = 0;
+};
+
+VIWO_REGISTER(KinematicModel, SkidSteer, "skid_steer", "1.0.0",
+              "skid-steered base: effective radii and centres of rotation of its sides",
+              "Apache-2.0", kParams);
+
+}  // namespace
+}  // namespace viwo

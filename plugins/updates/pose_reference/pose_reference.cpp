@@ -1,0 +1,222 @@
+// Fixes of a body on the IMU from outside: positions (GNSS) or poses (motion capture), each at its
+// own instant between two clones. Equations: model.md.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include "fix.hpp"
+#include "tally.hpp"
+#include "viwo/api/plugin.hpp"
+#include "viwo/math/arrays.hpp"
+#include "viwo/math/so3.hpp"
+
+namespace viwo {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using namespace pose_reference;
+
+/// The host has room for so many factors of one update in an epoch.
+constexpr double kMostFixes = 16.;
+
+constexpr std::array kParams{
+    ParamSpec{.name = "use",
+              .type = ParamType::kString,
+              .fallback = "position",
+              .choices = "position|pose",
+              .help = "what of a fix is believed: position (GNSS), or position and orientation "
+                      "(motion capture)"},
+    ParamSpec{.name = "sigma_position_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0.02",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "noise of the position, per axis"},
+    ParamSpec{.name = "sigma_height_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0",
+              .min = 0.,
+              .help = "noise of the vertical axis, if it is another; 0: sigma_position_m"},
+    ParamSpec{.name = "sigma_orientation_rad",
+              .type = ParamType::kNumber,
+              .unit = "rad",
+              .fallback = "0.01",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "use pose: noise of the orientation, per axis of B"},
+    ParamSpec{.name = "p_BinI_m",
+              .type = ParamType::kNumbers,
+              .unit = "m",
+              .fallback = "[0, 0, 0]",
+              .help = "lever arm: where B (antenna, marker frame) is seen from the IMU"},
+    ParamSpec{.name = "rpy_ItoB_rad",
+              .type = ParamType::kNumbers,
+              .unit = "rad",
+              .fallback = "[0, 0, 0]",
+              .min = -3.2,
+              .max = 3.2,
+              .help = "how the IMU is turned in B: R_ItoB = Rz(third) Ry(second) Rx(first)"},
+    ParamSpec{.name = "yaw_WtoG_rad",
+              .type = ParamType::kNumber,
+              .unit = "rad",
+              .fallback = "0",
+              .min = -3.2,
+              .max = 3.2,
+              .help = "how the world W of the fixes is turned in G, about the vertical"},
+    ParamSpec{.name = "p_WinG_m",
+              .type = ParamType::kNumbers,
+              .unit = "m",
+              .fallback = "[0, 0, 0]",
+              .help = "where the origin of W is in G"},
+    ParamSpec{.name = "max_per_epoch",
+              .type = ParamType::kInt,
+              .fallback = "5",
+              .min = 1.,
+              .max = kMostFixes,
+              .help = "of more fixes in an epoch so many are used, evenly spread"},
+    ParamSpec{.name = "max_span_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0.5",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "fixes between clones further apart are left out"},
+    ParamSpec{.name = "gate_probability",
+              .type = ParamType::kNumber,
+              .fallback = "0.001",
+              .min = 0.,
+              .max = 0.5,
+              .help = "fixes less likely than this are left out; 0: none"},
+};
+
+Vector3d three(const ParamSet& params, const char* key) {
+  const auto values = params.numbers(key);
+  if (values.size() != 3) throw ParamError(key, "needs three numbers");
+  return {values[0], values[1], values[2]};
+}
+
+ClonePose at_estimate(const CloneView& clone) {
+  // The velocity is held in I, as it was when the clone was made.
+  return {clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.R_GtoI_fej * clone.v_IinG};
+}
+
+ClonePose at_first_estimate(const CloneView& clone) {
+  ClonePose pose = at_estimate(clone);
+  pose.R_GtoI = clone.R_GtoI_fej;
+  pose.p_IinG = clone.p_IinG_fej;
+  return pose;
+}
+
+class PoseReference final : public Update {
+ public:
+  PoseReference(const ParamSet& params, const HostServices& /*services*/)
+      : with_orientation_(params.text("use") == "pose"),
+        max_per_epoch_(static_cast<std::size_t>(params.integer("max_per_epoch"))),
+        max_span_s_(params.number("max_span_s")),
+        gate_probability_(params.number("gate_probability")),
+        p_WinG_(three(params, "p_WinG_m")) {
+    const double height = params.number("sigma_height_m");
+    const double position = params.number("sigma_position_m");
+    sigma_.head<3>().setConstant(params.number("sigma_orientation_rad"));
+    sigma_.tail<3>() << position, position, height > 0. ? height : position;
+    R_WtoG_ = exp_so3({0., 0., params.number("yaw_WtoG_rad")});
+    const Vector3d rpy = three(params, "rpy_ItoB_rad");
+    lever_.R_ItoB =
+        exp_so3({0., 0., rpy.z()}) * exp_so3({0., rpy.y(), 0.}) * exp_so3({rpy.x(), 0., 0.});
+    lever_.p_BinI = three(params, "p_BinI_m");
+  }
+
+  UpdateKind kind() const override { return UpdateKind::kPoses; }
+
+  void start(const UpdateSetup& /*setup*/) override {}
+
+  void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
+    const std::size_t n = data.poses.size();
+    const std::size_t used = std::min(n, max_per_epoch_);
+    too_many_.add(static_cast<std::int64_t>(n - used), data.end_ns);
+    for (std::size_t i = 0; i < used; ++i) {
+      // The last of each of `used` equal parts: all of them when there are few.
+      const PoseSample& fix = data.poses[(i + 1) * n / used - 1];
+      const auto last = clone_behind(filter, fix.t_ns);
+      if (last) emit(filter.clones[*last - 1], filter.clones[*last], fix, sink);
+    }
+  }
+
+  void rejections(std::vector<RejectionCount>& out) const override {
+    too_late_.append_to(out);
+    too_far_.append_to(out);
+    bad_quaternion_.append_to(out);
+    too_many_.append_to(out);
+  }
+
+ private:
+  /// Index of the first clone at or behind the fix; nothing when there is none before it.
+  std::optional<std::size_t> clone_behind(const FilterView& filter, std::int64_t t_ns) {
+    const auto clones = filter.clones;
+    if (clones.size() < 2 || t_ns < clones.front().t_ns || t_ns > clones.back().t_ns) {
+      too_late_.add(1, t_ns);
+      return std::nullopt;
+    }
+    std::size_t last = clones.size() - 1;
+    while (last > 1 && clones[last - 1].t_ns >= t_ns) --last;
+    if (seconds_between(clones[last - 1].t_ns, clones[last].t_ns) > max_span_s_) {
+      too_far_.add(1, t_ns);
+      return std::nullopt;
+    }
+    return last;
+  }
+
+  void emit(const CloneView& first, const CloneView& last, const PoseSample& fix,
+            FactorSink& sink) {
+    const Eigen::Quaterniond q = to_quaternion(fix.q_BtoW_xyzw);
+    if (with_orientation_ && !(std::abs(q.norm() - 1.) < 1e-3)) {
+      bad_quaternion_.add(1, fix.t_ns);
+      return;
+    }
+    const double period_s = seconds_between(first.t_ns, last.t_ns);
+    const double u = seconds_between(first.t_ns, fix.t_ns) / period_s;
+    const BodyPose body = body_between(at_estimate(first), at_estimate(last), period_s, u, lever_);
+    BodyJacobian J;
+    body_between(at_first_estimate(first), at_first_estimate(last), period_s, u, lever_, &J);
+
+    const int rows = with_orientation_ ? 6 : 3;
+    ResidualFactor& factor = sink.add_residual();
+    factor.columns.add(first.column, kPoseSize);
+    factor.columns.add(last.column, kPoseSize);
+    factor.set_rows(rows);
+    factor.gate_probability = gate_probability_;
+    factor.H = J.bottomRows(rows);
+    factor.R.diagonal() = sigma_.tail(rows).cwiseAbs2();
+    // (PR-7)
+    factor.residual.tail<3>() = R_WtoG_ * to_vector(fix.p_BinW_m) + p_WinG_ - body.p_BinG;
+    if (!with_orientation_) return;
+    // (PR-8)
+    const Matrix3d R_BtoG = R_WtoG_ * q.normalized().toRotationMatrix();
+    factor.residual.head<3>() = -log_so3(R_BtoG.transpose() * body.R_GtoB.transpose());
+  }
+
+  bool with_orientation_;
+  std::size_t max_per_epoch_;
+  double max_span_s_, gate_probability_;
+  Eigen::Matrix<double, 6, 1> sigma_;  // orientation, position
+  Vector3d p_WinG_;
+  Matrix3d R_WtoG_;
+  Lever lever_;
+
+  Tally too_late_{"fix that is older than the oldest clone"};
+  Tally too_far_{"fix between clones that are too far apart"};
+  Tally bad_quaternion_{"fix whose quaternion has not unit norm"};
+  Tally too_many_{"fix beyond max_per_epoch"};
+};
+
+VIWO_REGISTER(Update, PoseReference, "pose_reference", "1.0.0",
+              "positions or poses of a body on the IMU, as GNSS or motion capture gives them",
+              "Apache-2.0", kParams);
+
+}  // namespace
+}  // namespace viwo
