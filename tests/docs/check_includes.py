@@ -14,7 +14,7 @@ import sys
 # Folder below framework/, in the order of the dependencies. Headers of plugin_api are viwo/api/.
 MODULES = ["plugin_api", "math", "testing", "config", "log", "plugin_host", "wheel", "camera", "filter",
            "sim", "eval",
-           "report", "observability", "experiment", "app"]
+           "report", "observability", "experiment", "conformance", "app"]
 PLUGIN_MODULES = {"plugin_api", "math", "log", "sim", "wheel", "camera"}
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*["<]([^">\n]+)[">]', re.MULTILINE)
 SOURCES = {".cpp", ".hpp", ".h", ".cc"}

@@ -1,0 +1,125 @@
+// A differential drive with one mistake, DEFECT; without it the model is right.
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <string>
+#include <thread>
+
+#include "viwo/api/plugin.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr std::string_view kDefect = DEFECT;
+constexpr bool is(std::string_view defect) { return kDefect == defect; }
+
+constexpr std::array kParams{
+    ParamSpec{.name = is("name_without_unit") ? "radius" : "radius_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0.05",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = is("no_help") ? "" : "radius of both wheels"},
+    ParamSpec{.name = "baseline_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0.3",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "distance between the wheels"},
+};
+
+double shared_radius_m = 0.;
+
+class Broken final : public KinematicModel {
+ public:
+  Broken(const ParamSet& params, const HostServices& /*services*/)
+      : radius_m_(params.number(kParams[0].name)), baseline_m_(params.number("baseline_m")) {
+    if (is("throws_at_the_edge") && baseline_m_ < 1e-6) throw std::logic_error("too narrow");
+    if (is("shared") || shared_radius_m == 0.) shared_radius_m = radius_m_;
+    if (is("first_instance")) baseline_m_ = 0.3;
+  }
+
+  void describe(ModelDescription& out) const override {
+    const double r = is("shared") || is("first_instance") ? shared_radius_m : radius_m_;
+    out.n_drive = 2;
+    out.n_rows = 3;
+    out.constant_A = true;
+    const RowRange baseline_rows = is("row_range") ? RowRange{0, 1} : RowRange{0, 2};
+    out.intrinsics = {
+        {"r_left", "m", r, 0.001, is("gauge"), {0, 1}},
+        {"r_right", is("no_unit") ? "" : "m", r, 0.001, false, {1, 1}},
+        {"baseline", "m", baseline_m_, is("prior") ? 0. : 0.01, false, baseline_rows}};
+    out.noises = {{NoiseKind::kDrive, 0, 0.001, {0, 1}},
+                  {NoiseKind::kDrive, is("channel") ? 2 : 1, is("noise") ? -0.001 : 0.001, {1, 1}},
+                  {NoiseKind::kSlip, 0, 0.001, {2, 1}}};
+    if (is("rows_without_noise")) out.noises.pop_back();
+  }
+
+  Status rows(const EncoderSample& y, const Intrinsics& x_WI, bool /*A_is_current*/,
+              RowSystem& out) const override {
+    const auto& drive = y.drive_rad_per_s;
+    if (is("crash") && std::isnan(drive[0])) std::raise(SIGSEGV);
+    if (is("throws") && !std::isfinite(drive[0])) throw std::domain_error("not a number");
+    if (is("endless") && std::isnan(drive[0])) {
+      for (;;) std::this_thread::yield();
+    }
+    double extra = 0.;
+    if (is("random")) extra = 1e-12 * ++calls_;
+    out.A << 1., 0., -0.5 * x_WI[2], 1., 0., 0.5 * x_WI[2], 0., 1., 0.;
+    if (is("constant_A")) out.A(2, 0) = 1e-3 * drive[0];
+    out.b << x_WI[0] * drive[0] + extra, x_WI[1] * drive[1], 0.;
+    cached_ = out.b[0];
+    return Status::kOk;
+  }
+
+  void intrinsic_derivatives(const EncoderSample& /*y*/, const Intrinsics& x_WI,
+                             const RowSystem& rows, const RowVector& b, const Twist& xi,
+                             const RowVector& e, IntrinsicDerivatives& out) const override {
+    const RowVector& signal = is("measured") ? rows.b : b;
+    out.J(0, 0) = (is("cache") ? cached_.load() : signal[0]) / x_WI[0];
+    out.J(1, 1) = signal[1] / x_WI[1];
+    out.J(0, 2) = 0.5 * xi.z();
+    out.J(1, 2) = (is("sign") ? 0.5 : -0.5) * xi.z();
+    if (!is("adds")) out.DtE.setZero();
+    out.DtE(2, 2) += 0.5 * ((is("dte") ? e[0] : -e[0]) + e[1]);
+  }
+
+  void noise_derivatives(const EncoderSample& /*y*/, const Intrinsics& x_WI,
+                         const RowSystem& /*rows*/, const RowVector& /*b*/, const Twist& /*xi*/,
+                         const RowVector& /*e*/, NoiseDerivatives& out) const override {
+    out.J(0, 0) = x_WI[0];
+    out.J(1, 1) = is("noise_scale") ? 1.01 * x_WI[1] : x_WI[1];
+    if (out.J.cols() > 2 && !is("no_slip")) out.J(2, 2) = 1.;
+  }
+
+  Status inverse(const Twist& xi, const Intrinsics& x_WI, const RowVector& /*slip*/,
+                 EncoderSample& y) const override {
+    if (std::abs(xi.y()) > 1e-9) return Status::kRejected;
+    const double turn = 0.5 * x_WI[2] * (is("inverse") ? -xi.z() : xi.z());
+    y.n_drive = 2;
+    y.n_steer = 0;
+    y.drive_rad_per_s[0] = (xi.x() - turn) / x_WI[0];
+    y.drive_rad_per_s[1] = (xi.x() + turn) / x_WI[1];
+    return Status::kOk;
+  }
+
+  Status move_frame(const Eigen::Vector3d& g, Intrinsics& x_WI) const override {
+    if (!is("move_frame")) return Status::kUnsupported;
+    x_WI[2] += g[0];
+    return Status::kOk;
+  }
+
+ private:
+  double radius_m_, baseline_m_;
+  mutable std::atomic<int> calls_ = 0;
+  mutable std::atomic<double> cached_ = 0.;
+};
+
+VIWO_REGISTER(KinematicModel, Broken, "broken_" DEFECT, "1.0.0", "a base with one mistake",
+              "Apache-2.0", kParams);
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,67 @@
+// A sensor with one mistake, DEFECT; without it it is right.
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+
+#include "viwo/api/plugin.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr std::string_view kDefect = DEFECT;
+constexpr bool is(std::string_view defect) { return kDefect == defect; }
+
+constexpr std::array kParams{
+    ParamSpec{.name = "count",
+              .type = ParamType::kInt,
+              .fallback = "20",
+              .min = 0.,
+              .max = 1e6,
+              .help = "how many samples"},
+    ParamSpec{.name = "path", .type = ParamType::kPath, .fallback = "''", .help = "a file"},
+};
+
+int shared_count = 0;
+
+class Broken final : public Sensor {
+ public:
+  Broken(const ParamSet& params, const HostServices& services)
+      : left_(params.integer("count")), seed_(services.seed) {
+    const std::string& path = params.text("path");
+    if (path.empty() || is("ignores_files")) return;
+    std::string word;
+    std::ifstream file(path);
+    if (!(file >> word) || word != "samples") {
+      if (is("throws_on_files")) throw std::runtime_error("bad file");
+      throw InputError(path + ":1: not a file of samples");
+    }
+  }
+
+  Status next(Measurement& out) override {
+    if (left_-- <= 0) {
+      left_ = is("goes_on") ? 5 : 0;
+      return Status::kEnd;
+    }
+    ++shared_count;
+    ImuSample sample;
+    time_ns_ += is("order") && left_ == 7 ? -1'000'000 : 5'000'000;
+    sample.t_ns = time_ns_;
+    sample.gyro_rad_per_s[0] = 1e-3 * static_cast<double>(seed_);
+    if (is("clock")) sample.gyro_rad_per_s[1] = 1e-3 * shared_count;
+    if (is("nan") && left_ == 3) sample.accel_m_per_s2[2] = std::nan("");
+    out = sample;
+    return Status::kOk;
+  }
+
+ private:
+  std::int64_t left_;
+  std::uint64_t seed_;
+  std::int64_t time_ns_ = 0;
+};
+
+VIWO_REGISTER(Sensor, Broken, "broken_" DEFECT, "1.0.0", "a sensor with one mistake", "Apache-2.0",
+              kParams);
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,58 @@
+// The kit around its checks: configuration, refusals, texts, names.
+#include <fstream>
+
+#include "support.hpp"
+#include "viwo/api/status.hpp"
+
+namespace viwo::conformance {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string error_of(const fs::path& file, const Options& options) {
+  try {
+    check_plugin(file, options);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "(no error)";
+}
+
+TEST(Conformance, RefusesWhatTheHostRefuses) {
+  const std::string text = error_of("/etc/hostname", {});
+  EXPECT_EQ(text,
+            "refusing /etc/hostname: is not a shared library - a plugin is built with "
+            "viwo_add_plugin()");
+}
+
+TEST(Conformance, NeedsASectionThatIsForThePlugin) {
+  const fs::path config = fs::temp_directory_path() / "viwo_conformance_other.yaml";
+  std::ofstream(config) << "kinematics: {type: something_else}\n";
+  Options options;
+  options.config = config;
+  EXPECT_EQ(
+      error_of(broken("kinematics", "none"), options),
+      config.string() + ": no section says 'type: broken_none', the plugin that is to be checked");
+  fs::remove(config);
+}
+
+TEST(Conformance, SaysWhatIsWrongWithTheConfiguration) {
+  const fs::path config = fs::temp_directory_path() / "viwo_conformance_wrong.yaml";
+  std::ofstream(config) << "kinematics: {type: broken_none, baseline_m: -1}\n";
+  Options options;
+  options.config = config;
+  EXPECT_EQ(failures_of("kinematics", "none", options),
+            "construction: no object: " + config.string() +
+                ":1:45  kinematics.baseline_m: -1 violates baseline_m > 0 (distance between the "
+                "wheels, m)");
+  fs::remove(config);
+}
+
+TEST(Conformance, IsSaidInLines) {
+  EXPECT_EQ(to_text({"schema", {}, {"a note"}}), "ok      schema\n");
+  EXPECT_EQ(to_text({"gauge", {"one", "two"}, {"a note"}}, true),
+            "FAILED  gauge\n          one\n          two\n          note: a note\n");
+}
+
+}  // namespace
+}  // namespace viwo::conformance

@@ -1,0 +1,66 @@
+// Every plugin of this build is conformant; sensors that read files have a configuration for it.
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "viwo/conformance/conformance.hpp"
+
+namespace viwo::conformance {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> plugins() {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(VIWO_TEST_PLUGIN_DIR)) {
+    if (entry.path().extension() == ".so") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// "libviwo_kinematics_four_wis_wid.so" as "kinematics_four_wis_wid".
+std::string short_name(const fs::path& file) {
+  return file.stem().string().substr(std::string("libviwo_").size());
+}
+
+Options options_for(const fs::path& file) {
+  Options options;
+  const fs::path config =
+      fs::path(VIWO_TEST_SOURCE_DIR) / "tests/conformance/configs" / (short_name(file) + ".yaml");
+  if (fs::exists(config)) options.config = config;
+  return options;
+}
+
+class InTree : public ::testing::TestWithParam<fs::path> {};
+
+TEST_P(InTree, IsConformant) {
+  const Conformance result = check_plugin(GetParam(), options_for(GetParam()));
+  EXPECT_GE(result.checks.size(), 7u) << "construction did not come about";
+  for (const CheckResult& check : result.checks) {
+    EXPECT_TRUE(check.passed()) << to_text(check, true);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Plugins, InTree, ::testing::ValuesIn(plugins()),
+                         [](const auto& plugin) { return short_name(plugin.param); });
+
+TEST(Program, SaysWhatItFindsAndEndsWithACode) {
+  const std::string program = VIWO_TEST_BINARY_DIR "/bin/viwo_conformance ";
+  const auto code = [&](const std::string& arguments) {
+    return WEXITSTATUS(std::system((program + arguments + " > /dev/null 2>&1").c_str()));
+  };
+  const fs::path folder = VIWO_TEST_PLUGIN_DIR;
+  EXPECT_EQ(code((folder / "libviwo_kinematics_differential.so").string()), 0);
+  EXPECT_EQ(code((folder / "libviwo_sensor_asl_imu.so").string()), 1) << "needs --config";
+  EXPECT_EQ(code("/etc/hostname"), 2);
+  EXPECT_EQ(code("--no-such-option"), 2);
+  EXPECT_EQ(code(""), 2);
+  EXPECT_EQ(code("--help"), 0);
+}
+
+}  // namespace
+}  // namespace viwo::conformance
