@@ -3,7 +3,7 @@ option(VIWO_BUILD_TESTS "Build the tests" ON)
 option(VIWO_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark)" ON)
 option(VIWO_WERROR "Warnings are errors" OFF)
 set(VIWO_ARCH "native" CACHE STRING
-    "Instruction set of host and plugins, as for -march (native, x86-64-v3, ...); empty: the compiler's default")
+    "Instruction set of host and plugins, as for -march (native, x86-64-v3, ...); empty: the compiler's default, for packages")
 set(VIWO_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize: address,undefined or thread")
 
 set(VIWO_ABI_FLAGS "")
@@ -16,13 +16,15 @@ if(VIWO_SANITIZE)
   add_link_options(-fsanitize=${VIWO_SANITIZE})
 endif()
 
-set(VIWO_WARNINGS -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
-    $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
 # GCC 12 warns falsely: about its own AVX-512 headers when Eigen is inlined, and about std::string
-# (bug 105651).
-list(APPEND VIWO_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>
-     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>
-     $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized>)
+# (bug 105651). Plugins of others get these, too (viwo_add_plugin.cmake).
+set(VIWO_NO_FALSE_WARNINGS
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized>)
+set(VIWO_WARNINGS -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+    ${VIWO_NO_FALSE_WARNINGS})
 if(VIWO_WERROR)
   list(APPEND VIWO_WARNINGS -Werror)
 endif()
@@ -30,4 +32,13 @@ endif()
 find_program(VIWO_CCACHE ccache)
 if(VIWO_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${VIWO_CCACHE})
+endif()
+
+# The version of the plugin API names the folder of the plugins and the library that they link.
+set(build_record ${PROJECT_SOURCE_DIR}/framework/plugin_api/include/viwo/api/build_record.hpp)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${build_record})
+file(STRINGS ${build_record} VIWO_API_VERSION REGEX "^inline constexpr int kApiVersion = [0-9]+;$")
+string(REGEX MATCH "[0-9]+" VIWO_API_VERSION "${VIWO_API_VERSION}")
+if(NOT VIWO_API_VERSION)
+  message(FATAL_ERROR "kApiVersion not found in ${build_record}")
 endif()

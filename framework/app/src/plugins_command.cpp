@@ -1,8 +1,9 @@
-// viwo plugins list | describe NAME | check FILE
+// viwo plugins list | describe NAME | check FILE | new KIND NAME
 #include <algorithm>
 #include <iostream>
 
 #include "command_line.hpp"
+#include "new_plugin.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
 
@@ -52,17 +53,28 @@ int plugins_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   const std::string& what = arguments.positional[0];
   const std::size_t n = arguments.positional.size();
+  if (what == "new" && n == 3) {
+    const std::string& name = arguments.positional[2];
+    const auto folder = arguments.out.value_or(name);
+    write_new_plugin(plugins, arguments.positional[1], name, folder);
+    std::cout << "written: " << folder.string() << "; how to build and run it is in "
+              << (folder / "README.md").string() << "\n";
+    return 0;
+  }
+  if (arguments.out) throw InputError("viwo plugins: --out is for viwo plugins new KIND NAME");
   if (what == "list" && n == 1) return list(plugins);
   if (what == "describe" && n == 2) return describe(plugins, arguments.positional[1]);
   if (what == "check" && n == 2) {
     print_line(plugins.check(arguments.positional[1]));
     return 0;
   }
-  const std::vector<std::string> verbs{"list", "describe", "check"};
+  const std::vector<std::string> verbs{"list", "describe", "check", "new"};
   if (std::find(verbs.begin(), verbs.end(), what) == verbs.end()) {
     throw InputError("viwo plugins: unknown '" + what + "'" + config::did_you_mean(what, verbs));
   }
-  throw InputError("viwo plugins: usage: viwo plugins list | describe NAME | check FILE");
+  throw InputError(
+      "viwo plugins: usage: viwo plugins list | describe NAME | check FILE | new KIND NAME "
+      "[--out DIR]");
 }
 
 }  // namespace viwo::app

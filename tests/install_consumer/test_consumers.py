@@ -1,0 +1,173 @@
+#!/usr/bin/env python3
+"""test_consumers.py SOURCE BUILD WORK CMAKE [CLASS...]: builds against the installation and runs.
+
+Tutorial: every file and command of docs/writing_a_plugin.md, writing_an_update.md and
+writing_a_sensor.md. Skeletons: what `viwo plugins new` writes. Headers: each compiles alone.
+"""
+
+import json
+import re
+import unittest
+
+import tutorial
+from installed import ConsumerTest, Installation
+
+
+def expected_line(line):
+    """A line of an output block as a pattern: runs of spaces are one, '...' is anything."""
+    words = re.split(r'\s+', line.strip())
+    return ' +'.join('.*' if word == '...' else re.escape(word) for word in words)
+
+
+class Tutorial(ConsumerTest):
+    def follow(self, page):
+        """Does what the page says; one shell for all of its commands."""
+        path = Installation.source / 'docs' / page
+        steps = tutorial.steps(path.read_text(encoding='utf-8'), page)
+        self.assertTrue(steps, f'{page} has neither files nor commands')
+        script, outputs = ['set -eu', f'cd "{self.folder}"'], []
+        for step in steps:
+            if step.kind == 'file':
+                # Written by the script, at its place between the commands.
+                content = self.folder / f'.block_{step.line}'
+                content.write_text(step.text, encoding='utf-8')
+                target = self.folder / step.name
+                script.append(f'mkdir -p "{target.parent}" && cp "{content}" "{target}"')
+            elif step.kind == 'commands':
+                script += [f'echo "@{step.line}"', step.text]
+            else:
+                outputs.append(step)
+        log = self.run_command('bash', '-c', '\n'.join(script))
+        self.assertNotIn('warning:', log)
+        for step in outputs:
+            before = [match for match in re.finditer(r'^@(\d+)$', log, re.M)
+                      if int(match[1]) < step.line][-1]
+            printed = re.split(r'^@\d+$', log[before.end():], maxsplit=1, flags=re.M)[0]
+            for line in step.text.splitlines():
+                self.assertRegex(printed, '(?m)^' + expected_line(line) + r'\s*$',
+                                 f'{page}:{step.line}')
+
+    def test_writing_a_plugin(self):
+        self.follow('writing_a_plugin.md')
+        results = self.folder / 'tricycle' / 'results'
+        with self.subTest('the run calibrates: from off by the prior to a tenth of it'):
+            calibration = json.loads((results / 'run/summary.json').read_text())['calibration']
+            for name, prior in (('r', 0.001), ('wheel_base', 0.01), ('delta_o', 0.01)):
+                self.assertLess(calibration[name]['sigma'], 0.2 * prior, name)
+                self.assertLess(abs(calibration[name]['error']), 4 * calibration[name]['sigma'],
+                                name)
+        with self.subTest('the comparison is what the page says'):
+            variants = json.loads((results / 'compare/summary.json').read_text())['variants']
+            self.assertEqual({name: (v['runs'], v['diverged'], v['failed'])
+                              for name, v in variants.items()},
+                             {name: (10, 0, 0)
+                              for name in ('tricycle', 'tricycle_held', 'differential')})
+            ate = {name: v['metrics']['ate_m']['mean'] for name, v in variants.items()}
+            self.assertLess(abs(ate['tricycle'] - ate['differential']), 0.2 * ate['tricycle'])
+            self.assertGreater(ate['tricycle_held'], 2 * ate['tricycle'])
+            # Two-sided 99.9 % bounds of the mean over ten runs of a squared normal error.
+            for name in ('r', 'wheel_base', 'delta_o'):
+                nees = variants['tricycle']['calibration'][name]['nees']
+                self.assertTrue(0.127 < nees < 3.14, f'{name}: {nees}')
+
+    def test_a_page_with_code_that_nothing_checks_is_refused(self):
+        with self.assertRaisesRegex(ValueError, 'page:3: a block that is neither a file'):
+            tutorial.steps('Text.\n\n```cpp\nint x;\n```\n')
+        with self.assertRaisesRegex(ValueError, 'page: 4 fences, but 1 blocks'):
+            tutorial.steps('```sh\ntrue\n```\n\n  ```cpp\n  int x;\n  ```\n')
+
+    def test_writing_an_update(self):
+        self.follow('writing_an_update.md')
+
+    def test_writing_a_sensor(self):
+        self.follow('writing_a_sensor.md')
+
+
+class Skeletons(ConsumerTest):
+    def write_and_try(self, kind):
+        name = f'a_new_{kind}_2'
+        printed = self.run_command('viwo', 'plugins', 'new', kind, name)
+        self.assertEqual(printed, f'written: {name}; how to build and run it is in '
+                                  f'{name}/README.md\n')
+        for file in (self.folder / name).iterdir():
+            text = file.read_text(encoding='utf-8')
+            self.assertNotRegex(text, r'@\w+@', f'{file}: a placeholder was left')
+        log = self.build_and_test(self.folder / name)
+        for test in ('is_accepted', 'runs', 'conforms'):
+            self.assertRegex(log, rf'Test +#\d: {test} \.+ +Passed')
+        plugins = self.folder / name / 'build/lib/viwo/plugins/v1'
+        listing = self.run_command('viwo', 'plugins', 'list', '--plugin-path', plugins)
+        self.assertRegex(listing, rf'(?m)^{kind}  {name}  0\.1\.0  ')
+        return self.folder / name
+
+    def test_kinematics(self):
+        folder = self.write_and_try('kinematics')
+        with self.subTest('a plugin installs into a folder that viwo can be pointed to'):
+            self.run_command(Installation.cmake, '--install', folder / 'build', '--prefix',
+                             self.folder / 'mine')
+            self.run_command('viwo', 'plugins', 'describe', 'a_new_kinematics_2', '--plugin-path',
+                             self.folder / 'mine/lib/viwo/plugins/v1')
+
+    def test_update(self):
+        folder = self.write_and_try('update')
+        summary = json.loads((folder / 'build/results/run/summary.json').read_text())
+        self.assertGreater(summary['updates']['a_new_update_2']['applied'], 290)
+
+    def test_sensor(self):
+        folder = self.write_and_try('sensor')
+        # 2 s straight on with 0.5 m/s, then 2 s with 0.4 rad/s (encoders.csv): yaw 0.8 rad, and
+        # half a cell of the mean of both rates at the change.
+        last = (folder / 'build/results/run/trajectory.tum').read_text().splitlines()[-1].split()
+        self.assertAlmostEqual(float(last[6]), 0.3894, delta=0.01)
+
+
+class Headers(ConsumerTest):
+    def test_each_installed_header_compiles_alone(self):
+        include = Installation.prefix / 'include'
+        headers = sorted(str(path.relative_to(include)) for path in include.rglob('*.hpp'))
+        self.assertIn('viwo/api/plugin.hpp', headers)
+        self.assertIn('viwo/math/so3.hpp', headers)
+        lines = ['cmake_minimum_required(VERSION 3.22)', 'project(headers LANGUAGES CXX)',
+                 'find_package(viwo REQUIRED)', 'add_library(headers OBJECT)',
+                 'target_link_libraries(headers PRIVATE viwo::api viwo::math)',
+                 'target_compile_options(headers PRIVATE -Wall -Wextra -Wconversion -Wshadow '
+                 '-Werror)']
+        for header in headers:
+            source = re.sub(r'\W', '_', header) + '.cpp'
+            # Twice: a header must also bear to be included again.
+            (self.folder / source).write_text(f'#include "{header}"\n#include "{header}"\n')
+            lines.append(f'target_sources(headers PRIVATE {source})')
+        (self.folder / 'CMakeLists.txt').write_text('\n'.join(lines) + '\n')
+        self.run_command(Installation.cmake, '-S', '.', '-B', 'build', '-DCMAKE_BUILD_TYPE=Debug')
+        self.run_command(Installation.cmake, '--build', 'build')
+
+
+class Package(ConsumerTest):
+    def test_other_versions_are_not_found(self):
+        (self.folder / 'CMakeLists.txt').write_text(
+            'cmake_minimum_required(VERSION 3.22)\nproject(p LANGUAGES CXX)\n'
+            'find_package(viwo ${WANTED} REQUIRED)\n')
+        self.run_command(Installation.cmake, '-S', '.', '-B', 'good', '-DWANTED=0.1')
+        log = self.run_command(Installation.cmake, '-S', '.', '-B', 'bad', '-DWANTED=9.9', code=1)
+        self.assertIn('compatible with requested version "9.9"', ' '.join(log.split()))
+
+    def test_a_plugin_with_flags_of_its_own_is_refused_with_the_remedy(self):
+        self.run_command('viwo', 'plugins', 'new', 'kinematics', 'fast')
+        self.run_command(Installation.cmake, '-S', 'fast', '-B', 'fast/build',
+                         '-DCMAKE_CXX_FLAGS=-ffast-math')
+        self.run_command(Installation.cmake, '--build', 'fast/build')
+        library = 'fast/build/lib/viwo/plugins/v1/libviwo_kinematics_fast.so'
+        log = self.run_command('viwo', 'plugins', 'check', library, code=2)
+        self.assertIn('fast_math: host 0, plugin 1\n  -> rebuild it without -ffast-math', log)
+
+    def test_a_kind_that_does_not_exist_is_refused_by_cmake(self):
+        (self.folder / 'CMakeLists.txt').write_text(
+            'cmake_minimum_required(VERSION 3.22)\nproject(p LANGUAGES CXX)\n'
+            'find_package(viwo REQUIRED)\nviwo_add_plugin(kinematic x SOURCES x.cpp)\n')
+        log = self.run_command(Installation.cmake, '-S', '.', '-B', 'build', code=1)
+        self.assertIn('the kind is kinematics, sensor or update', log)
+
+
+if __name__ == '__main__':
+    Installation.from_arguments()
+    unittest.main()
