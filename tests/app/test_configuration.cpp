@@ -119,7 +119,7 @@ TEST_F(ConfigurationTest, RefusesMissingPlugins) {
                  kSearched);
   refuse_run("kinematics: *robot", "kinematics: {type: planar_simulator}",
              "run.yaml:13:20  kinematics.type: no kinematics plugin 'planar_simulator' - known: "
-             "differential, four_wis_wid, four_wis_wid_drive_only" +
+             "ackermann, differential, four_wis_wid, four_wis_wid_drive_only, mecanum, skid_steer" +
                  kSearched);
   refuse_run("kinematics: *robot\n", "",
              "run.yaml:1:1  'kinematics' is missing: the section of the kinematic model");

@@ -79,10 +79,12 @@ TEST(SimulateResult, IsDescribedByWhatThereIs) {
   EXPECT_EQ(describe(result), "2001 IMU samples and 1 image");
   result.counts[Measurement(EncoderSample()).index()] = 11;
   result.counts[Measurement(PoseSample()).index()] = 12;
-  result.counts[Measurement(StateSample()).index()] = 13;
+  EXPECT_EQ(describe(result),
+            "2001 IMU samples, 1 image, 11 encoder samples and 12 reference poses");
+  result.counts[Measurement(StateSample()).index()] = 13;  // the truth: poses are measured
   result.counts[Measurement(CalibrationSample()).index()] = 14;
   EXPECT_EQ(describe(result),
-            "2001 IMU samples, 1 image, 11 encoder samples, 12 reference poses, 13 reference "
+            "2001 IMU samples, 1 image, 11 encoder samples, 12 measured poses, 13 reference "
             "states and 14 true parameters");
 }
 
