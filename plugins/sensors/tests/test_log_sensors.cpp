@@ -7,7 +7,10 @@ namespace {
 class LogSensors : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) / "viwo_log_sensors";
+    // One per test: tests run side by side.
+    folder_ = std::filesystem::path(::testing::TempDir()) /
+              ("viwo_log_sensors_" +
+               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }
