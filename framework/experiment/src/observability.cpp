@@ -26,8 +26,8 @@ void set_if_there(Node& section, const char* key, const char* value) {
 }
 
 /// Without noise and without wrong starts, as far as the run's plugins have parameters for that.
-Node without_noise(const Node& run, PluginRegistry& plugins, std::vector<std::string>& notes) {
-  Node quiet = read_run(run, plugins).resolved;
+Node without_noise(const RunSetup& run, std::vector<std::string>& notes) {
+  Node quiet = run.resolved;
   if (Node* sensors = quiet.find("sensors")) {
     for (auto& sensor : sensors->entries()) {
       if (sensor.value.find("noise") == nullptr) {
@@ -187,8 +187,8 @@ Observability analysis_of(const Watched& run, double tolerance, MatrixXd* basis)
 
 /// Directions of the calibration alone that are hidden, and how sure the filter is along them: of
 /// the frozen run, and of `run` as it is.
-void follow_hidden(const Watched& frozen, const MatrixXd& null, const Node& run,
-                   PluginRegistry& plugins, ObservabilityResult& out) {
+void follow_hidden(const Watched& frozen, const MatrixXd& null, RunSetup& run,
+                   ObservabilityResult& out) {
   const auto n = static_cast<Eigen::Index>(frozen.state->calibration_columns().size());
   if (n == 0) return;
   MatrixXd calibration = MatrixXd::Zero(frozen.state->size(), n);
@@ -196,10 +196,9 @@ void follow_hidden(const Watched& frozen, const MatrixXd& null, const Node& run,
   const MatrixXd hidden = intersection(calibration, null, kHiddenAngle).middleRows(kImuSize, n);
   out.hidden_calibration = static_cast<int>(hidden.cols());
   out.without_noise = frozen.track->along(hidden);
-  RunSetup setup = read_run(run, plugins);
-  const RunData data = collect(setup);
+  const RunData data = collect(run);
   CovarianceTrack track(frozen.state->calibration_columns(), calibration_sigma(*frozen.state));
-  run_filter(setup, data, {}, [&](const Estimator&) { return &track; });
+  run_filter(run, data, {}, [&](const Estimator&) { return &track; });
   out.as_configured = track.along(hidden);
 }
 
@@ -264,37 +263,33 @@ ObservabilityReport analyse(const ExperimentSetup& setup, PluginRegistry& plugin
   report.setup = setup;
   report.tolerance = tolerance;
   const auto begin = std::chrono::steady_clock::now();
-  const auto seconds_since = [](auto then) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - then).count();
-  };
   Progress progress(setup.name, static_cast<int>(setup.recordings.size() * setup.variants.size()));
   for (std::size_t m = 0; m < setup.recordings.size(); ++m) {
     for (std::size_t v = 0; v < setup.variants.size(); ++v) {
-      const auto started = std::chrono::steady_clock::now();
       ObservabilityResult result;
       result.motion = m;
       result.variant = v;
-      const Node configured = configuration_of(setup, setup.variants[v], setup.recordings[m]);
-      Node run = without_noise(configured, plugins, report.notes);
+      RunSetup configured =
+          read_run(configuration_of(setup, setup.variants[v], setup.recordings[m]), plugins);
+      Node run = without_noise(configured, report.notes);
       MatrixXd null;
       const Watched held = watch(run, plugins);
       result.held = analysis_of(held, tolerance, &null);
       result.parameters = parameters_of(held, null);
-      follow_hidden(held, null, configured, plugins, result);
+      follow_hidden(held, null, configured, result);
       // Each wheel set has a gauge of its own; that of the first is looked at.
       if (Node* wheels = run.find("wheels")) set_if_there(*wheels, "hold_gauge", "false");
       const Watched free = watch(run, plugins);
       result.free = analysis_of(free, tolerance, &null);
       explain(free, null, result.free);
       look_at_wheels_alone(free, tolerance, result);
-      result.wall_s = seconds_since(started);
       progress.done(setup.recordings[m].name + "  " + setup.variants[v].name + "  " +
                     std::to_string(result.free.unobservable) + " unobservable, " +
                     std::to_string(result.held.unobservable) + " with the gauge held");
       report.results.push_back(std::move(result));
     }
   }
-  report.wall_s = seconds_since(begin);
+  report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return report;
 }
 

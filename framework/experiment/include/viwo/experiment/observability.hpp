@@ -68,7 +68,6 @@ struct ObservabilityResult {
   int hidden_calibration = 0;   ///< dimension of what is hidden of the calibration as configured
   SigmaOverTime without_noise;  ///< of the frozen estimator
   SigmaOverTime as_configured;  ///< of the run with its noise and its wrong start
-  double wall_s = 0.;
 };
 
 struct ObservabilityReport {
