@@ -42,6 +42,14 @@ void add(const CalibrationSample& s, Digest& out) {
   out.add(s.value);
 }
 
+void add(const ImageSample& s, Digest& out) {
+  out.add(s.camera);
+  Image image;
+  s.source->read(image);
+  out.add(image.width_px);
+  for (const std::uint8_t pixel : image.pixels) out.add(static_cast<int>(pixel));
+}
+
 }  // namespace
 
 std::uint64_t digest_of(const Measurement& measurement) {

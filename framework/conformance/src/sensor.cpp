@@ -73,8 +73,23 @@ std::string fault(const CalibrationSample& s) {
   return std::isfinite(s.value) ? "" : "has a value that is not finite";
 }
 
-constexpr const char* kKinds[] = {"encoder sample", "pose",       "IMU sample",
-                                  "image",          "true state", "true parameter"};
+std::string fault(const ImageSample& s) {
+  if (s.camera < 0) return "is of camera " + std::to_string(s.camera);
+  if (s.source == nullptr) return "has no source of its pixels";
+  Image image, again;
+  s.source->read(image);
+  if (image.width_px <= 0 || image.height_px <= 0 ||
+      image.pixels.size() !=
+          static_cast<std::size_t>(image.width_px) * static_cast<std::size_t>(image.height_px)) {
+    return "has another number of pixels than its size says";
+  }
+  s.source->read(again);
+  return image.pixels == again.pixels ? "" : "has other pixels when read again";
+}
+
+constexpr const char* kKinds[] = {"encoder sample", "pose",           "IMU sample", "image",
+                                  "true state",     "true parameter", "picture"};
+static_assert(std::size(kKinds) == std::variant_size_v<Measurement>);
 
 void check_measurements(const Subject& subject, Findings& findings) {
   const auto sensor = subject.make<Sensor>().object;

@@ -101,7 +101,7 @@ std::string text_of(const RunSetup& run) {
     text += info.kind + " " + info.name + " " + info.version + "\n";
   };
   if (run.kinematics.object) add(run.kinematics.info);
-  for (const auto& [name, sensor] : run.sensors) add(sensor.info);
+  for (const SensorEntry& entry : run.sensors) add(entry.sensor.info);
   if (run.filter) {
     for (const auto& entry : run.filter->updates) add(entry.update.info);
   }

@@ -5,9 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "stream.hpp"
 #include "viwo/experiment/run.hpp"
 
 namespace viwo::experiment {
@@ -29,7 +32,13 @@ class Feed {
       if (found != data.poses.end()) poses_[stream] = &found->second;
     }
     next_pose_.resize(poses_.size(), 0);
+    for (const SensorStream& stream : data.streams) {
+      streams_.push_back(std::make_unique<Prefetch>(stream));
+    }
   }
+
+  /// Sensors that are read while the filter runs.
+  std::span<const std::unique_ptr<Prefetch>> streams() const { return streams_; }
 
   /// False when there is nothing left.
   bool next(Estimator& estimator) {
@@ -43,6 +52,17 @@ class Feed {
     }
     for (std::size_t k = 0; k < poses_.size(); ++k) {
       if (poses_[k] != nullptr) first = std::min(first, stamp(*poses_[k], next_pose_[k]));
+    }
+    Prefetch* streamed = nullptr;
+    for (const auto& stream : streams_) {
+      const Measurement* head = stream->head();
+      if (head == nullptr || stamp_ns(*head) >= first) continue;
+      first = stamp_ns(*head);
+      streamed = stream.get();
+    }
+    if (streamed != nullptr) {
+      add_streamed(*streamed, estimator);
+      return true;
     }
     if (first == kNone) return false;
     // Before the IMU of the same stamp: nothing waits for poses.
@@ -65,6 +85,17 @@ class Feed {
   }
 
  private:
+  static void add_streamed(Prefetch& stream, Estimator& estimator) {
+    const auto* image = std::get_if<FeatureSample>(stream.head());
+    if (image == nullptr) {
+      throw InputError("sensor '" + stream.name() +
+                       "', which takes an input, gives something else than tracks of features - "
+                       "only those are used while the filter runs");
+    }
+    estimator.add(*image);
+    stream.pop();
+  }
+
   const RunData& data_;
   std::vector<const std::vector<EncoderSample>*> wheels_;
   std::vector<std::size_t> next_wheel_;
@@ -72,10 +103,11 @@ class Feed {
   std::vector<std::size_t> next_pose_;
   std::size_t next_imu_ = 0;
   std::size_t next_image_ = 0;
+  std::vector<std::unique_ptr<Prefetch>> streams_;
 };
 
 /// Estimator::step(); what a kinematic model throws becomes the cause of a run that failed.
-bool step(Estimator& estimator, std::string& cause) {
+inline bool step(Estimator& estimator, std::string& cause) {
   try {
     return estimator.step();
   } catch (const PluginFailure& failure) {

@@ -9,7 +9,6 @@
 #include <Eigen/Dense>
 
 #include "viwo/eval/consistency.hpp"
-#include "viwo/math/arrays.hpp"
 #include "viwo/math/se2.hpp"
 
 namespace viwo::experiment {
@@ -24,119 +23,6 @@ const char* name(RunStatus status) {
       break;
   }
   return "failed";
-}
-
-namespace {
-
-StampedPose planar_pose(std::int64_t t_ns, const std::array<double, 3>& p,
-                        const Eigen::Quaterniond& q) {
-  const Eigen::AngleAxisd about_z(yaw(q), Eigen::Vector3d::UnitZ());
-  return {t_ns, {p[0], p[1], 0.}, Eigen::Quaterniond(about_z)};
-}
-
-/// A model's complaint about the channels of a sensor, at the position of the model or the sensors.
-void require_channels(const WheelModel& model, const config::Mark& mark,
-                      const EncoderSample& sample, const std::string& sensor) {
-  try {
-    model.require_channels(sample, "sensors." + sensor);
-  } catch (const InputError& error) {
-    config::fail(mark, error.what());
-  }
-}
-
-/// The same for the first sample of a sensor that gives those of a further wheel set.
-void require_channels_of_set(const RunSetup& setup, const EncoderSample& sample,
-                             const std::string& sensor) {
-  for (const WheelSet& wheels : setup.filter->wheels) {
-    if (wheels.sensor != sensor) continue;
-    require_channels(*wheels.model, setup.sensors_mark, sample, sensor);
-  }
-}
-
-void require_what_the_filter_needs(const RunSetup& setup, const RunData& data) {
-  if (data.imu.empty()) config::fail(setup.sensors_mark, "no sensor of this run gave IMU samples");
-  if (setup.filter->start.mode == StartMode::kReference && data.states.empty()) {
-    config::fail(setup.sensors_mark,
-                 "no sensor of this run gave reference states, which estimator.start: reference "
-                 "needs - choose start: standstill or moving");
-  }
-}
-
-}  // namespace
-
-RunData collect(RunSetup& setup) {
-  RunData data;
-  std::string reference_name, imu_name, images_name;
-  const auto claim = [&setup](std::string& owner, const std::string& sensor, const char* what) {
-    if (owner.empty()) owner = sensor;
-    if (owner != sensor) {
-      config::fail(setup.sensors_mark, "both '" + owner + "' and '" + sensor + "' give " + what +
-                                           ": a run takes them from one sensor");
-    }
-  };
-  const std::string wheels_sensor =
-      setup.filter && !setup.filter->wheels.empty() ? setup.filter->wheels.front().sensor : "";
-  for (auto& entry : setup.sensors) {
-    const std::string& name = entry.first;
-    const Loaded<Sensor>& sensor = entry.second;
-    guarded(sensor.info, "next", [&] {
-      Measurement measurement;
-      while (sensor.object->next(measurement) == Status::kOk) {
-        if (const auto* encoders = std::get_if<EncoderSample>(&measurement)) {
-          if (!wheels_sensor.empty() && name != wheels_sensor) {
-            auto& samples = data.other_wheels[name];
-            if (samples.empty()) require_channels_of_set(setup, *encoders, name);
-            samples.push_back(*encoders);
-            continue;
-          }
-          claim(data.wheels_name, name, "encoder samples");
-          if (data.samples.empty() && setup.model) {
-            require_channels(*setup.model, setup.kinematics_mark, *encoders, name);
-          }
-          data.samples.push_back(*encoders);
-        } else if (const auto* pose = std::get_if<PoseSample>(&measurement)) {
-          const auto& measured = setup.measured_poses;
-          if (std::find(measured.begin(), measured.end(), name) != measured.end()) {
-            data.poses[name].push_back(*pose);
-            continue;
-          }
-          claim(reference_name, name, "reference poses");
-          data.reference.push_back(
-              planar_pose(pose->t_ns, pose->p_BinW_m, to_quaternion(pose->q_BtoW_xyzw)));
-        } else if (const auto* imu = std::get_if<ImuSample>(&measurement)) {
-          claim(imu_name, name, "IMU samples");
-          data.imu.push_back(*imu);
-        } else if (auto* image = std::get_if<FeatureSample>(&measurement)) {
-          claim(images_name, name, "images");
-          data.images.push_back(*image);
-        } else if (const auto* state = std::get_if<StateSample>(&measurement)) {
-          claim(reference_name, name, "reference states");
-          data.states.push_back(*state);
-        } else if (const auto* truth = std::get_if<CalibrationSample>(&measurement)) {
-          data.calibration[truth->name] = truth->value;
-        }
-      }
-      std::vector<RejectionCount> rejections;
-      sensor.object->rejections(rejections);
-      for (RejectionCount& rejection : rejections) data.rejections.emplace_back(name, rejection);
-    });
-  }
-  // Of a sensor that also knows the states, poses are measurements, here without an update.
-  if (!data.states.empty()) data.reference.clear();
-  if (setup.filter) {
-    require_what_the_filter_needs(setup, data);
-    return data;
-  }
-  if (data.samples.empty()) {
-    config::fail(setup.sensors_mark, "no sensor of this run gave encoder samples");
-  }
-  // States are those of the IMU: then it is the reference body.
-  if (!data.states.empty() && setup.O_in_I) setup.extrinsics = *setup.O_in_I;
-  for (const StateSample& state : data.states) {
-    data.reference.push_back(
-        planar_pose(state.t_ns, state.p_IinG_m, to_quaternion(state.q_ItoG_xyzw)));
-  }
-  return data;
 }
 
 namespace {

@@ -136,7 +136,7 @@ void add_configuration_section(const RunSetup& setup, Document& document) {
     plugins.rows.push_back({use, info.name, info.version, info.summary});
   };
   if (setup.kinematics.object) add("kinematics", setup.kinematics.info);
-  for (const auto& [sensor, loaded] : setup.sensors) add("sensor " + sensor, loaded.info);
+  for (const SensorEntry& entry : setup.sensors) add("sensor " + entry.name, entry.sensor.info);
   if (setup.filter) {
     for (const FilterSetup::Entry& entry : setup.filter->updates) {
       add("update " + entry.name, entry.update.info);

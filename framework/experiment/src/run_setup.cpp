@@ -1,6 +1,10 @@
 // Reading a run configuration.
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "calibration_file.hpp"
 #include "section.hpp"
@@ -82,6 +86,53 @@ constexpr std::array kEvaluationParams{
               .help = "longest gap of the reference that is interpolated over"},
 };
 
+/// The key `input` of a sensor's section; "" if there is none, or if it is wrong.
+std::string read_input(const Node::Entry& entry, const Node& sensors, const Loaded<Sensor>& loaded,
+                       config::Errors& errors) {
+  const std::string path = "sensors." + entry.key;
+  const Node* input = entry.value.is_map() ? entry.value.find("input") : nullptr;
+  if (!loaded.object) return "";
+  const bool takes_input =
+      guarded(loaded.info, "takes_input", [&] { return loaded.object->takes_input(); });
+  if (input == nullptr) {
+    if (takes_input) {
+      errors.add(entry.key_mark, path + ": '" + loaded.info.name +
+                                     "' needs 'input', the name of the sensor it works on");
+    }
+    return "";
+  }
+  if (!takes_input) {
+    errors.add(input->mark(), path + ".input: '" + loaded.info.name + "' takes no input");
+    return "";
+  }
+  if (!input->is_scalar() || sensors.find(input->scalar()) == nullptr) {
+    errors.add(input->mark(), path + ".input must be the name of another sensor of this run");
+    return "";
+  }
+  return input->scalar();
+}
+
+/// Every sensor behind its input. Sensors that have each other as inputs are errors.
+void place_behind_inputs(std::vector<SensorEntry> unplaced, const Node& sensors, RunSetup& setup,
+                         config::Errors& errors) {
+  const auto is_unplaced = [&unplaced](const std::string& name) {
+    return std::any_of(unplaced.begin(), unplaced.end(),
+                       [&](const SensorEntry& entry) { return entry.name == name; });
+  };
+  while (!unplaced.empty()) {
+    const auto ready = std::find_if(unplaced.begin(), unplaced.end(), [&](const SensorEntry& e) {
+      return e.input.empty() || !is_unplaced(e.input);
+    });
+    if (ready == unplaced.end()) {
+      errors.add(sensors.mark(), "sensors: '" + unplaced.front().name +
+                                     "' has itself as input, by way of others or not");
+      return;
+    }
+    setup.sensors.push_back(std::move(*ready));
+    unplaced.erase(ready);
+  }
+}
+
 void read_sensors(const Node& run, PluginRegistry& plugins, RunSetup& setup,
                   config::Errors& errors) {
   const Node* sensors = run.find("sensors");
@@ -92,15 +143,21 @@ void read_sensors(const Node& run, PluginRegistry& plugins, RunSetup& setup,
   }
   setup.sensors_mark = sensors->mark();
   Node resolved = Node::empty_map(sensors->mark());
+  constexpr std::string_view kHostKeys[] = {"input"};
   std::uint64_t index = 0;
+  std::vector<SensorEntry> unplaced;
   for (const auto& entry : sensors->entries()) {
     // Sensors of one run have seeds of their own; the same sensor keeps its own in every variant.
     const std::uint64_t seed = setup.seed * 1000 + index++;
-    auto loaded = plugins.make_sensor(entry.value, "sensors." + entry.key, seed, errors);
-    resolved.set(entry.key, loaded.resolved, entry.key_mark);
-    if (loaded.object) setup.sensors.emplace_back(entry.key, std::move(loaded));
+    auto loaded = plugins.make_sensor(entry.value, "sensors." + entry.key, seed, errors, kHostKeys);
+    Node section = loaded.resolved;
+    std::string input = read_input(entry, *sensors, loaded, errors);
+    if (!input.empty()) section.set("input", Node::scalar_of(input));
+    resolved.set(entry.key, section, entry.key_mark);
+    if (loaded.object) unplaced.push_back({entry.key, std::move(loaded), std::move(input)});
   }
   setup.resolved.set("sensors", resolved);
+  place_behind_inputs(std::move(unplaced), *sensors, setup, errors);
 }
 
 void read_kinematics(const Node& run, PluginRegistry& plugins, RunSetup& setup,

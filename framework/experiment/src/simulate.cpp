@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "inputs.hpp"
 #include "viwo/log/asl.hpp"
 
 namespace viwo::experiment {
@@ -10,11 +11,16 @@ namespace viwo::experiment {
 SimulateResult write_log(RunSetup& setup, const std::filesystem::path& folder) {
   // Read first: a sensor whose input is wrong must leave nothing behind.
   std::vector<Measurement> measurements;
-  for (auto& entry : setup.sensors) {
-    const Loaded<Sensor>& sensor = entry.second;
-    guarded(sensor.info, "next", [&] {
+  Inputs inputs(setup.sensors);
+  for (const SensorEntry& entry : setup.sensors) {
+    require_no_live_sensor(setup, entry);
+    inputs.connect(entry);
+    guarded(entry.sensor.info, "next", [&] {
       Measurement measurement;
-      while (sensor.object->next(measurement) == Status::kOk) measurements.push_back(measurement);
+      while (entry.sensor.object->next(measurement) == Status::kOk) {
+        measurements.push_back(measurement);
+        inputs.keep(entry, measurement);
+      }
     });
   }
   if (measurements.empty()) throw InputError("no sensor of this run gave a measurement");
@@ -46,10 +52,11 @@ std::string describe(const SimulateResult& result) {
     const char* many;
   };
   // `index` is that of the kind in Measurement.
-  static_assert(std::variant_size_v<Measurement> == 6);
+  static_assert(std::variant_size_v<Measurement> == 7);
   const bool measured = result.counts[4] > 0;  // poses beside true states
   const Kind kinds[] = {{2, "IMU sample", "IMU samples"},
-                        {3, "image", "images"},
+                        {3, "tracked image", "tracked images"},
+                        {6, "image", "images"},
                         {0, "encoder sample", "encoder samples"},
                         {1, measured ? "measured pose" : "reference pose",
                          measured ? "measured poses" : "reference poses"},

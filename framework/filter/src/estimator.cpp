@@ -313,6 +313,7 @@ bool Estimator::step() {
     stage_done(stage_ms_[i + 1]);
   }
   update_monitors();
+  if (observer_ != nullptr) observer_->on_epoch(filter_, data);
   if (filter_.window_full()) filter_.drop_oldest_clone();
   forget_used();
   failure_ = filter_.failure();

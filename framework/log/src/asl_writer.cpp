@@ -6,8 +6,10 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "viwo/api/status.hpp"
+#include "viwo/image/image_file.hpp"
 #include "viwo/log/asl.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_writer.hpp"
@@ -24,6 +26,7 @@ constexpr std::array<const char*, kTables> kFolders = {
     "poses0"};
 
 constexpr const char* kData = "data.csv";
+constexpr const char* kImages = "data";
 constexpr const char* kImuHeader =
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
     "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
@@ -45,15 +48,37 @@ constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
                    ", which is no part of a log written here: choose an empty folder");
 }
 
+/// "cam0"
+std::string camera_folder(std::size_t camera) { return "cam" + std::to_string(camera); }
+
+bool is_camera_folder(const fs::path& name) {
+  for (std::size_t camera = 0; camera <= kMaxCamera; ++camera) {
+    if (name == camera_folder(camera)) return true;
+  }
+  return false;
+}
+
+/// Folder `data` of images in the folder of a camera.
+void check_images_are_ours(const fs::path& folder, const fs::path& data) {
+  for (const auto& file : fs::directory_iterator(folder / data)) {
+    if (file.path().extension() != ".png" || file.is_directory()) {
+      refuse(folder, data / file.path().filename());
+    }
+  }
+}
+
 /// Everything in `folder` must come from an earlier log.
 void check_is_ours(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     const fs::path name = entry.path().filename();
-    if (std::find(kFolders.begin(), kFolders.end(), name) == kFolders.end() ||
-        !entry.is_directory()) {
-      refuse(folder, name);
-    }
+    const bool is_camera = is_camera_folder(name);
+    const bool is_table = std::find(kFolders.begin(), kFolders.end(), name) != kFolders.end();
+    if (!(is_camera || is_table) || !entry.is_directory()) refuse(folder, name);
     for (const auto& file : fs::directory_iterator(entry.path())) {
+      if (is_camera && file.path().filename() == kImages && file.is_directory()) {
+        check_images_are_ours(folder, name / kImages);
+        continue;
+      }
       if (file.path().filename() != kData || file.is_directory()) {
         refuse(folder, name / file.path().filename());
       }
@@ -101,6 +126,10 @@ struct AslWriter::Tables {
   void write(const FeatureSample& image);
   void write(const StateSample& state);
   void write(const CalibrationSample& parameter);
+  void write(const ImageSample& image);
+
+  std::vector<std::optional<TextWriter>> image_tables;  ///< by camera
+  Image pixels;
 };
 
 TextWriter& AslWriter::Tables::open(Table table, std::string_view header) {
@@ -201,6 +230,22 @@ void AslWriter::Tables::write(const CalibrationSample& parameter) {
   out << parameter.t_ns << "," << parameter.name << "," << parameter.value << "\n";
 }
 
+void AslWriter::Tables::write(const ImageSample& image) {
+  const auto camera = static_cast<std::size_t>(image.camera);
+  const fs::path place = folder / camera_folder(camera);
+  if (image_tables.size() <= camera) image_tables.resize(camera + 1);
+  auto& table = image_tables[camera];
+  if (!table) {
+    make_folder(place / kImages);
+    table.emplace(place / kData);
+    *table << "#timestamp [ns],filename\n";
+  }
+  const std::string name = std::to_string(image.t_ns) + ".png";
+  image.source->read(pixels);
+  write_png(place / kImages / name, pixels);
+  *table << image.t_ns << "," << name << "\n";
+}
+
 AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>()) {
   tables_->folder = folder;
   if (fs::exists(folder) && !fs::is_directory(folder)) {
@@ -210,6 +255,9 @@ AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>(
   check_is_ours(folder);
   // A table that the new log does not have must not stay behind.
   for (const char* const table : kFolders) fs::remove_all(folder / table);
+  for (std::size_t camera = 0; camera <= kMaxCamera; ++camera) {
+    fs::remove_all(folder / camera_folder(camera));
+  }
 }
 
 AslWriter::~AslWriter() = default;
@@ -223,6 +271,9 @@ void AslWriter::write_measured(const PoseSample& pose) { tables_->write_measured
 void AslWriter::close() {
   for (auto& writer : tables_->writers) {
     if (writer) writer->close();
+  }
+  for (auto& table : tables_->image_tables) {
+    if (table) table->close();
   }
 }
 

@@ -230,6 +230,9 @@ CameraView read_camera(const Section& section) {
   }
   read_intrinsics(section, camera);
   read_resolution(section, camera);
+  if (const Node* shift = section.find("timeshift_cam_imu")) {
+    if (const auto s = section.number(*shift, "timeshift_cam_imu")) camera.t_CtoI_s = *s;
+  }
   return camera;
 }
 

@@ -65,6 +65,16 @@ TEST_F(Kalibr, ReadsACameraAndItsPlaceEitherWay) {
   EXPECT_LT(camera_seen_by_itself.norm(), 1e-15);
 }
 
+TEST_F(Kalibr, ReadsTheClockOfTheCamera) {
+  const std::string place = std::string("  T_cam_imu:\n") + kQuarter;
+  const auto shifted =
+      read_kalibr_cameras(write("a.yaml", camera(place + "  timeshift_cam_imu: -0.0125\n")));
+  EXPECT_EQ(shifted[0].t_CtoI_s, -0.0125);
+  EXPECT_EQ(read_kalibr_cameras(write("b.yaml", camera(place)))[0].t_CtoI_s, 0.);
+  EXPECT_EQ(refusal(camera(place + "  timeshift_cam_imu: soon\n")),
+            "F:7:22  cam0.timeshift_cam_imu: 'soon' is not a number");
+}
+
 TEST_F(Kalibr, FollowsTheChainFromTheCameraBefore) {
   const auto cameras = read_kalibr_cameras(
       write("a.yaml", camera(std::string("  T_cam_imu:\n") + kQuarter) + "cam1:\n  T_cn_cnm1:\n" +

@@ -28,6 +28,18 @@ Sensor::~Sensor() = default;
 
 void Sensor::rejections(std::vector<RejectionCount>& /*out*/) const {}
 
+bool Sensor::takes_input() const { return false; }
+
+void Sensor::connect(Sensor& /*input*/) {}
+
+bool Sensor::live() const { return false; }
+
+void Sensor::stop() {}
+
+void Sensor::estimate(const EstimateSample& /*estimate*/) {}
+
+ImageSource::~ImageSource() = default;
+
 Update::~Update() = default;
 
 void Update::rejections(std::vector<RejectionCount>& /*out*/) const {}

@@ -21,6 +21,13 @@ namespace viwo::experiment {
 /// Where the reference body B is on the base: pose [x_m, y_m, yaw_rad] of O in B.
 using PlanarExtrinsics = Eigen::Vector3d;
 
+/// A sensor of a run. Its `input`, if it takes one, is a sensor before it.
+struct SensorEntry {
+  std::string name;
+  Loaded<Sensor> sensor;
+  std::string input;  ///< name of the sensor whose measurements it is given; "" for none
+};
+
 /// A run configuration that has been read and checked, its plugins loaded and its model ready.
 struct RunSetup {
   std::string name;
@@ -31,7 +38,7 @@ struct RunSetup {
   Intrinsics sigma;  ///< how well they are known; 0 where the gauge holds an entry
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
   std::optional<PlanarExtrinsics> O_in_I;  ///< of the section `wheels`: where states are reference
-  std::vector<std::pair<std::string, Loaded<Sensor>>> sensors;
+  std::vector<SensorEntry> sensors;  ///< those that take an input behind their input
   PreintegrationOptions preintegration;
   double epoch_s = 0.1;
   double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
@@ -49,6 +56,14 @@ struct RunSetup {
 RunSetup read_run(const config::Node& run, PluginRegistry& plugins,
                   std::optional<std::uint64_t> seed = {});
 
+/// A sensor that is read while the filter runs: what turns images into tracks.
+struct SensorStream {
+  std::string name;
+  PluginInfo info;
+  std::shared_ptr<Sensor> sensor;
+  std::shared_ptr<Sensor> input;  ///< what it reads from
+};
+
 /// What the sensors of a run gave.
 struct RunData {
   std::string wheels_name;             ///< sensor that gave the encoder samples
@@ -56,6 +71,8 @@ struct RunData {
   Trajectory reference;                ///< planar; empty if there is none
   std::vector<ImuSample> imu;
   std::vector<FeatureSample> images;
+  std::vector<ImageSample> pixels;            ///< of the images, in time order; for pictures
+  std::vector<SensorStream> streams;          ///< not read yet
   std::vector<StateSample> states;            ///< truth of the inertial state, if there is one
   std::map<std::string, double> calibration;  ///< true values, if known
   /// Encoder samples of further wheel sets, by sensor.
@@ -65,7 +82,8 @@ struct RunData {
   std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor
 };
 
-/// Reads all sensors to their end. Throws InputError when no sensor or more than one gives encoder
+/// Reads all sensors to their end, but for the last of a chain of sensors that take inputs: the
+/// filter is going to read that one, and only once. Throws InputError when no sensor or more than one gives encoder
 /// samples (or a reference), when channels do not fit the model, or when a sensor's input is
 /// broken.
 RunData collect(RunSetup& setup);

@@ -80,6 +80,8 @@ class EstimatorObserver {
                          const ResidualFactor& /*factor*/) {}
   virtual void on_factor(const Filter& /*filter*/, const UpdateEntry& /*update*/,
                          const InformationFactor& /*factor*/) {}
+  /// All updates of an epoch are done; before the oldest clone is dropped.
+  virtual void on_epoch(const Filter& /*filter*/, const EpochData& /*data*/) {}
 };
 
 /// Finds a state to start from, given everything that was measured so far. Nothing: not yet.

@@ -5,6 +5,7 @@
 //                                          empty id, u and v is an image (maybe without points)
 //   state_groundtruth_estimate0/data.csv   the EuRoC columns; nan for what is not known
 //   calibration_groundtruth0/data.csv      timestamp_ns, name, value
+//   camN/data.csv, camN/data/*.png         timestamp_ns, file name; the images of camera N
 // Readers take a table as the file, plain or gzipped, or as the folder of its data.csv. The stamp
 // column is `timestamp_ns`, `timestamp [ns]` or `timestamp`. InputError for what is wrong with it.
 #pragma once

@@ -12,7 +12,8 @@ namespace viwo::log {
 /// Cameras cam0, cam1, ... in this order: camera_model pinhole, distortion_model radtan or
 /// equidistant, intrinsics, distortion_coeffs, resolution, and the place on the IMU as T_cam_imu
 /// (p_C = T_cam_imu p_I), T_imu_cam, or T_cn_cnm1 after a camera whose place is known. Rotations
-/// may be off by 1e-3 (rounding in the file) and are made exact. timeshift_cam_imu is not read.
+/// may be off by 1e-3 (rounding in the file) and are made exact. timeshift_cam_imu [s] becomes
+/// t_CtoI_s.
 /// InputError with all that is wrong, one line "file:line:column  what" each.
 std::vector<CameraView> read_kalibr_cameras(const std::filesystem::path& file);
 

@@ -63,6 +63,7 @@ struct CameraView {
   Eigen::Matrix<double, 8, 1> intrinsics = Eigen::Matrix<double, 8, 1>::Zero();
   Eigen::Matrix3d R_ItoC = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_IinC = Eigen::Vector3d::Zero();
+  double t_CtoI_s = 0.;        ///< t_imu = t_camera + t_CtoI; stamps of features are in t_imu
   int extrinsics_column = -1;  ///< of dtheta of R_ItoC (same convention as R_GtoI); dp follows
   int intrinsics_column = -1;  ///< of the eight numbers
 };

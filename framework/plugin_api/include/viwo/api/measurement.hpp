@@ -4,9 +4,12 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
+
+#include "viwo/api/export.hpp"
 
 namespace viwo {
 
@@ -85,9 +88,33 @@ struct CalibrationSample {
   double value = 0.;
 };
 
+/// Pixels, 8 bit grey, row after row without padding.
+struct Image {
+  int width_px = 0;
+  int height_px = 0;
+  std::vector<std::uint8_t> pixels;  ///< width_px * height_px
+};
+
+/// Where the pixels of one image come from: a file, a message, a renderer. Images are read when
+/// they are needed, so that a whole recording of them fits into memory.
+class VIWO_API ImageSource {
+ public:
+  virtual ~ImageSource();
+  /// The pixels, into storage that may be used again; the same bits at every call, which may run
+  /// concurrently. Throws InputError when there is no such image or it is broken.
+  virtual void read(Image& out) const = 0;
+};
+
+/// One image of a camera.
+struct ImageSample {
+  std::int64_t t_ns = 0;  ///< stamp in the clock of the camera
+  int camera = 0;         ///< index in the configuration's list of cameras
+  std::shared_ptr<const ImageSource> source;
+};
+
 /// One timestamped datum of any sensor.
 using Measurement = std::variant<EncoderSample, PoseSample, ImuSample, FeatureSample, StateSample,
-                                 CalibrationSample>;
+                                 CalibrationSample, ImageSample>;
 
 inline std::int64_t stamp_ns(const Measurement& measurement) {
   return std::visit([](const auto& sample) { return sample.t_ns; }, measurement);

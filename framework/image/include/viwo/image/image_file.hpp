@@ -1,0 +1,48 @@
+// Image files, as OpenCV reads and writes them, to and from grey images.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "viwo/api/measurement.hpp"
+
+namespace viwo {
+
+/// Decodes a PNG, JPEG, ... that is in memory. Colours become grey, 16 bit become the upper 8.
+/// InputError when it is none or is cut short; `name` says where it comes from.
+void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out);
+
+/// Reads an image file. InputError when it is missing, no image, or cut short.
+void read_image(const std::filesystem::path& file, Image& out);
+
+/// The bytes of a PNG with exactly these pixels.
+std::vector<std::uint8_t> encode_png(const Image& image);
+
+/// Writes a PNG with exactly these pixels. std::runtime_error when it cannot be written.
+void write_png(const std::filesystem::path& file, const Image& image);
+
+/// An image that is a file.
+class ImageFile final : public ImageSource {
+ public:
+  explicit ImageFile(std::filesystem::path file) : file_(std::move(file)) {}
+  void read(Image& out) const override { read_image(file_, out); }
+
+ private:
+  std::filesystem::path file_;
+};
+
+/// An image that is in memory.
+class ImageInMemory final : public ImageSource {
+ public:
+  explicit ImageInMemory(Image image) : image_(std::move(image)) {}
+  void read(Image& out) const override { out = image_; }
+
+ private:
+  Image image_;
+};
+
+}  // namespace viwo

@@ -1,0 +1,84 @@
+#include "viwo/image/image_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string_view>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "viwo/api/status.hpp"
+
+namespace viwo {
+namespace {
+
+/// OpenCV decodes what it finds of a file that was cut short and leaves the rest black: look at the
+/// end of the formats that have one.
+bool cut_short(std::span<const std::uint8_t> bytes) {
+  const auto begins = [&](std::string_view magic) {
+    return bytes.size() >= magic.size() &&
+           std::equal(magic.begin(), magic.end(), bytes.begin(),
+                      [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
+  };
+  const auto has_near_end = [&](std::string_view mark) {
+    // Some writers pad the file.
+    const auto tail = bytes.last(std::min<std::size_t>(bytes.size(), 64));
+    const auto same = [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); };
+    return std::search(tail.begin(), tail.end(), mark.begin(), mark.end(), same) != tail.end();
+  };
+  if (begins("\x89PNG")) return !has_near_end("IEND");
+  if (begins("\xff\xd8")) return !has_near_end("\xff\xd9");
+  return false;
+}
+
+cv::Mat wrap(const Image& image) {
+  // OpenCV has no matrix of constant data; encoders do not write to it.
+  return {image.height_px, image.width_px, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data())};
+}
+
+}  // namespace
+
+void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out) {
+  if (bytes.empty()) throw InputError(name + ": the image is empty");
+  if (cut_short(bytes)) throw InputError(name + ": the image is cut short");
+  const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1,
+                    const_cast<std::uint8_t*>(bytes.data()));
+  cv::Mat grey;
+  try {
+    grey = cv::imdecode(raw, cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception& error) {
+    throw InputError(name + ": " + error.err);
+  }
+  if (grey.empty()) throw InputError(name + ": not an image that OpenCV can read");
+  out.width_px = grey.cols;
+  out.height_px = grey.rows;
+  out.pixels.assign(grey.datastart, grey.dataend);
+}
+
+void read_image(const std::filesystem::path& file, Image& out) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw InputError(file.string() + ": the image is missing or cannot be read");
+  const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), {});
+  decode_image({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, file.string(),
+               out);
+}
+
+std::vector<std::uint8_t> encode_png(const Image& image) {
+  std::vector<std::uint8_t> bytes;
+  // Fast: simulated images are noisy, and hardly any smaller with more effort.
+  cv::imencode(".png", wrap(image), bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  return bytes;
+}
+
+void write_png(const std::filesystem::path& file, const Image& image) {
+  const std::vector<std::uint8_t> bytes = encode_png(image);
+  std::ofstream stream(file, std::ios::binary);
+  stream.write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+  stream.close();
+  if (!stream) throw std::runtime_error("cannot write " + file.string());
+}
+
+}  // namespace viwo

@@ -1,0 +1,108 @@
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "viwo/api/status.hpp"
+#include "viwo/image/image_file.hpp"
+
+namespace viwo {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ImageFileTest : public ::testing::Test {
+ protected:
+  ImageFileTest() {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(::testing::TempDir()) / ("viwo_image_" + std::string(info->name()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~ImageFileTest() override { fs::remove_all(folder_); }
+
+  static Image pattern() {
+    Image image{7, 5, {}};
+    for (int i = 0; i < 35; ++i) image.pixels.push_back(static_cast<std::uint8_t>(7 * i));
+    return image;
+  }
+  fs::path folder_;
+};
+
+std::string failure(const fs::path& file) {
+  Image image;
+  try {
+    read_image(file, image);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST_F(ImageFileTest, PngComesBackToTheBit) {
+  const fs::path file = folder_ / "a.png";
+  write_png(file, pattern());
+  Image back;
+  ImageFile(file).read(back);
+  EXPECT_EQ(back.width_px, 7);
+  EXPECT_EQ(back.height_px, 5);
+  EXPECT_EQ(back.pixels, pattern().pixels);
+}
+
+TEST_F(ImageFileTest, EveryCutOfAFileIsRefusedByName) {
+  const std::vector<std::uint8_t> png = encode_png(pattern());
+  cv::Mat grey(20, 30, CV_8UC1, cv::Scalar(90));
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", grey, jpeg);
+  Image image;
+  for (const auto& bytes : {png, jpeg}) {
+    EXPECT_NO_THROW(decode_image(bytes, "whole", image));
+    // The very last bytes of a PNG are a checksum that nobody needs.
+    for (std::size_t size = 0; size + 8 < bytes.size(); size += 3) {
+      EXPECT_THROW(decode_image(std::span(bytes).first(size), "cut", image), InputError) << size;
+    }
+  }
+  const fs::path file = folder_ / "cut.png";
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(png.data()),
+             static_cast<std::streamsize>(png.size() / 2));
+  EXPECT_EQ(failure(file), file.string() + ": the image is cut short");
+}
+
+TEST_F(ImageFileTest, SaysWhatIsNoImage) {
+  EXPECT_EQ(failure(folder_ / "none.png"),
+            (folder_ / "none.png").string() + ": the image is missing or cannot be read");
+  std::ofstream(folder_ / "text.png") << "no image";
+  EXPECT_EQ(failure(folder_ / "text.png"),
+            (folder_ / "text.png").string() + ": not an image that OpenCV can read");
+  std::ofstream(folder_ / "empty.png").flush();
+  EXPECT_EQ(failure(folder_ / "empty.png"),
+            (folder_ / "empty.png").string() + ": the image is empty");
+}
+
+TEST_F(ImageFileTest, ColoursAndSixteenBitsBecomeGrey) {
+  cv::Mat deep(2, 2, CV_16UC1, cv::Scalar(0x4321));
+  cv::imwrite((folder_ / "deep.png").string(), deep);
+  Image image;
+  read_image(folder_ / "deep.png", image);
+  EXPECT_TRUE(std::all_of(image.pixels.begin(), image.pixels.end(),
+                          [](std::uint8_t p) { return p == 0x43; }));
+  cv::Mat white(2, 3, CV_8UC3, cv::Scalar(255, 255, 255));
+  cv::imwrite((folder_ / "white.png").string(), white);
+  read_image(folder_ / "white.png", image);
+  EXPECT_EQ(image.width_px, 3);
+  EXPECT_EQ(image.pixels, std::vector<std::uint8_t>(6, 255));
+}
+
+TEST_F(ImageFileTest, AFullDiskIsAnError) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  EXPECT_THROW(write_png("/dev/full", pattern()), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace viwo
