@@ -38,8 +38,9 @@ TEST(FilterRun, TellsItsProgressAsPartOfTheTimeOfTheLog) {
   RunSetup setup = inertia_and_wheels();
   const RunData data = collect(setup);
   std::vector<double> fractions;
-  const RunResult result =
-      experiment::run(setup, data, [&](double fraction) { fractions.push_back(fraction); });
+  RunHooks hooks;
+  hooks.progress = [&](double fraction) { fractions.push_back(fraction); };
+  const RunResult result = experiment::run(setup, data, hooks);
   ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
   ASSERT_EQ(fractions.size(), static_cast<std::size_t>(result.epochs));
   const double log_s = seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);
@@ -76,16 +77,17 @@ TEST(SimulateResult, IsDescribedByWhatThereIs) {
   result.counts[Measurement(ImuSample()).index()] = 2001;
   EXPECT_EQ(describe(result), "2001 IMU samples");
   result.counts[Measurement(FeatureSample()).index()] = 1;
-  EXPECT_EQ(describe(result), "2001 IMU samples and 1 image");
+  EXPECT_EQ(describe(result), "2001 IMU samples and 1 tracked image");
   result.counts[Measurement(EncoderSample()).index()] = 11;
   result.counts[Measurement(PoseSample()).index()] = 12;
   EXPECT_EQ(describe(result),
-            "2001 IMU samples, 1 image, 11 encoder samples and 12 reference poses");
+            "2001 IMU samples, 1 tracked image, 11 encoder samples and 12 reference poses");
   result.counts[Measurement(StateSample()).index()] = 13;  // the truth: poses are measured
   result.counts[Measurement(CalibrationSample()).index()] = 14;
-  EXPECT_EQ(describe(result),
-            "2001 IMU samples, 1 image, 11 encoder samples, 12 measured poses, 13 reference "
-            "states and 14 true parameters");
+  EXPECT_EQ(
+      describe(result),
+      "2001 IMU samples, 1 tracked image, 11 encoder samples, 12 measured poses, 13 reference "
+      "states and 14 true parameters");
 }
 
 TEST(TimeProgress, IsSilentForASecondAndThenSaysEveryTenPercent) {

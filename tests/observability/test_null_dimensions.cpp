@@ -207,11 +207,13 @@ int unobservable_with(double jacobian_error) {
   const RunData data = collect(setup);
   std::optional<ObservabilityMatrix> matrix;
   std::optional<Disturbed> disturbed;
-  run_filter(setup, data, {}, [&](const Estimator& estimator) {
+  RunHooks hooks;
+  hooks.on_start = [&](const Estimator& estimator) {
     matrix.emplace(estimator.filter(), FeatureOptions());
     disturbed.emplace(*matrix, jacobian_error);
     return &*disturbed;
-  });
+  };
+  run_filter(setup, data, hooks);
   const Eigen::MatrixXd M = matrix->triangle() * matrix->prior_sigma().asDiagonal();
   return matrix->size() - null_space(M, 5e-5).rank;
 }

@@ -1,5 +1,6 @@
 // The commands that run something.
 #include <iostream>
+#include <optional>
 
 #include "command_line.hpp"
 #include "viwo/eval/accuracy.hpp"
@@ -58,14 +59,22 @@ RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
 int run_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
-  const RunData data = collect(setup);
+  const RunData data = collect(setup, LiveSensors::kAllowed);
   const auto folder = out_folder(arguments);
   make_folder(folder);  // whether results can be written shows before the work
   const Figures figures(arguments, folder);
   RunResult result;
   {
     TimeProgress progress(setup.name);  // gone before anything else is printed
-    result = experiment::run(setup, data, [&](double fraction) { progress.at(fraction); });
+    RunHooks hooks;
+    hooks.progress = [&](double fraction) { progress.at(fraction); };
+    std::optional<InterruptSignal> interrupt;
+    if (!data.live.empty()) {
+      interrupt.emplace();
+      hooks.interrupted = [&interrupt] { return interrupt->raised(); };
+      std::cerr << setup.name << ": listening; ctrl-C ends the run and writes its results\n";
+    }
+    result = experiment::run(setup, data, hooks);
   }
   write_run(folder, setup, result);
   figures.write(report_of(setup, result));

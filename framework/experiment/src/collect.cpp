@@ -86,8 +86,10 @@ class Collector {
       return;
     }
     claim(reference_name_, sensor, "reference poses");
-    data_.reference.push_back(
-        planar_pose(pose.t_ns, pose.p_BinW_m, to_quaternion(pose.q_BtoW_xyzw)));
+    const Eigen::Quaterniond q_BtoW = to_quaternion(pose.q_BtoW_xyzw).normalized();
+    data_.reference.push_back(setup_.filter
+                                  ? StampedPose{pose.t_ns, to_vector(pose.p_BinW_m), q_BtoW}
+                                  : planar_pose(pose.t_ns, pose.p_BinW_m, q_BtoW));
   }
   void add(const std::string& sensor, const ImuSample& imu) {
     claim(imu_name_, sensor, "IMU samples");
@@ -114,9 +116,44 @@ class Collector {
   std::string wheels_sensor_, reference_name_, imu_name_, images_name_, pixels_name_;
 };
 
+/// The live sensors of a run and those that work on them, unread.
+RunData listen(const RunSetup& setup) {
+  RunData data;
+  for (const SensorEntry& entry : setup.sensors) {
+    const Loaded<Sensor>& sensor = entry.sensor;
+    const SensorStream stream{entry.name, sensor.info, sensor.object, entry.input, nullptr};
+    if (is_live(entry)) {
+      data.live.push_back(stream);
+      continue;
+    }
+    const bool works_on_live = std::any_of(data.live.begin(), data.live.end(),
+                                           [&](const auto& s) { return s.name == entry.input; });
+    if (!works_on_live) {
+      config::fail(setup.sensors_mark, "sensor '" + entry.name + "' plays something back, but '" +
+                                           data.live.front().name +
+                                           "' is live: the two do not go together");
+    }
+    data.streams.push_back(stream);
+  }
+  if (!setup.filter) {
+    config::fail(setup.sensors_mark, "sensor '" + data.live.front().name +
+                                         "' is live, which needs the filter (a section 'updates')");
+  }
+  if (setup.filter->start.mode == StartMode::kReference) {
+    config::fail(setup.sensors_mark, "sensor '" + data.live.front().name +
+                                         "' is live: choose estimator.start: standstill or moving");
+  }
+  return data;
+}
+
 }  // namespace
 
-RunData collect(RunSetup& setup) {
+RunData collect(RunSetup& setup, LiveSensors live) {
+  // Behind the live ones, whichever was written first.
+  std::stable_partition(setup.sensors.begin(), setup.sensors.end(), is_live);
+  if (live == LiveSensors::kAllowed && !setup.sensors.empty() && is_live(setup.sensors.front())) {
+    return listen(setup);
+  }
   RunData data;
   Collector collector(setup, data);
   Inputs inputs(setup.sensors);
@@ -125,7 +162,8 @@ RunData collect(RunSetup& setup) {
     const Loaded<Sensor>& sensor = entry.sensor;
     auto input = inputs.connect(entry);
     if (setup.filter && input != nullptr && !inputs.is_input(entry)) {
-      data.streams.push_back({entry.name, sensor.info, sensor.object, std::move(input)});
+      data.streams.push_back(
+          {entry.name, sensor.info, sensor.object, entry.input, std::move(input)});
       continue;
     }
     guarded(sensor.info, "next", [&] {

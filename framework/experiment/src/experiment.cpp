@@ -186,9 +186,11 @@ class Runner {
     if (stopped()) return false;
     try {
       RunSetup setup = read_run(configuration(run.variant, run.recording), plugins_, run.seed);
-      run.result = experiment::run(setup, collect(setup), [this](double) {
+      RunHooks hooks;
+      hooks.progress = [this](double) {
         if (stopped()) throw Stopped();
-      });
+      };
+      run.result = experiment::run(setup, collect(setup), hooks);
       write_run_of(run, setup);
     } catch (const Stopped&) {
       return false;

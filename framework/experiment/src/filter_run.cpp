@@ -155,7 +155,7 @@ class Recorder {
       result_.nees.position = sum_position_ / n_nees_;
       result_.nees.orientation = sum_orientation_ / n_nees_;
     }
-    result_.reference = truth_;
+    if (!truth_.empty()) result_.reference = truth_;
   }
 
  private:
@@ -228,34 +228,31 @@ class Recorder {
   void add_calibration(const Filter& filter) {
     auto track = result_.calibration.begin();
     for (std::size_t k = 0; k < setup_.wheels.size(); ++k) {
-      const WheelsView& wheels = filter.wheels()[k];
-      const std::optional<WheelsView>& truth = truths_[k];
-      const auto add = [&](double estimate, int column, double true_value, double error) {
-        track->estimate.push_back(estimate);
-        track->sigma.push_back(column < 0 ? 0. : std::sqrt(filter.covariance()(column, column)));
-        if (truth) {
-          track->truth = true_value;
-          track->final_error = error;
-        }
-        ++track;
-      };
-      const auto column = [](int first, int i) { return first < 0 ? -1 : first + i; };
-      const WheelsView& is = truth ? *truth : wheels;
-      const Vector3d turned = log_so3(wheels.R_ItoO), truly = log_so3(is.R_ItoO);
-      const Vector3d turn_error = log_so3(is.R_ItoO * wheels.R_ItoO.transpose());
-      for (int i = 0; i < 3; ++i) {
-        add(turned[i], column(wheels.extrinsics_column, i), truly[i], turn_error[i]);
+      auto next = track;
+      for (const CalibrationValue& estimate : calibration_of(filter, k)) {
+        next->estimate.push_back(estimate.value);
+        next->sigma.push_back(estimate.sigma);
+        ++next;
       }
-      for (int i = 0; i < 3; ++i) {
-        add(wheels.p_IinO[i], column(wheels.extrinsics_column, 3 + i), is.p_IinO[i],
-            wheels.p_IinO[i] - is.p_IinO[i]);
-      }
-      add(wheels.t_OtoI_s, wheels.time_offset_column, is.t_OtoI_s, wheels.t_OtoI_s - is.t_OtoI_s);
-      for (int i = 0; i < wheels.x_WI.size(); ++i) {
-        add(wheels.x_WI[i], column(wheels.intrinsics_column, i), is.x_WI[i],
-            wheels.x_WI[i] - is.x_WI[i]);
-      }
+      if (truths_[k]) compare(filter.wheels()[k], *truths_[k], track);
+      track = next;
     }
+  }
+
+  /// Truth and present error of a wheel set's parameters, from `track` on.
+  static void compare(const WheelsView& wheels, const WheelsView& truth,
+                      std::vector<CalibrationTrack>::iterator track) {
+    const auto add = [&track](double true_value, double error) {
+      track->truth = true_value;
+      track->final_error = error;
+      ++track;
+    };
+    const Vector3d truly = log_so3(truth.R_ItoO);
+    const Vector3d turn_error = log_so3(truth.R_ItoO * wheels.R_ItoO.transpose());
+    for (int i = 0; i < 3; ++i) add(truly[i], turn_error[i]);
+    for (int i = 0; i < 3; ++i) add(truth.p_IinO[i], wheels.p_IinO[i] - truth.p_IinO[i]);
+    add(truth.t_OtoI_s, wheels.t_OtoI_s - truth.t_OtoI_s);
+    for (int i = 0; i < wheels.x_WI.size(); ++i) add(truth.x_WI[i], wheels.x_WI[i] - truth.x_WI[i]);
   }
 
   const FilterSetup& setup_;
@@ -269,45 +266,57 @@ class Recorder {
   int n_nees_ = 0;
 };
 
-Estimator make_estimator(const FilterSetup& setup) {
+Estimator make_estimator(const FilterSetup& setup, bool live) {
+  EstimatorOptions options = setup.options;
+  // The trackers of two cameras give what they found at one instant a little after each other.
+  if (live) options.max_image_wait_s = 0.05;
   std::vector<WheelsPrior> wheels;
   for (const WheelSet& set : setup.wheels) wheels.push_back(set.prior);
   std::vector<UpdateEntry> updates;
   for (const auto& entry : setup.updates) {
     updates.push_back({entry.name, entry.update.object, entry.wheels, entry.poses});
   }
-  return {setup.options, setup.cameras, wheels, updates};
+  return {options, setup.cameras, wheels, updates};
 }
 
-/// Time and rejections of the sensors that were read while the filter ran. The filter's time per
-/// epoch is without them.
-void record_streams(Feed& feed, RunResult& result) {
-  for (const auto& stream : feed.streams()) {
-    stream->stop();
-    result.stages.emplace_back("sensor " + stream->name(), stage_time(stream->ms_per_stamp()));
-    for (RejectionCount& rejection : stream->rejections()) {
-      result.rejections.emplace_back(stream->name(), std::move(rejection));
-    }
+/// Feed::next(); once there are results, a sensor that breaks is the cause of a run that failed.
+bool next(Feed& feed, Estimator& estimator, std::string& cause) {
+  try {
+    return feed.next(estimator);
+  } catch (const std::exception& error) {
+    if (estimator.epochs() == 0) throw;
+    cause = error.what();
+    return false;
+  }
+}
+
+/// Estimator::step(); what a kinematic model throws becomes the cause of a run that failed.
+bool step(Estimator& estimator, std::string& cause) {
+  try {
+    return estimator.step();
+  } catch (const PluginFailure& failure) {
+    cause = std::string(failure.what()) + " (epoch " + std::to_string(estimator.epochs() + 1) + ")";
+    return false;
   }
 }
 
 }  // namespace
 
-RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgress& progress,
-                     const OnStart& on_start) {
+RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks& hooks) {
   RunResult result;
   result.rejections = data.rejections;
-  Estimator estimator = make_estimator(*setup.filter);
+  const bool live = !data.live.empty();
+  Estimator estimator = make_estimator(*setup.filter, live);
   start(estimator, setup, data);
-  if (on_start) estimator.observe(on_start(estimator));
+  if (hooks.on_start) estimator.observe(hooks.on_start(estimator));
   Recorder recorder(setup, data, result);
-  Feed feed(setup, data);
-  const double log_s = seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);
+  const auto feed = live ? feed_live(setup, data, hooks.interrupted) : feed_recorded(setup, data);
+  const double log_s = live ? 0. : seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);
   double wall_s = 0.;
   const auto all_begin = std::chrono::steady_clock::now();
   bool more = true;
   while (more && estimator.failure().empty() && result.cause.empty()) {
-    more = feed.next(estimator);
+    more = next(*feed, estimator, result.cause);
     if (!more) estimator.finish();
     for (;;) {
       const auto begin = std::chrono::steady_clock::now();
@@ -315,16 +324,17 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgres
       wall_s += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       if (!stepped) break;
       recorder.record(estimator);
-      if (progress && log_s > 0.) {
-        progress(seconds_between(data.imu.front().t_ns, estimator.filter().t_ns()) / log_s);
+      feed->on_epoch(estimator);
+      if (hooks.progress && log_s > 0.) {
+        hooks.progress(seconds_between(data.imu.front().t_ns, estimator.filter().t_ns()) / log_s);
       }
     }
   }
+  feed->finish(result);
   recorder.finish(estimator);
-  record_streams(feed, result);
   // Beside sensors that work while it runs, the filter's own time says little.
   const std::chrono::duration<double> all_s = std::chrono::steady_clock::now() - all_begin;
-  result.wall_s = data.streams.empty() ? wall_s : all_s.count();
+  result.wall_s = data.streams.empty() && !live ? wall_s : all_s.count();
   result.epochs = estimator.epochs();
   if (!result.estimate.empty()) {
     result.duration_s = seconds_between(result.estimate.front().t_ns, result.estimate.back().t_ns);

@@ -23,8 +23,12 @@ std::shared_ptr<Sensor> Inputs::connect(const SensorEntry& entry) {
   return replay;
 }
 
+bool is_live(const SensorEntry& entry) {
+  return guarded(entry.sensor.info, "live", [&] { return entry.sensor.object->live(); });
+}
+
 void require_no_live_sensor(const RunSetup& setup, const SensorEntry& entry) {
-  if (!guarded(entry.sensor.info, "live", [&] { return entry.sensor.object->live(); })) return;
+  if (!is_live(entry)) return;
   config::fail(setup.sensors_mark, "sensor '" + entry.name +
                                        "' is live, without an end: `viwo run` "
                                        "alone can use it, with the filter");

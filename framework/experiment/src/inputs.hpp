@@ -26,6 +26,8 @@ class Inputs {
   std::map<std::string, std::shared_ptr<std::vector<Measurement>>> kept_;
 };
 
+bool is_live(const SensorEntry& entry);
+
 /// InputError for a sensor that never ends.
 void require_no_live_sensor(const RunSetup& setup, const SensorEntry& entry);
 

@@ -120,14 +120,17 @@ Watched watch(const Node& run, PluginRegistry& plugins) {
   filter.options.frozen = true;
   out.data = collect(out.setup);
   FeatureOptions feature;
-  feature.enabled = !out.data.images.empty() && !filter.cameras.empty();
-  out.result = run_filter(out.setup, out.data, {}, [&](const Estimator& estimator) {
+  feature.enabled =
+      (!out.data.images.empty() || !out.data.streams.empty()) && !filter.cameras.empty();
+  RunHooks hooks;
+  hooks.on_start = [&](const Estimator& estimator) {
     out.state.emplace(estimator.filter(), feature);
     out.names = state_names(*out.state, estimator.filter(), filter);
     out.wheels.assign(estimator.filter().wheels().begin(), estimator.filter().wheels().end());
     out.track.emplace(out.state->calibration_columns(), calibration_sigma(*out.state), &*out.state);
     return &*out.track;
-  });
+  };
+  out.result = run_filter(out.setup, out.data, hooks);
   if (out.result.status != RunStatus::kOk) {
     throw InputError(out.setup.name + ": " + out.result.cause);
   }
@@ -198,7 +201,9 @@ void follow_hidden(const Watched& frozen, const MatrixXd& null, RunSetup& run,
   out.without_noise = frozen.track->along(hidden);
   const RunData data = collect(run);
   CovarianceTrack track(frozen.state->calibration_columns(), calibration_sigma(*frozen.state));
-  run_filter(run, data, {}, [&](const Estimator&) { return &track; });
+  RunHooks hooks;
+  hooks.on_start = [&](const Estimator&) { return &track; };
+  run_filter(run, data, hooks);
   out.as_configured = track.along(hidden);
 }
 

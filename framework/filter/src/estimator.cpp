@@ -170,15 +170,24 @@ bool Estimator::encoders_reach(std::int64_t t_ns) const {
   return true;
 }
 
+bool Estimator::images_arrived(std::int64_t t_ns) const {
+  if (finished_) return true;
+  const std::int64_t wait_ns = to_ns(options_.max_image_wait_s);
+  if (latest_ns_ > t_ns + wait_ns) return true;
+  if (wait_ns == 0) return false;
+  const auto is_of_epoch = [t_ns](const FeatureSample& image) { return image.t_ns == t_ns; };
+  const auto n = std::count_if(
+      waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(n_waiting_), is_of_epoch);
+  return n >= static_cast<std::ptrdiff_t>(filter_.cameras().size());
+}
+
 std::optional<std::int64_t> Estimator::next_epoch_ns() const {
   if (imu_.empty()) return std::nullopt;
   const std::int64_t reached_ns = imu_.back().t_ns;
   std::int64_t t_ns = filter_.t_ns() + to_ns(options_.max_epoch_s);
   if (n_waiting_ > 0) t_ns = std::min(t_ns, waiting_.front().t_ns);
   if (reached_ns < t_ns) return std::nullopt;
-  // The other images of the same instant may still be on their way.
-  const bool all_arrived = finished_ || latest_ns_ > t_ns;
-  if (!all_arrived) return std::nullopt;
+  if (!images_arrived(t_ns)) return std::nullopt;
   const bool waited = finished_ || seconds_between(t_ns, latest_ns_) > options_.max_wait_s;
   if (!waited && !encoders_reach(t_ns)) return std::nullopt;
   return t_ns;

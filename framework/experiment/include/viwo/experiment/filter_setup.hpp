@@ -60,6 +60,15 @@ struct FilterSetup {
 /// (theta_ItoO_x.. [rad], p_IinO_x.. [m]), t_OtoI [s], intrinsics.
 std::vector<std::string> calibration_names(const WheelSet& wheels);
 
+struct CalibrationValue {
+  double value = 0.;
+  double sigma = 0.;  ///< 0 for what is held
+};
+
+/// What a filter knows of the calibration of its wheel set `wheels`, in the order of
+/// calibration_names().
+std::vector<CalibrationValue> calibration_of(const Filter& filter, std::size_t wheels);
+
 /// Reads the sections `estimator`, `imu`, `cameras`, `wheels`, `wheel_sets` and `updates` of a run
 /// and appends what is wrong to `errors`. `model`, `x_WI` and `sigma` are those of the section
 /// `kinematics`; `model` may be null. The resolved sections are set in `resolved`.

@@ -38,7 +38,7 @@ struct RunSetup {
   Intrinsics sigma;  ///< how well they are known; 0 where the gauge holds an entry
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
   std::optional<PlanarExtrinsics> O_in_I;  ///< of the section `wheels`: where states are reference
-  std::vector<SensorEntry> sensors;  ///< those that take an input behind their input
+  std::vector<SensorEntry> sensors;        ///< those that take an input behind their input
   PreintegrationOptions preintegration;
   double epoch_s = 0.1;
   double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
@@ -61,7 +61,8 @@ struct SensorStream {
   std::string name;
   PluginInfo info;
   std::shared_ptr<Sensor> sensor;
-  std::shared_ptr<Sensor> input;  ///< what it reads from
+  std::string input_name;
+  std::shared_ptr<Sensor> input;  ///< what it reads from; null where that is a live sensor
 };
 
 /// What the sensors of a run gave.
@@ -73,6 +74,7 @@ struct RunData {
   std::vector<FeatureSample> images;
   std::vector<ImageSample> pixels;            ///< of the images, in time order; for pictures
   std::vector<SensorStream> streams;          ///< not read yet
+  std::vector<SensorStream> live;             ///< measurements that are still to happen
   std::vector<StateSample> states;            ///< truth of the inertial state, if there is one
   std::map<std::string, double> calibration;  ///< true values, if known
   /// Encoder samples of further wheel sets, by sensor.
@@ -82,11 +84,14 @@ struct RunData {
   std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor
 };
 
+/// Whether measurements may still be to happen; then none may have been recorded.
+enum class LiveSensors { kRefused, kAllowed };
+
 /// Reads all sensors to their end, but for the last of a chain of sensors that take inputs: the
-/// filter is going to read that one, and only once. Throws InputError when no sensor or more than one gives encoder
-/// samples (or a reference), when channels do not fit the model, or when a sensor's input is
-/// broken.
-RunData collect(RunSetup& setup);
+/// filter is going to read that one, and only once. Throws InputError when no sensor or more than
+/// one gives encoder samples (or a reference), when channels do not fit the model, or when a
+/// sensor's input is broken.
+RunData collect(RunSetup& setup, LiveSensors live = LiveSensors::kRefused);
 
 /// Statistics of the time that a stage took per epoch.
 struct StageTime {
@@ -190,14 +195,20 @@ using OnProgress = std::function<void(double)>;
 /// Called when the estimator is about to begin; returns who is to watch it, or nullptr.
 using OnStart = std::function<EstimatorObserver*(const Estimator&)>;
 
+/// Who is to know what happens in a run; any of them may be empty.
+struct RunHooks {
+  OnProgress progress;
+  OnStart on_start;
+  std::function<bool()> interrupted;  ///< whether live sensors are to stop
+};
+
 /// Runs the filter over all measurements and evaluates. A filter that diverges, or a kinematic
 /// model that throws, ends the run with the epoch and the cause.
-RunResult run_filter(const RunSetup& setup, const RunData& data, const OnProgress& progress = {},
-                     const OnStart& on_start = {});
+RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks& hooks = {});
 
 /// What the configuration asks for.
-inline RunResult run(const RunSetup& setup, const RunData& data, const OnProgress& progress = {}) {
-  return setup.filter ? run_filter(setup, data, progress) : run_odometry(setup, data);
+inline RunResult run(const RunSetup& setup, const RunData& data, const RunHooks& hooks = {}) {
+  return setup.filter ? run_filter(setup, data, hooks) : run_odometry(setup, data);
 }
 
 StageTime stage_time(std::vector<double> ms);

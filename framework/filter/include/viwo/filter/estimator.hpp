@@ -28,6 +28,9 @@ struct EstimatorOptions {
   double max_epoch_s = 0.25;
   /// How long (in stamps) an epoch waits for encoder samples that reach its end.
   double max_wait_s = 0.2;
+  /// Measurements come in the order of their arrival and not of their stamps: how long (in stamps)
+  /// an epoch waits for the images of the other cameras, s. 0: in the order of their stamps.
+  double max_image_wait_s = 0.;
   /// Longer spacings of the IMU are counted.
   double max_imu_gap_s = 0.05;
   /// Residuals are taken as zero: the estimate is only propagated, its covariance is that of a
@@ -136,6 +139,8 @@ class Estimator {
  private:
   std::optional<std::int64_t> next_epoch_ns() const;
   bool encoders_reach(std::int64_t t_ns) const;
+  /// Whether no further image of an epoch's instant is to be expected.
+  bool images_arrived(std::int64_t t_ns) const;
   void cut_imu(std::int64_t end_ns);
   void take_images(std::int64_t t_ns);
   void take_poses(std::int64_t t_ns);

@@ -1,0 +1,232 @@
+// Runs on sensors that give measurements as they happen.
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "simulated.hpp"
+#include "viwo/experiment/run.hpp"
+
+namespace viwo::experiment {
+namespace {
+
+using testing::registry;
+
+/// Gives what it was made with, then waits for stop(), or ends at once.
+class Device : public Sensor {
+ public:
+  Device(std::vector<Measurement> measurements, bool waits)
+      : measurements_(std::move(measurements)), waits_(waits) {}
+  bool live() const override { return true; }
+  Status next(Measurement& out) override {
+    if (next_ < measurements_.size()) {
+      out = measurements_[next_++];
+      return Status::kOk;
+    }
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return stopped_ || !waits_; });
+    return Status::kEnd;
+  }
+  void stop() override {
+    {
+      const std::scoped_lock lock(mutex_);
+      stopped_ = true;
+    }
+    changed_.notify_all();
+  }
+  void estimate(const EstimateSample& estimate) override { estimates.push_back(estimate); }
+  std::vector<EstimateSample> estimates;
+
+ private:
+  std::vector<Measurement> measurements_;
+  std::size_t next_ = 0;
+  bool waits_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool stopped_ = false;
+};
+
+/// A picture without pixels: what is behind it are the points of an image.
+struct Points final : ImageSource {
+  explicit Points(FeatureSample sample) : points(std::move(sample)) {}
+  void read(Image& /*out*/) const override {}
+  FeatureSample points;
+};
+
+/// Finds in a picture the points that are behind it.
+class Tracker final : public Sensor {
+ public:
+  bool takes_input() const override { return true; }
+  void connect(Sensor& input) override { input_ = &input; }
+  Status next(Measurement& out) override {
+    Measurement in;
+    while (input_->next(in) == Status::kOk) {
+      const auto* image = std::get_if<ImageSample>(&in);
+      if (image == nullptr) continue;
+      out = static_cast<const Points&>(*image->source).points;
+      return Status::kOk;
+    }
+    return Status::kEnd;
+  }
+
+ private:
+  Sensor* input_ = nullptr;
+};
+
+RunSetup standing_then_driving() {
+  const std::string robot = std::string("{type: four_wis_wid, ") + testing::kSwerve + "}";
+  const std::string cameras = VIWO_TEST_SOURCE_DIR "/configs/cameras/pinhole.yaml";
+  const config::Node run = config::parse(
+      "sensors: {sim: {type: simulator, motion: sweep_then_straight, duration_s: 4, features: 40, "
+      "cameras: " +
+          cameras + ", robot: " + robot + "}}\nkinematics: " + robot +
+          "\ncameras: {kalibr: " + cameras +
+          "}\nestimator: {start: moving}\nupdates: {visual_features: {}, wheel_odometry: {}}\n",
+      "run.yaml");
+  return read_run(run, registry(), 1);
+}
+
+/// All of a recorded run as one sensor would give it, with pictures in the place of tracks.
+std::vector<Measurement> as_they_come(const RunData& data, bool pictures) {
+  std::vector<Measurement> all;
+  for (const auto& imu : data.imu) all.emplace_back(imu);
+  for (const auto& sample : data.samples) all.emplace_back(sample);
+  for (const auto& image : data.images) {
+    if (pictures) {
+      all.emplace_back(ImageSample{image.t_ns, image.camera, std::make_shared<Points>(image)});
+    } else {
+      all.emplace_back(image);
+    }
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return stamp_ns(a) < stamp_ns(b); });
+  return all;
+}
+
+SensorStream stream(const std::string& name, std::shared_ptr<Sensor> sensor,
+                    const std::string& input = "") {
+  SensorStream out;
+  out.name = name;
+  out.sensor = std::move(sensor);
+  out.input_name = input;
+  return out;
+}
+
+double distance(const RunResult& a, const RunResult& b) {
+  double largest = 0.;
+  for (std::size_t i = 0; i < std::min(a.estimate.size(), b.estimate.size()); ++i) {
+    largest = std::max(largest, (a.estimate[i].p_BinW - b.estimate[i].p_BinW).norm());
+  }
+  return largest;
+}
+
+TEST(LiveFeed, GivesTheTrajectoryOfTheSameMeasurementsRecorded) {
+  RunSetup setup = standing_then_driving();
+  const RunData recorded = collect(setup);
+  const RunResult expected = run_filter(setup, recorded);
+  ASSERT_EQ(expected.status, RunStatus::kOk) << expected.cause;
+  const auto device = std::make_shared<Device>(as_they_come(recorded, false), false);
+  RunData data;
+  data.live.push_back(stream("device", device));
+  const RunResult live = run_filter(setup, data);
+  ASSERT_EQ(live.status, RunStatus::kOk) << live.cause;
+  ASSERT_EQ(live.estimate.size(), expected.estimate.size());
+  EXPECT_LT(distance(live, expected), 1e-9);
+  ASSERT_EQ(device->estimates.size(), live.estimate.size());
+  const EstimateSample& last = device->estimates.back();
+  EXPECT_EQ(last.t_ns, live.estimate.back().t_ns);
+  EXPECT_EQ(last.p_IinG_m[0], live.estimate.back().p_BinW.x());
+  EXPECT_GT(last.covariance[0], 0.);
+  ASSERT_EQ(last.calibration_names.size(), live.calibration.size());
+  EXPECT_EQ(last.calibration_names.front(), live.calibration.front().name);
+  EXPECT_EQ(last.calibration.back(), live.calibration.back().estimate.back());
+  EXPECT_EQ(last.calibration_sigma.back(), live.calibration.back().sigma.back());
+}
+
+TEST(LiveFeed, FeedsWhatWorksOnPicturesAndTellsTheLatency) {
+  RunSetup setup = standing_then_driving();
+  const RunData recorded = collect(setup);
+  // Pictures come faster here than they are worked on: few enough that none is dropped.
+  std::vector<Measurement> measurements;
+  int pictures = 0;
+  for (const Measurement& measurement : as_they_come(recorded, true)) {
+    if (std::holds_alternative<ImageSample>(measurement) && ++pictures > 8) continue;
+    measurements.push_back(measurement);
+  }
+  RunData data;
+  const auto device = std::make_shared<Device>(std::move(measurements), false);
+  data.live.push_back(stream("device", device));
+  data.streams.push_back(stream("tracks", std::make_shared<Tracker>(), "device"));
+  const RunResult live = run_filter(setup, data);
+  ASSERT_EQ(live.status, RunStatus::kOk) << live.cause;
+  std::vector<std::string> stages;
+  for (const auto& [stage, time] : live.stages) stages.push_back(stage);
+  EXPECT_NE(std::find(stages.begin(), stages.end(), "sensor tracks"), stages.end());
+  EXPECT_NE(std::find(stages.begin(), stages.end(), "latency from image to pose"), stages.end());
+}
+
+TEST(LiveFeed, EndsWhenItIsInterruptedAndKeepsTheResults) {
+  RunSetup setup = standing_then_driving();
+  const RunData recorded = collect(setup);
+  const auto device = std::make_shared<Device>(as_they_come(recorded, false), true);
+  RunData data;
+  data.live.push_back(stream("device", device));
+  RunHooks hooks;
+  const auto begin = std::chrono::steady_clock::now();
+  hooks.interrupted = [&] {
+    return std::chrono::steady_clock::now() - begin > std::chrono::milliseconds(300);
+  };
+  const RunResult live = run_filter(setup, data, hooks);
+  EXPECT_EQ(live.status, RunStatus::kOk) << live.cause;
+  EXPECT_GT(live.estimate.size(), 10U);
+}
+
+TEST(LiveFeed, EndsWithTheErrorOfItsSensor) {
+  class Broken final : public Device {
+   public:
+    Broken() : Device({}, false) {}
+    Status next(Measurement& /*out*/) override { throw InputError("the cable is out"); }
+  };
+  RunSetup setup = standing_then_driving();
+  RunData data;
+  data.live.push_back(stream("device", std::make_shared<Broken>()));
+  try {
+    run_filter(setup, data);
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "the cable is out");
+  }
+}
+
+TEST(LiveFeed, KeepsTheResultsUpToTheErrorOfOneOfItsSensors) {
+  /// Breaks after all else has been given.
+  class Breaking final : public Device {
+   public:
+    using Device::Device;
+    Status next(Measurement& out) override {
+      const Status status = Device::next(out);
+      if (status == Status::kEnd) throw InputError("the cable is out");
+      return status;
+    }
+  };
+  RunSetup setup = standing_then_driving();
+  const RunData recorded = collect(setup);
+  RunData data;
+  data.live.push_back(
+      stream("device", std::make_shared<Breaking>(as_they_come(recorded, false), false)));
+  data.live.push_back(stream("silent", std::make_shared<Device>(std::vector<Measurement>(), true)));
+  const RunResult live = run_filter(setup, data);
+  EXPECT_EQ(live.status, RunStatus::kFailed);
+  EXPECT_EQ(live.cause, "the cable is out");
+  EXPECT_GT(live.estimate.size(), 10U);
+}
+
+}  // namespace
+}  // namespace viwo::experiment
