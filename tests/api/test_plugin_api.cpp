@@ -157,8 +157,8 @@ TEST_F(ChangedApi, IsSeenInTheOrderOfVirtualFunctions) {
   EXPECT_EQ(change("sensor.hpp", "virtual Status next(Measurement& out) = 0;",
                    "virtual void reset() {}\n  virtual Status next(Measurement& out) = 0;"),
             "in Sensor  size 8, align 8\n"
-            "  was   slots 4 (two of the destructor)\n"
-            "  is    slots 5 (two of the destructor)");
+            "  was   slots 9 (two of the destructor)\n"
+            "  is    slots 10 (two of the destructor)");
 }
 
 TEST_F(ChangedApi, IsSeenInAnEnumerator) {

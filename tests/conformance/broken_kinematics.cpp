@@ -1,4 +1,4 @@
-// A differential drive with one mistake, DEFECT; without it the model is right.
+// A differential drive with one mistake, which its name says; without it the model is right.
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -8,13 +8,17 @@
 
 #include "viwo/api/plugin.hpp"
 
+/// "broken_<defect>": of the library that this is linked into.
+extern const char kPluginName[];
+
 namespace viwo {
 namespace {
 
-constexpr std::string_view kDefect = DEFECT;
-constexpr bool is(std::string_view defect) { return kDefect == defect; }
+bool is(std::string_view defect) {
+  return std::string_view(kPluginName).substr(std::string_view("broken_").size()) == defect;
+}
 
-constexpr std::array kParams{
+const std::array kParams{
     ParamSpec{.name = is("name_without_unit") ? "radius" : "radius_m",
               .type = ParamType::kNumber,
               .unit = "m",
@@ -118,8 +122,8 @@ class Broken final : public KinematicModel {
   mutable std::atomic<double> cached_ = 0.;
 };
 
-VIWO_REGISTER(KinematicModel, Broken, "broken_" DEFECT, "1.0.0", "a base with one mistake",
-              "Apache-2.0", kParams);
+VIWO_REGISTER(KinematicModel, Broken, kPluginName, "1.0.0", "a base with one mistake", "Apache-2.0",
+              kParams);
 
 }  // namespace
 }  // namespace viwo

@@ -1,4 +1,4 @@
-// A sensor with one mistake, DEFECT; without it it is right.
+// A sensor with one mistake, which its name says; without it it is right.
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -6,11 +6,15 @@
 
 #include "viwo/api/plugin.hpp"
 
+/// "broken_<defect>": of the library that this is linked into.
+extern const char kPluginName[];
+
 namespace viwo {
 namespace {
 
-constexpr std::string_view kDefect = DEFECT;
-constexpr bool is(std::string_view defect) { return kDefect == defect; }
+bool is(std::string_view defect) {
+  return std::string_view(kPluginName).substr(std::string_view("broken_").size()) == defect;
+}
 
 constexpr std::array kParams{
     ParamSpec{.name = "count",
@@ -60,7 +64,7 @@ class Broken final : public Sensor {
   std::int64_t time_ns_ = 0;
 };
 
-VIWO_REGISTER(Sensor, Broken, "broken_" DEFECT, "1.0.0", "a sensor with one mistake", "Apache-2.0",
+VIWO_REGISTER(Sensor, Broken, kPluginName, "1.0.0", "a sensor with one mistake", "Apache-2.0",
               kParams);
 
 }  // namespace

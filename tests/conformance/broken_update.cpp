@@ -1,4 +1,5 @@
-// An update with one mistake, DEFECT; without it it is right: the base does not lift off.
+// An update with one mistake, which its name says; without it it is right: the base does not lift
+// off.
 #include <array>
 #include <cmath>
 #include <csignal>
@@ -6,11 +7,15 @@
 
 #include "viwo/api/plugin.hpp"
 
+/// "broken_<defect>": of the library that this is linked into.
+extern const char kPluginName[];
+
 namespace viwo {
 namespace {
 
-constexpr std::string_view kDefect = DEFECT;
-constexpr bool is(std::string_view defect) { return kDefect == defect; }
+bool is(std::string_view defect) {
+  return std::string_view(kPluginName).substr(std::string_view("broken_").size()) == defect;
+}
 
 constexpr std::array kParams{
     ParamSpec{.name = "sigma_height_m",
@@ -56,7 +61,7 @@ class Broken final : public Update {
   double sigma_m_;
 };
 
-VIWO_REGISTER(Update, Broken, "broken_" DEFECT, "1.0.0", "an update with one mistake", "Apache-2.0",
+VIWO_REGISTER(Update, Broken, kPluginName, "1.0.0", "an update with one mistake", "Apache-2.0",
               kParams);
 
 }  // namespace

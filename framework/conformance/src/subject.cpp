@@ -166,9 +166,28 @@ Loaded<KinematicModel> Subject::make(const Node& section, std::uint64_t /*seed*/
 
 template <>
 Loaded<Sensor> Subject::make(const Node& section, std::uint64_t seed) const {
+  constexpr std::string_view kHostKeys[] = {"input"};
   config::Errors errors;
-  auto loaded = registry_->make_sensor(section, "sensor", seed, errors);
+  auto loaded = registry_->make_sensor(section, "sensor", seed, errors, kHostKeys);
   errors.throw_if_any();
+  const Node* input = section.find("input");
+  if (!guarded(loaded.info, "takes_input", [&] { return loaded.object->takes_input(); })) {
+    if (input != nullptr) config::fail(input->mark(), "'" + loaded.info.name + "' takes no input");
+    return loaded;
+  }
+  if (input == nullptr || !input->is_map()) {
+    throw InputError("'" + loaded.info.name +
+                     "' works on what another sensor gives - give --config FILE, with 'input: "
+                     "{type: ...}', the section of that sensor, beside its own parameters");
+  }
+  const auto source = make<Sensor>(*input, seed).object;
+  guarded(loaded.info, "connect", [&] { loaded.object->connect(*source); });
+  // Both live as long as what is returned.
+  struct Pair {
+    std::shared_ptr<Sensor> source, sensor;
+  };
+  const auto pair = std::make_shared<Pair>(Pair{source, loaded.object});
+  loaded.object = std::shared_ptr<Sensor>(pair, pair->sensor.get());
   return loaded;
 }
 

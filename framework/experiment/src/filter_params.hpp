@@ -93,6 +93,7 @@ inline constexpr std::array kEstimatorParams{
               .unit = "s",
               .fallback = "1",
               .min = 0.1,
+              .max = 60.,
               .help = "how much data a start without reference looks at"},
     ParamSpec{.name = "sigma_start_orientation_rad",
               .type = ParamType::kNumber,

@@ -10,6 +10,8 @@ namespace {
 
 constexpr int kMaxFactorsPerUpdate = 16;
 constexpr std::size_t kFirstWindow = 3;
+/// No start looks at more than this before it, s (estimator.start_window_s has that bound).
+constexpr double kMaxStartWindowS = 60.;
 constexpr std::size_t kEpochsPerClone = 3;
 
 /// CPU time of this thread: what an epoch costs, however busy the machine is with other things.
@@ -262,10 +264,30 @@ void Estimator::forget_used() {
   }
 }
 
+void Estimator::forget_before_start() {
+  if (imu_.empty() || seconds_between(imu_.front().t_ns, latest_ns_) < 2. * kMaxStartWindowS)
+    return;
+  const std::int64_t keep_ns = latest_ns_ - to_ns(kMaxStartWindowS);
+  const auto drop = [keep_ns](auto& samples) {
+    const auto keep = std::find_if(samples.begin(), samples.end(),
+                                   [keep_ns](const auto& s) { return s.t_ns >= keep_ns; });
+    samples.erase(samples.begin(), keep);
+  };
+  drop(imu_);
+  for (auto& samples : encoders_) drop(samples);
+  while (n_waiting_ > 0 && waiting_.front().t_ns < keep_ns) {
+    reject("image before the start", waiting_.front().t_ns);
+    take_images(waiting_.front().t_ns);
+  }
+}
+
 bool Estimator::try_to_initialize() {
   if (!initializer_) return false;
   const auto prior = initializer_(imu_, encoders_);
-  if (!prior) return false;
+  if (!prior) {
+    forget_before_start();
+    return false;
+  }
   start(*prior);
   return true;
 }

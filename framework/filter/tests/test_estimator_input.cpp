@@ -253,5 +253,49 @@ TEST(Estimator, AsksTheInitializerUntilItFindsAStart) {
   EXPECT_EQ(estimator.rejections()[0].count, 5);
 }
 
+TEST(Estimator, ForgetsWhatNoStartLooksAtWhileItWaitsForOne) {
+  const auto update = std::make_shared<FakeUpdate>();
+  Estimator estimator({}, {camera_prior()}, {}, {{"fake", update, -1}});
+  std::size_t most = 0;
+  double least_s = 1e9;
+  estimator.start([&](auto imu, auto) -> std::optional<ImuPrior> {
+    most = std::max(most, imu.size());
+    const double s = seconds_between(imu.front().t_ns, imu.back().t_ns);
+    if (imu.back().t_ns > kStart + 200'000 * kMs) least_s = std::min(least_s, s);
+    return std::nullopt;
+  });
+  for (std::int64_t t = 0; t <= 600'000; t += 100) {
+    estimator.add(imu_at(kStart + t * kMs));
+    if (t % 1000 == 0) estimator.add(image_at(kStart + t * kMs));
+    EXPECT_FALSE(estimator.step());
+  }
+  EXPECT_LE(most, 1202U);
+  EXPECT_GE(least_s, 59.9);
+  ASSERT_EQ(estimator.rejections().size(), 3U);
+  EXPECT_EQ(estimator.rejections()[0].reason, "gap of the IMU bridged");
+  EXPECT_EQ(estimator.rejections()[1].reason, "image before the start");
+  EXPECT_GT(estimator.rejections()[1].count, 400);
+}
+
+TEST(Estimator, OfLiveMeasurementsWaitsForTheImageOfTheOtherCamera) {
+  const auto images_of_epoch = [](bool second_comes, std::int64_t imu_until_ms) {
+    EstimatorOptions options;
+    options.max_image_wait_s = 0.05;
+    const auto update = std::make_shared<FakeUpdate>();
+    Estimator estimator(options, {camera_prior(), camera_prior()}, {}, {{"fake", update, -1}});
+    estimator.start(level_prior(kStart));
+    // Tracking takes time: the IMU is ahead when the images come.
+    for (std::int64_t t = 0; t <= imu_until_ms; t += 10) estimator.add(imu_at(kStart + t * kMs));
+    estimator.add(image_at(kStart + 100 * kMs, 0));
+    estimator.step();
+    if (second_comes) estimator.add(image_at(kStart + 100 * kMs, 1));
+    estimator.step();
+    return update->seen.empty() ? 0U : update->seen.front().features.size();
+  };
+  EXPECT_EQ(images_of_epoch(true, 120), 2U);   // at once when both are there
+  EXPECT_EQ(images_of_epoch(false, 120), 0U);  // waits
+  EXPECT_EQ(images_of_epoch(false, 160), 1U);  // but not for ever
+}
+
 }  // namespace
 }  // namespace viwo

@@ -146,6 +146,8 @@ class Estimator {
   void take_poses(std::int64_t t_ns);
   void forget_used();
   bool try_to_initialize();
+  /// A base that waits for hours before it moves: what no start looks at any more.
+  void forget_before_start();
   static void start_update(const UpdateEntry& entry, const UpdateSetup& setup);
   bool call_update(std::size_t index, const EpochData& data);
   void run_update(std::size_t index, const EpochData& data);
