@@ -7,6 +7,7 @@ writing_a_sensor.md. Skeletons: what `viwo plugins new` writes. Headers: each co
 
 import json
 import re
+import shutil
 import unittest
 
 import tutorial
@@ -119,6 +120,38 @@ class Skeletons(ConsumerTest):
         # half a cell of the mean of both rates at the change.
         last = (folder / 'build/results/run/trajectory.tum').read_text().splitlines()[-1].split()
         self.assertAlmostEqual(float(last[6]), 0.3894, delta=0.01)
+
+
+class RecordedLog(ConsumerTest):
+    """A model that is not in the tree, on logs of a real robot, against the model of viwo."""
+
+    def test_third_party_model(self):
+        recordings = Installation.source.parent / 'shared/data/4wis4wid'
+        if not recordings.is_dir():
+            self.skipTest(f'no recordings in {recordings}')
+        shutil.copytree(Installation.source / 'tests/install_consumer/swerve_auto',
+                        self.folder / 'swerve_auto')
+        build = self.folder / 'swerve_auto/build'
+        self.run_command(Installation.cmake, '-S', 'swerve_auto', '-B', build)
+        self.run_command(Installation.cmake, '--build', build)
+        plugins = build / 'lib/viwo/plugins/v2'
+        listing = self.run_command('viwo', 'plugins', 'list', '--plugin-path', plugins)
+        self.assertRegex(listing, r'(?m)^kinematics  swerve_auto  1\.0\.0  ')
+        conformance = self.folder / 'conformance.yaml'
+        conformance.write_text('{type: swerve_auto, radius_m: 0.0254, track_m: 0.225}\n')
+        self.run_command('viwo_conformance', plugins / 'libviwo_kinematics_swerve_auto.so',
+                         '--config', conformance)
+        experiment = self.folder / 'compare.yaml'
+        experiment.write_text((self.folder / 'swerve_auto/compare.yaml').read_text().replace(
+            '@SHARE@', str(Installation.prefix / 'share/viwo')))
+        self.run_command('viwo', 'experiment', experiment, '--plugin-path', plugins, '--out',
+                         'results', '--set', f'placeholders.data={recordings}')
+        variants = json.loads((self.folder / 'results/summary.json').read_text())['variants']
+        self.assertEqual([v['runs'] for v in variants.values()], [3, 3])
+        # The same rows, derived and differentiated in another way: the same odometry.
+        ate = {name: v['metrics']['ate_m']['mean'] for name, v in variants.items()}
+        self.assertGreater(ate['viwo'], 0.001)
+        self.assertAlmostEqual(ate['viwo'], ate['third_party'], delta=1e-9)
 
 
 class Headers(ConsumerTest):

@@ -1,7 +1,6 @@
 // Hands what the sensors of a run give to the estimator.
 #pragma once
 
-#include <functional>
 #include <memory>
 
 #include "viwo/experiment/run.hpp"
@@ -23,8 +22,7 @@ class Feed {
 /// All measurements in the order of their stamps: the same in every run.
 std::unique_ptr<Feed> feed_recorded(const RunSetup& setup, const RunData& data);
 
-/// Measurements as they come. `interrupted` is asked now and then whether that is to end.
-std::unique_ptr<Feed> feed_live(const RunSetup& setup, const RunData& data,
-                                std::function<bool()> interrupted);
+/// Measurements as they come. hooks.interrupted is asked now and then whether that is to end.
+std::unique_ptr<Feed> feed_live(const RunSetup& setup, const RunData& data, const RunHooks& hooks);
 
 }  // namespace viwo::experiment

@@ -310,7 +310,7 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks&
   start(estimator, setup, data);
   if (hooks.on_start) estimator.observe(hooks.on_start(estimator));
   Recorder recorder(setup, data, result);
-  const auto feed = live ? feed_live(setup, data, hooks.interrupted) : feed_recorded(setup, data);
+  const auto feed = live ? feed_live(setup, data, hooks) : feed_recorded(setup, data);
   const double log_s = live ? 0. : seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);
   double wall_s = 0.;
   const auto all_begin = std::chrono::steady_clock::now();

@@ -90,8 +90,8 @@ class LiveInput final : public Sensor {
 
 class LiveFeed final : public Feed {
  public:
-  LiveFeed(const RunSetup& setup, const RunData& data, std::function<bool()> interrupted)
-      : setup_(setup), data_(data), interrupted_(std::move(interrupted)) {
+  LiveFeed(const RunSetup& setup, const RunData& data, const RunHooks& hooks)
+      : setup_(setup), data_(data), hooks_(hooks) {
     for (const SensorStream& stream : data.streams) {
       workers_.push_back({&stream, std::make_unique<LiveInput>(), {}});
       LiveInput& input = *workers_.back().input;
@@ -111,7 +111,7 @@ class LiveFeed final : public Feed {
       std::unique_lock lock(mutex_);
       while (!changed_.wait_for(lock, kPollPeriod,
                                 [this] { return !arrivals_.empty() || running_ == 0; })) {
-        if (!interrupted_ || !interrupted_()) continue;
+        if (!interrupted()) continue;
         lock.unlock();
         stop_sensors();
         lock.lock();
@@ -123,7 +123,7 @@ class LiveFeed final : public Feed {
       arrival = std::move(arrivals_.front());
       arrivals_.pop_front();
     }
-    if (interrupted_ && interrupted_()) stop_sensors();
+    if (interrupted()) stop_sensors();
     std::visit([&](const auto& sample) { add(*arrival.sensor, sample, estimator); },
                arrival.measurement);
     return true;
@@ -191,6 +191,7 @@ class LiveFeed final : public Feed {
       for (const Worker& worker : workers_) {
         if (worker.stream->input_name == stream.name) worker.input->push(*image);
       }
+      if (hooks_.on_live_image) hooks_.on_live_image(*image);
       return false;
     });
     for (const Worker& worker : workers_) {
@@ -240,6 +241,8 @@ class LiveFeed final : public Feed {
     }
     changed_.notify_all();
   }
+
+  bool interrupted() const { return hooks_.interrupted && hooks_.interrupted(); }
 
   void stop_sensors() {
     for (const SensorStream& stream : data_.live) {
@@ -320,7 +323,7 @@ class LiveFeed final : public Feed {
 
   const RunSetup& setup_;
   const RunData& data_;
-  std::function<bool()> interrupted_;
+  const RunHooks& hooks_;
   std::vector<Worker> workers_;
   std::set<std::pair<std::string, std::size_t>> checked_;  ///< sensor and wheel set
   Trajectory reference_;
@@ -337,9 +340,8 @@ class LiveFeed final : public Feed {
 
 }  // namespace
 
-std::unique_ptr<Feed> feed_live(const RunSetup& setup, const RunData& data,
-                                std::function<bool()> interrupted) {
-  return std::make_unique<LiveFeed>(setup, data, std::move(interrupted));
+std::unique_ptr<Feed> feed_live(const RunSetup& setup, const RunData& data, const RunHooks& hooks) {
+  return std::make_unique<LiveFeed>(setup, data, hooks);
 }
 
 }  // namespace viwo::experiment

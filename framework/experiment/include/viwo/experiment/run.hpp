@@ -200,6 +200,8 @@ struct RunHooks {
   OnProgress progress;
   OnStart on_start;
   std::function<bool()> interrupted;  ///< whether live sensors are to stop
+  /// A live sensor has given an image, which is still to be worked on. In another thread.
+  std::function<void(const ImageSample&)> on_live_image;
 };
 
 /// Runs the filter over all measurements and evaluates. A filter that diverges, or a kinematic
