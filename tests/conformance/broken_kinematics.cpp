@@ -71,6 +71,7 @@ class Broken final : public KinematicModel {
       for (;;) std::this_thread::yield();
     }
     double extra = 0.;
+    if (is("race")) ++unsynchronised_calls_;  // only the thread sanitizer sees it
     if (is("random")) extra = 1e-12 * ++calls_;
     out.A << 1., 0., -0.5 * x_WI[2], 1., 0., 0.5 * x_WI[2], 0., 1., 0.;
     if (is("constant_A")) out.A(2, 0) = 1e-3 * drive[0];
@@ -119,6 +120,7 @@ class Broken final : public KinematicModel {
  private:
   double radius_m_, baseline_m_;
   mutable std::atomic<int> calls_ = 0;
+  mutable int unsynchronised_calls_ = 0;
   mutable std::atomic<double> cached_ = 0.;
 };
 

@@ -1,0 +1,46 @@
+#!/bin/bash
+# check_threads.sh
+# Every kinematic model of the tree through viwo_conformance, all of it built with the thread
+# sanitizer: const calls on one object may run concurrently (folder build-tsan). A model with a race
+# that nothing else shows must fail.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+models=()
+for source in plugins/kinematics/*/model.md; do
+  models+=("$(basename "$(dirname "$source")")")
+done
+
+echo "== Building with the thread sanitizer (folder build-tsan)"
+cmake --preset tsan -DVIWO_BUILD_BENCHMARKS=OFF > build-tsan.log 2>&1 || { cat build-tsan.log; exit 1; }
+rm build-tsan.log
+cmake --build --preset tsan --parallel "$(nproc)" \
+  --target viwo_conformance_program viwo_kinematics_broken_race "${models[@]/#/viwo_kinematics_}"
+export TSAN_OPTIONS=halt_on_error=1
+
+echo "== Conformance of ${#models[@]} kinematic models"
+failed=0
+for model in "${models[@]}"; do
+  library=$(echo build-tsan/lib/viwo/plugins/v*/libviwo_kinematics_"$model".so)
+  config=tests/conformance/configs/kinematics_$model.yaml
+  arguments=()
+  if [ -e "$config" ]; then arguments=(--config "$config"); fi
+  if output=$(build-tsan/bin/viwo_conformance "$library" "${arguments[@]}" 2>&1); then
+    echo "$model: passed"
+  else
+    echo "$model: FAILED"
+    echo "$output"
+    failed=1
+  fi
+done
+
+race=build-tsan/tests/conformance/libviwo_kinematics_broken_race.so
+if output=$(build-tsan/bin/viwo_conformance "$race" 2>&1) || [[ $output != *"concurrent calls"* ]]; then
+  echo "the model with a race: not found"
+  echo "$output"
+  failed=1
+else
+  echo "the model with a race: found"
+fi
+echo "$((${#models[@]} + 1 - failed)) passed, $failed failed"
+exit "$failed"
