@@ -42,19 +42,24 @@ for package in ca-certificates libeigen3-dev libboost-dev libboost-program-optio
   need_package "$package"
 done
 
-optional=()
+# What is left out where it is not to be had: bags and live topics of ROS.
+required=("${missing[@]}")
+missing=()
+for package in librosbag-storage-dev libroscpp-dev libsensor-msgs-dev libnav-msgs-dev \
+  libgeometry-msgs-dev libtf2-msgs-dev libdiagnostic-msgs-dev libsqlite3-dev libfastcdr-dev; do
+  need_package "$package"
+done
 if [ "${1:-}" = --tests ]; then
-  required=("${missing[@]}")
-  missing=()
   need_command clang-format-14 clang-format-14
   need_command gnuplot-nox gnuplot
   # On Ubuntu Chromium is a snap, which cannot be had in a container: the test is skipped there.
   if ! grep -qsx 'ID=ubuntu' /etc/os-release; then
     need_command chromium chromium chromium-browser google-chrome
   fi
-  optional=("${missing[@]}")
-  missing=("${required[@]}")
+  for package in python3-roslaunch python3-rosbag librosbag-dev xvfb; do need_package "$package"; done
 fi
+optional=("${missing[@]}")
+missing=("${required[@]}")
 
 if [ ${#missing[@]} -eq 0 ] && [ ${#optional[@]} -eq 0 ]; then
   echo "All dependencies are installed."

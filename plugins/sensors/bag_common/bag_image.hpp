@@ -1,0 +1,27 @@
+// An image of a bag, read when it is needed.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "bag.hpp"
+#include "viwo/api/measurement.hpp"
+
+namespace viwo::bag {
+
+class BagImage final : public ImageSource {
+ public:
+  /// `load` reads the message; `where` is it for error messages.
+  BagImage(std::shared_ptr<const Bag> bag, std::function<void(Bytes&)> load, bool is_compressed,
+           std::string where);
+  void read(Image& out) const override;
+
+ private:
+  std::shared_ptr<const Bag> bag_;
+  std::function<void(Bytes&)> load_;
+  bool is_compressed_;
+  std::string where_;
+};
+
+}  // namespace viwo::bag

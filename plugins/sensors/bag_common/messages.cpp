@@ -1,0 +1,193 @@
+#include "messages.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include <opencv2/imgproc.hpp>
+
+namespace viwo::bag {
+namespace {
+
+constexpr std::array<std::pair<Kind, std::string_view>, 7> kTypes = {
+    {{Kind::kImu, "sensor_msgs/Imu"},
+     {Kind::kImage, "sensor_msgs/Image"},
+     {Kind::kCompressedImage, "sensor_msgs/CompressedImage"},
+     {Kind::kJoints, "sensor_msgs/JointState"},
+     {Kind::kPose, "geometry_msgs/PoseStamped"},
+     {Kind::kPoseWithCovariance, "geometry_msgs/PoseWithCovarianceStamped"},
+     {Kind::kOdometry, "nav_msgs/Odometry"}}};
+
+/// How an encoding becomes grey.
+struct Encoding {
+  std::string_view name;
+  int channels;
+  int channel_bytes;
+  int conversion;  ///< of OpenCV; negative: the byte of each pixel at -1 - conversion is grey
+};
+
+// OpenCV names a Bayer pattern by its second row.
+constexpr std::array kEncodings{Encoding{"mono8", 1, 1, -1},
+                                Encoding{"8UC1", 1, 1, -1},
+                                Encoding{"mono16", 1, 2, -1},
+                                Encoding{"16UC1", 1, 2, -1},
+                                Encoding{"bgr8", 3, 1, cv::COLOR_BGR2GRAY},
+                                Encoding{"8UC3", 3, 1, cv::COLOR_BGR2GRAY},
+                                Encoding{"rgb8", 3, 1, cv::COLOR_RGB2GRAY},
+                                Encoding{"bgra8", 4, 1, cv::COLOR_BGRA2GRAY},
+                                Encoding{"8UC4", 4, 1, cv::COLOR_BGRA2GRAY},
+                                Encoding{"rgba8", 4, 1, cv::COLOR_RGBA2GRAY},
+                                Encoding{"bayer_rggb8", 1, 1, cv::COLOR_BayerBG2GRAY},
+                                Encoding{"bayer_bggr8", 1, 1, cv::COLOR_BayerRG2GRAY},
+                                Encoding{"bayer_gbrg8", 1, 1, cv::COLOR_BayerGR2GRAY},
+                                Encoding{"bayer_grbg8", 1, 1, cv::COLOR_BayerGB2GRAY},
+                                Encoding{"yuv422", 2, 1, -2},
+                                Encoding{"yuv422_yuy2", 2, 1, -1}};
+
+const Encoding* find_encoding(std::string_view name) {
+  const auto found = std::find_if(kEncodings.begin(), kEncodings.end(),
+                                  [name](const Encoding& known) { return known.name == name; });
+  return found == kEncodings.end() ? nullptr : &*found;
+}
+
+std::array<double, 3> read_vector(FieldReader& in) {
+  std::array<double, 3> v{};
+  for (double& value : v) value = in.f64();
+  return v;
+}
+
+void skip(FieldReader& in, int numbers) {
+  for (int i = 0; i < numbers; ++i) in.f64();
+}
+
+std::vector<double> read_numbers(FieldReader& in) {
+  std::vector<double> numbers(in.count(sizeof(double)));
+  for (double& number : numbers) number = in.f64();
+  return numbers;
+}
+
+/// One byte of each pixel.
+void pick_bytes(const ImageHead& head, std::span<const std::uint8_t> pixels, std::size_t stride,
+                std::size_t offset, Image& out) {
+  for (std::size_t v = 0; v < head.height_px; ++v) {
+    const std::uint8_t* const from = pixels.data() + v * head.row_bytes + offset;
+    std::uint8_t* const to = out.pixels.data() + v * head.width_px;
+    if (stride == 1) {
+      std::copy_n(from, head.width_px, to);
+    } else {
+      for (std::size_t u = 0; u < head.width_px; ++u) to[u] = from[u * stride];
+    }
+  }
+}
+
+std::string size_text(const ImageHead& head) {
+  return std::to_string(head.width_px) + " x " + std::to_string(head.height_px) + " " +
+         head.encoding;
+}
+
+}  // namespace
+
+std::optional<Kind> kind_of(std::string_view type) {
+  std::string plain(type);
+  if (const auto middle = plain.find("/msg/"); middle != std::string::npos) {
+    plain.erase(middle, 4);
+  }
+  for (const auto& [kind, name] : kTypes) {
+    if (name == plain) return kind;
+  }
+  return std::nullopt;
+}
+
+std::string_view type_name(Kind kind) {
+  return std::find_if(kTypes.begin(), kTypes.end(),
+                      [kind](const auto& known) { return known.first == kind; })
+      ->second;
+}
+
+ImuSample read_imu(FieldReader& in) {
+  ImuSample imu;
+  imu.t_ns = in.header();
+  skip(in, 4 + 9);  // an orientation, which not every driver knows, and its covariance
+  imu.gyro_rad_per_s = read_vector(in);
+  skip(in, 9);
+  imu.accel_m_per_s2 = read_vector(in);
+  return imu;
+}
+
+Joints read_joints(FieldReader& in) {
+  Joints joints;
+  joints.t_ns = in.header();
+  joints.names.resize(in.count(sizeof(std::uint32_t)));
+  for (std::string& name : joints.names) name = in.text();
+  joints.positions = read_numbers(in);
+  joints.velocities = read_numbers(in);
+  return joints;
+}
+
+PoseSample read_pose(Kind kind, FieldReader& in) {
+  PoseSample pose;
+  pose.t_ns = in.header();
+  if (kind == Kind::kOdometry) in.text();  // child_frame_id
+  pose.p_BinW_m = read_vector(in);
+  for (double& value : pose.q_BtoW_xyzw) value = in.f64();
+  return pose;
+}
+
+ImageHead read_image_head(FieldReader& in) {
+  ImageHead head;
+  head.t_ns = in.header();
+  head.height_px = in.u32();
+  head.width_px = in.u32();
+  head.encoding = in.text();
+  head.big_endian = in.u8() != 0;
+  head.row_bytes = in.u32();
+  return head;
+}
+
+bool is_known_encoding(std::string_view encoding) { return find_encoding(encoding) != nullptr; }
+
+std::string known_encodings() {
+  std::string names;
+  for (const Encoding& known : kEncodings) {
+    names += (names.empty() ? "" : ", ") + std::string(known.name);
+  }
+  return names;
+}
+
+void to_grey(const ImageHead& head, std::span<const std::uint8_t> pixels, Image& out) {
+  const Encoding* const encoding = find_encoding(head.encoding);
+  if (encoding == nullptr) throw BrokenMessage("encoding '" + head.encoding + "' is not read");
+  constexpr std::uint32_t kMaxSide = 1U << 15;
+  if (head.width_px == 0 || head.height_px == 0 || head.width_px > kMaxSide ||
+      head.height_px > kMaxSide) {
+    throw BrokenMessage("an image of " + size_text(head));
+  }
+  const auto pixel_bytes = static_cast<std::size_t>(encoding->channels * encoding->channel_bytes);
+  const std::size_t used_bytes = head.width_px * pixel_bytes;
+  if (head.row_bytes < used_bytes ||
+      pixels.size() < std::size_t{head.row_bytes} * (head.height_px - 1) + used_bytes) {
+    throw BrokenMessage("an image of " + size_text(head) + " in rows of " +
+                        std::to_string(head.row_bytes) + " bytes has " +
+                        std::to_string(pixels.size()) + " bytes of pixels");
+  }
+  out.width_px = static_cast<int>(head.width_px);
+  out.height_px = static_cast<int>(head.height_px);
+  out.pixels.resize(std::size_t{head.width_px} * head.height_px);
+  if (encoding->conversion < 0) {
+    const bool upper_is_second = encoding->channel_bytes == 2 && !head.big_endian;
+    const auto offset = static_cast<std::size_t>(-1 - encoding->conversion);
+    return pick_bytes(head, pixels, pixel_bytes, offset + (upper_is_second ? 1 : 0), out);
+  }
+  // OpenCV has no matrix of constant data; it does not write to the source of a conversion.
+  const cv::Mat from(out.height_px, out.width_px, CV_8UC(encoding->channels),
+                     const_cast<std::uint8_t*>(pixels.data()), head.row_bytes);
+  cv::Mat to(out.height_px, out.width_px, CV_8UC1, out.pixels.data());
+  try {
+    cv::cvtColor(from, to, encoding->conversion);
+  } catch (const cv::Exception& error) {  // a Bayer pattern of fewer than three rows
+    throw BrokenMessage("an image of " + size_text(head) + ": " + error.err);
+  }
+}
+
+}  // namespace viwo::bag

@@ -1,0 +1,96 @@
+// Pixels of all encodings, against values by hand.
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "messages.hpp"
+
+namespace viwo::bag {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+using Bytes = std::vector<std::uint8_t>;
+
+Image grey(const ImageHead& head, const Bytes& pixels) {
+  Image out;
+  to_grey(head, pixels, out);
+  return out;
+}
+
+ImageHead head(const std::string& encoding, std::uint32_t width_px, std::uint32_t height_px,
+               std::uint32_t row_bytes, bool big_endian = false) {
+  return {0, height_px, width_px, encoding, big_endian, row_bytes};
+}
+
+std::string error_of(const ImageHead& bad, const Bytes& pixels) {
+  try {
+    grey(bad, pixels);
+  } catch (const BrokenMessage& broken) {
+    return broken.what();
+  }
+  return {};
+}
+
+TEST(ToGrey, LeavesOutThePaddingOfRows) {
+  const Image out = grey(head("mono8", 2, 2, 3), {1, 2, 99, 3, 4});  // the last row may end early
+  EXPECT_EQ(out.width_px, 2);
+  EXPECT_EQ(out.height_px, 2);
+  EXPECT_THAT(out.pixels, ElementsAre(1, 2, 3, 4));
+}
+
+TEST(ToGrey, TakesTheUpperByteInTheByteOrderOfTheMessage) {
+  EXPECT_THAT(grey(head("mono16", 2, 1, 4, false), {1, 2, 3, 4}).pixels, ElementsAre(2, 4));
+  EXPECT_THAT(grey(head("16UC1", 2, 1, 4, true), {1, 2, 3, 4}).pixels, ElementsAre(1, 3));
+}
+
+TEST(ToGrey, WeighsColoursInTheOrderOfTheEncoding) {
+  // 0.299 R + 0.587 G + 0.114 B of (200, 100, 50) and of (50, 100, 200)
+  EXPECT_THAT(grey(head("rgb8", 1, 1, 3), {200, 100, 50}).pixels, ElementsAre(124));
+  EXPECT_THAT(grey(head("bgr8", 1, 1, 3), {200, 100, 50}).pixels, ElementsAre(96));
+  EXPECT_THAT(grey(head("8UC3", 1, 1, 3), {200, 100, 50}).pixels, ElementsAre(96));
+  EXPECT_THAT(grey(head("rgba8", 1, 1, 4), {200, 100, 50, 9}).pixels, ElementsAre(124));
+  EXPECT_THAT(grey(head("bgra8", 1, 1, 4), {200, 100, 50, 9}).pixels, ElementsAre(96));
+}
+
+TEST(ToGrey, KnowsWhereTheColoursOfABayerPatternAre) {
+  // Everywhere R = 200, G = 100, B = 50; what is at (row, column) of the pattern's square.
+  const auto field = [](const Bytes& square) {
+    Bytes pixels;
+    for (std::size_t v = 0; v < 6; ++v) {
+      for (std::size_t u = 0; u < 6; ++u) pixels.push_back(square[2 * (v % 2) + u % 2]);
+    }
+    return pixels;
+  };
+  EXPECT_THAT(grey(head("bayer_rggb8", 6, 6, 6), field({200, 100, 100, 50})).pixels, Each(124));
+  EXPECT_THAT(grey(head("bayer_bggr8", 6, 6, 6), field({50, 100, 100, 200})).pixels, Each(124));
+  EXPECT_THAT(grey(head("bayer_gbrg8", 6, 6, 6), field({100, 50, 200, 100})).pixels, Each(124));
+  EXPECT_THAT(grey(head("bayer_grbg8", 6, 6, 6), field({100, 200, 50, 100})).pixels, Each(124));
+}
+
+TEST(ToGrey, TakesTheBrightnessOfYuv) {
+  EXPECT_THAT(grey(head("yuv422", 2, 1, 4), {9, 1, 8, 2}).pixels, ElementsAre(1, 2));
+  EXPECT_THAT(grey(head("yuv422_yuy2", 2, 1, 4), {1, 9, 2, 8}).pixels, ElementsAre(1, 2));
+}
+
+TEST(ToGrey, RefusesSizesThatContradictEachOther) {
+  EXPECT_EQ(error_of(head("mono8", 2, 2, 2), {1, 2, 3}),
+            "an image of 2 x 2 mono8 in rows of 2 bytes has 3 bytes of pixels");
+  EXPECT_EQ(error_of(head("rgb8", 2, 1, 5), Bytes(10)),
+            "an image of 2 x 1 rgb8 in rows of 5 bytes has 10 bytes of pixels");
+  EXPECT_EQ(error_of(head("mono8", 0, 1, 0), {}), "an image of 0 x 1 mono8");
+  EXPECT_EQ(error_of(head("mono8", 1, 0xffffffff, 1), {1}), "an image of 1 x 4294967295 mono8");
+  EXPECT_EQ(error_of(head("32FC1", 1, 1, 4), Bytes(4)), "encoding '32FC1' is not read");
+}
+
+TEST(Kinds, AreThoseOfBothRos) {
+  EXPECT_EQ(kind_of("sensor_msgs/Imu"), Kind::kImu);
+  EXPECT_EQ(kind_of("sensor_msgs/msg/Imu"), Kind::kImu);
+  EXPECT_EQ(kind_of("nav_msgs/msg/Odometry"), Kind::kOdometry);
+  EXPECT_EQ(kind_of("sensor_msgs/msg/PointCloud2"), std::nullopt);
+  EXPECT_EQ(type_name(Kind::kPoseWithCovariance), "geometry_msgs/PoseWithCovarianceStamped");
+}
+
+}  // namespace
+}  // namespace viwo::bag

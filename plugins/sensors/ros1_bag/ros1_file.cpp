@@ -1,0 +1,224 @@
+#include "ros1_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <system_error>
+#include <utility>
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+
+#include "messages.hpp"
+#include "ros1_fields.hpp"
+#include "ros1_structure.hpp"
+#include "viwo/api/status.hpp"
+#include "viwo/log/text.hpp"
+
+namespace viwo::bag {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Of the definitions that messages.cpp reads.
+constexpr std::array<std::pair<Kind, const char*>, 7> kMd5Sums = {
+    {{Kind::kImu, "6a62c6daae103f4ff57a132d6f95cec2"},
+     {Kind::kImage, "060021388200f6f0f447d0fcd9c64743"},
+     {Kind::kCompressedImage, "8f7a12909da2c9d3332d540a0977563f"},
+     {Kind::kJoints, "3066dcd76a6cfaef579bd0f34173e9fd"},
+     {Kind::kPose, "d3812c3cbc69362b77dc0b19b345f8f5"},
+     {Kind::kPoseWithCovariance, "953b798c0f514ff060a53a3498ce6246"},
+     {Kind::kOdometry, "cd5e73d190d741a2f92e81eda573aca7"}}};
+
+/// Where rosbag_storage puts the bytes of a message, once it knows how many they are.
+struct Sink {
+  Bytes& bytes;
+  std::uint8_t* advance(std::uint32_t n) {
+    bytes.resize(n);
+    return bytes.data();
+  }
+};
+
+struct File {
+  std::string name;
+  rosbag::Bag bag;
+  mutable std::mutex mutex;  ///< of the bag, which has one file position and one open chunk
+  std::int64_t begin_ns = 0;
+};
+
+std::int64_t to_ns(const ros::Time& time) {
+  return std::int64_t{time.sec} * 1'000'000'000 + time.nsec;
+}
+
+/// The nearest time that there is in ROS.
+ros::Time to_time(std::int64_t t_ns) {
+  if (t_ns <= to_ns(ros::TIME_MIN)) return ros::TIME_MIN;
+  if (t_ns >= to_ns(ros::TIME_MAX)) return ros::TIME_MAX;
+  ros::Time time;
+  return time.fromNSec(static_cast<std::uint64_t>(t_ns));
+}
+
+void load(const rosbag::MessageInstance& message, Bytes& out) {
+  out.clear();
+  Sink sink{out};
+  message.write(sink);
+}
+
+std::unique_ptr<File> open_file(const fs::path& path) {
+  auto file = std::make_unique<File>();
+  file->name = path.string();
+  check_structure(file->name);
+  try {
+    file->bag.open(file->name, rosbag::bagmode::Read);
+    rosbag::View all(file->bag);
+    if (all.size() > 0) file->begin_ns = to_ns(all.getBeginTime());
+  } catch (const std::exception& broken) {
+    throw InputError(file->name + "  is damaged: " + broken.what());
+  }
+  return file;
+}
+
+class Ros1Bag final : public Bag {
+ public:
+  Ros1Bag(std::string name, std::vector<std::unique_ptr<File>> files)
+      : name_(std::move(name)), files_(std::move(files)) {
+    for (const auto& file : files_) {
+      rosbag::View all(file->bag);
+      if (all.size() > 0 && (begin_ns_ == 0 || file->begin_ns < begin_ns_)) {
+        begin_ns_ = file->begin_ns;
+      }
+      for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
+        add_topic({connection->topic, connection->datatype});
+      }
+    }
+    std::sort(topics_.begin(), topics_.end(),
+              [](const Topic& a, const Topic& b) { return a.name < b.name; });
+  }
+
+  const std::string& name() const override { return name_; }
+  const std::vector<Topic>& topics() const override { return topics_; }
+  std::int64_t begin_ns() const override { return begin_ns_; }
+
+  void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
+            const std::function<void(const Message&)>& visit) const override {
+    for (const auto& file : files_) {
+      const std::scoped_lock lock(file->mutex);
+      try {
+        read_file(*file, wanted, to_time(from_ns), to_time(to_ns), visit);
+      } catch (const InputError&) {
+        throw;
+      } catch (const std::exception& broken) {
+        throw InputError(file->name + "  is damaged: " + broken.what());
+      }
+    }
+  }
+
+  std::unique_ptr<FieldReader> fields(std::span<const std::uint8_t> message) const override {
+    return std::make_unique<Ros1Fields>(message);
+  }
+
+ private:
+  void add_topic(const Topic& topic) {
+    for (const Topic& known : topics_) {
+      if (known.name != topic.name) continue;
+      if (known.type == topic.type) return;
+      throw InputError(name_ + "  topic '" + topic.name + "' is of two types, " + known.type +
+                       " and " + topic.type);
+    }
+    topics_.push_back(topic);
+  }
+
+  /// The layout of the messages must be the one that is read.
+  static void check_definition(const File& file, const rosbag::MessageInstance& message) {
+    const auto kind = kind_of(message.getDataType());
+    for (const auto& [known, md5] : kMd5Sums) {
+      if (known != kind || message.getMD5Sum() == md5) continue;
+      throw InputError(file.name + "  topic '" + message.getTopic() +
+                       "' has another definition of " + message.getDataType() + " (md5 " +
+                       message.getMD5Sum() + ", known is " + md5 + ")");
+    }
+  }
+
+  static void read_file(const File& file, const std::vector<Wanted>& wanted, const ros::Time& from,
+                        const ros::Time& to, const std::function<void(const Message&)>& visit) {
+    std::map<std::string, std::size_t> index;
+    std::vector<std::string> names;
+    for (const Wanted& topic : wanted) {
+      index[topic.name] = names.size();
+      names.push_back(topic.name);
+    }
+    std::vector<std::int64_t> numbers(wanted.size(), 0);
+    rosbag::View view(file.bag, rosbag::TopicQuery(names), from, to);
+    Bytes bytes;
+    for (const rosbag::MessageInstance& instance : view) {
+      Message message;
+      message.topic = index.at(instance.getTopic());
+      message.number = ++numbers[message.topic];
+      if (message.number == 1) check_definition(file, instance);
+      message.received_ns = to_ns(instance.getTime());
+      message.file = &file.name;
+      load(instance, bytes);
+      message.bytes = bytes;
+      if (wanted[message.topic].large) {
+        message.load = [&file, instance](Bytes& out) { load_again(file, instance, out); };
+      }
+      visit(message);
+    }
+  }
+
+  static void load_again(const File& file, const rosbag::MessageInstance& message, Bytes& out) {
+    const std::scoped_lock lock(file.mutex);
+    try {
+      load(message, out);
+    } catch (const std::exception& broken) {
+      throw InputError(file.name + "  is damaged: " + broken.what());
+    }
+  }
+
+  std::string name_;
+  std::vector<std::unique_ptr<File>> files_;
+  std::vector<Topic> topics_;
+  std::int64_t begin_ns_ = 0;
+};
+
+}  // namespace
+
+std::shared_ptr<const Bag> open_ros1(const fs::path& path, const std::vector<std::string>& names) {
+  std::vector<std::unique_ptr<File>> files;
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) {
+    if (!names.empty()) {
+      throw ParamError("paths",
+                       "names of bags need a folder as path, not the file " + path.string());
+    }
+    files.push_back(open_file(path));
+    return std::make_shared<Ros1Bag>(path.string(), std::move(files));
+  }
+  for (const std::string& name : names) {
+    if (!fs::exists(path / name, ignored)) {
+      std::vector<std::string> there;
+      for (const auto& entry : fs::directory_iterator(path)) {
+        if (entry.path().extension() == ".bag") there.push_back(entry.path().filename().string());
+      }
+      std::sort(there.begin(), there.end());
+      throw ParamError(
+          "paths", "no file '" + name + "' in " + path.string() + log::did_you_mean(name, there));
+    }
+    files.push_back(open_file(path / name));
+  }
+  if (names.empty()) {
+    for (const auto& entry : fs::directory_iterator(path)) {
+      if (entry.path().extension() == ".bag") files.push_back(open_file(entry.path()));
+    }
+    if (files.empty()) throw ParamError("path", "no *.bag in the folder " + path.string());
+    std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) {
+      return std::pair(a->begin_ns, a->name) < std::pair(b->begin_ns, b->name);
+    });
+  }
+  return std::make_shared<Ros1Bag>(path.string(), std::move(files));
+}
+
+}  // namespace viwo::bag

@@ -1,0 +1,238 @@
+#include "ros1_structure.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <set>
+#include <string_view>
+#include <vector>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "viwo/api/status.hpp"
+
+namespace viwo::bag {
+namespace {
+
+/// Kinds of records: the field `op`.
+constexpr char kMessage = 0x02, kFileHeader = 0x03, kIndex = 0x04, kChunk = 0x05, kChunkInfo = 0x06,
+               kConnection = 0x07;
+constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
+constexpr std::uint32_t kMaxHeader = 1U << 20;
+
+std::uint32_t u32_at(std::string_view bytes) {
+  std::uint32_t value = 0;  // little endian, as all that rosbag_storage runs on
+  std::memcpy(&value, bytes.data(), sizeof(value));
+  return value;
+}
+
+class Structure {
+ public:
+  explicit Structure(const std::string& file) : file_(file), fd_(::open(file.c_str(), O_RDONLY)) {
+    if (fd_ < 0) throw InputError(file_ + "  cannot be read: " + std::strerror(errno));
+    const off_t end = ::lseek(fd_, 0, SEEK_END);
+    size_ = end > 0 ? static_cast<std::uint64_t>(end) : 0;
+  }
+  ~Structure() { ::close(fd_); }
+  Structure(const Structure&) = delete;
+  Structure& operator=(const Structure&) = delete;
+
+  void check() {
+    check_magic();
+    std::uint64_t at = kMagic.size();
+    while (at < size_) {
+      const Record record = read_record(at, size_);
+      check_record(record);
+      at = record.end;
+    }
+    for (const std::uint64_t place : wanted_chunks_) {
+      if (!chunks_.contains(place)) fail(place, "there is no chunk where the index has one");
+    }
+    for (const std::uint32_t connection : indexed_) {
+      if (!connections_.contains(connection)) fail(size_, "a connection is missing");
+    }
+  }
+
+ private:
+  struct Record {
+    std::uint64_t begin = 0;
+    std::uint64_t data = 0;
+    std::uint64_t end = 0;
+    char op = 0;
+    std::string header;
+
+    /// The value of a field; empty when there is none.
+    std::string_view field(std::string_view name) const {
+      std::string_view rest = header;
+      while (!rest.empty()) {  // lengths have been checked
+        const std::string_view item = rest.substr(4, u32_at(rest));
+        rest.remove_prefix(4 + item.size());
+        if (item.substr(0, item.find('=')) == name) return item.substr(name.size() + 1);
+      }
+      return {};
+    }
+  };
+
+  std::string remedy() const {
+    return " - `rosbag reindex " + file_ + "` mends what can be mended";
+  }
+
+  [[noreturn]] void fail(std::uint64_t at, const std::string& what) const {
+    throw InputError(file_ + "  is cut short or damaged: at byte " + std::to_string(at) + ", " +
+                     what + remedy());
+  }
+
+  std::string read(std::uint64_t at, std::size_t n) const {
+    std::string bytes(n, '\0');
+    const ssize_t got = ::pread(fd_, bytes.data(), n, static_cast<off_t>(at));
+    if (got != static_cast<ssize_t>(n)) fail(at, "the file cannot be read");
+    return bytes;
+  }
+
+  void check_magic() const {
+    if (size_ == 0) throw InputError(file_ + "  is empty");
+    const std::string begin = read(0, std::min<std::size_t>(kMagic.size(), size_));
+    if (begin == kMagic) return;
+    if (begin.starts_with("#ROSBAG V")) {
+      throw InputError(file_ + "  is a bag of another format than 2.0");
+    }
+    throw InputError(file_ + "  is no ROS 1 bag");
+  }
+
+  Record read_record(std::uint64_t at, std::uint64_t end) const {
+    constexpr std::size_t kMost = 128;  // of a header: one read for nearly all records
+    const std::string begin = read(at, std::min<std::uint64_t>(kMost, end - at));
+    if (begin.size() < 8) fail(at, "a record goes beyond the end");
+    const std::uint32_t size = u32_at(begin);
+    if (size > kMaxHeader || size > end - at - 8) fail(at, "a record goes beyond the end");
+    Record record;
+    record.begin = at;
+    const std::string rest =
+        size + 8 <= begin.size() ? begin.substr(4, size + 4) : read(at + 4, size + 4);
+    record.header = rest.substr(0, size);
+    record.data = at + 8 + size;
+    const std::uint32_t data_size = u32_at(std::string_view(rest).substr(size));
+    if (data_size > end - record.data) fail(at, "a record goes beyond the end");
+    record.end = record.data + data_size;
+    check_fields(record);
+    const std::string_view op = record.field("op");
+    if (op.size() != 1) fail(at, "a record has no kind");
+    record.op = op[0];
+    return record;
+  }
+
+  void check_fields(const Record& record) const {
+    std::string_view rest = record.header;
+    while (!rest.empty()) {
+      if (rest.size() < 4 || u32_at(rest) > rest.size() - 4 ||
+          rest.substr(4, u32_at(rest)).find('=') == std::string_view::npos) {
+        fail(record.begin, "the header of a record is wrong");
+      }
+      rest.remove_prefix(4 + u32_at(rest));
+    }
+  }
+
+  std::uint32_t number(const Record& record, std::string_view name) const {
+    const std::string_view value = record.field(name);
+    if (value.size() != 4) fail(record.begin, "a record lacks a number");
+    return u32_at(value);
+  }
+
+  std::uint64_t place(const Record& record, std::string_view name) const {
+    const std::string_view value = record.field(name);
+    std::uint64_t out = 0;
+    if (value.size() != sizeof(out)) fail(record.begin, "a record lacks a place");
+    std::memcpy(&out, value.data(), sizeof(out));
+    return out;
+  }
+
+  void check_record(const Record& record) {
+    switch (record.op) {
+      case kFileHeader:
+        return check_file_header(record);
+      case kChunk:
+        return check_chunk(record);
+      case kIndex:
+        return check_index(record);
+      case kChunkInfo:
+        wanted_chunks_.insert(place(record, "chunk_pos"));
+        return check_list(record, 8);
+      case kConnection:
+        connections_.insert(number(record, "conn"));
+        return;
+      default:
+        fail(record.begin, "a record is of an unknown kind");
+    }
+  }
+
+  void check_file_header(const Record& record) const {
+    const std::string_view encryptor = record.field("encryptor");
+    if (!encryptor.empty() && encryptor != "rosbag/NoEncryptor") {
+      throw InputError(file_ + "  is encrypted, which is not read");
+    }
+    const std::uint64_t index = place(record, "index_pos");
+    if (index == 0) {
+      throw InputError(file_ + "  has no index: its recording was not ended" + remedy());
+    }
+    if (index > size_) fail(size_, "the file ends before its index");
+  }
+
+  /// A list of items as long as `count` says.
+  void check_list(const Record& record, std::uint64_t item_bytes) const {
+    if (record.end - record.data != item_bytes * number(record, "count")) {
+      fail(record.begin, "a list has another length than it says");
+    }
+  }
+
+  void check_chunk(const Record& chunk) {
+    chunks_.insert(chunk.begin);
+    messages_.clear();
+    chunk_size_ = number(chunk, "size");
+    is_compressed_ = chunk.field("compression") != "none";
+    if (is_compressed_) return;
+    if (chunk.end - chunk.data != chunk_size_) fail(chunk.begin, "a chunk has another size");
+    for (std::uint64_t at = chunk.data; at < chunk.end;) {
+      const Record record = read_record(at, chunk.end);
+      if (record.op == kMessage) {
+        messages_.push_back(static_cast<std::uint32_t>(at - chunk.data));
+      } else if (record.op != kConnection) {
+        fail(at, "a record is of an unknown kind");
+      }
+      at = record.end;
+    }
+  }
+
+  /// Of the messages of the chunk before it.
+  void check_index(const Record& record) {
+    constexpr std::size_t kEntry = 12;  // time and offset
+    indexed_.insert(number(record, "conn"));
+    check_list(record, kEntry);
+    const std::string data = read(record.data, record.end - record.data);
+    for (std::size_t i = 0; i < data.size(); i += kEntry) {
+      const std::uint32_t offset = u32_at(std::string_view(data).substr(i + 8));
+      const bool is_message = is_compressed_
+                                  ? std::uint64_t{offset} + 8 < chunk_size_
+                                  : std::binary_search(messages_.begin(), messages_.end(), offset);
+      if (!is_message) fail(record.begin, "there is no message where the index has one");
+    }
+  }
+
+  std::string file_;
+  int fd_;
+  std::uint64_t size_ = 0;
+  std::set<std::uint64_t> chunks_, wanted_chunks_;
+  std::set<std::uint32_t> connections_, indexed_;
+  // Of the last chunk:
+  std::vector<std::uint32_t> messages_;  ///< where they are in it
+  std::uint32_t chunk_size_ = 0;
+  bool is_compressed_ = false;
+};
+
+}  // namespace
+
+void check_structure(const std::string& file) { Structure(file).check(); }
+
+}  // namespace viwo::bag

@@ -1,0 +1,193 @@
+// The sensor ros1_bag as the host loads it: what it drops, counts and refuses.
+#include <limits>
+#include <random>
+
+#include "test_fixture.hpp"
+#include "viwo/image/image_file.hpp"
+
+namespace viwo {
+namespace {
+
+TEST_F(Ros1Bag, NamesTheTopicsThatThereAre) {
+  write_drive();
+  const std::string in_file = " in " + file();
+  EXPECT_THAT(error_of(section("imu_topic: /imu1")),
+              HasSubstr("sensor.imu_topic: no topic '/imu1'" + in_file +
+                        " - did you mean '/imu0'? - of type sensor_msgs/Imu there are: /imu0"));
+  EXPECT_THAT(error_of(section("image_topics: [/camera]")),
+              HasSubstr("sensor.image_topics: no topic '/camera'" + in_file +
+                        " - of type sensor_msgs/Image or sensor_msgs/CompressedImage there are: "
+                        "/cam0/image_raw, /cam1/image_raw"));
+  EXPECT_THAT(error_of(section("odometry_topic: /odom")),
+              HasSubstr("sensor.odometry_topic: no topic '/odom'" + in_file +
+                        " - there is no topic of type nav_msgs/Odometry"));
+  EXPECT_THAT(error_of(section("imu_topic: /truth")),
+              HasSubstr("sensor.imu_topic: topic '/truth'" + in_file +
+                        " is of type geometry_msgs/PoseStamped, needed is sensor_msgs/Imu - there "
+                        "are: /imu0"));
+}
+
+TEST_F(Ros1Bag, NamesTheJointsThatThereAre) {
+  write_drive();
+  EXPECT_THAT(error_of(section("joint_topic: /joint_states, drive_joints: [drive_1, drive_3]")),
+              HasSubstr("sensor.drive_joints: no joint 'drive_3' on topic '/joint_states' in " +
+                        file() + " - did you mean 'drive_1'?"));
+  EXPECT_THAT(error_of(section("joint_topic: /joint_states, drive_joints: [drive_1], "
+                               "steer_joints: [rudder]")),
+              HasSubstr("sensor.steer_joints: no joint 'rudder' on topic '/joint_states' in " +
+                        file() + " - there are: steer_1, drive_1, arm, drive_2"));
+}
+
+TEST_F(Ros1Bag, RefusesParametersThatContradictEachOther) {
+  write_drive();
+  EXPECT_THAT(error_of(section("clock: stamp")),
+              HasSubstr("sensor.path: nothing to read: give one of imu_topic, image_topics"));
+  EXPECT_THAT(error_of(section("joint_topic: /joint_states")),
+              HasSubstr("sensor.joint_topic: a joint_topic needs drive_joints"));
+  EXPECT_THAT(error_of(section("imu_topic: /imu0, drive_joints: [a]")),
+              HasSubstr("sensor.drive_joints: names of joints need the joint_topic"));
+  EXPECT_THAT(error_of(section("pose_topic: /truth, odometry_topic: /o")),
+              HasSubstr("sensor.odometry_topic: pose_topic and odometry_topic both give poses"));
+  EXPECT_THAT(error_of(section("image_topics: [/cam0/image_raw, /cam0/image_raw]")),
+              HasSubstr("sensor.image_topics: '/cam0/image_raw' is there twice"));
+  EXPECT_THAT(error_of(section("imu_topic: /imu0, paths: [b.bag]")),
+              HasSubstr("sensor.paths: names of bags need a folder as path"));
+}
+
+TEST_F(Ros1Bag, CountsStampsThatGoBackGapsAndValuesThatAreNoNumbers) {
+  {
+    Ros1Writer out(file());
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    std::int64_t received = kStart;
+    for (const std::int64_t ms : {0, 5, 3, 10, 500}) {
+      out.write_imu("/imu0", {kStart + ms * kMs, received += kMs}, {}, {});
+    }
+    out.write_imu("/imu0", {kStart + 510 * kMs, received += kMs}, {0., nan, 0.}, {});
+    out.close();
+  }
+  const auto rejections = rejections_of(section("imu_topic: /imu0, max_rejected_fraction: 0.4"));
+  ASSERT_EQ(rejections.size(), 3U);
+  EXPECT_EQ(rejections[0].reason, "/imu0: stamp not after the previous one");
+  EXPECT_EQ(rejections[0].first, "a.bag: message 3");
+  EXPECT_EQ(rejections[1].reason, "/imu0: gap longer than 0.2 s");
+  EXPECT_EQ(rejections[1].first, "a.bag: message 5");
+  EXPECT_EQ(rejections[2].reason, "/imu0: value that is not finite");
+  EXPECT_EQ(rejections[2].count, 1);
+  EXPECT_THAT(error_of(section("imu_topic: /imu0")), HasSubstr("2 of 6 messages rejected"));
+}
+
+TEST_F(Ros1Bag, CountsAMessageThatIsBroken) {
+  write_drive();
+  // The number of names stands before the length of the first one.
+  patch("steer_1", 3, -8, "\xff\xff\xff\x7f");
+  const auto sensor = make_sensor(section(kAll));
+  EXPECT_EQ(only<EncoderSample>(play(*sensor)).size(), 19U);
+  std::vector<RejectionCount> rejections;
+  sensor->rejections(rejections);
+  ASSERT_EQ(rejections.size(), 1U);
+  EXPECT_EQ(rejections[0].reason,
+            "/joint_states: broken message: a list is longer than its message");
+  EXPECT_EQ(rejections[0].first, "a.bag: message 3");
+}
+
+TEST_F(Ros1Bag, ABrokenImageIsAnErrorWhenItIsRead) {
+  {
+    Ros1Writer out(file());
+    out.write_image("/cam0", {1, 1}, {3, 2, "mono8", false, 4, {1, 2, 3, 4, 5, 6}});
+    std::vector<std::uint8_t> png = encode_png({2, 1, {17, 200}});
+    png.resize(png.size() / 2);
+    out.write_compressed_image("/cam1", {1, 1}, "png", png);
+    out.write_image("/depth", {1, 1}, {1, 1, "32FC1", false, 4, {1, 2, 3, 4}});
+    out.close();
+  }
+  const auto images = play_only<ImageSample>(section("image_topics: [/cam0, /cam1]"));
+  ASSERT_EQ(images.size(), 2U);
+  const auto error = [](const ImageSample& sample) -> std::string {
+    try {
+      read_image(sample);
+    } catch (const InputError& broken) {
+      return broken.what();
+    }
+    return {};
+  };
+  EXPECT_EQ(error(images[0]), file() +
+                                  ": /cam0 message 1: an image of 3 x 2 mono8 in rows of 4 "
+                                  "bytes has 6 bytes of pixels");
+  EXPECT_EQ(error(images[1]), file() + ": /cam1 message 1: the image is cut short");
+  EXPECT_THAT(error_of(section("image_topics: [/depth]")),
+              HasSubstr(file() + "  topic '/depth' has images of encoding '32FC1': what is read "
+                                 "is mono8, "));
+}
+
+TEST_F(Ros1Bag, SaysWhatToDoWithABagThatWasCutShort) {
+  write_drive();
+  const std::string whole = read();
+  for (const double part : {0.01, 0.5, 0.99}) {
+    fs::resize_file(file(), static_cast<std::uintmax_t>(part * static_cast<double>(whole.size())));
+    const std::string error = error_of(section(kAll));
+    EXPECT_THAT(error, HasSubstr(file() + "  is cut short or damaged: ")) << part;
+    EXPECT_THAT(error, HasSubstr("`rosbag reindex " + file() + "`")) << part;
+    std::ofstream(file(), std::ios::binary) << whole;
+  }
+  // As a recorder leaves it that was killed.
+  patch("index_pos=", 1, 10, std::string(8, '\0'));
+  EXPECT_THAT(error_of(section(kAll)),
+              HasSubstr(file() + "  has no index: its recording was not ended - `rosbag reindex " +
+                        file() + "` mends what can be mended"));
+}
+
+TEST_F(Ros1Bag, RefusesWhatIsNoBag) {
+  EXPECT_THAT(error_of(section(kAll, "no.bag")),
+              HasSubstr(file("no.bag") + "  cannot be read: No such file or directory"));
+  std::ofstream(file("empty.bag")).flush();
+  EXPECT_THAT(error_of(section(kAll, "empty.bag")), HasSubstr(file("empty.bag") + "  is empty"));
+  std::ofstream(file("text.bag")) << "timestamp_ns,x\n1,2\n";
+  EXPECT_THAT(error_of(section(kAll, "text.bag")),
+              HasSubstr(file("text.bag") + "  is no ROS 1 bag"));
+}
+
+TEST_F(Ros1Bag, RefusesADamagedChunk) {
+  write_drive(200, "bz2");
+  patch("BZh", 2, 60, std::string(40, '\x55'));
+  EXPECT_THAT(error_of(section(kAll)), HasSubstr(file() + "  is damaged: "));
+}
+
+TEST_F(Ros1Bag, SurvivesBytesThatAreWrongAnywhere) {
+  for (const std::string compression : {"none", "lz4"}) {
+    write_drive(40, compression);
+    const std::string whole = read();
+    std::mt19937_64 random(5);
+    int refused = 0;
+    for (int k = 0; k < 300; ++k) {
+      std::string content = whole;
+      for (std::uint64_t i = 0; i <= random() % 3; ++i) {
+        content[random() % content.size()] = static_cast<char>(random());
+      }
+      std::ofstream(file(), std::ios::binary) << content;
+      try {
+        for (const ImageSample& image : only<ImageSample>(play(*make_sensor(section(kAll))))) {
+          read_image(image);
+        }
+      } catch (const InputError&) {
+        ++refused;  // anything else, or a crash, ends the test
+      }
+    }
+    EXPECT_GT(refused, 50) << compression;
+    EXPECT_LT(refused, 299) << compression;
+  }
+}
+
+TEST_F(Ros1Bag, RefusesAnotherDefinitionOfAMessage) {
+  write_drive();
+  std::string content = read();
+  const std::string md5 = "6a62c6daae103f4ff57a132d6f95cec2";
+  for (std::size_t at = 0; (at = content.find(md5, at)) != std::string::npos;) content[at] = '7';
+  std::ofstream(file(), std::ios::binary) << content;
+  EXPECT_THAT(error_of(section("imu_topic: /imu0")),
+              HasSubstr("topic '/imu0' has another definition of sensor_msgs/Imu (md5 7a62c6daae10"
+                        "3f4ff57a132d6f95cec2, known is " +
+                        md5 + ")"));
+}
+
+}  // namespace
+}  // namespace viwo

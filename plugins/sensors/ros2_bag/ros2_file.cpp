@@ -1,0 +1,128 @@
+#include "ros2_file.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <yaml-cpp/yaml.h>
+
+#include "database.hpp"
+#include "ros2_fields.hpp"
+#include "viwo/api/status.hpp"
+
+namespace viwo::bag {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kRemedy =
+    ": what is read is SQLite (storage_id sqlite3) without compression - `ros2 bag convert` makes "
+    "it";
+
+/// The files that metadata.yaml lists.
+std::vector<fs::path> files_of(const fs::path& folder, const fs::path& metadata) {
+  std::vector<fs::path> files;
+  try {
+    const YAML::Node info = YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"];
+    if (!info.IsMap()) {
+      throw InputError(metadata.string() + "  has no rosbag2_bagfile_information");
+    }
+    const auto text = [&info](const char* key) { return info[key].as<std::string>(""); };
+    if (text("storage_identifier") != "sqlite3") {
+      throw InputError(folder.string() + "  is stored as '" + text("storage_identifier") + "'" +
+                       kRemedy);
+    }
+    if (!text("compression_format").empty()) {
+      throw InputError(folder.string() + "  is compressed (" + text("compression_format") + ")" +
+                       kRemedy);
+    }
+    for (const YAML::Node& file : info["relative_file_paths"]) {
+      // Early versions write the folder, too.
+      files.push_back(folder / fs::path(file.as<std::string>()).filename());
+    }
+  } catch (const YAML::Exception& error) {
+    throw InputError(metadata.string() + "  cannot be read: " + error.what());
+  }
+  if (files.empty()) throw InputError(metadata.string() + "  lists no files");
+  return files;
+}
+
+std::vector<fs::path> files_of(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) {
+    const std::string extension = path.extension().string();
+    if (extension == ".mcap" || extension == ".zstd" || extension == ".lz4") {
+      throw InputError(path.string() + "  is a file " + extension + kRemedy);
+    }
+    return {path};
+  }
+  const fs::path metadata = path / "metadata.yaml";
+  if (fs::exists(metadata, ignored)) return files_of(path, metadata);
+  std::vector<fs::path> files;  // its recording was not ended
+  for (const auto& entry : fs::directory_iterator(path)) {
+    if (entry.path().extension() == ".db3") files.push_back(entry.path());
+  }
+  if (files.empty()) {
+    throw InputError(path.string() + "  is no ROS 2 bag: it has neither metadata.yaml nor *.db3");
+  }
+  return files;
+}
+
+class Ros2Bag final : public Bag {
+ public:
+  Ros2Bag(std::string name, std::vector<std::unique_ptr<Database>> files)
+      : name_(std::move(name)), files_(std::move(files)) {
+    std::sort(files_.begin(), files_.end(), [](const auto& a, const auto& b) {
+      return std::pair(a->begin_ns(), a->name()) < std::pair(b->begin_ns(), b->name());
+    });
+    bool is_first = true;
+    for (const auto& file : files_) {
+      for (const Topic& topic : file->topics()) add_topic(topic);
+      if (file->is_empty() || !is_first) continue;
+      is_first = false;
+      begin_ns_ = file->begin_ns();
+    }
+    std::sort(topics_.begin(), topics_.end(),
+              [](const Topic& a, const Topic& b) { return a.name < b.name; });
+  }
+
+  const std::string& name() const override { return name_; }
+  const std::vector<Topic>& topics() const override { return topics_; }
+  std::int64_t begin_ns() const override { return begin_ns_; }
+  void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
+            const std::function<void(const Message&)>& visit) const override {
+    for (const auto& file : files_) file->read(wanted, from_ns, to_ns, visit);
+  }
+  std::unique_ptr<FieldReader> fields(std::span<const std::uint8_t> message) const override {
+    return std::make_unique<Ros2Fields>(message);
+  }
+
+ private:
+  void add_topic(const Topic& topic) {
+    for (const Topic& known : topics_) {
+      if (known.name != topic.name) continue;
+      if (known.type == topic.type) return;
+      throw InputError(name_ + "  topic '" + topic.name + "' is of two types, " + known.type +
+                       " and " + topic.type);
+    }
+    topics_.push_back(topic);
+  }
+
+  std::string name_;
+  std::vector<std::unique_ptr<Database>> files_;
+  std::vector<Topic> topics_;
+  std::int64_t begin_ns_ = 0;
+};
+
+}  // namespace
+
+std::shared_ptr<const Bag> open_ros2(const fs::path& path) {
+  std::vector<std::unique_ptr<Database>> files;
+  for (const fs::path& file : files_of(path)) files.push_back(std::make_unique<Database>(file));
+  return std::make_shared<Ros2Bag>(path.string(), std::move(files));
+}
+
+}  // namespace viwo::bag

@@ -1,0 +1,368 @@
+// The sensor ros2_bag as the host loads it, on bags that SQLite and fastcdr have written.
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <fastcdr/Cdr.h>
+#include <fastcdr/FastBuffer.h>
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+
+#include "support.hpp"
+#include "viwo/image/image_file.hpp"
+
+namespace viwo {
+namespace {
+
+namespace fs = std::filesystem;
+using eprosima::fastcdr::Cdr;
+using eprosima::fastcdr::FastBuffer;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr std::int64_t kStart = 1'700'000'000'123'456'789;
+constexpr std::int64_t kMs = 1'000'000;
+
+/// A message in the making, in either byte order.
+class Cdr2 {
+ public:
+  explicit Cdr2(Cdr::Endianness order = Cdr::LITTLE_ENDIANNESS)
+      : out_(buffer_, order, Cdr::DDS_CDR) {
+    out_.serialize_encapsulation();
+  }
+  template <class T>
+  Cdr2& operator<<(const T& value) {
+    out_ << value;
+    return *this;
+  }
+  Cdr2& header(std::int64_t t_ns, const std::string& frame = "f") {
+    return *this << static_cast<std::int32_t>(t_ns / 1'000'000'000)
+                 << static_cast<std::uint32_t>(t_ns % 1'000'000'000) << frame;
+  }
+  std::string bytes() { return {buffer_.getBuffer(), out_.getSerializedDataLength()}; }
+
+ private:
+  FastBuffer buffer_;
+  Cdr out_;
+};
+
+std::string imu(std::int64_t t_ns, double x, Cdr::Endianness order = Cdr::LITTLE_ENDIANNESS) {
+  Cdr2 out(order);
+  out.header(t_ns, "imu_link") << std::array{0., 0., 0., 1.} << std::array<double, 9>{}
+                               << std::array{x, -x, 0.2} << std::array<double, 9>{}
+                               << std::array{1., x, 9.81} << std::array<double, 9>{};
+  return out.bytes();
+}
+
+std::string joints(std::int64_t t_ns, double x) {
+  Cdr2 out;
+  out.header(t_ns, "") << std::vector<std::string>{"steer", "drive"} << std::vector<double>{x, 0.}
+                       << std::vector<double>{0., 3. + x} << std::vector<double>{};
+  return out.bytes();
+}
+
+std::string image(std::int64_t t_ns, std::uint8_t value, std::size_t size = 6) {
+  Cdr2 out;
+  out.header(t_ns, "camera") << std::uint32_t{2} << std::uint32_t{3} << std::string("mono8")
+                             << std::uint8_t{0} << std::uint32_t{3}
+                             << std::vector<std::uint8_t>(size, value);
+  return out.bytes();
+}
+
+/// Writes a .db3 with the tables of rosbag2.
+class Writer {
+ public:
+  explicit Writer(const std::string& file) {
+    sqlite3* database = nullptr;
+    EXPECT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+    database_.reset(database);
+    run("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
+        "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)");
+    run("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, "
+        "timestamp INTEGER NOT NULL, data BLOB NOT NULL)");
+    run("CREATE INDEX timestamp_idx ON messages (timestamp ASC)");
+    run("BEGIN");
+  }
+  ~Writer() { run("COMMIT"); }
+
+  void topic(int id, const std::string& name, const std::string& type,
+             const std::string& format = "cdr") {
+    run("INSERT INTO topics VALUES (" + std::to_string(id) + ", '" + name + "', '" + type + "', '" +
+        format + "', '')");
+  }
+  void message(int topic, std::int64_t received_ns, const std::string& data) {
+    sqlite3_stmt* insert = nullptr;
+    ASSERT_EQ(
+        sqlite3_prepare_v2(database_.get(),
+                           "INSERT INTO messages(topic_id, timestamp, data) VALUES (?1, ?2, ?3)",
+                           -1, &insert, nullptr),
+        SQLITE_OK);
+    sqlite3_bind_int(insert, 1, topic);
+    sqlite3_bind_int64(insert, 2, received_ns);
+    sqlite3_bind_blob(insert, 3, data.data(), static_cast<int>(data.size()), SQLITE_STATIC);
+    EXPECT_EQ(sqlite3_step(insert), SQLITE_DONE);
+    sqlite3_finalize(insert);
+  }
+
+ private:
+  void run(const std::string& sql) {
+    ASSERT_EQ(sqlite3_exec(database_.get(), sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
+        << sqlite3_errmsg(database_.get());
+  }
+  struct Close {
+    void operator()(sqlite3* database) const { sqlite3_close(database); }
+  };
+  std::unique_ptr<sqlite3, Close> database_;
+};
+
+class Ros2Bag : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) /
+              (std::string("viwo_ros2_") +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string file(const std::string& name = "bag_0.db3") const {
+    return (folder_ / name).string();
+  }
+  std::string section(const std::string& rest, const std::string& name = "bag_0.db3") const {
+    return "{type: ros2_bag, path: " + file(name) + ", " + rest + "}";
+  }
+
+  /// Samples begin..end-1 at 5 ms, images and poses at each fourth.
+  void write_drive(const std::string& name = "bag_0.db3", int begin = 0, int end = 20) const {
+    Writer out(file(name));
+    out.topic(1, "/imu0", "sensor_msgs/msg/Imu");
+    out.topic(2, "/joints", "sensor_msgs/msg/JointState");
+    out.topic(3, "/cam0", "sensor_msgs/msg/Image");
+    out.topic(4, "/png", "sensor_msgs/msg/CompressedImage");
+    out.topic(5, "/pose", "geometry_msgs/msg/PoseStamped");
+    out.topic(6, "/odom", "nav_msgs/msg/Odometry");
+    for (int k = begin; k < end; ++k) {
+      const std::int64_t t = kStart + 5 * k * kMs;
+      const double x = 0.1 * k + 1. / 3.;
+      out.message(1, t + kMs, imu(t, x));
+      out.message(2, t + kMs, joints(t, x));
+      if (k % 4 != 0) continue;
+      out.message(3, t + kMs, image(t, static_cast<std::uint8_t>(k)));
+      out.message(4, t + kMs, png(t, static_cast<std::uint8_t>(k + 100)));
+      Cdr2 pose, odometry;
+      pose.header(t) << std::array{x, 1., 2.} << std::array{0., 0., 0.6, 0.8};
+      odometry.header(t) << std::string("base_link") << std::array{x, 3., 4.}
+                         << std::array{0.6, 0., 0., 0.8} << std::array<double, 36>{}
+                         << std::array<double, 6>{} << std::array<double, 36>{};
+      out.message(5, t + kMs, pose.bytes());
+      out.message(6, t + kMs, odometry.bytes());
+    }
+  }
+
+  static std::string png(std::int64_t t_ns, std::uint8_t value) {
+    Cdr2 out;
+    // A frame so long that its head alone would not do as a message.
+    out.header(t_ns, std::string(100, 'x')) << std::string("png") << encode_png({2, 1, {value, 7}});
+    return out.bytes();
+  }
+
+  void write_metadata(const std::string& storage, const std::string& compression,
+                      const std::string& files) const {
+    std::ofstream(folder_ / "metadata.yaml")
+        << "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: " << storage
+        << "\n  compression_format: \"" << compression << "\"\n  compression_mode: \"\"\n"
+        << "  relative_file_paths: " << files << "\n";
+  }
+
+  static constexpr const char* kAll =
+      "imu_topic: /imu0, joint_topic: /joints, drive_joints: [drive], steer_joints: [steer], "
+      "image_topics: [/cam0, /png], pose_topic: /pose";
+
+  fs::path folder_;
+};
+
+TEST_F(Ros2Bag, GivesAllTopicsInTimeOrderToTheBit) {
+  write_drive();
+  const auto all = play(*make_sensor(section(kAll)));
+  const double x = 0.1 * 4 + 1. / 3.;
+  const auto imu_samples = only<ImuSample>(all);
+  ASSERT_EQ(imu_samples.size(), 20U);
+  EXPECT_EQ(imu_samples[4].t_ns, kStart + 20 * kMs);
+  EXPECT_EQ(imu_samples[4].gyro_rad_per_s, (std::array{x, -x, 0.2}));
+  EXPECT_EQ(imu_samples[4].accel_m_per_s2, (std::array{1., x, 9.81}));
+  const auto wheels = only<EncoderSample>(all);
+  ASSERT_EQ(wheels.size(), 20U);
+  EXPECT_EQ(wheels[4].t_ns, kStart + 20 * kMs);
+  EXPECT_EQ(wheels[4].drive_rad_per_s[0], 3. + x);
+  EXPECT_EQ(wheels[4].steer_rad[0], x);
+  const auto poses = only<PoseSample>(all);
+  ASSERT_EQ(poses.size(), 5U);
+  EXPECT_EQ(poses[1].p_BinW_m, (std::array{x, 1., 2.}));
+  EXPECT_EQ(poses[1].q_BtoW_xyzw, (std::array{0., 0., 0.6, 0.8}));
+  const auto images = only<ImageSample>(all);
+  ASSERT_EQ(images.size(), 10U);
+  Image pixels;
+  images[2].source->read(pixels);
+  EXPECT_EQ(images[2].t_ns, kStart + 20 * kMs);
+  EXPECT_EQ(pixels.width_px, 3);
+  EXPECT_THAT(pixels.pixels, ElementsAre(4, 4, 4, 4, 4, 4));
+  images[3].source->read(pixels);
+  EXPECT_EQ(images[3].camera, 1);
+  EXPECT_THAT(pixels.pixels, ElementsAre(104, 7));
+  const auto odometry = play_only<PoseSample>(section("odometry_topic: /odom"));
+  ASSERT_EQ(odometry.size(), 5U);
+  EXPECT_EQ(odometry[1].p_BinW_m, (std::array{x, 3., 4.}));
+  EXPECT_EQ(odometry[1].q_BtoW_xyzw, (std::array{0.6, 0., 0., 0.8}));
+}
+
+TEST_F(Ros2Bag, ReadsBothByteOrders) {
+  {
+    Writer out(file());
+    out.topic(7, "/imu0", "sensor_msgs/msg/Imu");
+    out.message(7, 1, imu(kStart, 0.5, Cdr::BIG_ENDIANNESS));
+    out.message(7, 2, imu(kStart + kMs, 0.25, Cdr::LITTLE_ENDIANNESS));
+  }
+  const auto samples = play_only<ImuSample>(section("imu_topic: /imu0"));
+  ASSERT_EQ(samples.size(), 2U);
+  EXPECT_EQ(samples[0].t_ns, kStart);
+  EXPECT_EQ(samples[0].accel_m_per_s2, (std::array{1., 0.5, 9.81}));
+  EXPECT_EQ(samples[1].gyro_rad_per_s, (std::array{0.25, -0.25, 0.2}));
+}
+
+TEST_F(Ros2Bag, PlaysTheFilesOfAFolderOneAfterTheOther) {
+  write_drive("bag_10.db3", 10, 20);
+  write_drive("bag_9.db3", 0, 10);
+  write_metadata("sqlite3", "", "[bag/bag_9.db3, bag_10.db3]");
+  EXPECT_EQ(play_only<ImuSample>(section("imu_topic: /imu0", "")).size(), 20U);
+  // Relative to the first message of the bag, in whichever file.
+  const auto samples =
+      play_only<ImuSample>(section("imu_topic: /imu0, start_s: 0.04, duration_s: 0.02", ""));
+  ASSERT_EQ(samples.size(), 5U);
+  EXPECT_EQ(samples[0].t_ns, kStart + 40 * kMs);
+  fs::remove(folder_ / "metadata.yaml");  // as a recorder leaves it that was killed
+  EXPECT_EQ(play_only<ImuSample>(section("imu_topic: /imu0", "")).size(), 20U);
+}
+
+TEST_F(Ros2Bag, RefusesWhatItCannotRead) {
+  write_drive();
+  const std::string remedy =
+      ": what is read is SQLite (storage_id sqlite3) without compression - `ros2 bag convert`";
+  write_metadata("mcap", "", "[bag_0.mcap]");
+  EXPECT_THAT(error_of(section(kAll, "")), HasSubstr("  is stored as 'mcap'" + remedy));
+  write_metadata("sqlite3", "zstd", "[bag_0.db3.zstd]");
+  EXPECT_THAT(error_of(section(kAll, "")), HasSubstr("  is compressed (zstd)" + remedy));
+  write_metadata("sqlite3", "", "[bag_1.db3]");
+  EXPECT_THAT(error_of(section(kAll, "")),
+              HasSubstr(file("bag_1.db3") + "  cannot be read: No such file or directory"));
+  std::ofstream(folder_ / "metadata.yaml") << "a: [1\n";
+  EXPECT_THAT(error_of(section(kAll, "")), HasSubstr(file("metadata.yaml") + "  cannot be read: "));
+  EXPECT_THAT(error_of(section(kAll, "bag_0.db3.zstd")), HasSubstr("is a file .zstd" + remedy));
+  fs::create_directories(folder_ / "none");
+  EXPECT_THAT(error_of(section(kAll, "none")),
+              HasSubstr("is no ROS 2 bag: it has neither metadata.yaml nor *.db3"));
+  std::ofstream(file("text.db3")) << std::string(200, 'x');
+  EXPECT_THAT(error_of(section(kAll, "text.db3")),
+              HasSubstr(file("text.db3") + "  is no SQLite database"));
+  {
+    Writer out(file("json.db3"));
+    out.topic(1, "/imu0", "sensor_msgs/msg/Imu", "json");
+  }
+  EXPECT_THAT(error_of(section(kAll, "json.db3")),
+              HasSubstr("topic '/imu0' is serialised as 'json', what is read is cdr"));
+}
+
+TEST_F(Ros2Bag, RefusesADatabaseThatWasCutShort) {
+  write_drive("bag_0.db3", 0, 200);
+  const auto size = fs::file_size(file());
+  fs::resize_file(file(), size / 2);
+  EXPECT_THAT(error_of(section(kAll)), HasSubstr(file() + "  cannot be read as a ROS 2 bag: "));
+}
+
+TEST_F(Ros2Bag, SurvivesBytesThatAreWrongAnywhere) {
+  write_drive();
+  std::ifstream in(file(), std::ios::binary);
+  const std::string whole{std::istreambuf_iterator<char>(in), {}};
+  std::mt19937_64 random(5);
+  int refused = 0;
+  for (int k = 0; k < 200; ++k) {
+    std::string content = whole;
+    for (int i = 0; i < 5; ++i) {
+      content[random() % content.size()] = static_cast<char>(random());
+    }
+    std::ofstream(file(), std::ios::binary) << content;
+    try {
+      Image pixels;
+      for (const ImageSample& sample : only<ImageSample>(play(*make_sensor(section(kAll))))) {
+        sample.source->read(pixels);
+      }
+    } catch (const InputError&) {
+      ++refused;  // anything else, or a crash, ends the test
+    }
+  }
+  EXPECT_GT(refused, 10);
+  EXPECT_LT(refused, 199);
+}
+
+TEST_F(Ros2Bag, NamesTheTopicsThatThereAre) {
+  write_drive();
+  EXPECT_THAT(error_of(section("imu_topic: /imu")),
+              HasSubstr("sensor.imu_topic: no topic '/imu' in " + file() +
+                        " - did you mean '/imu0'? - of type sensor_msgs/Imu there are: /imu0"));
+  EXPECT_THAT(error_of(section("imu_topic: /pose")),
+              HasSubstr("is of type geometry_msgs/msg/PoseStamped, needed is sensor_msgs/Imu - "
+                        "there are: /imu0"));
+}
+
+TEST_F(Ros2Bag, CountsMessagesThatAreBroken) {
+  {
+    Writer out(file());
+    out.topic(1, "/imu0", "sensor_msgs/msg/Imu");
+    out.topic(2, "/joints", "sensor_msgs/msg/JointState");
+    const std::string whole = imu(kStart, 0.5);
+    out.message(1, 1, whole.substr(0, whole.size() - 80));  // without the accelerations
+    out.message(1, 2, whole);
+    out.message(1, 3, "\x28\xb5\x2f\xfd compressed, perhaps");
+    std::string many = joints(kStart, 0.);
+    many.replace(4 + 4 + 4 + 4 + 4, 4, "\xff\xff\xff\x7f");  // the number of names
+    out.message(2, 4, many);
+    out.message(2, 5, joints(kStart, 0.));
+  }
+  const auto sensor =
+      make_sensor(section("imu_topic: /imu0, joint_topic: /joints, drive_joints: [drive], "
+                          "max_rejected_fraction: 0.7"));
+  EXPECT_EQ(play(*sensor).size(), 2U);
+  std::vector<RejectionCount> rejections;
+  sensor->rejections(rejections);
+  ASSERT_EQ(rejections.size(), 3U);
+  EXPECT_EQ(rejections[0].reason, "/imu0: broken message: it ends too early");
+  EXPECT_EQ(rejections[0].first, "bag_0.db3: message 1");
+  EXPECT_EQ(rejections[1].reason, "/imu0: broken message: it does not begin like CDR");
+  EXPECT_EQ(rejections[2].reason, "/joints: broken message: a list is longer than its message");
+}
+
+TEST_F(Ros2Bag, ABrokenImageIsAnErrorWhenItIsRead) {
+  {
+    Writer out(file());
+    out.topic(3, "/cam0", "sensor_msgs/msg/Image");
+    out.message(3, 1, image(kStart, 1, 5));
+  }
+  const auto images = play_only<ImageSample>(section("image_topics: [/cam0]"));
+  ASSERT_EQ(images.size(), 1U);
+  Image out;
+  try {
+    images[0].source->read(out);
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.what(), file() +
+                                ": /cam0 message 1: an image of 3 x 2 mono8 in rows of 3 "
+                                "bytes has 5 bytes of pixels");
+  }
+}
+
+}  // namespace
+}  // namespace viwo

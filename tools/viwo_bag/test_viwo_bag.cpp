@@ -1,0 +1,167 @@
+// viwo_bag: a log folder, as a bag, read back by ros1_bag, gives the same samples.
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+
+#include "support.hpp"
+#include "viwo/image/image_file.hpp"
+#include "viwo/log/asl.hpp"
+
+namespace viwo {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class ViwoBag : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) /
+              (std::string("viwo_bag_") +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  /// The exit code; what it printed is in output_.
+  int run(const std::string& arguments) {
+    const std::string output = path("output.txt");
+    const int status = std::system(
+        (VIWO_TEST_BINARY_DIR "/bin/viwo_bag " + arguments + " > " + output + " 2>&1").c_str());
+    std::ifstream in(output);
+    output_.assign(std::istreambuf_iterator<char>(in), {});
+    return WEXITSTATUS(status);
+  }
+
+  /// What one sensor of each kind gives, from stamp 0 on, with random values.
+  std::vector<Measurement> write_log(const std::string& name) const {
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> normal;
+    std::vector<Measurement> all;
+    for (std::int64_t k = 0; k < 100; ++k) {
+      const std::int64_t t_ns = k * 9'999'991;
+      if (k % 5 == 0) {
+        PoseSample pose{t_ns, {normal(random), normal(random), normal(random)}, {}};
+        pose.q_BtoW_xyzw = {0., 0.6, 0., 0.8};
+        all.emplace_back(pose);
+      }
+      all.emplace_back(ImuSample{t_ns,
+                                 {normal(random), normal(random), normal(random)},
+                                 {normal(random), normal(random), normal(random)}});
+      EncoderSample wheels;
+      wheels.t_ns = t_ns + 1;
+      wheels.n_drive = wheels.n_steer = 2;
+      wheels.drive_rad_per_s = {normal(random), normal(random)};
+      wheels.steer_rad = {normal(random), normal(random)};
+      all.emplace_back(wheels);
+      if (k % 20 != 0) continue;
+      for (int camera = 0; camera < 2; ++camera) {
+        Image image{5, 3, std::vector<std::uint8_t>(15)};
+        for (std::uint8_t& pixel : image.pixels) pixel = static_cast<std::uint8_t>(random());
+        all.emplace_back(ImageSample{t_ns + 2, camera, std::make_shared<ImageInMemory>(image)});
+      }
+    }
+    log::AslWriter writer(folder_ / name);
+    for (const Measurement& measurement : all) writer.write(measurement);
+    writer.close();
+    return all;
+  }
+
+  fs::path folder_;
+  std::string output_;
+};
+
+template <class Sample>
+void expect_same(const std::vector<Measurement>& expected, const std::vector<Measurement>& actual,
+                 void (*compare)(const Sample&, const Sample&)) {
+  const auto a = only<Sample>(expected);
+  const auto b = only<Sample>(actual);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].t_ns, b[i].t_ns);
+    compare(a[i], b[i]);
+  }
+}
+
+TEST_F(ViwoBag, ALogComesBackToTheBit) {
+  const auto log = write_log("log");
+  ASSERT_EQ(run(path("log") + " " + path("a.bag")), 0) << output_;
+  EXPECT_EQ(output_, path("a.bag") + ": 230 messages (100 IMU, 100 wheels, 10 images, 20 poses)\n");
+  const auto played = play(*make_sensor(
+      "{type: ros1_bag, path: " + path("a.bag") +
+      ", imu_topic: /imu0, image_topics: [/cam0/image_raw, /cam1/image_raw], joint_topic: "
+      "/joint_states, drive_joints: [drive_1, drive_2], steer_joints: [steer_1, steer_2], "
+      "pose_topic: /ground_truth}"));
+  EXPECT_EQ(played.size(), log.size());
+  expect_same<ImuSample>(log, played, [](const ImuSample& a, const ImuSample& b) {
+    EXPECT_EQ(a.gyro_rad_per_s, b.gyro_rad_per_s);
+    EXPECT_EQ(a.accel_m_per_s2, b.accel_m_per_s2);
+  });
+  expect_same<EncoderSample>(log, played, [](const EncoderSample& a, const EncoderSample& b) {
+    EXPECT_EQ(a.drive_rad_per_s, b.drive_rad_per_s);
+    EXPECT_EQ(a.steer_rad, b.steer_rad);
+  });
+  expect_same<PoseSample>(log, played, [](const PoseSample& a, const PoseSample& b) {
+    EXPECT_EQ(a.p_BinW_m, b.p_BinW_m);
+    EXPECT_EQ(a.q_BtoW_xyzw, b.q_BtoW_xyzw);
+  });
+  expect_same<ImageSample>(log, played, [](const ImageSample& a, const ImageSample& b) {
+    Image x, y;
+    a.source->read(x);
+    b.source->read(y);
+    EXPECT_EQ(a.camera, b.camera);
+    EXPECT_EQ(x.width_px, y.width_px);
+    EXPECT_EQ(x.pixels, y.pixels);
+  });
+  // The cells of the wheels are those of the log, too.
+  const auto from_log =
+      play_only<EncoderSample>("{type: asl_encoders, path: " + path("log/wheels0") + "}");
+  const auto from_bag = only<EncoderSample>(played);
+  ASSERT_EQ(from_log.size(), from_bag.size());
+  for (std::size_t i = 0; i < from_log.size(); ++i) {
+    EXPECT_EQ(from_log[i].begin_ns, from_bag[i].begin_ns);
+    EXPECT_EQ(from_log[i].end_ns, from_bag[i].end_ns);
+  }
+}
+
+TEST_F(ViwoBag, SaysHowItIsUsed) {
+  EXPECT_EQ(run("--help"), 0);
+  EXPECT_THAT(output_, HasSubstr("viwo_bag LOG_FOLDER OUT.bag"));
+  EXPECT_EQ(run(""), 2);
+  EXPECT_EQ(run("--fast a b"), 2);
+}
+
+TEST_F(ViwoBag, RefusesWrongInputAndWritesNothing) {
+  const std::string out = path("out.bag");
+  EXPECT_EQ(run(path("none") + " " + out), 2);
+  EXPECT_EQ(output_, path("none") + "  is no folder\n");
+  fs::create_directories(folder_ / "empty");
+  EXPECT_EQ(run(path("empty") + " " + out), 2);
+  EXPECT_THAT(output_, HasSubstr(path("empty") + "  is no log folder: it has none of imu0, "));
+  write_log("log");
+  std::ofstream(path("text.txt")) << "important\n";
+  EXPECT_EQ(run(path("log") + " " + path("text.txt")), 2);
+  EXPECT_EQ(output_, path("text.txt") + "  exists and is no bag\n");
+  fs::remove(folder_ / "log/cam1/data/2.png");
+  EXPECT_EQ(run(path("log") + " " + out), 2);
+  EXPECT_EQ(output_, path("log/cam1/data/2.png") + ": the image is missing or cannot be read\n");
+  EXPECT_FALSE(fs::exists(out));
+}
+
+TEST_F(ViwoBag, AFullDiskIsAnError) {
+  write_log("log");
+  EXPECT_EQ(run(path("log") + " /dev/full"), 1);
+  EXPECT_THAT(output_, HasSubstr("/dev/full  cannot be written: "));
+  EXPECT_EQ(run(path("log") + " " + path("no/such/folder/a.bag")), 1);
+  EXPECT_THAT(output_, HasSubstr("a.bag  cannot be written: "));
+}
+
+}  // namespace
+}  // namespace viwo

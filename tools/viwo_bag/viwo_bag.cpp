@@ -1,0 +1,240 @@
+// viwo_bag: a log folder as a ROS 1 bag.
+// Exit codes: 0 done; 1 writing failed; 2 the input is wrong.
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "ros1_writer.hpp"
+#include "viwo/api/status.hpp"
+#include "viwo/image/image_file.hpp"
+#include "viwo/log/asl.hpp"
+#include "viwo/log/table_reader.hpp"
+#include "viwo/log/text.hpp"
+
+namespace viwo {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kHelp =
+    "viwo_bag LOG_FOLDER OUT.bag\n\n"
+    "Writes a log folder, as `viwo simulate` makes it, as a ROS 1 bag:\n"
+    "  imu0                         /imu0             sensor_msgs/Imu\n"
+    "  wheels0                      /joint_states     sensor_msgs/JointState, joints drive_1 ..\n"
+    "                                                 (velocity) and steer_1 .. (position)\n"
+    "  cam0, cam1, ..               /camN/image_raw   sensor_msgs/Image, mono8\n"
+    "  poses0                       /poses0           geometry_msgs/PoseStamped\n"
+    "  state_groundtruth_estimate0  /ground_truth     geometry_msgs/PoseStamped\n"
+    "What the folder does not have is left out. Stamps of recording are those of the headers.\n";
+
+struct ImageOnDisk {
+  std::int64_t t_ns = 0;
+  std::size_t camera = 0;
+  fs::path file;
+};
+
+struct Log {
+  std::vector<ImuSample> imu;
+  std::vector<EncoderSample> wheels;
+  std::vector<PoseSample> poses;
+  std::vector<PoseSample> truth;
+  std::vector<ImageOnDisk> images;
+};
+
+/// What is dropped is said.
+template <class Sample>
+std::vector<Sample> samples_of(const log::Recording<Sample>& recording, const fs::path& table) {
+  for (const RejectionCount& rejection : recording.rejections) {
+    std::cerr << table.string() << "  dropped: " << rejection.reason << " (" << rejection.count
+              << ", first at " << rejection.first << ")\n";
+  }
+  return recording.samples;
+}
+
+/// The column of stamps as the datasets and our own logs call it.
+std::size_t stamp_column(const log::TableReader& table) {
+  for (const char* name : {"timestamp [ns]", "timestamp"}) {
+    if (table.has_column(name)) return table.column(name);
+  }
+  return table.column("timestamp_ns");
+}
+
+void read_images(const fs::path& folder, std::size_t camera, std::vector<ImageOnDisk>& out) {
+  log::TableReader table(folder / "data.csv");
+  const std::size_t stamp = stamp_column(table);
+  const std::size_t name = table.column("filename");
+  while (table.next()) {
+    out.push_back({table.stamp_ns(stamp), camera, folder / "data" / std::string(table.text(name))});
+  }
+}
+
+Log read_log(const fs::path& folder) {
+  std::error_code ignored;
+  if (!fs::is_directory(folder, ignored)) throw InputError(folder.string() + "  is no folder");
+  const auto has = [&](const fs::path& part) { return fs::exists(folder / part, ignored); };
+  // Gaps are nothing that a bag could not hold.
+  const log::LogLimits limits{std::numeric_limits<double>::infinity(), 0.1};
+  Log log;
+  if (has("imu0")) {
+    log.imu = samples_of(log::read_asl_imu(folder / "imu0", limits), folder / "imu0");
+  }
+  if (has("wheels0")) {
+    const auto wheels = log::read_asl_encoders(folder / "wheels0", {limits, false, 1});
+    log.wheels = samples_of(wheels, folder / "wheels0");
+  }
+  if (has("poses0")) {
+    log.poses = samples_of(log::read_asl_poses(folder / "poses0", limits), folder / "poses0");
+  }
+  const fs::path truth = folder / "state_groundtruth_estimate0";
+  if (fs::exists(truth, ignored)) log.truth = samples_of(log::read_asl_poses(truth, limits), truth);
+  for (std::size_t camera = 0; camera <= log::kMaxCamera; ++camera) {
+    const std::string name = "cam" + std::to_string(camera);
+    if (has(name)) read_images(folder / name, camera, log.images);
+  }
+  if (log.imu.empty() && log.wheels.empty() && log.poses.empty() && log.truth.empty() &&
+      log.images.empty()) {
+    throw InputError(folder.string() +
+                     "  is no log folder: it has none of imu0, wheels0, cam0, poses0, "
+                     "state_groundtruth_estimate0");
+  }
+  return log;
+}
+
+/// A message that is to be written: the `index`-th of its kind.
+struct Entry {
+  enum Kind : std::uint8_t { kImu, kWheels, kPose, kTruth, kImage };
+  std::int64_t t_ns = 0;
+  Kind kind = kImu;
+  std::size_t index = 0;
+};
+
+/// All messages in time order.
+std::vector<Entry> schedule(const Log& log) {
+  std::vector<Entry> entries;
+  const auto add = [&entries](const auto& samples, Entry::Kind kind) {
+    for (std::size_t i = 0; i < samples.size(); ++i) entries.push_back({samples[i].t_ns, kind, i});
+  };
+  add(log.imu, Entry::kImu);
+  add(log.wheels, Entry::kWheels);
+  add(log.poses, Entry::kPose);
+  add(log.truth, Entry::kTruth);
+  add(log.images, Entry::kImage);
+  std::stable_sort(entries.begin(), entries.end(),
+                   [](const Entry& a, const Entry& b) { return a.t_ns < b.t_ns; });
+  return entries;
+}
+
+void write_wheels(const EncoderSample& sample, const bag::Stamps& stamps, bag::Ros1Writer& out) {
+  // Values that are not known stand as zero, so that every joint has both.
+  std::vector<std::string> names;
+  std::vector<double> positions, velocities;
+  for (int i = 0; i < sample.n_drive; ++i) {
+    names.push_back("drive_" + std::to_string(i + 1));
+    positions.push_back(0.);
+    velocities.push_back(sample.drive_rad_per_s[static_cast<std::size_t>(i)]);
+  }
+  for (int i = 0; i < sample.n_steer; ++i) {
+    names.push_back("steer_" + std::to_string(i + 1));
+    positions.push_back(sample.steer_rad[static_cast<std::size_t>(i)]);
+    velocities.push_back(0.);
+  }
+  out.write_joints("/joint_states", stamps, names, positions, velocities);
+}
+
+void write_image(const ImageOnDisk& image, const bag::Stamps& stamps, bag::Ros1Writer& out) {
+  Image pixels;
+  read_image(image.file, pixels);
+  const auto width_px = static_cast<std::uint32_t>(pixels.width_px);
+  out.write_image("/cam" + std::to_string(image.camera) + "/image_raw", stamps,
+                  {width_px, static_cast<std::uint32_t>(pixels.height_px), "mono8", false, width_px,
+                   std::move(pixels.pixels)});
+}
+
+void write(const Log& log, const Entry& entry, bag::Ros1Writer& out) {
+  const bag::Stamps stamps{entry.t_ns, entry.t_ns};
+  switch (entry.kind) {
+    case Entry::kImu: {
+      const ImuSample& imu = log.imu[entry.index];
+      return out.write_imu("/imu0", stamps, imu.gyro_rad_per_s, imu.accel_m_per_s2);
+    }
+    case Entry::kWheels:
+      return write_wheels(log.wheels[entry.index], stamps, out);
+    case Entry::kPose: {
+      const PoseSample& pose = log.poses[entry.index];
+      return out.write_pose("/poses0", stamps, pose.p_BinW_m, pose.q_BtoW_xyzw);
+    }
+    case Entry::kTruth: {
+      const PoseSample& pose = log.truth[entry.index];
+      return out.write_pose("/ground_truth", stamps, pose.p_BinW_m, pose.q_BtoW_xyzw);
+    }
+    case Entry::kImage:
+      return write_image(log.images[entry.index], stamps, out);
+  }
+}
+
+/// A file that is no bag is not replaced.
+void check_output(const fs::path& file) {
+  std::error_code ignored;
+  if (fs::is_directory(file, ignored)) throw InputError(file.string() + "  is a folder");
+  if (!fs::is_regular_file(file, ignored) || fs::file_size(file, ignored) == 0) return;
+  constexpr std::string_view kMagic = "#ROSBAG V";
+  std::string begin(kMagic.size(), '\0');
+  std::ifstream(file, std::ios::binary)
+      .read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  if (begin != kMagic) throw InputError(file.string() + "  exists and is no bag");
+}
+
+void convert(const fs::path& folder, const fs::path& file) {
+  const Log log = read_log(folder);
+  const std::vector<Entry> entries = schedule(log);
+  if (entries.front().t_ns < 0) {
+    throw InputError(folder.string() + "  has stamps before 0, which a bag cannot hold");
+  }
+  check_output(file);
+  try {
+    bag::Ros1Writer out(file.string());
+    for (const Entry& entry : entries) write(log, entry, out);
+    out.close();
+  } catch (...) {
+    std::error_code ignored;  // half a bag is of no use
+    if (fs::is_regular_file(file, ignored)) fs::remove(file, ignored);
+    throw;
+  }
+  std::cout << file.string() << ": " << entries.size() << " messages (" << log.imu.size()
+            << " IMU, " << log.wheels.size() << " wheels, " << log.images.size() << " images, "
+            << log.poses.size() + log.truth.size() << " poses)\n";
+}
+
+}  // namespace
+}  // namespace viwo
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (words.size() == 1 && (words[0] == "--help" || words[0] == "-h")) {
+    std::cout << viwo::kHelp;
+    return 0;
+  }
+  if (words.size() != 2 || words[0].starts_with("-") || words[1].starts_with("-")) {
+    std::cerr << viwo::kHelp;
+    return 2;
+  }
+  try {
+    viwo::convert(words[0], words[1]);
+    return 0;
+  } catch (const viwo::InputError& error) {
+    std::cerr << error.what() << "\n";
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << "\n";
+    return 1;
+  }
+}
