@@ -56,7 +56,7 @@ if [ "${1:-}" = --tests ]; then
   if ! grep -qsx 'ID=ubuntu' /etc/os-release; then
     need_command chromium chromium chromium-browser google-chrome
   fi
-  for package in python3-roslaunch python3-rosbag librosbag-dev xvfb; do need_package "$package"; done
+  for package in python3-rosmaster python3-rosbag librosbag-dev xvfb; do need_package "$package"; done
 fi
 optional=("${missing[@]}")
 missing=("${required[@]}")
@@ -80,12 +80,12 @@ apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -y -q)
 
 echo "Installing with apt: ${missing[*]} ${optional[*]}"
 "${apt[@]}" update < /dev/null
-# What only single tests use, and this release may not have; those tests are then skipped.
+# What this release may not have: parts and tests that need it are then left out.
 for package in "${optional[@]}"; do
   if apt-cache show "$package" > /dev/null 2>&1; then
     missing+=("$package")
   else
-    echo "There is no package $package here: the test that uses it is skipped."
+    echo "There is no package $package here: what needs it is left out."
   fi
 done
 if [ ${#missing[@]} -gt 0 ]; then

@@ -16,6 +16,8 @@ namespace fs = std::filesystem;
 std::vector<fs::path> plugins() {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(VIWO_TEST_PLUGIN_DIR)) {
+    // It cannot be made without a ROS master; tests/live have one.
+    if (entry.path().filename() == "libviwo_sensor_ros1_topics.so") continue;
     if (entry.path().extension() == ".so") files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());

@@ -1,0 +1,81 @@
+// From messages as they come to measurements in the queue; what cannot be used is counted, and said
+// once.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <boost/shared_ptr.hpp>
+
+#include "live_cells.hpp"
+#include "live_queue.hpp"
+#include "messages.hpp"
+#include "raw_message.hpp"
+#include "topic_options.hpp"
+#include "viwo/api/host_services.hpp"
+
+namespace viwo::ros1 {
+
+class Intake {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// A topic that is wanted.
+  struct Topic {
+    std::string name;
+    std::vector<bag::Kind> kinds;  ///< what may be on it
+    int camera = -1;               ///< index of its images
+  };
+
+  /// `services` and `queue` outlive it.
+  Intake(const TopicOptions& options, const HostServices& services, LiveQueue& queue);
+
+  const std::vector<Topic>& topics() const { return topics_; }
+
+  /// A message on topics()[topic] of type `type` ("sensor_msgs/Imu"), with the md5 sum of its
+  /// definition ("*": not known). From any thread.
+  void take(std::size_t topic, const std::string& type, const std::string& md5,
+            const boost::shared_ptr<const RawMessage>& message);
+
+  /// When something came last that could be used; of all topics.
+  std::optional<Clock::time_point> last_use() const;
+  /// Topics of which nothing could be used for longer than this.
+  std::vector<std::string> silent_topics(std::chrono::milliseconds longer_than) const;
+  void rejections(std::vector<RejectionCount>& out) const;
+
+ private:
+  struct State {
+    std::optional<std::int64_t> last_ns;
+    Clock::time_point last_use = Clock::now();
+  };
+
+  void read(std::size_t topic, bag::Kind kind, const boost::shared_ptr<const RawMessage>& message);
+  void take_imu(std::size_t topic, const ImuSample& imu);
+  void take_pose(std::size_t topic, PoseSample pose);
+  void take_joints(std::size_t topic, const bag::Joints& joints);
+  void take_image(std::size_t topic, const ImageSample& image);
+  bool accept(std::size_t topic, std::int64_t t_ns);
+  void reject(std::size_t topic, const std::string& reason, std::int64_t t_ns);
+  void count(std::size_t topic, const std::string& reason, std::int64_t t_ns,
+             const std::string& consequence);
+
+  TopicOptions options_;
+  const HostServices& services_;
+  LiveQueue& queue_;
+  std::vector<Topic> topics_;
+
+  mutable std::mutex mutex_;
+  std::vector<State> states_;
+  LiveCells cells_;
+  ImageOrder image_order_;
+  std::vector<ImageSample> ready_;
+  std::optional<Clock::time_point> last_use_;
+  std::vector<RejectionCount> counts_;
+};
+
+}  // namespace viwo::ros1

@@ -1,0 +1,103 @@
+#include "live_queue.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <variant>
+
+namespace viwo::ros1 {
+
+ImageOrder::ImageOrder(std::size_t n_cameras) : cameras_(n_cameras) {}
+
+bool ImageOrder::is_final(std::int64_t t_ns) const {
+  return std::all_of(cameras_.begin(), cameras_.end(), [t_ns](const Camera& camera) {
+    return !camera.waited_for || (camera.newest_ns && *camera.newest_ns >= t_ns - kSameInstantNs);
+  });
+}
+
+void ImageOrder::release_first(std::vector<ImageSample>& out) {
+  const auto first = waiting_.begin();
+  for (auto& [camera, image] : first->second) out.push_back(std::move(image));
+  released_ns_ = first->first;
+  waiting_.erase(first);
+}
+
+bool ImageOrder::add(const ImageSample& image, std::vector<ImageSample>& out) {
+  Camera& camera = cameras_.at(static_cast<std::size_t>(image.camera));
+  camera.newest_ns = image.t_ns;
+  camera.waited_for = true;
+  if (released_ns_ && image.t_ns <= *released_ns_) return false;
+  waiting_[image.t_ns][image.camera] = image;
+  while (!waiting_.empty()) {
+    const std::int64_t first_ns = waiting_.begin()->first;
+    if (!is_final(first_ns)) {
+      if (waiting_.size() <= kMaxWaiting) break;
+      for (Camera& silent : cameras_) {
+        if (!silent.newest_ns || *silent.newest_ns < first_ns - kSameInstantNs)
+          silent.waited_for = false;
+      }
+    }
+    release_first(out);
+  }
+  return true;
+}
+
+void LiveQueue::push(Measurement measurement) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (ended_) return;
+    if (std::holds_alternative<ImageSample>(measurement)) {
+      if (n_images_ == max_images_) drop_oldest_images();
+      ++n_images_;
+    }
+    queue_.push_back(std::move(measurement));
+  }
+  changed_.notify_one();
+}
+
+void LiveQueue::drop_oldest_images() {
+  const auto oldest = std::find_if(queue_.begin(), queue_.end(), [](const Measurement& m) {
+    return std::holds_alternative<ImageSample>(m);
+  });
+  const std::int64_t oldest_ns = stamp_ns(*oldest);
+  const auto kept = std::remove_if(oldest, queue_.end(), [oldest_ns](const Measurement& m) {
+    return std::holds_alternative<ImageSample>(m) && stamp_ns(m) <= oldest_ns + kSameInstantNs;
+  });
+  const auto n = static_cast<std::size_t>(queue_.end() - kept);
+  if (dropped_ == 0) first_dropped_ns_ = oldest_ns;
+  dropped_ += static_cast<std::int64_t>(n);
+  n_images_ -= n;
+  queue_.erase(kept, queue_.end());
+}
+
+LiveQueue::Taken LiveQueue::pop(Measurement& out, std::chrono::milliseconds wait) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, wait, [this] { return ended_ || !queue_.empty(); });
+  if (queue_.empty()) return ended_ ? Taken::kEnded : Taken::kNothing;
+  out = std::move(queue_.front());
+  queue_.pop_front();
+  if (std::holds_alternative<ImageSample>(out)) --n_images_;
+  return Taken::kMeasurement;
+}
+
+void LiveQueue::end() {
+  {
+    const std::scoped_lock lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+}
+
+bool LiveQueue::ended() const {
+  const std::scoped_lock lock(mutex_);
+  return ended_;
+}
+
+void LiveQueue::rejections(std::vector<RejectionCount>& out) const {
+  const std::scoped_lock lock(mutex_);
+  if (dropped_ == 0) return;
+  out.push_back({"image dropped: images come faster than they are taken", dropped_,
+                 "stamp " + std::to_string(first_dropped_ns_) + " ns"});
+}
+
+}  // namespace viwo::ros1

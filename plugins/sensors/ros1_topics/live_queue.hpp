@@ -1,0 +1,82 @@
+// Between the threads that receive and the one that takes: a queue that loses images when it is
+// read too slowly, but nothing else; and what brings the images of several cameras into order.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "viwo/api/measurement.hpp"
+#include "viwo/api/sensor.hpp"
+
+namespace viwo::ros1 {
+
+/// Images of several cameras whose stamps differ by no more are of one instant.
+inline constexpr std::int64_t kSameInstantNs = 3'000'000;
+
+/// Gives the images of all cameras in the order of their stamps (those of one instant by camera),
+/// whichever of their messages came first. An image waits until every camera has given one of its
+/// instant or a later one; a camera that gives nothing for kMaxWaiting instants is waited for no
+/// longer, until it gives an image again.
+class ImageOrder {
+ public:
+  static constexpr std::size_t kMaxWaiting = 3;
+
+  explicit ImageOrder(std::size_t n_cameras);
+
+  /// Appends to `out` what need not wait any longer. False for an image that comes when later ones
+  /// are gone: it is dropped. Stamps of one camera must increase.
+  bool add(const ImageSample& image, std::vector<ImageSample>& out);
+
+ private:
+  bool is_final(std::int64_t t_ns) const;
+  void release_first(std::vector<ImageSample>& out);
+
+  struct Camera {
+    std::optional<std::int64_t> newest_ns;
+    bool waited_for = true;
+  };
+  std::vector<Camera> cameras_;
+  /// By stamp, then by camera.
+  std::map<std::int64_t, std::map<int, ImageSample>> waiting_;
+  std::optional<std::int64_t> released_ns_;
+};
+
+class LiveQueue {
+ public:
+  enum class Taken : std::uint8_t { kMeasurement, kNothing, kEnded };
+
+  /// Holds `max_images` images at most.
+  explicit LiveQueue(std::size_t max_images) : max_images_(max_images) {}
+
+  /// Where an image has no room, all images of the oldest instant go: one of a stereo pair alone is
+  /// of little use. After end() nothing is taken in.
+  void push(Measurement measurement);
+  /// Waits for a measurement. kEnded: nothing will come any more.
+  Taken pop(Measurement& out, std::chrono::milliseconds wait);
+  /// What is in the queue can still be taken.
+  void end();
+  bool ended() const;
+
+  void rejections(std::vector<RejectionCount>& out) const;
+
+ private:
+  void drop_oldest_images();
+
+  std::size_t max_images_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Measurement> queue_;
+  std::size_t n_images_ = 0;
+  bool ended_ = false;
+  std::int64_t dropped_ = 0;
+  std::int64_t first_dropped_ns_ = 0;
+};
+
+}  // namespace viwo::ros1
