@@ -19,8 +19,9 @@ class Inputs {
   bool is_input(const SensorEntry& entry) const { return kept_.contains(entry.name); }
   /// Keeps a measurement of a sensor that is an input; of others, does nothing.
   void keep(const SensorEntry& entry, const Measurement& measurement);
-  /// Gives a sensor its input, which must have been read to its end; null if it takes none.
-  std::shared_ptr<Sensor> connect(const SensorEntry& entry);
+  /// Gives a sensor its input, which must have been read to its end; null if it takes none. It must
+  /// live as long as the sensor is read.
+  [[nodiscard]] std::shared_ptr<Sensor> connect(const SensorEntry& entry);
 
  private:
   std::map<std::string, std::shared_ptr<std::vector<Measurement>>> kept_;

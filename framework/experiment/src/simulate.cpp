@@ -14,7 +14,7 @@ SimulateResult write_log(RunSetup& setup, const std::filesystem::path& folder) {
   Inputs inputs(setup.sensors);
   for (const SensorEntry& entry : setup.sensors) {
     require_no_live_sensor(setup, entry);
-    inputs.connect(entry);
+    const auto input = inputs.connect(entry);  // outlives the reading
     guarded(entry.sensor.info, "next", [&] {
       Measurement measurement;
       while (entry.sensor.object->next(measurement) == Status::kOk) {

@@ -14,7 +14,8 @@ namespace {
 using Grid = std::vector<float>;
 
 constexpr float kScale = 256.F;
-constexpr int kSmallest = 8;  ///< of the levels; at least the radius of the kernel must fit
+constexpr int kLeastSize = 8;
+constexpr int kLastLevel = 4;  ///< so that there are two levels at least
 /// Every level is smoothed by one of its texels; the next one by two of them.
 constexpr double kNextBlur = 1.7320508075688772;
 
@@ -66,10 +67,10 @@ Grid halve(const Grid& in, int size) {
 struct Leaf {
   enum Shape { kRectangle, kTriangle, kDisc, kChecks, kShapes };
   Shape shape = kRectangle;
-  float x = 0.F, y = 0.F;            ///< centre, texels
-  float radius = 0.F;                ///< texels
-  float slenderness = 1.F;           ///< height over width, of rectangles and checks
-  float cosine = 1.F, sine = 0.F;    ///< of its turn
+  float x = 0.F, y = 0.F;          ///< centre, texels
+  float radius = 0.F;              ///< texels
+  float slenderness = 1.F;         ///< height over width, of rectangles and checks
+  float cosine = 1.F, sine = 0.F;  ///< of its turn
   float grey = 0.F, other_grey = 0.F;
 
   Leaf(RandomStream& random, int size) {
@@ -82,8 +83,7 @@ struct Leaf {
     // Frequencies ~ radius^-3: then every octave of sizes covers the same area.
     const double least = 3., most = 0.15 * size;
     const double u = random.uniform();
-    radius = static_cast<float>(
-        1. / std::sqrt((1. - u) / (least * least) + u / (most * most)));
+    radius = static_cast<float>(1. / std::sqrt((1. - u) / (least * least) + u / (most * most)));
     slenderness = draw(0.4, 1.);
     const float turn = draw(0., 2. * M_PI);
     cosine = std::cos(turn);
@@ -127,6 +127,12 @@ struct Leaf {
   }
 };
 
+/// floor(log2(x)) of x >= 1: std::ilogb without its special cases.
+int octave_of(float x) {
+  constexpr int kBitsOfMantissa = 23, kBias = 127;
+  return static_cast<int>(std::bit_cast<std::uint32_t>(x) >> kBitsOfMantissa) - kBias;
+}
+
 /// White noise of unit variance, smoothed to a wavelength of about `texels`.
 void add_noise(RandomStream& random, int size, int texels, float sigma, Grid& grid) {
   const int n = size / texels;
@@ -153,7 +159,7 @@ void add_noise(RandomStream& random, int size, int texels, float sigma, Grid& gr
 }  // namespace
 
 Texture::Texture(int size, const std::vector<float>& grey) {
-  if (size < kSmallest || !std::has_single_bit(static_cast<unsigned>(size)) ||
+  if (size < kLeastSize || !std::has_single_bit(static_cast<unsigned>(size)) ||
       grey.size() != static_cast<std::size_t>(size) * static_cast<std::size_t>(size)) {
     throw std::invalid_argument("a texture is square, its size a power of two, at least 8");
   }
@@ -161,65 +167,55 @@ Texture::Texture(int size, const std::vector<float>& grey) {
   for (;;) {
     Level& level = levels_.emplace_back();
     level.size = size;
-    level.texels.reserve(grid.size());
-    for (const float value : grid) {
-      level.texels.push_back(
-          static_cast<std::uint16_t>(std::lround(std::clamp(value, 0.F, 255.F) * kScale)));
+    for (int row = 0; row <= size; ++row) {
+      for (int column = 0; column <= size; ++column) {
+        const int i = (row % size) * size + column % size;
+        const float value = std::clamp(grid[static_cast<std::size_t>(i)], 0.F, 255.F);
+        level.texels.push_back(static_cast<std::uint16_t>(std::lround(value * kScale)));
+      }
     }
-    if (size == kSmallest) return;
+    if (size == kLastLevel) return;
     grid = halve(smooth(grid, size, kNextBlur), size);
     size /= 2;
   }
 }
 
-float Texture::bilinear(const Level& level, float x, float y) const {
+float Texture::Level::at(float x, float y) const {
   const float left = std::floor(x), top = std::floor(y);
   const float u = x - left, v = y - top;
-  const int mask = level.size - 1;
+  const int mask = size - 1, stride = size + 1;
   const int i = static_cast<int>(left) & mask, j = static_cast<int>(top) & mask;
-  const int i1 = (i + 1) & mask, j1 = (j + 1) & mask;
-  const std::uint16_t* const texels = level.texels.data();
-  const std::uint16_t* const upper = texels + static_cast<std::ptrdiff_t>(j) * level.size;
-  const std::uint16_t* const lower = texels + static_cast<std::ptrdiff_t>(j1) * level.size;
-  const float a = static_cast<float>(upper[i]) + u * static_cast<float>(upper[i1] - upper[i]);
-  const float b = static_cast<float>(lower[i]) + u * static_cast<float>(lower[i1] - lower[i]);
+  const std::uint16_t* const upper = texels.data() + j * stride + i;
+  const std::uint16_t* const lower = upper + stride;
+  const float a = static_cast<float>(upper[0]) + u * static_cast<float>(upper[1] - upper[0]);
+  const float b = static_cast<float>(lower[0]) + u * static_cast<float>(lower[1] - lower[0]);
   return a + v * (b - a);
 }
 
-float Texture::trilinear(std::size_t fine, float weight_of_coarse, float x, float y) const {
-  const float scale = 1.F / static_cast<float>(1U << fine);
-  const float a = bilinear(levels_[fine], scale * x, scale * y);
-  if (weight_of_coarse <= 0.F) return a;
-  const float b = bilinear(levels_[fine + 1], 0.5F * scale * x, 0.5F * scale * y);
-  return a + weight_of_coarse * (b - a);
-}
-
 float Texture::grey(float x, float y, float across, float along, float dx, float dy) const {
-  // (IMG-4)
-  const float width = kBlur * std::max(across, along / kMostTaps);
-  std::size_t fine = 0;
-  float weight = 0.F;
-  if (width > 1.F) {
-    // Linear in the size within an octave.
-    const auto last = static_cast<int>(levels_.size()) - 1;
-    const int octave = std::min(std::ilogb(width), last);
-    fine = static_cast<std::size_t>(octave);
-    if (octave < last) weight = width / static_cast<float>(1U << fine) - 1.F;
+  const float wanted_along = kBlur * along;
+  const float sigma = std::max({kBlur * across, wanted_along / kMostStretch, 1.F});
+  // Variances add: the level's share and, below the next level, some of that one.
+  const int octave = std::min(octave_of(sigma), static_cast<int>(levels_.size()) - 2);
+  const float scale = 1.F / static_cast<float>(1U << octave);
+  const float of_level = sigma * scale;
+  const float coarse = std::min((of_level * of_level - 1.F) / 3.F, 1.F);  // (IMG-4)
+  const Level& fine_level = levels_[static_cast<std::size_t>(octave)];
+  const Level& coarse_level = levels_[static_cast<std::size_t>(octave) + 1];
+  // (IMG-5): equal samples with the variance that is missing along the footprint.
+  const float stretch = std::max(wanted_along / sigma, 1.F);
+  const int taps = static_cast<int>(std::ceil(std::sqrt(3.F * stretch * stretch - 2.F)));
+  const auto n = static_cast<float>(taps);
+  const float spacing =
+      taps > 1 ? sigma * std::sqrt(12.F * (stretch * stretch - 1.F) / (n * n - 1.F)) : 0.F;
+  const float step_x = scale * spacing * dx, step_y = scale * spacing * dy;
+  float at_x = scale * x - 0.5F * (n - 1.F) * step_x, at_y = scale * y - 0.5F * (n - 1.F) * step_y;
+  float fine_sum = 0.F, coarse_sum = 0.F;
+  for (int k = 0; k < taps; ++k, at_x += step_x, at_y += step_y) {
+    fine_sum += fine_level.at(at_x, at_y);
+    if (coarse > 0.F) coarse_sum += coarse_level.at(0.5F * at_x, 0.5F * at_y);
   }
-  // Of the length, what the level does not average already.
-  const float texel = std::max(width, 1.F);
-  const int taps = static_cast<int>(kBlur * along / texel + 0.5F);
-  if (taps <= 1) return trilinear(fine, weight, x, y) / kScale;
-  float sum = 0.F, total = 0.F;
-  for (int k = 0; k < taps; ++k) {
-    const float at = (static_cast<float>(k) + 0.5F) / static_cast<float>(taps) - 0.5F;
-    // A window of two pixels with the standard deviation of kBlur.
-    const float z = 2.F * at / kBlur;
-    const float tap_weight = std::max(0.F, 1.F - 0.16F * z * z);
-    sum += tap_weight * trilinear(fine, weight, x + 2.F * at * along * dx, y + 2.F * at * along * dy);
-    total += tap_weight;
-  }
-  return sum / total / kScale;
+  return (fine_sum + coarse * (coarse_sum - fine_sum)) / (n * kScale);
 }
 
 Texture leaves_texture(int size, std::uint64_t seed, std::uint64_t index) {

@@ -19,19 +19,22 @@ class Texture {
   /// The pattern at (x, y), in texels of the finest level, as a pixel sees it whose footprint is
   /// `across` texels wide and `along` >= across texels long, in the direction of the unit vector
   /// (dx, dy). Smoothing is Gaussian with kBlur of the footprint; it is never below one texel, and
-  /// longer than kMostTaps times its width it is made wider.
+  /// longer than kMostStretch times its width it is made wider.
   float grey(float x, float y, float across, float along, float dx, float dy) const;
 
-  static constexpr float kBlur = 0.65F;   ///< standard deviation over the size of a pixel
-  static constexpr float kMostTaps = 8.F; ///< samples along a footprint
+  static constexpr float kBlur = 0.65F;       ///< standard deviation over the size of a pixel
+  static constexpr float kMostStretch = 4.F;  ///< length over width of a footprint
 
  private:
   struct Level {
+    /// Interpolated, in texels of this level.
+    float at(float x, float y) const;
+
     int size = 0;
-    std::vector<std::uint16_t> texels;  ///< grey level * kScale
+    /// Grey levels times a constant; at the end of each row its first one once more, and at the end
+    /// the first row.
+    std::vector<std::uint16_t> texels;
   };
-  float bilinear(const Level& level, float x, float y) const;
-  float trilinear(std::size_t fine, float weight_of_coarse, float x, float y) const;
 
   std::vector<Level> levels_;
 };

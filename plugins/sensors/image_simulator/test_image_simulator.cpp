@@ -1,0 +1,282 @@
+// The image simulator as the host loads it, on the true states of sensor simulator or of a test.
+#include <cmath>
+#include <deque>
+#include <map>
+#include <thread>
+
+#include <Eigen/Geometry>
+
+#include "support.hpp"
+#include "viwo/log/kalibr.hpp"
+#include "viwo/sim/image_renderer.hpp"
+
+namespace viwo {
+namespace {
+
+const std::string kCameraFile =
+    std::string(VIWO_TEST_SOURCE_DIR) + "/configs/cameras/t265_like.yaml";
+
+/// Small textures: quick to make.
+std::string config(const std::string& rest, const std::string& cameras = kCameraFile) {
+  return "{type: image_simulator, cameras: " + cameras + ", texture_size_px: 256, boxes: 10" +
+         (rest.empty() ? "" : ", " + rest) + "}";
+}
+
+/// Gives what it was made with.
+class Given final : public Sensor {
+ public:
+  explicit Given(std::vector<Measurement> all) : all_(all.begin(), all.end()) {}
+  Status next(Measurement& out) override {
+    if (all_.empty()) return Status::kEnd;
+    out = all_.front();
+    all_.pop_front();
+    return Status::kOk;
+  }
+
+ private:
+  std::deque<Measurement> all_;
+};
+
+/// True states of a robot that turns while it drives, n of them 0.1 s apart.
+std::vector<Measurement> states(int n) {
+  std::vector<Measurement> out;
+  for (int i = 0; i < n; ++i) {
+    StateSample state;
+    state.t_ns = 2'000'000'000 + i * std::int64_t{100'000'000};
+    state.p_IinG_m = {0.1 * i, 0.03 * i, 0.15};
+    const Eigen::Quaterniond q = Eigen::AngleAxisd(0.05 * i, Eigen::Vector3d::UnitZ()) *
+                                 Eigen::AngleAxisd(0.02 * i, Eigen::Vector3d::UnitX());
+    state.q_ItoG_xyzw = {q.x(), q.y(), q.z(), q.w()};
+    out.emplace_back(ImuSample{state.t_ns, {}, {}});
+    out.emplace_back(state);
+  }
+  return out;
+}
+
+std::vector<ImageSample> images(const std::string& yaml, std::vector<Measurement> input,
+                                std::uint64_t seed = 1) {
+  const auto sensor = make_sensor(yaml, seed);
+  EXPECT_TRUE(sensor->takes_input());
+  Given given(std::move(input));
+  sensor->connect(given);
+  const auto all = play(*sensor);
+  const auto out = only<ImageSample>(all);
+  EXPECT_EQ(out.size(), all.size());
+  return out;
+}
+
+std::string refusal(const std::string& yaml, const std::vector<Measurement>& input) {
+  try {
+    images(yaml, input);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+Image pixels_of(const ImageSample& sample) {
+  Image out;
+  sample.source->read(out);
+  return out;
+}
+
+double mean_of(const Image& image) {
+  double sum = 0.;
+  for (const std::uint8_t value : image.pixels) sum += static_cast<double>(value);
+  return sum / static_cast<double>(image.pixels.size());
+}
+
+TEST(ImageSimulator, ImagesStandAtTheStampsOfTheSimulatorsCameras) {
+  const std::string simulator =
+      "{type: simulator, robot: {type: differential, radius_left_m: 0.1, radius_right_m: 0.1, "
+      "baseline_m: 0.5}, motion: figure_eight, duration_s: 2, camera_phase_s: 0.0137, ground: "
+      "uneven";
+  const auto tracked = play_only<FeatureSample>(simulator + ", features: 5, n_cameras: 2, " +
+                                                "cameras: " + kCameraFile + "}");
+  const auto sensor = make_sensor(config("n_cameras: 2"));
+  const auto input = make_sensor(simulator + ", features: 0}");
+  sensor->connect(*input);
+  const auto rendered = only<ImageSample>(play(*sensor));
+  ASSERT_EQ(rendered.size(), tracked.size());
+  for (std::size_t i = 0; i < tracked.size(); ++i) {
+    EXPECT_EQ(rendered[i].t_ns, tracked[i].t_ns);
+    EXPECT_EQ(rendered[i].camera, tracked[i].camera);
+  }
+}
+
+TEST(ImageSimulator, TheFirstStateHasImagesOnlyIfAskedFor) {
+  EXPECT_EQ(images(config(""), states(4)).size(), 3U);
+  EXPECT_EQ(images(config("n_cameras: 2"), states(4)).size(), 6U);
+  const auto all = images(config("skip_first: false"), states(4));
+  ASSERT_EQ(all.size(), 4U);
+  EXPECT_EQ(all[0].t_ns, 2'000'000'000);
+}
+
+TEST(ImageSimulator, CamerasAreWhereTheirChainPutsThemOnTheImu) {
+  const auto rendered =
+      images(config("n_cameras: 2, sigma_grey: 0, room_size_m: [8, 7], room_centre_m: [0.2, 0.1]"),
+             states(5));
+  sim::RoomOptions options;
+  options.size_m = {8., 7.};
+  options.centre_m = {0.2, 0.1};
+  options.texture_size = 256;
+  options.blocks = 10;
+  const auto input = only<StateSample>(states(5));
+  const auto cameras = log::read_kalibr_cameras(kCameraFile);
+  // Homogeneous matrices, inverted by Eigen.
+  std::vector<Eigen::Vector3d> path;
+  std::vector<sim::CameraPose> poses;
+  for (std::size_t k = 1; k < input.size(); ++k) {
+    Eigen::Isometry3d T_GfromI = Eigen::Isometry3d::Identity();
+    T_GfromI.translate(Eigen::Vector3d(input[k].p_IinG_m.data()));
+    T_GfromI.rotate(Eigen::AngleAxisd(0.05 * static_cast<double>(k), Eigen::Vector3d::UnitZ()) *
+                    Eigen::AngleAxisd(0.02 * static_cast<double>(k), Eigen::Vector3d::UnitX()));
+    for (const CameraView& camera : cameras) {
+      Eigen::Isometry3d T_CfromI = Eigen::Isometry3d::Identity();
+      T_CfromI.translate(camera.p_IinC);
+      T_CfromI.rotate(camera.R_ItoC);
+      const Eigen::Isometry3d T_GfromC = T_GfromI * T_CfromI.inverse();
+      poses.push_back({T_GfromC.linear(), T_GfromC.translation()});
+      path.push_back(T_GfromC.translation());
+    }
+  }
+  const auto room = std::make_shared<const sim::TexturedRoom>(sim::make_room(options, path));
+  ASSERT_EQ(rendered.size(), poses.size());
+  for (const std::size_t i : {0, 1, 6, 7}) {
+    const sim::ImageRenderer renderer(cameras[i % 2], room);
+    Image expected;
+    renderer.render(poses[i], {}, expected);
+    const Image image = pixels_of(rendered[i]);
+    ASSERT_EQ(image.pixels.size(), expected.pixels.size());
+    int different = 0;
+    for (std::size_t k = 0; k < image.pixels.size(); ++k) {
+      different += std::abs(static_cast<int>(image.pixels[k]) - expected.pixels[k]) > 1 ? 1 : 0;
+    }
+    EXPECT_LT(different, 100) << i;  // rounding of the poses, at edges
+    EXPECT_GT(mean_of(image), 60.);
+  }
+}
+
+TEST(ImageSimulator, StampsAreInTheClocksOfTheCamerasAndStayInOrder) {
+  const std::string file = ::testing::TempDir() + "/viwo_image_simulator_clocks.yaml";
+  std::ofstream out(file);
+  for (int i = 0; i < 2; ++i) {
+    out << "cam" << i << ":\n  camera_model: pinhole\n  intrinsics: [100, 100, 39.5, 29.5]\n"
+        << "  distortion_model: radtan\n  distortion_coeffs: [0, 0, 0, 0]\n"
+        << "  resolution: [80, 60]\n  timeshift_cam_imu: " << (i == 0 ? "-0.13" : "0.0125")
+        << "\n  T_cam_imu: [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]\n";
+  }
+  out.close();
+  const auto all = images(config("n_cameras: 2, sigma_grey: 0", file), states(6));
+  ASSERT_EQ(all.size(), 10U);
+  std::vector<ImageSample> of_camera[2];
+  for (const ImageSample& image : all) of_camera[image.camera].push_back(image);
+  for (int k = 0; k < 5; ++k) {
+    const std::int64_t t_ns = 2'100'000'000 + k * std::int64_t{100'000'000};
+    const auto i = static_cast<std::size_t>(k);
+    EXPECT_EQ(of_camera[0][i].t_ns, t_ns + 130'000'000);
+    EXPECT_EQ(of_camera[1][i].t_ns, t_ns - 12'500'000);
+    // Both cameras are in one place, hence see the same at the same true time.
+    EXPECT_EQ(pixels_of(of_camera[0][i]).pixels, pixels_of(of_camera[1][i]).pixels);
+  }
+}
+
+TEST(ImageSimulator, NoiseIsThatOfTheImageWhateverElseIsSimulatedOrRead) {
+  const auto clean = images(config("sigma_grey: 0"), states(4));
+  const auto noisy = images(config("sigma_grey: 5"), states(4));
+  const auto both = images(config("sigma_grey: 5, n_cameras: 2, drop_start_s: [0.05], "
+                                  "drop_duration_s: 0.1"),
+                           states(4));
+  const auto other = images(config("sigma_grey: 5"), states(4), 2);
+  ASSERT_EQ(both.size(), 4U);
+  const Image reference = pixels_of(clean[2]), last = pixels_of(noisy[2]);
+  EXPECT_EQ(last.pixels, pixels_of(noisy[2]).pixels);
+  EXPECT_NE(last.pixels, pixels_of(other[2]).pixels);
+  const auto residual = [](const Image& a, const Image& b) {
+    double sum = 0.;
+    for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+      sum += std::pow(static_cast<double>(a.pixels[i]) - static_cast<double>(b.pixels[i]), 2);
+    }
+    return std::sqrt(sum / static_cast<double>(a.pixels.size()));
+  };
+  EXPECT_NEAR(residual(reference, last), 5., 0.1);
+  EXPECT_NEAR(residual(last, pixels_of(other[2])), 5. * std::sqrt(2.), 0.15);
+  const auto alone =
+      images(config("sigma_grey: 5, drop_start_s: [0.05], drop_duration_s: 0.1"), states(4));
+  ASSERT_EQ(alone.size(), 2U);
+  EXPECT_EQ(pixels_of(alone[1]).pixels, last.pixels);
+}
+
+TEST(ImageSimulator, ReadingFromSeveralThreadsGivesTheSameBits) {
+  const auto all = images(config("n_cameras: 2"), states(3));
+  std::vector<Image> alone, together(8);
+  for (std::size_t i = 0; i < 8; ++i) alone.push_back(pixels_of(all[i % 4]));
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < 8; ++i) {
+    threads.emplace_back([&, i] { all[i % 4].source->read(together[i]); });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(alone[i].pixels, together[i].pixels) << i;
+}
+
+TEST(ImageSimulator, DarknessAndMissingImagesComeWhenTheyWereAskedFor) {
+  const auto all = images(config("dark_start_s: [0.3, 0.85], dark_duration_s: 0.2, "
+                                 "drop_start_s: [0.6], drop_duration_s: 0.2"),
+                          states(11));
+  std::map<std::int64_t, double> brightness;  // by tenths of a second from the first state
+  for (const ImageSample& image : all) {
+    brightness[(image.t_ns - 2'000'000'000) / 100'000'000] = mean_of(pixels_of(image));
+  }
+  for (const std::int64_t tenth : {1, 2, 5, 8}) {
+    ASSERT_TRUE(brightness.contains(tenth)) << tenth;
+    EXPECT_GT(brightness[tenth], 80.) << tenth;
+  }
+  for (const std::int64_t tenth : {3, 4, 9, 10}) {
+    ASSERT_TRUE(brightness.contains(tenth)) << tenth;
+    EXPECT_LT(brightness[tenth], 4.) << tenth;
+  }
+  EXPECT_EQ(brightness.size(), 8U);  // without 6 and 7
+}
+
+TEST(ImageSimulator, TheBrightnessSwings) {
+  const auto all = images(
+      config("exposure_swing: 0.5, exposure_period_s: 0.4, sigma_grey: 0, skip_first: false"),
+      states(4));
+  const double middle = mean_of(pixels_of(all[0]));
+  EXPECT_GT(mean_of(pixels_of(all[1])), 1.3 * middle);
+  EXPECT_NEAR(mean_of(pixels_of(all[2])), middle, 0.1 * middle);
+  EXPECT_NEAR(mean_of(pixels_of(all[3])), 0.5 * middle, 0.05 * middle);
+}
+
+TEST(ImageSimulator, TheRoomFollowsFromTheWorldSeedAndNotFromThatOfTheRun) {
+  const auto reference = pixels_of(images(config("sigma_grey: 0"), states(2), 1)[0]);
+  EXPECT_EQ(pixels_of(images(config("sigma_grey: 0"), states(2), 99)[0]).pixels, reference.pixels);
+  EXPECT_NE(pixels_of(images(config("sigma_grey: 0, world_seed: 2"), states(2), 1)[0]).pixels,
+            reference.pixels);
+}
+
+TEST(ImageSimulator, SaysWhatItRefusesAndWhy) {
+  const auto message = [](const std::string& rest) {
+    const std::string text = error_of(config(rest));
+    return text.substr(std::min(text.find("sensor."), text.size()));
+  };
+  EXPECT_EQ(message("room_size_m: [5]"),
+            "sensor.room_size_m: needs two numbers, along x and y, not 1");
+  EXPECT_EQ(message("n_cameras: 3"), "sensor.n_cameras: there are only 2 in " + kCameraFile);
+  EXPECT_EQ(message("box_reach_m: 0.2"), "sensor.box_reach_m: is less than box_clearance_m");
+  EXPECT_NE(error_of("{type: image_simulator, cameras: " + kCameraFile + ", texture_size_px: 100}")
+                .find("sensor.texture_size_px: 100 is not a power of two: 512, 1024, 2048, ..."),
+            std::string::npos);
+  EXPECT_EQ(refusal(config(""), {ImuSample{}}),
+            "the input gives no true states, which sensors simulator and asl_state do");
+  EXPECT_NE(refusal(config("room_size_m: [2, 4], room_centre_m: [0, 0]"), states(12))
+                .find("the cameras leave the room or come closer than 0.1 m to it: along x they "
+                      "move from 0.1"),
+            std::string::npos);
+  EXPECT_NE(refusal(config("floor_m: 0.3"), states(12)).find("along z they move"),
+            std::string::npos);
+  EXPECT_TRUE(images(config(""), states(1)).empty());
+}
+
+}  // namespace
+}  // namespace viwo
