@@ -220,9 +220,10 @@ TEST_F(FilterTest, SaysThatItFoundNoStateToStartFrom) {
 TEST_F(FilterTest, CountsWhatItSimulates) {
   // 200 Hz, 100 Hz and 10 Hz for five seconds, both ends included; 16 intrinsics, 6 of the mounting
   // and a time offset.
-  EXPECT_EQ(expect_done({"simulate", "run.yaml", "--out", "log"}).out,
-            "1001 IMU samples, 50 tracked images, 501 encoder samples, 51 reference states and 23 true "
-            "parameters in log\n");
+  EXPECT_EQ(
+      expect_done({"simulate", "run.yaml", "--out", "log"}).out,
+      "1001 IMU samples, 50 tracked images, 501 encoder samples, 51 reference states and 23 true "
+      "parameters in log\n");
   write("run.yaml", kRun);
   EXPECT_EQ(expect_done({"simulate", "run.yaml", "--out", "log"}).out,
             "501 encoder samples and 501 reference poses in log\n");

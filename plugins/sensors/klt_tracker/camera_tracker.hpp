@@ -1,0 +1,83 @@
+// Points of one camera, followed from image to image.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "detector.hpp"
+#include "frame.hpp"
+#include "patch.hpp"
+#include "tracker_options.hpp"
+#include "viwo/api/filter_view.hpp"
+
+namespace viwo::klt {
+
+/// A point of the newest image.
+struct Track {
+  std::int64_t id = -1;                            ///< -1: new in this image
+  cv::Point2f uv;                                  ///< px, as measured
+  Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();  ///< unit, in the camera
+  cv::Point2f velocity_px_per_s;                   ///< between the last two images
+  bool has_velocity = false;
+  std::shared_ptr<const Patch> patch;               ///< as it was found; null without refinement
+  Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  ///< deformation since then
+  double inverse_distance_per_m = -1.;  ///< along the ray, from stereo; negative: not known
+};
+
+class CameraTracker {
+ public:
+  CameraTracker(const CameraView& camera, const TrackerOptions& options, cv::Mat mask,
+                std::uint64_t seed);
+
+  /// Follows all points from one image to the next, `dt_s` later; what cannot be followed ends.
+  /// Both frames not blank, `from` with derivatives.
+  void follow(const Frame& from, const Frame& to, double dt_s);
+  /// Adds new points (id -1) where there are too few.
+  void refill(const Frame& frame);
+  void drop_all() { tracks_.clear(); }
+
+  /// Older tracks first.
+  std::vector<Track>& tracks() { return tracks_; }
+
+ private:
+  /// Lucas-Kanade from `old_` to `now_`, first from the predicted place; fills `status_`.
+  void flow(const Frame& from, const Frame& to, double dt_s);
+  /// To where the points look as they did when they were found.
+  void refine(const Frame& to);
+  void check_epipolar();
+  /// The tracks that are left, at their new places.
+  void keep(double dt_s);
+
+  CameraView camera_;
+  TrackerOptions options_;
+  Detector detector_;
+  std::uint64_t seed_;
+  std::uint64_t images_ = 0;
+  double focal_px_;
+  std::vector<Track> tracks_;
+  // Per track, while it is followed; storage is used again.
+  std::vector<cv::Point2f> old_, now_;
+  std::vector<std::uint8_t> status_, step_status_;
+  std::vector<float> error_;
+  std::vector<Eigen::Vector3d> rays_;
+};
+
+/// One call of OpenCV's Lucas-Kanade: `to_points` holds the first guesses and gets the results.
+void lucas_kanade(const Frame& from, const Frame& to, const TrackerOptions& options, int levels,
+                  const std::vector<cv::Point2f>& from_points, std::vector<cv::Point2f>& to_points,
+                  std::vector<std::uint8_t>& status, std::vector<float>& error);
+
+/// Moves a point from next to it to where it looks as it did when it was found. False when it does
+/// not look like that there.
+bool refine_point(const Patch& patch, const Frame& frame, cv::Point2f& uv, Eigen::Matrix2f& A);
+
+/// What an angle next to the axis is in pixels.
+inline double focal_px(const CameraView& camera) {
+  return 0.5 * (camera.intrinsics[0] + camera.intrinsics[1]);
+}
+
+}  // namespace viwo::klt

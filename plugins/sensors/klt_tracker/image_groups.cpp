@@ -1,0 +1,90 @@
+#include "image_groups.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+namespace viwo::klt {
+
+std::string place(int camera, std::int64_t t_ns) {
+  std::array<char, 64> text{};
+  const std::lldiv_t t = std::lldiv(t_ns, 1'000'000'000);
+  std::snprintf(text.data(), text.size(), "camera %d at %s%lld.%09lld s", camera,
+                t_ns < 0 ? "-" : "", std::llabs(t.quot), std::llabs(t.rem));
+  return text.data();
+}
+
+void Rejections::add(const std::string& reason, const std::string& where) {
+  const auto found = std::find_if(counts_.begin(), counts_.end(), [&](const RejectionCount& count) {
+    return count.reason == reason;
+  });
+  if (found == counts_.end()) {
+    counts_.push_back({reason, 1, where});
+  } else {
+    ++found->count;
+  }
+}
+
+void Rejections::append_to(std::vector<RejectionCount>& out) const {
+  out.insert(out.end(), counts_.begin(), counts_.end());
+}
+
+std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& rejections) {
+  Measurement measurement;
+  while (!ended_) {
+    const Status status = input.next(measurement);
+    if (status == Status::kEnd) {
+      ended_ = true;
+      break;
+    }
+    auto* image = std::get_if<ImageSample>(&measurement);
+    if (status != Status::kOk || image == nullptr || image->camera < 0 ||
+        image->camera >= n_cameras_) {
+      ++others_;
+      continue;
+    }
+    const std::string where = place(image->camera, image->t_ns);
+    if (image->source == nullptr) {
+      rejections.add("image without pixels", where);
+      continue;
+    }
+    std::int64_t& last_ns = last_ns_[static_cast<std::size_t>(image->camera)];
+    if (image->t_ns <= last_ns || (group_ns_ && image->t_ns <= *group_ns_) ||
+        (newest_ns_ && image->t_ns < *newest_ns_ - tolerance_ns_)) {
+      rejections.add("image whose stamp is not after the previous one", where);
+      continue;
+    }
+    last_ns = image->t_ns;
+    newest_ns_ = std::max(newest_ns_.value_or(image->t_ns), image->t_ns);
+    ++images_;
+    return std::move(*image);
+  }
+  return std::nullopt;
+}
+
+bool ImageGroups::next(Sensor& input, Rejections& rejections, ImageGroup& out) {
+  out = {};
+  std::optional<ImageSample> image =
+      ahead_ ? std::exchange(ahead_, std::nullopt) : next_image(input, rejections);
+  if (!image) return false;
+  const std::int64_t begin_ns = image->t_ns;
+  int lowest_camera = kMaxCameras;
+  for (int count = 0; image; image = next_image(input, rejections)) {
+    auto& source = out.sources[static_cast<std::size_t>(image->camera)];
+    if (source != nullptr || std::abs(image->t_ns - begin_ns) > tolerance_ns_) {
+      ahead_ = std::move(image);
+      break;
+    }
+    source = std::move(image->source);
+    if (image->camera < lowest_camera) {
+      lowest_camera = image->camera;
+      out.t_ns = image->t_ns;
+    }
+    if (++count == n_cameras_) break;
+  }
+  group_ns_ = out.t_ns;
+  return true;
+}
+
+}  // namespace viwo::klt

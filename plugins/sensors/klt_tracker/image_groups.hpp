@@ -1,0 +1,67 @@
+// The images of one instant, one of each camera, out of a stream of measurements.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viwo/api/measurement.hpp"
+#include "viwo/api/sensor.hpp"
+
+namespace viwo::klt {
+
+inline constexpr int kMaxCameras = 2;
+
+/// "camera 0 at 1.050000000 s".
+std::string place(int camera, std::int64_t t_ns);
+
+/// Counts what is dropped.
+class Rejections {
+ public:
+  void add(const std::string& reason, const std::string& where);
+  void append_to(std::vector<RejectionCount>& out) const;
+
+ private:
+  std::vector<RejectionCount> counts_;
+};
+
+struct ImageGroup {
+  /// Of the first camera's image, or of the only one; camera clock.
+  std::int64_t t_ns = 0;
+  std::array<std::shared_ptr<const ImageSource>, kMaxCameras> sources;  ///< null: no image
+};
+
+/// Reads a sensor and gathers its images, in time order. A group is complete when it has an image
+/// of every camera, or when the next image is of another instant.
+class ImageGroups {
+ public:
+  ImageGroups(int n_cameras, std::int64_t tolerance_ns)
+      : n_cameras_(n_cameras), tolerance_ns_(tolerance_ns) {
+    last_ns_.fill(std::numeric_limits<std::int64_t>::min());
+  }
+
+  /// False at the end.
+  bool next(Sensor& input, Rejections& rejections, ImageGroup& out);
+  std::int64_t images() const { return images_; }  ///< that were taken so far
+  std::int64_t others() const { return others_; }  ///< measurements that were not
+
+ private:
+  /// The next image of one of the cameras whose stamp can be.
+  std::optional<ImageSample> next_image(Sensor& input, Rejections& rejections);
+
+  int n_cameras_;
+  std::int64_t tolerance_ns_;
+  std::optional<ImageSample> ahead_;  ///< the first image of the next group
+  std::array<std::int64_t, kMaxCameras> last_ns_{};
+  std::optional<std::int64_t> newest_ns_;
+  std::optional<std::int64_t> group_ns_;  ///< of the last group
+  std::int64_t images_ = 0;
+  std::int64_t others_ = 0;
+  bool ended_ = false;
+};
+
+}  // namespace viwo::klt

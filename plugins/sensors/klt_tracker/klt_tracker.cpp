@@ -1,0 +1,246 @@
+#include "klt_tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include <opencv2/core/utility.hpp>
+
+#include "params.hpp"
+#include "viwo/image/image_file.hpp"
+#include "viwo/log/kalibr.hpp"
+
+namespace viwo::klt {
+namespace {
+
+/// A pair with fewer matches says nothing about the extrinsics.
+constexpr std::size_t kMinMatches = 20;
+constexpr double kContradictingShare = 0.7;
+/// Pairs in a row that contradict the extrinsics before it is said.
+constexpr int kContradictingPairs = 10;
+constexpr double kMinBaseline = 1e-3;  // m
+
+std::string size_text(int width_px, int height_px) {
+  return std::to_string(width_px) + " x " + std::to_string(height_px) + " pixels";
+}
+
+std::vector<CameraView> read_cameras(const ParamSet& params) {
+  const std::string& file = params.text("cameras");
+  std::vector<CameraView> cameras = log::read_kalibr_cameras(file);
+  const auto asked = static_cast<std::size_t>(params.integer("n_cameras"));
+  if (asked > cameras.size()) {
+    throw ParamError("n_cameras",
+                     "there are only " + std::to_string(cameras.size()) + " cameras in " + file);
+  }
+  cameras.resize(asked > 0 ? asked : std::min<std::size_t>(cameras.size(), kMaxCameras));
+  if (cameras.size() < 2) return cameras;
+  const double shift_s = std::abs(cameras[1].t_CtoI_s - cameras[0].t_CtoI_s);
+  if (shift_s > params.number("max_camera_dt_s")) {
+    throw ParamError("max_camera_dt_s", "timeshift_cam_imu of cam0 and cam1 differ by " +
+                                            std::to_string(shift_s) + " s in " + file +
+                                            ": images of a pair must be taken at the same time");
+  }
+  const Eigen::Vector3d p_C0inC1 =
+      cameras[1].p_IinC - cameras[1].R_ItoC * cameras[0].R_ItoC.transpose() * cameras[0].p_IinC;
+  if (params.flag("stereo") && p_C0inC1.norm() < kMinBaseline) {
+    throw ParamError("stereo", "cam0 and cam1 are at the same place in " + file);
+  }
+  return cameras;
+}
+
+/// Not 0 where no point may be; empty without a mask.
+cv::Mat read_mask(const ParamSet& params, std::size_t camera, const CameraView& view) {
+  const std::string name = "mask" + std::to_string(camera);
+  const std::string& file = params.text(name);
+  if (file.empty()) return {};
+  Image image;
+  read_image(file, image);
+  if (image.width_px != view.width_px || image.height_px != view.height_px) {
+    throw ParamError(name, file + " has " + size_text(image.width_px, image.height_px) +
+                               ", camera " + std::to_string(camera) + " has " +
+                               size_text(view.width_px, view.height_px));
+  }
+  const cv::Mat grey(image.height_px, image.width_px, CV_8UC1, image.pixels.data());
+  return cv::Mat(grey > 127);
+}
+
+}  // namespace
+
+KltTracker::KltTracker(const ParamSet& params, const HostServices& services)
+    : services_(services),
+      options_(read_options(params)),
+      chain_file_(params.text("cameras")),
+      max_gap_s_(params.number("max_gap_s")),
+      cameras_(read_cameras(params)),
+      shift_ns_(std::llround(cameras_[0].t_CtoI_s * 1e9)) {
+  const bool stereo = cameras_.size() > 1 && params.flag("stereo");
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    eyes_.emplace_back(options_);
+    const cv::Mat mask = read_mask(params, i, cameras_[i]);
+    if (stereo && i == 1) {
+      matchers_.emplace_back(cameras_[0], cameras_[1], options_, mask);
+    } else {
+      trackers_.emplace_back(cameras_[i], options_, mask, services.seed + i);
+    }
+  }
+  groups_.emplace(static_cast<int>(cameras_.size()),
+                  std::llround(params.number("max_camera_dt_s") * 1e9));
+}
+
+void KltTracker::read_one(const ImageSource* source, bool with_derivatives, Eye& eye) const {
+  eye.is_read = false;
+  eye.unreadable.clear();
+  eye.failure = nullptr;
+  if (source == nullptr) return;
+  try {
+    source->read(eye.image);
+    eye.is_read = true;
+    const auto pixels = static_cast<std::size_t>(std::max(eye.image.width_px, 0)) *
+                        static_cast<std::size_t>(std::max(eye.image.height_px, 0));
+    if (pixels == 0 || eye.image.pixels.size() != pixels) throw InputError("no pixels");
+    eye.maker.make(eye.image, with_derivatives, eye.now);
+  } catch (const InputError& error) {
+    eye.is_read = false;
+    eye.unreadable = error.what();
+  } catch (...) {  // nothing may leave a thread of OpenCV
+    eye.failure = std::current_exception();
+  }
+}
+
+void KltTracker::read(const ImageGroup& group) {
+  cv::parallel_for_(cv::Range(0, static_cast<int>(eyes_.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      const auto camera = static_cast<std::size_t>(i);
+      // Points are followed from the images of trackers; the right image of a pair is only
+      // searched.
+      read_one(group.sources[camera].get(), camera < trackers_.size(), eyes_[camera]);
+    }
+  });
+}
+
+void KltTracker::check(const ImageGroup& group) {
+  for (std::size_t i = 0; i < eyes_.size(); ++i) {
+    Eye& eye = eyes_[i];
+    if (eye.failure) std::rethrow_exception(eye.failure);
+    const std::string where = place(static_cast<int>(i), group.t_ns);
+    if (!eye.unreadable.empty()) {
+      rejections_.add("image that cannot be read", where + ": " + eye.unreadable);
+    }
+    if (!eye.is_read) continue;
+    const CameraView& camera = cameras_[i];
+    if (eye.image.width_px != camera.width_px || eye.image.height_px != camera.height_px) {
+      throw InputError("the image of " + where + " has " +
+                       size_text(eye.image.width_px, eye.image.height_px) + ", but cam" +
+                       std::to_string(i) + " of " + chain_file_ + " has " +
+                       size_text(camera.width_px, camera.height_px) +
+                       ": is the calibration that of another camera?");
+    }
+  }
+  if (is_stereo() && !eyes_[0].is_read && eyes_[1].is_read) {
+    rejections_.add("right image without its left one", place(1, group.t_ns));
+    eyes_[1].is_read = false;
+  }
+}
+
+void KltTracker::advance(std::size_t camera, std::int64_t t_ns) {
+  Eye& eye = eyes_[camera];
+  CameraTracker& tracker = trackers_[camera];
+  if (!eye.is_read) return;
+  const double dt_s = eye.before_ns ? seconds_between(*eye.before_ns, t_ns) : 0.;
+  if (eye.now.blank || !eye.before_ns || dt_s > max_gap_s_) {
+    tracker.drop_all();
+  } else {
+    tracker.follow(eye.before, eye.now, dt_s);
+  }
+  eye.before_ns.reset();
+  if (eye.now.blank) return;
+  tracker.refill(eye.now);
+  eye.before_ns = t_ns;
+}
+
+void KltTracker::give_ids(std::vector<Track>& tracks) {
+  for (Track& track : tracks) {
+    if (track.id < 0) track.id = next_id_++;
+  }
+}
+
+void KltTracker::watch_stereo(const StereoCounts& counts, std::int64_t t_ns) {
+  if (counts.found < kMinMatches) return;
+  const double share =
+      static_cast<double>(counts.contradicting) / static_cast<double>(counts.found);
+  if (share < kContradictingShare) {
+    contradicting_pairs_ = 0;
+    return;
+  }
+  rejections_.add("stereo pair that contradicts the extrinsics", place(0, t_ns));
+  if (++contradicting_pairs_ < kContradictingPairs || told_contradiction_) return;
+  told_contradiction_ = true;
+  services_.log(LogLevel::kWarning,
+                std::to_string(std::lround(100. * share)) + " % of the " +
+                    std::to_string(counts.found) + " stereo matches of " + place(0, t_ns) +
+                    ", and most of those of the " + std::to_string(kContradictingPairs - 1) +
+                    " pairs before, contradict the extrinsics in " + chain_file_ +
+                    ": the two cameras are probably swapped, or the calibration is of others. "
+                    "Such matches are not used");
+}
+
+void KltTracker::match_right(std::int64_t t_ns, FeatureSample& sample) {
+  if (eyes_[0].now.blank || eyes_[1].now.blank) return;
+  watch_stereo(matchers_[0].match(eyes_[0].now, eyes_[1].now, trackers_[0].tracks(), sample.points),
+               t_ns);
+}
+
+void KltTracker::process(const ImageGroup& group) {
+  read(group);
+  check(group);
+  if (trackers_.size() == 1) {
+    advance(0, group.t_ns);  // parallel inside
+  } else {
+    cv::parallel_for_(cv::Range(0, static_cast<int>(trackers_.size())),
+                      [&](const cv::Range& range) {
+                        for (int i = range.start; i < range.end; ++i) {
+                          advance(static_cast<std::size_t>(i), group.t_ns);
+                        }
+                      });
+  }
+  for (CameraTracker& tracker : trackers_) give_ids(tracker.tracks());
+  for (std::size_t i = 0; i < eyes_.size(); ++i) {
+    if (!eyes_[i].is_read) continue;
+    FeatureSample sample{group.t_ns + shift_ns_, static_cast<int>(i), {}};
+    if (i < trackers_.size()) {
+      for (const Track& track : trackers_[i].tracks()) {
+        sample.points.push_back({track.id, track.uv.x, track.uv.y});
+      }
+    } else {
+      match_right(group.t_ns, sample);
+    }
+    ready_.push_back(std::move(sample));
+  }
+  for (Eye& eye : eyes_) {
+    if (eye.is_read) std::swap(eye.now, eye.before);
+  }
+}
+
+Status KltTracker::next(Measurement& out) {
+  if (input_ == nullptr) throw InputError("klt_tracker: it has no input to take images from");
+  while (ready_.empty()) {
+    ImageGroup group;
+    if (!groups_->next(*input_, rejections_, group)) {
+      if (groups_->images() == 0 && groups_->others() > 0) {
+        throw InputError("klt_tracker: its input gives no image of " +
+                         std::string(cameras_.size() == 1 ? "camera 0" : "camera 0 or 1") +
+                         ", only " + std::to_string(groups_->others()) + " other measurements");
+      }
+      return Status::kEnd;
+    }
+    process(group);
+  }
+  out = std::move(ready_.front());
+  ready_.pop_front();
+  return Status::kOk;
+}
+
+void KltTracker::rejections(std::vector<RejectionCount>& out) const { rejections_.append_to(out); }
+
+}  // namespace viwo::klt

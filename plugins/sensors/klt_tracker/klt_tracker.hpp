@@ -1,0 +1,76 @@
+// Sensor klt_tracker: images to feature tracks.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera_tracker.hpp"
+#include "frame.hpp"
+#include "image_groups.hpp"
+#include "stereo_matcher.hpp"
+#include "tracker_options.hpp"
+#include "viwo/api/host_services.hpp"
+#include "viwo/api/params.hpp"
+#include "viwo/api/sensor.hpp"
+
+namespace viwo::klt {
+
+class KltTracker final : public Sensor {
+ public:
+  KltTracker(const ParamSet& params, const HostServices& services);
+
+  bool takes_input() const override { return true; }
+  void connect(Sensor& input) override { input_ = &input; }
+  Status next(Measurement& out) override;
+  void rejections(std::vector<RejectionCount>& out) const override;
+
+ private:
+  /// What is kept of one camera's images.
+  struct Eye {
+    explicit Eye(const TrackerOptions& options) : maker(options) {}
+    FrameMaker maker;
+    Image image;
+    Frame now, before;
+    std::optional<std::int64_t> before_ns;  ///< none: nothing to follow points from
+    bool is_read = false;                   ///< `now` is of this group
+    std::string unreadable;
+    std::exception_ptr failure;
+  };
+
+  bool is_stereo() const { return !matchers_.empty(); }
+  /// Reads and prepares the images of a group, at the same time.
+  void read(const ImageGroup& group);
+  void read_one(const ImageSource* source, bool with_derivatives, Eye& eye) const;
+  /// Counts images that cannot be read. InputError for one that is not of this camera.
+  void check(const ImageGroup& group);
+  /// Follows and refills the points of one camera; ids are given later.
+  void advance(std::size_t camera, std::int64_t t_ns);
+  void give_ids(std::vector<Track>& tracks);
+  void match_right(std::int64_t t_ns, FeatureSample& sample);
+  void watch_stereo(const StereoCounts& counts, std::int64_t t_ns);
+  void process(const ImageGroup& group);
+
+  HostServices services_;
+  TrackerOptions options_;
+  std::string chain_file_;
+  double max_gap_s_;
+  std::vector<CameraView> cameras_;
+  std::int64_t shift_ns_ = 0;  ///< from the clock of camera 0 to that of the IMU
+  std::vector<Eye> eyes_;
+  std::vector<CameraTracker> trackers_;  ///< of every camera, or of the left one of a pair
+  std::vector<StereoMatcher> matchers_;  ///< one or none
+  Sensor* input_ = nullptr;
+  std::optional<ImageGroups> groups_;
+  Rejections rejections_;
+  std::int64_t next_id_ = 0;
+  std::deque<FeatureSample> ready_;
+  int contradicting_pairs_ = 0;  ///< in a row
+  bool told_contradiction_ = false;
+};
+
+}  // namespace viwo::klt

@@ -1,0 +1,147 @@
+// What the tracker makes of images that are broken, missing, dark, late or of another camera.
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test_drive.hpp"
+
+namespace viwo::klt {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(KltTracker, TracksOverAnImageThatCannotBeRead) {
+  std::vector<Measurement> input = drive(4, 1);
+  std::get<ImageSample>(input[2]).source = std::make_shared<BrokenImage>();
+  const Played played = track(input, section({}, 1));
+  ASSERT_EQ(played.samples.size(), 3U);
+  EXPECT_GT(common(played.samples[1], played.samples[2]), 170U);
+  const RejectionCount& count = played.rejections.at("image that cannot be read");
+  EXPECT_EQ(count.count, 1);
+  EXPECT_EQ(count.first, "camera 0 at 5.200000000 s: b.png: the image is cut short");
+}
+
+TEST(KltTracker, TracksTheLeftImageAloneWhenTheRightOneIsMissing) {
+  std::vector<Measurement> input = drive(4, 2);
+  input.erase(input.begin() + 3);  // right, second pair
+  const Played played = track(input, section());
+  ASSERT_EQ(played.samples.size(), 7U);
+  const auto left = played.of(0);
+  EXPECT_EQ(left.size(), 4U);
+  EXPECT_GT(common(left[1], left[2]), 185U);
+  EXPECT_GT(common(left[2], played.of(1).back()), 170U);
+  EXPECT_TRUE(played.rejections.empty());
+}
+
+TEST(KltTracker, CountsARightImageWithoutItsLeftOne) {
+  std::vector<Measurement> input = drive(4, 2);
+  input.erase(input.begin() + 2);  // left, second pair
+  const Played played = track(input, section());
+  EXPECT_EQ(played.samples.size(), 6U);
+  const RejectionCount& count = played.rejections.at("right image without its left one");
+  EXPECT_EQ(count.count, 1);
+  EXPECT_EQ(count.first, "camera 1 at 5.100000000 s");
+  EXPECT_GT(common(played.of(0)[0], played.of(0)[1]), 170U);
+}
+
+TEST(KltTracker, StartsAnewAfterALongGapAndAfterDarkness) {
+  // GIVEN images 0 to 2, then none for 0.6 s, then 8 to 10, of which 9 is dark
+  std::vector<Measurement> input = drive(11, 1);
+  std::get<ImageSample>(input[9]) =
+      sample_of({424, 400, std::vector<std::uint8_t>(424 * 400, 2)}, 0, stamp_of(9));
+  input.erase(input.begin() + 3, input.begin() + 8);
+  const auto left = track(input, section({}, 1)).of(0);
+  ASSERT_EQ(left.size(), 6U);
+  EXPECT_GT(common(left[1], left[2]), 180U);
+  // THEN there is a sample for the dark one, too, and no id comes back
+  EXPECT_TRUE(left[4].points.empty());
+  EXPECT_EQ(left[4].t_ns, stamp_of(9) + kShiftNs);
+  for (const auto& [from, to] : {std::pair{2U, 3U}, {2U, 5U}, {3U, 5U}}) {
+    EXPECT_GT(left[to].points.size(), 190U);
+    EXPECT_EQ(common(left[from], left[to]), 0U);
+    EXPECT_LT(*ids_of(left[from]).rbegin(), *ids_of(left[to]).begin());
+  }
+}
+
+TEST(KltTracker, CountsImagesWhoseStampsGoBack) {
+  std::vector<Measurement> input = drive(4, 1);
+  std::get<ImageSample>(input[2]).t_ns = stamp_of(0);
+  const Played played = track(input, section({}, 1));
+  EXPECT_EQ(played.samples.size(), 3U);
+  const RejectionCount& count =
+      played.rejections.at("image whose stamp is not after the previous one");
+  EXPECT_EQ(count.count, 1);
+  EXPECT_EQ(count.first, "camera 0 at 5.000000000 s");
+}
+
+TEST(KltTracker, RefusesAnImageOfAnotherSize) {
+  std::vector<Measurement> input = drive(2, 1);
+  std::get<ImageSample>(input[1]) =
+      sample_of({320, 240, std::vector<std::uint8_t>(320 * 240, 99)}, 0, stamp_of(1));
+  EXPECT_THAT(
+      failure_of(input, section({}, 1)),
+      HasSubstr("the image of camera 0 at 5.100000000 s has 320 x 240 pixels, but cam0 of " +
+                temporary("chain.yaml").string() +
+                " has 424 x 400 pixels: is the calibration that of another camera?"));
+}
+
+TEST(KltTracker, WarnsOnceWhenTheCamerasAreSwapped) {
+  static std::vector<std::string> told;
+  PluginRegistry own({VIWO_TEST_PLUGIN_DIR},
+                     [](const PluginInfo&, LogLevel level, std::string_view text) {
+                       if (level == LogLevel::kWarning) told.emplace_back(text);
+                     });
+  for (const bool swapped : {false, true}) {
+    told.clear();
+    std::vector<Measurement> input = drive(13, 2);
+    for (Measurement& measurement : input) {
+      auto& image = std::get<ImageSample>(measurement);
+      if (swapped) image.camera = 1 - image.camera;
+    }
+    FakeInput images(input);
+    config::Errors errors;
+    const auto sensor =
+        own.make_sensor(config::parse(section(), "test.yaml"), "sensor", 1, errors).object;
+    errors.throw_if_any();
+    sensor->connect(images);
+    const auto samples = only<FeatureSample>(play(*sensor));
+    std::vector<RejectionCount> rejections;
+    sensor->rejections(rejections);
+    if (!swapped) {
+      EXPECT_TRUE(told.empty());
+      EXPECT_TRUE(rejections.empty());
+      continue;
+    }
+    ASSERT_EQ(told.size(), 1U);
+    EXPECT_THAT(told[0], HasSubstr("the two cameras are probably swapped"));
+    ASSERT_EQ(rejections.size(), 1U);
+    EXPECT_EQ(rejections[0].reason, "stereo pair that contradicts the extrinsics");
+    EXPECT_EQ(rejections[0].count, 13);
+    EXPECT_LT(samples.back().points.size(), 60U);
+  }
+}
+
+TEST(KltTracker, SaysWhatIsWrongWithItsParameters) {
+  write_png(temporary("small.png"), {32, 24, std::vector<std::uint8_t>(32 * 24, 0)});
+  EXPECT_THAT(error_of(section("mask0: " + temporary("small.png").string() + "\n")),
+              HasSubstr("small.png has 32 x 24 pixels, camera 0 has 424 x 400 pixels"));
+  EXPECT_THAT(error_of(section("mask1: /no/such.png\n")),
+              HasSubstr("/no/such.png: the image is missing or cannot be read"));
+  EXPECT_THAT(error_of(section("n_cameras: 2\n", 1)), HasSubstr("there are only 1 cameras in"));
+  EXPECT_THAT(error_of("type: klt_tracker\ncameras: " + chain_file(2, 0.02) + "\n"),
+              HasSubstr("timeshift_cam_imu of cam0 and cam1 differ by 0.016000 s"));
+  EXPECT_EQ(error_of("type: klt_tracker\ncameras: " + chain_file(2, 0.02) + "\nn_cameras: 1\n"),
+            "");
+}
+
+TEST(KltTracker, SaysThatItsInputHasNoImages) {
+  EXPECT_EQ(failure_of({ImuSample{}, ImuSample{}}, section()),
+            "klt_tracker: its input gives no image of camera 0 or 1, only 2 other measurements");
+}
+
+}  // namespace
+}  // namespace viwo::klt

@@ -1,0 +1,205 @@
+// What the tracker makes of good images.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/core/utility.hpp>
+
+#include "test_drive.hpp"
+
+namespace viwo::klt {
+namespace {
+
+struct Errors {
+  double rmse_px = 0.;  ///< per coordinate
+  double max_px = 0.;
+  int count = 0;
+};
+
+/// Of the points of one camera, against the places on the walls where the left image first saw
+/// them.
+Errors errors_of(const Played& played, int camera) {
+  std::map<std::int64_t, Eigen::Vector3d> truth;
+  Errors errors;
+  double sum = 0.;
+  for (const FeatureSample& sample : played.samples) {
+    const auto image = static_cast<int>((sample.t_ns - kShiftNs - kStartNs) / kPeriodNs);
+    const CameraView& view = rig().cameras[static_cast<std::size_t>(sample.camera)];
+    const CameraPose pose = rig().pose(image, sample.camera);
+    for (const FeaturePoint& point : sample.points) {
+      const Eigen::Vector2d measured(point.u_px, point.v_px);
+      const auto found = truth.find(point.id);
+      if (found == truth.end()) {
+        EXPECT_EQ(sample.camera, 0);
+        truth[point.id] = Room::hit(pose.p_CinW, pose.R_CtoW * unproject(view, measured).value());
+        continue;
+      }
+      if (sample.camera != camera) continue;
+      Eigen::Vector2d uv;
+      EXPECT_TRUE(project(view, pose.R_CtoW.transpose() * (found->second - pose.p_CinW), uv));
+      sum += (uv - measured).squaredNorm();
+      errors.max_px = std::max(errors.max_px, (uv - measured).norm());
+      ++errors.count;
+    }
+  }
+  errors.rmse_px = std::sqrt(0.5 * sum / errors.count);
+  return errors;
+}
+
+TEST(KltTracker, StaysOnItsPointsToATenthOfAPixel) {
+  const Played played = track(drive(12, 2), section());
+  const Errors left = errors_of(played, 0), right = errors_of(played, 1);
+  EXPECT_LT(left.rmse_px, 0.1);
+  EXPECT_LT(right.rmse_px, 0.1);
+  EXPECT_LT(left.max_px, 1.5);
+  EXPECT_LT(right.max_px, 1.5);
+  EXPECT_GT(left.count, 11 * 160);
+  EXPECT_GT(right.count, 12 * 180);
+}
+
+TEST(KltTracker, DriftsThreeTimesAsMuchWithoutRefinement) {
+  const std::vector<Measurement> images = drive(12, 1);
+  const Errors with = errors_of(track(images, section({}, 1)), 0);
+  const Errors without = errors_of(track(images, section("refine: false\n", 1)), 0);
+  EXPECT_GT(without.rmse_px, 3. * with.rmse_px);
+  EXPECT_LT(without.rmse_px, 1.);
+}
+
+TEST(KltTracker, KeepsTheIdsOfWhatItFollows) {
+  const auto left = track(drive(6, 1), section({}, 1)).of(0);
+  ASSERT_EQ(left.size(), 6U);
+  for (std::size_t i = 0; i + 1 < left.size(); ++i) {
+    EXPECT_GT(common(left[i], left[i + 1]), 185U);
+    EXPECT_NEAR(static_cast<double>(left[i].points.size()), 200., 5.);
+  }
+  EXPECT_GT(common(left.front(), left.back()), 150U);
+}
+
+TEST(KltTracker, GivesOneSamplePerImageAndOneStampPerPair) {
+  // GIVEN a second camera whose stamps are half a millisecond off, and other measurements
+  std::vector<Measurement> input;
+  for (int i = 0; i < 3; ++i) {
+    input.emplace_back(ImuSample{stamp_of(i) - 1000, {}, {}});
+    input.emplace_back(sample_of(rig().render(i, 1), 1, stamp_of(i) - 500'000));
+    input.emplace_back(sample_of(rig().render(i, 0), 0, stamp_of(i)));
+  }
+  const Played played = track(input, section());
+  // THEN there are pairs, at the time of the first camera in the clock of the IMU
+  ASSERT_EQ(played.samples.size(), 6U);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(played.samples[i].camera, static_cast<int>(i % 2));
+    EXPECT_EQ(played.samples[i].t_ns, stamp_of(static_cast<int>(i / 2)) + kShiftNs);
+    EXPECT_GT(played.samples[i].points.size(), 180U);
+  }
+  EXPECT_TRUE(played.rejections.empty());
+}
+
+TEST(KltTracker, GivesEachCameraItsOwnPointsWithoutStereo) {
+  const Played played = track(drive(4, 2), section("stereo: false\n"));
+  ASSERT_EQ(played.samples.size(), 8U);
+  for (std::size_t i = 0; i < 8; i += 2) {
+    EXPECT_EQ(common(played.samples[i], played.samples[i + 1]), 0U);
+    EXPECT_GT(played.samples[i + 1].points.size(), 185U);
+  }
+  EXPECT_GT(common(played.samples[1], played.samples[7]), 150U);
+}
+
+TEST(KltTracker, GivesTheSameBitsAtEveryRunAndForAnyNumberOfThreads) {
+  const std::vector<Measurement> images = drive(5, 2);
+  const int threads = cv::getNumThreads();
+  for (const char* parameters : {"", "stereo: false\nhistogram_method: clahe\n"}) {
+    std::vector<Played> all;
+    for (const int n : {1, 2, 2}) {
+      cv::setNumThreads(n);
+      all.push_back(track(images, section(parameters)));
+    }
+    for (const Played& played : all) {
+      ASSERT_EQ(played.samples.size(), 10U);
+      for (std::size_t i = 0; i < 10; ++i) {
+        const auto& points = played.samples[i].points;
+        const auto& first = all.front().samples[i].points;
+        ASSERT_EQ(points.size(), first.size());
+        for (std::size_t k = 0; k < points.size(); ++k) {
+          EXPECT_EQ(points[k].id, first[k].id);
+          EXPECT_EQ(points[k].u_px, first[k].u_px);
+          EXPECT_EQ(points[k].v_px, first[k].v_px);
+        }
+      }
+    }
+  }
+  cv::setNumThreads(threads);
+}
+
+TEST(KltTracker, DropsWhatMovesOnItsOwn) {
+  // GIVEN a square in front of the cameras that goes up while the cameras go to the side
+  const auto run = [](const std::string& parameters) {
+    std::vector<Measurement> input;
+    for (int i = 0; i < 6; ++i) {
+      const Mover mover{Eigen::Vector3d(0., 0.5 - 0.06 * i, 1.4), 0.7};
+      input.emplace_back(sample_of(rig().render(i, 0, mover), 0, stamp_of(i)));
+    }
+    const auto left = track(input, section(parameters, 1)).of(0);
+    // Followed points on the square, and others.
+    std::pair<int, int> counts;
+    for (int i = 1; i < 6; ++i) {
+      const auto before = ids_of(left[static_cast<std::size_t>(i - 1)]);
+      const CameraPose pose = rig().pose(i, 0);
+      for (const FeaturePoint& point : left[static_cast<std::size_t>(i)].points) {
+        if (!before.contains(point.id)) continue;
+        const Eigen::Vector3d direction =
+            pose.R_CtoW *
+            unproject(rig().cameras[0], Eigen::Vector2d(point.u_px, point.v_px)).value();
+        const Eigen::Vector3d at =
+            pose.p_CinW + (1.4 - pose.p_CinW.z()) / direction.z() * direction;
+        const bool on = direction.z() > 0. && std::abs(at.x()) < 0.65 &&
+                        std::abs(at.y() - (0.5 - 0.06 * i)) < 0.65;
+        ++(on ? counts.first : counts.second);
+      }
+    }
+    return counts;
+  };
+  const auto all = run("ransac: false\n");
+  const auto rigid = run("ransac: true\n");
+  EXPECT_GT(all.first, 60);
+  EXPECT_LT(rigid.first, all.first / 5);
+  EXPECT_GT(rigid.second, all.second * 95 / 100);
+}
+
+TEST(KltTracker, LosesNothingByTurningOrStanding) {
+  for (const double yaw : {0., 0.05}) {
+    std::vector<Measurement> input;
+    for (int i = 0; i < 5; ++i) {
+      const CameraPose pose{exp_so3(Eigen::Vector3d(0., yaw * i, 0.)), Eigen::Vector3d::Zero()};
+      input.emplace_back(
+          sample_of(rig().left.render(pose, 1.5, static_cast<std::uint64_t>(i)), 0, stamp_of(i)));
+    }
+    const auto without = track(input, section("ransac: false\n", 1)).of(0);
+    const auto with = track(input, section({}, 1)).of(0);
+    EXPECT_GE(common(with.front(), with.back()) + 3, common(without.front(), without.back()));
+    EXPECT_GT(common(with.front(), with.back()), yaw > 0. ? 150U : 198U);
+  }
+}
+
+TEST(KltTracker, RespectsMasksOfBothCameras) {
+  Image mask{424, 400, std::vector<std::uint8_t>(424 * 400, 0)};
+  std::fill(mask.pixels.begin() + 424 * 250, mask.pixels.end(), std::uint8_t{255});
+  write_png(temporary("mask0.png"), mask);
+  std::fill(mask.pixels.begin() + 424 * 200, mask.pixels.end(), std::uint8_t{255});
+  write_png(temporary("mask1.png"), mask);
+  const Played played =
+      track(drive(5, 2), section("mask0: " + temporary("mask0.png").string() +
+                                 "\nmask1: " + temporary("mask1.png").string() + "\n"));
+  for (const FeatureSample& sample : played.samples) {
+    EXPECT_GT(sample.points.size(), 60U);
+    for (const FeaturePoint& point : sample.points) {
+      EXPECT_LT(point.v_px, sample.camera == 0 ? 249.5 : 199.5);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace viwo::klt
