@@ -81,7 +81,10 @@ class ImagesTest : public CommandLineTest {
   static fs::path image(const fs::path& camera, std::size_t n) {
     std::vector<fs::path> files;
     for (const auto& file : fs::directory_iterator(camera / "data")) files.push_back(file.path());
-    std::sort(files.begin(), files.end());
+    // Their names are numbers: stamps.
+    std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+      return std::stoll(a.stem()) < std::stoll(b.stem());
+    });
     return files.at(n);
   }
 

@@ -14,7 +14,7 @@ import sys
 # Folder below framework/, in the order of the dependencies. Headers of plugin_api are viwo/api/.
 MODULES = ["plugin_api", "math", "testing", "config", "image", "log", "plugin_host", "wheel", "camera", "filter",
            "sim", "eval",
-           "report", "observability", "experiment", "conformance", "app"]
+           "report", "observability", "view", "experiment", "conformance", "app"]
 PLUGIN_MODULES = {"plugin_api", "math", "image", "log", "sim", "wheel", "camera"}
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*["<]([^">\n]+)[">]', re.MULTILINE)
 SOURCES = {".cpp", ".hpp", ".h", ".cc"}

@@ -36,6 +36,11 @@ void add_option(const std::string& name, po::options_description& options) {
   } else if (name == "figures") {
     add("figures", po::value<std::string>()->value_name("FORMAT"),
         "every plot also as a static figure for a paper: svg or pdf (needs gnuplot)");
+  } else if (name == "show") {
+    add("show", "a window with the tracks in the images, the trajectory and the calibration");
+  } else if (name == "video") {
+    add("video", po::value<std::string>()->value_name("FILE"),
+        "the same pictures, one for each epoch, as a video file: .mp4 or .avi");
   } else if (name == "reference") {
     add("reference", po::value<std::string>()->value_name("A.tum")->required(), "true trajectory");
   } else if (name == "estimate") {
@@ -94,6 +99,9 @@ void check_ranges(const Command& command, const po::variables_map& values) {
   if (values.contains("out") && values["out"].as<std::string>().empty()) {
     refuse(command, "--out needs the name of a folder");
   }
+  if (values.contains("video") && values["video"].as<std::string>().empty()) {
+    refuse(command, "--video needs the name of a file");
+  }
 }
 
 void check_positional(const Command& command, const std::vector<std::string>& given) {
@@ -132,6 +140,8 @@ Arguments arguments_of(const po::variables_map& values) {
   if (values.contains("jobs")) arguments.jobs = values["jobs"].as<int>();
   arguments.keep_runs = values.contains("keep-runs");
   arguments.resume = values.contains("resume");
+  arguments.show = values.contains("show");
+  arguments.video = text("video");
   arguments.figures = text("figures");
   arguments.reference = text("reference");
   arguments.estimate = text("estimate");

@@ -23,7 +23,9 @@ struct Arguments {
   int jobs = 0;
   bool keep_runs = false;
   bool resume = false;
-  std::string figures;  ///< "svg", "pdf" or none
+  bool show = false;
+  std::filesystem::path video;  ///< none if empty
+  std::string figures;          ///< "svg", "pdf" or none
   std::string reference, estimate, align;
 };
 

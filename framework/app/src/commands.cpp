@@ -1,6 +1,8 @@
 // The commands that run something.
 #include <iostream>
 #include <optional>
+#include <stdexcept>
+#include <utility>
 
 #include "command_line.hpp"
 #include "viwo/eval/accuracy.hpp"
@@ -9,6 +11,7 @@
 #include "viwo/experiment/interrupt.hpp"
 #include "viwo/experiment/observability.hpp"
 #include "viwo/experiment/output.hpp"
+#include "viwo/experiment/pictures.hpp"
 #include "viwo/experiment/progress.hpp"
 #include "viwo/experiment/simulate.hpp"
 #include "viwo/log/tum.hpp"
@@ -59,7 +62,9 @@ RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
 int run_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
+  PictureSinks sinks = open_sinks(setup, arguments.show, arguments.video);
   const RunData data = collect(setup, LiveSensors::kAllowed);
+  RunPictures pictures(setup, data, std::move(sinks));
   const auto folder = out_folder(arguments);
   make_folder(folder);  // whether results can be written shows before the work
   const Figures figures(arguments, folder);
@@ -67,6 +72,7 @@ int run_command(const Arguments& arguments) {
   {
     TimeProgress progress(setup.name);  // gone before anything else is printed
     RunHooks hooks;
+    pictures.watch(hooks);
     hooks.progress = [&](double fraction) { progress.at(fraction); };
     std::optional<InterruptSignal> interrupt;
     if (!data.live.empty()) {
@@ -76,9 +82,11 @@ int run_command(const Arguments& arguments) {
     }
     result = experiment::run(setup, data, hooks);
   }
+  const std::string picture_failure = pictures.finish(result);
   write_run(folder, setup, result);
   figures.write(report_of(setup, result));
   std::cout << describe(result) << "report: " << (folder / "report.html").string() << "\n";
+  if (!picture_failure.empty()) throw std::runtime_error(picture_failure);
   return result.status == RunStatus::kOk ? 0 : 1;
 }
 

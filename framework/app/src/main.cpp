@@ -18,7 +18,7 @@ constexpr Command kCommands[] = {
     {"run", "run CONFIG [--out DIR] [--seed N] [--set KEY=VALUE]...",
      "Runs one configuration, the filter or wheel odometry alone; writes trajectory, summary.json "
      "and report.html.",
-     "out seed set figures", 1, run_command},
+     "out seed set figures show video", 1, run_command},
     {"experiment",
      "experiment EXPERIMENT [--out DIR] [--jobs N] [--seeds N] [--resume] [--set KEY=VALUE]...",
      "Runs variants x recordings x seeds side by side and writes tables and report.html.",

@@ -325,6 +325,7 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks&
       if (!stepped) break;
       recorder.record(estimator);
       feed->on_epoch(estimator);
+      if (hooks.on_epoch) hooks.on_epoch(result);
       if (hooks.progress && log_s > 0.) {
         hooks.progress(seconds_between(data.imu.front().t_ns, estimator.filter().t_ns()) / log_s);
       }

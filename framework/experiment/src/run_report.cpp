@@ -150,6 +150,22 @@ void add_configuration_section(const RunSetup& setup, Document& document) {
 
 }  // namespace
 
+void add_picture_section(const RunResult& result, Document& document) {
+  if (result.pictures.empty()) return;
+  Section section{"Pictures", {}};
+  section.blocks.emplace_back(Paragraph{
+      "The points that the filter was given, coloured by how long they had been tracked, with the "
+      "way they came over the last images; a ring marks those in two cameras. Beside them the "
+      "trajectory from above, below the calibration with bands of three sigma: around zero where "
+      "the truth is known, else around the change since the start."});
+  for (const RunPicture& picture : result.pictures) {
+    const std::string at = significant(picture.t_s, 4) + " s";
+    section.blocks.emplace_back(report::Image{
+        at, "Tracked points, trajectory and calibration at " + at, "image/png", picture.png});
+  }
+  document.sections.push_back(std::move(section));
+}
+
 Document report_of(const RunSetup& setup, const RunResult& result) {
   const std::string model =
       setup.model ? setup.kinematics.info.name + " " + setup.kinematics.info.version : "no wheels";
@@ -160,6 +176,7 @@ Document report_of(const RunSetup& setup, const RunResult& result) {
                     {}};
   add_result_section(setup, result, document);
   add_trajectory_section(result, document);
+  add_picture_section(result, document);
   add_error_section(result, document);
   add_calibration_section(setup, result, document);
   add_excitation_section(result, document);

@@ -10,6 +10,9 @@ namespace viwo::experiment {
 inline constexpr int kEstimateColour = 0;
 inline constexpr int kSecondColour = 1;
 
+/// What cameras, trajectory and calibration looked like at some instants.
+void add_picture_section(const RunResult& result, report::Document& document);
+
 /// Position and yaw error with their bands, and the NEES with its bounds.
 void add_error_section(const RunResult& result, report::Document& document);
 

@@ -1,5 +1,5 @@
-// The recorded swerve robot as somebody else would model it: four wheels at the corners of a square,
-// each steered and driven, with one radius and one track to calibrate.
+// The recorded swerve robot as somebody else would model it: four wheels at the corners of a
+// square, each steered and driven, with one radius and one track to calibrate.
 #include <array>
 #include <cmath>
 #include <cstddef>

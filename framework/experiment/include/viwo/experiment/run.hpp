@@ -158,6 +158,12 @@ struct MonitorTrack {
   std::vector<MonitorWarning> warnings;
 };
 
+/// A picture of a run at one instant (pictures.hpp).
+struct RunPicture {
+  double t_s = 0.;
+  std::string png;  ///< the bytes of the file
+};
+
 struct RunResult {
   RunStatus status = RunStatus::kOk;
   std::string cause;  ///< of a run that is not ok
@@ -182,6 +188,7 @@ struct RunResult {
   std::vector<CalibrationTrack> calibration;
   std::vector<UpdateTrack> updates;
   MonitorTrack monitor;
+  std::vector<RunPicture> pictures;  ///< for the page, in time order
 };
 
 /// Integrates the wheels from the first to the last common instant, starting at the reference pose
@@ -199,6 +206,9 @@ using OnStart = std::function<EstimatorObserver*(const Estimator&)>;
 struct RunHooks {
   OnProgress progress;
   OnStart on_start;
+  /// An epoch is done, and recorded in the result, which is not complete yet. The time this takes
+  /// is none of the epoch's.
+  std::function<void(const RunResult&)> on_epoch;
   std::function<bool()> interrupted;  ///< whether live sensors are to stop
   /// A live sensor has given an image, which is still to be worked on. In another thread.
   std::function<void(const ImageSample&)> on_live_image;

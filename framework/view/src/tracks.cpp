@@ -1,0 +1,30 @@
+#include "viwo/view/tracks.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace viwo::view {
+
+void Tracks::add(std::span<const FeaturePoint> points) {
+  std::vector<Track> now;
+  now.reserve(points.size());
+  for (const FeaturePoint& point : points) {
+    const auto before =
+        std::lower_bound(tracks_.begin(), tracks_.end(), point.id,
+                         [](const Track& track, std::int64_t id) { return track.id < id; });
+    Track track;
+    track.id = point.id;
+    if (before != tracks_.end() && before->id == point.id) {
+      track.images = before->images;
+      track.trail = std::move(before->trail);
+    }
+    ++track.images;
+    if (track.trail.size() == kTrailImages) track.trail.erase(track.trail.begin());
+    track.trail.push_back({point.u_px, point.v_px});
+    now.push_back(std::move(track));
+  }
+  std::sort(now.begin(), now.end(), [](const Track& a, const Track& b) { return a.id < b.id; });
+  tracks_ = std::move(now);
+}
+
+}  // namespace viwo::view
