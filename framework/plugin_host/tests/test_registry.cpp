@@ -219,9 +219,9 @@ TEST_F(Registry, RefusesALibraryWithoutARecord) {
 }
 
 TEST_F(Registry, RefusesAnotherApiInTheRecord) {
-  EXPECT_EQ(reason(doctored("{api=1;", "{api=0;")),
+  EXPECT_EQ(reason(doctored("{api=2;", "{api=0;")),
             "is built differently from this host\n"
-            "  api: host 1, plugin 0\n"
+            "  api: host 2, plugin 0\n"
             "  -> it is for another version of the plugin API: rebuild it against this viwo");
 }
 
@@ -338,7 +338,7 @@ TEST_F(Registry, RefusesAShortDescriptor) {
 
 TEST_F(Registry, RefusesAnotherApiInTheDescriptor) {
   EXPECT_EQ(reason(bad("wrong_api")),
-            "is for version 7 of the plugin API, this host has version 1 - rebuild it against this "
+            "is for version 7 of the plugin API, this host has version 2 - rebuild it against this "
             "viwo");
 }
 

@@ -43,12 +43,12 @@ class SwerveAuto final : public viwo::AutoKinematics<SwerveAuto> {
     out.noise_block = 2;
     out.intrinsics = {{"r", "m", p_.number("radius_m"), p_.number("prior_sigma_m")},
                       {"track", "m", p_.number("track_m"), p_.number("prior_sigma_m")}};
-    for (int i = 0; i < 4; ++i) {
-      out.noises.push_back({NoiseKind::kDrive, i, p_.number("sigma_drive_rad_per_s"), {2 * i, 1}});
-      out.noises.push_back({NoiseKind::kSteer, i, p_.number("sigma_steer_rad"), {2 * i, 2}});
-      out.noises.push_back(
-          {NoiseKind::kSlip, i, p_.number("sigma_lateral_m_per_s"), {2 * i + 1, 1}});
-    }
+    const auto add = [&out](NoiseKind kind, double sigma, int first, int rows) {
+      for (int i = 0; i < 4; ++i) out.noises.push_back({kind, i, sigma, {2 * i + first, rows}});
+    };
+    add(NoiseKind::kDrive, p_.number("sigma_drive_rad_per_s"), 0, 1);
+    add(NoiseKind::kSteer, p_.number("sigma_steer_rad"), 0, 2);
+    add(NoiseKind::kSlip, p_.number("sigma_lateral_m_per_s"), 1, 1);
   }
 
   template <class T>
@@ -74,7 +74,7 @@ class SwerveAuto final : public viwo::AutoKinematics<SwerveAuto> {
   viwo::ParamSet p_;
 };
 
-VIWO_REGISTER(KinematicModel, SwerveAuto, "swerve_auto", "1.0.0", "square swerve base",
+VIWO_REGISTER(viwo::KinematicModel, SwerveAuto, "swerve_auto", "1.0.0", "square swerve base",
               "Apache-2.0", kParams);
 
 }  // namespace
