@@ -26,16 +26,6 @@ const char* why_not_unit(std::array<double, 4>& xyzw) {
   return nullptr;
 }
 
-/// Why a sample cannot be used; nullptr when it can.
-const char* why_rejected(PoseSample& pose) {
-  if (!all_finite(pose.p_BinW_m) || !all_finite(pose.q_BtoW_xyzw)) return kNotFinite;
-  return why_not_unit(pose.q_BtoW_xyzw);
-}
-
-const char* why_rejected(ImuSample& imu) {
-  return all_finite(imu.gyro_rad_per_s) && all_finite(imu.accel_m_per_s2) ? nullptr : kNotFinite;
-}
-
 const char* why_rejected(StateSample& state) {
   if (!all_finite(state.q_ItoG_xyzw) || !all_finite(state.p_IinG_m) ||
       !all_finite(state.v_IinG_m_per_s) || !all_finite(state.gyro_bias_rad_per_s) ||
@@ -57,13 +47,25 @@ EncoderSample rate_sample(const EncoderReading& reading) {
 
 }  // namespace
 
+const char* why_rejected(PoseSample& pose) {
+  if (!all_finite(pose.p_BinW_m) || !all_finite(pose.q_BtoW_xyzw)) return kNotFinite;
+  return why_not_unit(pose.q_BtoW_xyzw);
+}
+
+const char* why_rejected(const ImuSample& imu) {
+  return all_finite(imu.gyro_rad_per_s) && all_finite(imu.accel_m_per_s2) ? nullptr : kNotFinite;
+}
+
+const char* why_rejected(const EncoderReading& reading) {
+  return all_finite(reading.drive) && all_finite(reading.steer_rad) ? nullptr : kNotFinite;
+}
+
 EncoderCollector::EncoderCollector(const EncoderRecordingOptions& options)
     : options_(options), filter_(options.limits) {}
 
 void EncoderCollector::add(const EncoderReading& reading, const TextReader& at) {
-  // Channels that are not used are zero, hence finite.
-  if (!all_finite(reading.drive) || !all_finite(reading.steer_rad)) {
-    filter_.reject(kNotFinite, at);
+  if (const char* why = why_rejected(reading)) {
+    filter_.reject(why, at);
   } else if (filter_.accept(reading.t_ns, at)) {
     readings_.push_back(reading);
   }

@@ -1,4 +1,4 @@
-// An image of a bag, read when it is needed.
+// An image of a message; of a bag it is read when it is needed.
 #pragma once
 
 #include <functional>
@@ -6,9 +6,14 @@
 #include <string>
 
 #include "bag.hpp"
+#include "field_reader.hpp"
 #include "viwo/api/measurement.hpp"
 
 namespace viwo::bag {
+
+/// Decodes a sensor_msgs/Image or CompressedImage. BrokenMessage, or InputError with
+/// `where`, when it cannot be.
+void read_image(FieldReader& in, bool is_compressed, const std::string& where, Image& out);
 
 class BagImage final : public ImageSource {
  public:

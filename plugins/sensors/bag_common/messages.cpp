@@ -10,14 +10,26 @@
 namespace viwo::bag {
 namespace {
 
-constexpr std::array<std::pair<Kind, std::string_view>, 7> kTypes = {
-    {{Kind::kImu, "sensor_msgs/Imu"},
-     {Kind::kImage, "sensor_msgs/Image"},
-     {Kind::kCompressedImage, "sensor_msgs/CompressedImage"},
-     {Kind::kJoints, "sensor_msgs/JointState"},
-     {Kind::kPose, "geometry_msgs/PoseStamped"},
-     {Kind::kPoseWithCovariance, "geometry_msgs/PoseWithCovarianceStamped"},
-     {Kind::kOdometry, "nav_msgs/Odometry"}}};
+struct Type {
+  Kind kind;
+  std::string_view name;
+  std::string_view ros1_md5;
+};
+
+constexpr std::array kTypes{
+    Type{Kind::kImu, "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"},
+    Type{Kind::kImage, "sensor_msgs/Image", "060021388200f6f0f447d0fcd9c64743"},
+    Type{Kind::kCompressedImage, "sensor_msgs/CompressedImage", "8f7a12909da2c9d3332d540a0977563f"},
+    Type{Kind::kJoints, "sensor_msgs/JointState", "3066dcd76a6cfaef579bd0f34173e9fd"},
+    Type{Kind::kPose, "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5"},
+    Type{Kind::kPoseWithCovariance, "geometry_msgs/PoseWithCovarianceStamped",
+         "953b798c0f514ff060a53a3498ce6246"},
+    Type{Kind::kOdometry, "nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7"}};
+
+const Type& type_of(Kind kind) {
+  return *std::find_if(kTypes.begin(), kTypes.end(),
+                       [kind](const Type& known) { return known.kind == kind; });
+}
 
 /// How an encoding becomes grey.
 struct Encoding {
@@ -93,17 +105,15 @@ std::optional<Kind> kind_of(std::string_view type) {
   if (const auto middle = plain.find("/msg/"); middle != std::string::npos) {
     plain.erase(middle, 4);
   }
-  for (const auto& [kind, name] : kTypes) {
-    if (name == plain) return kind;
+  for (const Type& known : kTypes) {
+    if (known.name == plain) return known.kind;
   }
   return std::nullopt;
 }
 
-std::string_view type_name(Kind kind) {
-  return std::find_if(kTypes.begin(), kTypes.end(),
-                      [kind](const auto& known) { return known.first == kind; })
-      ->second;
-}
+std::string_view type_name(Kind kind) { return type_of(kind).name; }
+
+std::string_view ros1_md5(Kind kind) { return type_of(kind).ros1_md5; }
 
 ImuSample read_imu(FieldReader& in) {
   ImuSample imu;

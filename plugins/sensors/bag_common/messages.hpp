@@ -30,6 +30,9 @@ std::optional<Kind> kind_of(std::string_view type);
 /// "sensor_msgs/Imu"
 std::string_view type_name(Kind kind);
 
+/// Of the definition that is read, as ROS 1 gives it.
+std::string_view ros1_md5(Kind kind);
+
 /// sensor_msgs/JointState without the efforts.
 struct Joints {
   std::int64_t t_ns = 0;

@@ -1,36 +1,32 @@
 #include "topic_readers.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstddef>
 #include <iterator>
 #include <utility>
 #include <vector>
 
 #include "bag_image.hpp"
+#include "joint_reading.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/log/cells.hpp"
+#include "viwo/log/recording.hpp"
 #include "viwo/log/text.hpp"
 
 namespace viwo::bag {
 namespace {
 
-template <std::size_t N>
-bool all_finite(const std::array<double, N>& values) {
-  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-}
-
-/// False when the norm is off by more than 1e-3; what rounding explains is left as it is.
-bool make_unit(std::array<double, 4>& q) {
-  double norm2 = 0.;
-  for (const double value : q) norm2 += value * value;
-  const double norm = std::sqrt(norm2);
-  if (!(std::abs(norm - 1.) <= 1e-3)) return false;
-  if (std::abs(norm - 1.) > 1e-12) {
-    for (double& value : q) value /= norm;
+/// Why a message gives no reading.
+const char* reason_of(MissingJoint::What missing) {
+  switch (missing) {
+    case MissingJoint::What::kJoint:
+      return "message without one of the joints";
+    case MissingJoint::What::kPosition:
+      return "message without the positions of the joints";
+    case MissingJoint::What::kVelocity:
+      return "message without the velocities of the joints";
   }
-  return true;
+  return "";
 }
 
 class ImuReader final : public TopicReader {
@@ -40,9 +36,7 @@ class ImuReader final : public TopicReader {
   void take(FieldReader& in, const Message& message) override {
     ImuSample imu = read_imu(in);
     imu.t_ns = stamp(imu.t_ns, message);
-    if (!all_finite(imu.gyro_rad_per_s) || !all_finite(imu.accel_m_per_s2)) {
-      return filter_.reject(log::kNotFinite, message);
-    }
+    if (const char* const why = log::why_rejected(imu)) return filter_.reject(why, message);
     if (filter_.accept(imu.t_ns, message)) samples_.push_back(imu);
   }
 
@@ -61,10 +55,7 @@ class PoseReader final : public TopicReader {
   void take(FieldReader& in, const Message& message) override {
     PoseSample pose = read_pose(kind_, in);
     pose.t_ns = stamp(pose.t_ns, message);
-    if (!all_finite(pose.p_BinW_m) || !all_finite(pose.q_BtoW_xyzw)) {
-      return filter_.reject(log::kNotFinite, message);
-    }
-    if (!make_unit(pose.q_BtoW_xyzw)) return filter_.reject(log::kNotUnit, message);
+    if (const char* const why = log::why_rejected(pose)) return filter_.reject(why, message);
     if (filter_.accept(pose.t_ns, message)) samples_.push_back(pose);
   }
 
@@ -122,69 +113,29 @@ class ImageReader final : public TopicReader {
 class JointReader final : public TopicReader {
  public:
   explicit JointReader(const BagOptions& options)
-      : TopicReader(options, options.joint_topic),
-        options_(options.encoders),
-        drive_(options.drive_joints),
-        steer_(options.steer_joints) {}
+      : TopicReader(options, options.joint_topic), options_(options) {}
 
   void take(FieldReader& in, const Message& message) override {
     Joints joints = read_joints(in);
+    log::EncoderReading reading;
+    const auto missing = joint_reading(joints, options_, reading);
+    if (!missing || missing->what != MissingJoint::What::kJoint) any_has_all_ = true;
     if (joints.names != names_) {
       names_ = std::move(joints.names);
-      has_all_ = find(drive_) && find(steer_);
-      any_has_all_ = any_has_all_ || has_all_;
       for (const std::string& name : names_) {
         if (std::find(known_.begin(), known_.end(), name) == known_.end()) known_.push_back(name);
       }
     }
-    if (!has_all_) return filter_.reject("message without one of the joints", message);
-    log::EncoderReading reading;
+    if (missing) return filter_.reject(reason_of(missing->what), message);
+    if (const char* const why = log::why_rejected(reading)) return filter_.reject(why, message);
     reading.t_ns = stamp(joints.t_ns, message);
-    reading.n_drive = static_cast<int>(drive_.names.size());
-    reading.n_steer = static_cast<int>(steer_.names.size());
-    if (!pick(steer_, joints.positions, reading.steer_rad) ||
-        (options_.drive_is_angle && !pick(drive_, joints.positions, reading.drive))) {
-      return filter_.reject("message without the positions of the joints", message);
-    }
-    if (!options_.drive_is_angle && !pick(drive_, joints.velocities, reading.drive)) {
-      return filter_.reject("message without the velocities of the joints", message);
-    }
-    if (!all_finite(reading.drive) || !all_finite(reading.steer_rad)) {
-      return filter_.reject(log::kNotFinite, message);
-    }
     if (filter_.accept(reading.t_ns, message)) readings_.push_back(reading);
   }
 
  private:
-  /// Joints that are wanted, and where they are in the messages of names_.
-  struct Channels {
-    explicit Channels(const std::vector<std::string>& wanted)
-        : names(wanted), places(wanted.size()) {}
-    std::vector<std::string> names;
-    std::vector<std::size_t> places;
-  };
-
-  bool find(Channels& channels) const {
-    for (std::size_t i = 0; i < channels.names.size(); ++i) {
-      const auto found = std::find(names_.begin(), names_.end(), channels.names[i]);
-      if (found == names_.end()) return false;
-      channels.places[i] = static_cast<std::size_t>(found - names_.begin());
-    }
-    return true;
-  }
-
-  template <std::size_t N>
-  static bool pick(const Channels& channels, const std::vector<double>& from,
-                   std::array<double, N>& to) {
-    for (std::size_t i = 0; i < channels.places.size(); ++i) {
-      if (channels.places[i] >= from.size()) return false;
-      to[i] = from[channels.places[i]];
-    }
-    return true;
-  }
-
-  void check_names(const char* key, const Channels& channels, const std::string& bag) const {
-    for (const std::string& name : channels.names) {
+  void check_names(const char* key, const std::vector<std::string>& wanted,
+                   const std::string& bag) const {
+    for (const std::string& name : wanted) {
       if (std::find(known_.begin(), known_.end(), name) != known_.end()) continue;
       throw ParamError(key, "no joint '" + name + "' on topic '" + filter_.topic() + "' in " + bag +
                                 log::did_you_mean(name, known_));
@@ -193,14 +144,13 @@ class JointReader final : public TopicReader {
 
   void check(const std::string& bag) const override {
     if (any_has_all_ || known_.empty()) return;
-    check_names("drive_joints", drive_, bag);
-    check_names("steer_joints", steer_, bag);
+    check_names("drive_joints", options_.drive_joints, bag);
+    check_names("steer_joints", options_.steer_joints, bag);
   }
 
   void move_samples(BagSamples& out) override {
-    const double max_gap_s = options_.limits.max_gap_s;
     if (options_.drive_is_angle) {
-      out.wheels = log::cells_from_angles(readings_, max_gap_s, options_.stride);
+      out.wheels = log::cells_from_angles(readings_, options_.max_gap_s, options_.stride);
       if (!out.wheels.empty()) return;
       throw InputError("topic '" + filter_.topic() +
                        "' has too few messages without a gap for a rate");
@@ -214,14 +164,12 @@ class JointReader final : public TopicReader {
       sample.steer_rad = reading.steer_rad;
       out.wheels.push_back(sample);
     }
-    log::make_cells(out.wheels, max_gap_s);
+    log::make_cells(out.wheels, options_.max_gap_s);
   }
 
-  log::EncoderRecordingOptions options_;
-  Channels drive_, steer_;
+  BagOptions options_;
   std::vector<std::string> names_;  ///< of the last message
   std::vector<std::string> known_;  ///< of all messages
-  bool has_all_ = false;
   bool any_has_all_ = false;
   std::vector<log::EncoderReading> readings_;
 };

@@ -15,7 +15,7 @@ namespace viwo::bag {
 class TopicReader {
  public:
   TopicReader(const BagOptions& options, const std::string& topic)
-      : filter_(options.encoders.limits, topic), by_reception_(options.by_reception) {}
+      : filter_(options.limits(), topic), by_reception_(options.by_reception) {}
   virtual ~TopicReader() = default;
 
   /// BrokenMessage when it is not what it says to be.

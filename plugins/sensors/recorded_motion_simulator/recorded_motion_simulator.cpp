@@ -32,7 +32,7 @@ constexpr std::array kMotionParams{
 };
 // clang-format on
 
-constexpr auto kParams = sim::joined(kMotionParams, sim::kRigParams);
+constexpr auto kParams = log::joined(kMotionParams, sim::kRigParams);
 
 /// IMU samples must not lie behind the last pose.
 double duration_within(double recorded_s, double imu_rate_hz) {

@@ -10,12 +10,13 @@
 namespace viwo {
 namespace {
 
-constexpr auto kParams = bag::with_topic_params(std::array{
+constexpr std::array kFileParams{
     ParamSpec{.name = "path", .type = ParamType::kPath, .help = "a bag, or a folder of bags"},
     ParamSpec{.name = "paths",
               .type = ParamType::kStrings,
               .fallback = "[]",
-              .help = "of a folder, the bags to play one after the other; empty: all of them"}});
+              .help = "of a folder, the bags to play one after the other; empty: all of them"}};
+constexpr auto kParams = log::joined(kFileParams, bag::kBagParams);
 
 class Ros1Bag final : public bag::BagSensor {
  public:

@@ -1,7 +1,6 @@
 #include "ros1_file.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <exception>
 #include <map>
@@ -22,16 +21,6 @@ namespace viwo::bag {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Of the definitions that messages.cpp reads.
-constexpr std::array<std::pair<Kind, const char*>, 7> kMd5Sums = {
-    {{Kind::kImu, "6a62c6daae103f4ff57a132d6f95cec2"},
-     {Kind::kImage, "060021388200f6f0f447d0fcd9c64743"},
-     {Kind::kCompressedImage, "8f7a12909da2c9d3332d540a0977563f"},
-     {Kind::kJoints, "3066dcd76a6cfaef579bd0f34173e9fd"},
-     {Kind::kPose, "d3812c3cbc69362b77dc0b19b345f8f5"},
-     {Kind::kPoseWithCovariance, "953b798c0f514ff060a53a3498ce6246"},
-     {Kind::kOdometry, "cd5e73d190d741a2f92e81eda573aca7"}}};
 
 /// Where rosbag_storage puts the bytes of a message, once it knows how many they are.
 struct Sink {
@@ -134,12 +123,10 @@ class Ros1Bag final : public Bag {
   /// The layout of the messages must be the one that is read.
   static void check_definition(const File& file, const rosbag::MessageInstance& message) {
     const auto kind = kind_of(message.getDataType());
-    for (const auto& [known, md5] : kMd5Sums) {
-      if (known != kind || message.getMD5Sum() == md5) continue;
-      throw InputError(file.name + "  topic '" + message.getTopic() +
-                       "' has another definition of " + message.getDataType() + " (md5 " +
-                       message.getMD5Sum() + ", known is " + md5 + ")");
-    }
+    if (!kind || message.getMD5Sum() == ros1_md5(*kind)) return;
+    throw InputError(file.name + "  topic '" + message.getTopic() + "' has another definition of " +
+                     message.getDataType() + " (md5 " + message.getMD5Sum() + ", known is " +
+                     std::string(ros1_md5(*kind)) + ")");
   }
 
   static void read_file(const File& file, const std::vector<Wanted>& wanted, const ros::Time& from,

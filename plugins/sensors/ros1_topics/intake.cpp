@@ -1,15 +1,14 @@
 #include "intake.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <memory>
 #include <utility>
 
+#include "bag_image.hpp"
+#include "joint_reading.hpp"
 #include "ros1_fields.hpp"
-#include "ros_messages.hpp"
 #include "viwo/api/status.hpp"
-#include "viwo/image/image_file.hpp"
+#include "viwo/log/recording.hpp"
 #include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/text.hpp"
 
@@ -18,33 +17,6 @@ namespace {
 
 using bag::Kind;
 
-template <std::size_t N>
-bool all_finite(const std::array<double, N>& values) {
-  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-}
-
-/// Of the definition that is read.
-const char* md5_of(Kind kind) {
-  using ros::message_traits::md5sum;
-  switch (kind) {
-    case Kind::kImu:
-      return md5sum<msg::Imu>();
-    case Kind::kImage:
-      return md5sum<msg::Image>();
-    case Kind::kCompressedImage:
-      return md5sum<msg::CompressedImage>();
-    case Kind::kJoints:
-      return md5sum<msg::JointState>();
-    case Kind::kPose:
-      return md5sum<msg::PoseStamped>();
-    case Kind::kPoseWithCovariance:
-      return md5sum<msg::PoseWithCovarianceStamped>();
-    case Kind::kOdometry:
-      return md5sum<msg::Odometry>();
-  }
-  return "*";
-}
-
 /// The image in a message, decoded when it is needed.
 class MessageImage final : public ImageSource {
  public:
@@ -52,16 +24,9 @@ class MessageImage final : public ImageSource {
       : message_(std::move(message)), is_compressed_(is_compressed), where_(std::move(where)) {}
 
   void read(Image& out) const override {
+    bag::Ros1Fields in(message_->bytes);
     try {
-      bag::Ros1Fields in(message_->bytes);
-      if (is_compressed_) {
-        in.header();
-        in.text();  // the format, which the bytes tell, too
-        decode_image(in.bytes(), where_, out);
-      } else {
-        const bag::ImageHead head = bag::read_image_head(in);
-        bag::to_grey(head, in.bytes(), out);
-      }
+      bag::read_image(in, is_compressed_, where_, out);
     } catch (const bag::BrokenMessage& broken) {
       throw InputError(where_ + ": " + broken.what());
     }
@@ -73,25 +38,19 @@ class MessageImage final : public ImageSource {
   std::string where_;
 };
 
-/// The values of the joints `wanted`, in this order. Says what is missing, if something is.
-template <std::size_t N>
-std::string pick(const bag::Joints& joints, const std::vector<std::string>& wanted,
-                 const std::vector<double>& from, const char* what, std::array<double, N>& to) {
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    const auto found = std::find(joints.names.begin(), joints.names.end(), wanted[i]);
-    if (found == joints.names.end()) {
-      return "no joint '" + wanted[i] + "'" + log::did_you_mean(wanted[i], joints.names);
-    }
-    const auto place = static_cast<std::size_t>(found - joints.names.begin());
-    if (place >= from.size()) return "no " + std::string(what) + " of joint '" + wanted[i] + "'";
-    to[i] = from[place];
+/// Why a message gives no reading.
+std::string reason_of(const bag::MissingJoint& missing, const bag::Joints& joints) {
+  using What = bag::MissingJoint::What;
+  const std::string joint = "joint '" + missing.joint + "'";
+  if (missing.what == What::kJoint) {
+    return "no " + joint + log::did_you_mean(missing.joint, joints.names);
   }
-  return {};
+  return (missing.what == What::kPosition ? "no position of " : "no velocity of ") + joint;
 }
 
 }  // namespace
 
-Intake::Intake(const TopicOptions& options, const HostServices& services, LiveQueue& queue)
+Intake::Intake(const bag::TopicOptions& options, const HostServices& services, LiveQueue& queue)
     : options_(options),
       services_(services),
       queue_(queue),
@@ -120,7 +79,7 @@ void Intake::take(std::size_t topic, const std::string& type, const std::string&
         topic, "a " + type + " where a " + std::string(bag::type_name(kinds.front())) + " must be",
         0);
   }
-  if (md5 != "*" && md5 != md5_of(*kind)) {
+  if (md5 != "*" && md5 != bag::ros1_md5(*kind)) {
     return reject(topic, "another definition of " + type + " (md5 " + md5 + ")", 0);
   }
   try {
@@ -168,41 +127,21 @@ void Intake::read(std::size_t topic, Kind kind,
 }
 
 void Intake::take_imu(std::size_t topic, const ImuSample& imu) {
-  if (!all_finite(imu.gyro_rad_per_s) || !all_finite(imu.accel_m_per_s2)) {
-    return reject(topic, log::kNotFinite, imu.t_ns);
-  }
+  if (const char* const why = log::why_rejected(imu)) return reject(topic, why, imu.t_ns);
   if (accept(topic, imu.t_ns)) queue_.push(imu);
 }
 
 void Intake::take_pose(std::size_t topic, PoseSample pose) {
-  auto& q = pose.q_BtoW_xyzw;
-  if (!all_finite(pose.p_BinW_m) || !all_finite(q)) {
-    return reject(topic, log::kNotFinite, pose.t_ns);
-  }
-  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  if (!(std::abs(norm - 1.) <= 1e-3)) return reject(topic, log::kNotUnit, pose.t_ns);
-  if (std::abs(norm - 1.) > 1e-12) {  // what rounding explains is left as it is
-    for (double& value : q) value /= norm;
-  }
+  if (const char* const why = log::why_rejected(pose)) return reject(topic, why, pose.t_ns);
   if (accept(topic, pose.t_ns)) queue_.push(pose);
 }
 
 void Intake::take_joints(std::size_t topic, const bag::Joints& joints) {
   log::EncoderReading reading;
-  reading.t_ns = joints.t_ns;
-  reading.n_drive = static_cast<int>(options_.drive_joints.size());
-  reading.n_steer = static_cast<int>(options_.steer_joints.size());
-  std::string missing =
-      options_.drive_is_angle
-          ? pick(joints, options_.drive_joints, joints.positions, "position", reading.drive)
-          : pick(joints, options_.drive_joints, joints.velocities, "velocity", reading.drive);
-  if (missing.empty()) {
-    missing = pick(joints, options_.steer_joints, joints.positions, "position", reading.steer_rad);
+  if (const auto missing = bag::joint_reading(joints, options_, reading)) {
+    return reject(topic, reason_of(*missing, joints), joints.t_ns);
   }
-  if (!missing.empty()) return reject(topic, missing, joints.t_ns);
-  if (!all_finite(reading.drive) || !all_finite(reading.steer_rad)) {
-    return reject(topic, log::kNotFinite, joints.t_ns);
-  }
+  if (const char* const why = log::why_rejected(reading)) return reject(topic, why, joints.t_ns);
   if (!accept(topic, reading.t_ns)) return;
   if (const auto cell = cells_.add(reading)) queue_.push(*cell);
 }

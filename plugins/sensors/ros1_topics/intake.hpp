@@ -33,7 +33,7 @@ class Intake {
   };
 
   /// `services` and `queue` outlive it.
-  Intake(const TopicOptions& options, const HostServices& services, LiveQueue& queue);
+  Intake(const bag::TopicOptions& options, const HostServices& services, LiveQueue& queue);
 
   const std::vector<Topic>& topics() const { return topics_; }
 
@@ -64,7 +64,7 @@ class Intake {
   void count(std::size_t topic, const std::string& reason, std::int64_t t_ns,
              const std::string& consequence);
 
-  TopicOptions options_;
+  bag::TopicOptions options_;
   const HostServices& services_;
   LiveQueue& queue_;
   std::vector<Topic> topics_;

@@ -17,7 +17,7 @@
 #include "intake.hpp"
 #include "live_queue.hpp"
 #include "master.hpp"
-#include "topic_options.hpp"
+#include "topic_names.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/text.hpp"
 
@@ -96,12 +96,7 @@ constexpr std::array kOwnParams{
               .min = 0.,
               .help = "a longer time from image to pose is a warning in the diagnostics"}};
 
-constexpr auto kParams = [] {
-  std::array<ParamSpec, kTopicParams.size() + kOwnParams.size()> all{};
-  for (std::size_t i = 0; i < kTopicParams.size(); ++i) all[i] = kTopicParams[i];
-  for (std::size_t i = 0; i < kOwnParams.size(); ++i) all[kTopicParams.size() + i] = kOwnParams[i];
-  return all;
-}();
+constexpr auto kParams = log::joined(bag::kTopicParams, kOwnParams);
 
 constexpr auto kPoll = 100ms;           ///< how late an end that nobody signals is seen
 constexpr auto kSilence = 2s;           ///< without any message the master is asked for
@@ -143,7 +138,7 @@ class Ros1Topics final : public Sensor {
  public:
   Ros1Topics(const ParamSet& params, const HostServices& services)
       : services_(services),
-        options_(topic_options_from(params)),
+        options_(options_from(params)),
         frames_(frames_from(params)),
         sigma_rate_(params.number("sigma_rate_rad_per_s")),
         warn_latency_s_(params.number("warn_latency_s")),
@@ -152,11 +147,7 @@ class Ros1Topics final : public Sensor {
         queue_(static_cast<std::size_t>(params.integer("max_waiting_images"))),
         intake_(options_, services_, queue_) {
     const std::string& out = params.text("odometry_topic_out");
-    std::string error;
-    if (out.empty() || !ros::names::validate(out, error)) {
-      throw ParamError("odometry_topic_out",
-                       "'" + out + "' cannot be the name of a topic: " + error);
-    }
+    check_name("odometry_topic_out", out);
     join(master_, milliseconds(params.number("connect_timeout_s")));
     node_ = std::make_unique<ros::NodeHandle>();
     node_->setCallbackQueue(&callbacks_);
@@ -292,7 +283,7 @@ class Ros1Topics final : public Sensor {
   }
 
   HostServices services_;
-  TopicOptions options_;
+  bag::TopicOptions options_;
   OutputFrames frames_;
   double sigma_rate_;
   double warn_latency_s_;

@@ -20,6 +20,7 @@
 namespace viwo::ros1 {
 namespace {
 
+using bag::TopicOptions;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 

@@ -8,10 +8,11 @@
 namespace viwo {
 namespace {
 
-constexpr auto kParams = bag::with_topic_params(
-    std::array{ParamSpec{.name = "path",
-                         .type = ParamType::kPath,
-                         .help = "the folder of a bag, with metadata.yaml, or its .db3"}});
+constexpr std::array kFileParams{
+    ParamSpec{.name = "path",
+              .type = ParamType::kPath,
+              .help = "the folder of a bag, with metadata.yaml, or its .db3"}};
+constexpr auto kParams = log::joined(kFileParams, bag::kBagParams);
 
 class Ros2Bag final : public bag::BagSensor {
  public:

@@ -10,6 +10,7 @@
 #include "pose_simulator.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
+#include "viwo/log/sensor_params.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/rig_simulator.hpp"
@@ -80,7 +81,7 @@ constexpr std::array kBaseParams{
 };
 // clang-format on
 
-constexpr auto kParams = sim::joined(kBaseParams, kPoseParams, sim::kRigParams);
+constexpr auto kParams = log::joined(kBaseParams, kPoseParams, sim::kRigParams);
 
 sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
                                                const ModelDescription& robot) {

@@ -35,6 +35,13 @@ using FeatureRecording = Recording<FeatureSample>;
 using StateRecording = Recording<StateSample>;
 using CalibrationRecording = Recording<CalibrationSample>;
 
+/// Why a datum cannot be used (kNotFinite, kNotUnit); nullptr when it can. A quaternion whose norm
+/// is off by less than 1e-3 is of unit norm then.
+const char* why_rejected(PoseSample& pose);
+const char* why_rejected(const ImuSample& imu);
+/// Channels that are not used are zero, hence finite.
+const char* why_rejected(const EncoderReading& reading);
+
 /// Takes readings in the order of the file.
 class EncoderCollector {
  public:

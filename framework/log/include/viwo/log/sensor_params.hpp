@@ -1,6 +1,8 @@
-// Parameters that the sensors which play logs back have in common, for their tables.
+// Parameters that the sensors which play logs back have in common, and joined() for tables.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -10,6 +12,18 @@
 #include "viwo/log/ros_text.hpp"
 
 namespace viwo::log {
+
+/// Several parameter tables as one.
+template <std::size_t... N>
+constexpr auto joined(const std::array<ParamSpec, N>&... tables) {
+  std::array<ParamSpec, (N + ...)> out{};
+  std::size_t n = 0;
+  const auto append = [&](const auto& table) {
+    for (const ParamSpec& spec : table) out[n++] = spec;
+  };
+  (append(tables), ...);
+  return out;
+}
 
 inline constexpr ParamSpec kMaxGapParam{
     .name = "max_gap_s",

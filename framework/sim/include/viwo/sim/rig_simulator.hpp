@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -41,18 +40,6 @@ std::vector<CalibrationSample> mounting_truth(const Mounting& mounting, std::int
 
 /// Sorts by stamp; what has the same stamp keeps its order.
 void sort_by_time(std::vector<Measurement>& measurements);
-
-/// Several parameter tables as one.
-template <std::size_t... N>
-constexpr auto joined(const std::array<ParamSpec, N>&... tables) {
-  std::array<ParamSpec, (N + ...)> out{};
-  std::size_t n = 0;
-  const auto append = [&](const auto& table) {
-    for (const ParamSpec& spec : table) out[n++] = spec;
-  };
-  (append(tables), ...);
-  return out;
-}
 
 // clang-format off
 inline constexpr std::array kRigParams{

@@ -1,15 +1,14 @@
-// Which topics are wanted, and what is on them.
+// Which topics are wanted, and what is on them: of a bag as of a running system.
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "viwo/api/params.hpp"
 #include "viwo/log/sensor_params.hpp"
 
-namespace viwo::ros1 {
+namespace viwo::bag {
 
 inline constexpr std::array kTopicParams{
     ParamSpec{.name = "imu_topic",
@@ -59,7 +58,9 @@ struct TopicOptions {
   double max_gap_s = 0.2;
 };
 
-/// ParamError for names that are none in ROS, and for parameters that contradict each other.
-TopicOptions topic_options_from(const ParamSet& params);
+/// ParamError for parameters that contradict each other; where no topic is wanted, for `key`:
+/// "nothing to <verb>".
+TopicOptions topic_options_from(const ParamSet& params, const std::string& key,
+                                const std::string& verb);
 
-}  // namespace viwo::ros1
+}  // namespace viwo::bag
