@@ -300,6 +300,29 @@ bool step(Estimator& estimator, std::string& cause) {
   }
 }
 
+/// How a run has ended, and how accurate it was.
+void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& result) {
+  result.epochs = estimator.epochs();
+  if (!result.estimate.empty()) {
+    result.duration_s = seconds_between(result.estimate.front().t_ns, result.estimate.back().t_ns);
+  }
+  if (!result.cause.empty()) {
+    result.status = RunStatus::kFailed;
+  } else if (!estimator.failure().empty()) {
+    result.status = RunStatus::kDiverged;
+    result.cause = estimator.failure() + " (epoch " + std::to_string(result.epochs) + ", " +
+                   std::to_string(result.duration_s) + " s)";
+  } else if (result.epochs == 0) {
+    result.status = RunStatus::kFailed;
+    result.cause = setup.filter->start.mode == StartMode::kReference
+                       ? "the measurements do not make a single epoch"
+                       : "no state to start from was found in the measurements";
+  }
+  if (result.status == RunStatus::kOk && !result.reference.empty()) {
+    result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);
+  }
+}
+
 }  // namespace
 
 RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks& hooks) {
@@ -336,25 +359,7 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks&
   // Beside sensors that work while it runs, the filter's own time says little.
   const std::chrono::duration<double> all_s = std::chrono::steady_clock::now() - all_begin;
   result.wall_s = data.streams.empty() && !live ? wall_s : all_s.count();
-  result.epochs = estimator.epochs();
-  if (!result.estimate.empty()) {
-    result.duration_s = seconds_between(result.estimate.front().t_ns, result.estimate.back().t_ns);
-  }
-  if (!result.cause.empty()) {
-    result.status = RunStatus::kFailed;
-  } else if (!estimator.failure().empty()) {
-    result.status = RunStatus::kDiverged;
-    result.cause = estimator.failure() + " (epoch " + std::to_string(result.epochs) + ", " +
-                   std::to_string(result.duration_s) + " s)";
-  } else if (result.epochs == 0) {
-    result.status = RunStatus::kFailed;
-    result.cause = setup.filter->start.mode == StartMode::kReference
-                       ? "the measurements do not make a single epoch"
-                       : "no state to start from was found in the measurements";
-  }
-  if (result.status == RunStatus::kOk && !result.reference.empty()) {
-    result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);
-  }
+  conclude(setup, estimator, result);
   return result;
 }
 
