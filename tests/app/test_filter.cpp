@@ -212,8 +212,9 @@ TEST_F(FilterTest, SaysThatItFoundNoStateToStartFrom) {
   change("clones: 11", "start: standstill");  // but the base drives all the time
   const Outcome outcome = viwo({"run", "run.yaml", "--out", "out"});
   EXPECT_EQ(outcome.code, 1);
-  EXPECT_EQ(
-      outcome.out.find("status failed: no state to start from was found in the measurements\n"), 0U)
+  EXPECT_EQ(outcome.out.find("status failed: no state to start from was found in the measurements: "
+                             "a wheel turns faster than 0.05 rad/s ("),
+            0U)
       << outcome.out;
 }
 

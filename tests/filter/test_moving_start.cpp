@@ -205,7 +205,7 @@ MeanNees monte_carlo(const sim::BodyTrajectory& trajectory, const MovingStartOpt
   for (int run = 0; run < kRuns; ++run) {
     const auto seed = static_cast<std::uint64_t>(100 + run);
     const Drive drive = simulate(trajectory, truth, seed, 1.3 + 0.02 * run);
-    const auto prior = start_from_motion(drive.imu, drive.encoders, believed);
+    const auto prior = start_from_motion(drive.imu, drive.encoders, believed).prior;
     if (!prior) continue;
     StartError start = start_error(trajectory, drive, *prior);
     start.P.topRightCorner<2, kDof - 2>() *= correlation;
@@ -271,7 +271,7 @@ TEST(MovingStart, IsExactWithoutNoiseAndErrors) {
   for (const char* motion : {"icr_sweep", "circle", "straight", "spin", "stationary"}) {
     const auto trajectory = trajectory_of(motion, {}, 0.);
     const Drive drive = simulate(trajectory, options, 1, 3., 0., false);
-    const auto prior = start_from_motion(drive.imu, drive.encoders, options);
+    const auto prior = start_from_motion(drive.imu, drive.encoders, options).prior;
     ASSERT_TRUE(prior) << motion;
     const StartError start = start_error(trajectory, drive, *prior);
     // Means over 0.1 s for velocities, trapezoids between samples.
@@ -288,9 +288,13 @@ TEST(MovingStart, IsExactWithoutNoiseAndErrors) {
 
 class MovingStartRefusal : public ::testing::Test {
  protected:
-  bool starts() const {
-    return start_from_motion(drive_.imu, drive_.encoders, options_).has_value();
+  /// What is in the way of a start; empty when there is one.
+  std::string_view obstacle() const {
+    const StartAttempt attempt = start_from_motion(drive_.imu, drive_.encoders, options_);
+    EXPECT_NE(attempt.prior.has_value(), !attempt.obstacle.empty());
+    return attempt.obstacle;
   }
+  bool starts() const { return obstacle().empty(); }
 
   MovingStartOptions options_ = make_options();
   Drive drive_ = simulate(trajectory_of("circle"), options_, 7, 3.);
@@ -300,42 +304,45 @@ TEST_F(MovingStartRefusal, WaitsForAWholeWindow) {
   EXPECT_TRUE(starts());
   // A second, the clock's margin and half of the mean of a velocity at both ends.
   drive_.imu.resize(1 + 200 * 11 / 10);
-  EXPECT_FALSE(starts());
+  EXPECT_EQ(obstacle(), "fewer measurements than start_window_s asks for");
   drive_ = simulate(trajectory_of("circle"), options_, 7, 1.2);
   EXPECT_TRUE(starts());
   drive_.encoders.resize(105);
   EXPECT_FALSE(starts());
-  EXPECT_FALSE(start_from_motion({}, drive_.encoders, options_));
-  EXPECT_FALSE(start_from_motion(drive_.imu, {}, options_));
+  drive_.encoders.clear();
+  EXPECT_EQ(obstacle(), "no encoder samples");
+  drive_.imu.clear();
+  EXPECT_FALSE(starts());
 }
 
 TEST_F(MovingStartRefusal, SeesHolesInTheWindow) {
   const Drive whole = drive_;
   drive_.encoders.erase(drive_.encoders.begin() + 250, drive_.encoders.begin() + 256);
-  EXPECT_FALSE(starts());
+  EXPECT_EQ(obstacle(), "encoder samples are missing in the window, or contradict each other");
   drive_ = whole;
   drive_.encoders.erase(drive_.encoders.begin() + 100, drive_.encoders.begin() + 106);
   EXPECT_TRUE(starts()) << "long before";
   drive_ = whole;
   drive_.imu.erase(drive_.imu.begin() + 500, drive_.imu.begin() + 512);
-  EXPECT_FALSE(starts());
+  EXPECT_EQ(obstacle(), "a hole in the IMU of more than 0.05 s");
 }
 
 TEST_F(MovingStartRefusal, SeesGravityThatCannotBe) {
   for (ImuSample& sample : drive_.imu) sample.accel_m_per_s2[2] *= 1.05;
-  EXPECT_FALSE(starts());
+  EXPECT_EQ(obstacle(),
+            "what the wheels leave of the specific force is not gravity within four sigma");
 }
 
 TEST_F(MovingStartRefusal, SeesWheelsThatTurnOtherwiseThanTheImu) {
   for (EncoderSample& sample : drive_.encoders) {
     for (double& rate : sample.drive_rad_per_s) rate *= 1.3;
   }
-  EXPECT_FALSE(starts());
+  EXPECT_EQ(obstacle(), "gyro and wheels turn otherwise by more than four sigma");
 }
 
 TEST_F(MovingStartRefusal, SeesWheelsThatSayNothing) {
   for (EncoderSample& sample : drive_.encoders) sample.drive_rad_per_s.fill(std::nan(""));
-  EXPECT_FALSE(starts());
+  EXPECT_EQ(obstacle(), "encoder samples are missing in the window, or contradict each other");
 }
 
 }  // namespace

@@ -300,6 +300,27 @@ bool step(Estimator& estimator, std::string& cause) {
   }
 }
 
+/// Why a run did not begin: what was in the way of its start, the most frequent first.
+std::string no_epoch(const FilterSetup& setup, const Estimator& estimator) {
+  if (setup.start.mode == StartMode::kReference || estimator.filter().initialized()) {
+    return "the measurements do not make a single epoch";
+  }
+  std::vector<StartObstacle> obstacles(estimator.start_obstacles().begin(),
+                                       estimator.start_obstacles().end());
+  std::stable_sort(obstacles.begin(), obstacles.end(),
+                   [](const auto& a, const auto& b) { return a.count > b.count; });
+  std::int64_t attempts = 0;
+  for (const StartObstacle& obstacle : obstacles) attempts += obstacle.count;
+  std::string text = "no state to start from was found in the measurements";
+  const char* separator = ": ";
+  for (const StartObstacle& obstacle : obstacles) {
+    text += separator + std::string(obstacle.text) + " (" + std::to_string(obstacle.count) +
+            " of " + std::to_string(attempts) + " attempts)";
+    separator = ", ";
+  }
+  return text;
+}
+
 /// How a run has ended, and how accurate it was.
 void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& result) {
   result.epochs = estimator.epochs();
@@ -314,9 +335,7 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
                    std::to_string(result.duration_s) + " s)";
   } else if (result.epochs == 0) {
     result.status = RunStatus::kFailed;
-    result.cause = setup.filter->start.mode == StartMode::kReference
-                       ? "the measurements do not make a single epoch"
-                       : "no state to start from was found in the measurements";
+    result.cause = no_epoch(*setup.filter, estimator);
   }
   if (result.status == RunStatus::kOk && !result.reference.empty()) {
     result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);

@@ -283,13 +283,19 @@ void Estimator::forget_before_start() {
 
 bool Estimator::try_to_initialize() {
   if (!initializer_) return false;
-  const auto prior = initializer_(imu_, encoders_);
-  if (!prior) {
-    forget_before_start();
-    return false;
+  const StartAttempt attempt = initializer_(imu_, encoders_);
+  if (attempt.prior) {
+    start(*attempt.prior);
+    return true;
   }
-  start(*prior);
-  return true;
+  const auto is_known = [&](const StartObstacle& known) { return known.text == attempt.obstacle; };
+  auto known = std::find_if(start_obstacles_.begin(), start_obstacles_.end(), is_known);
+  if (known == start_obstacles_.end()) {
+    known = start_obstacles_.insert(known, {attempt.obstacle, 0});
+  }
+  ++known->count;
+  forget_before_start();
+  return false;
 }
 
 void Estimator::update_monitors() {

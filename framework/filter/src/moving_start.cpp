@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <string_view>
 
 #include <Eigen/Dense>
 
@@ -24,6 +25,8 @@ constexpr std::int64_t kHalfNs = 50'000'000;  ///< velocities are means over twi
 constexpr std::int64_t kMaxGapNs = 50'000'000;
 constexpr double kMaxBridgedS = 0.02;
 constexpr double kGate = 4.;  ///< sigmas
+constexpr std::string_view kUnusableWheels =
+    "encoder samples are missing in the window, or contradict each other";
 
 /// What can be wrong with the inputs, as offsets on top of them (F-16).
 enum Offset : Eigen::Index {
@@ -53,9 +56,11 @@ class Window {
         options_(options),
         preintegrator_(options.model, wheels()) {}
 
-  /// The last window that the measurements fill without holes.
-  bool find() {
-    if (imu_.size() < 20 || encoders_.empty()) return false;
+  /// The last window that the measurements fill without holes. What is in its way, or nothing.
+  std::string_view find() {
+    constexpr std::string_view kTooShort = "fewer measurements than start_window_s asks for";
+    if (imu_.size() < 20) return kTooShort;
+    if (encoders_.empty()) return "no encoder samples";
     const std::int64_t offset_ns = to_ns(options_.wheels.wheels.t_OtoI_s);
     constexpr std::int64_t kMarginNs = kHalfNs + 2'000'000;  // the clock is varied by a ms
     const std::int64_t latest_ns =
@@ -67,25 +72,28 @@ class Window {
       return std::lower_bound(imu_.begin(), imu_.end(), t_ns, stamp) - imu_.begin() - 1;
     };
     const std::ptrdiff_t last = at_or_before(latest_ns);
-    if (last < 0) return false;
+    if (last < 0) return kTooShort;
     last_ = static_cast<std::size_t>(last);
     const std::int64_t earliest_ns =
         std::max(imu_.front().t_ns, encoders_.front().begin_ns + offset_ns) + kMarginNs;
     const std::ptrdiff_t first = at_or_before(imu_[last_].t_ns - to_ns(options_.window_s));
-    if (first < 0 || imu_[static_cast<std::size_t>(first)].t_ns < earliest_ns) return false;
+    if (first < 0 || imu_[static_cast<std::size_t>(first)].t_ns < earliest_ns) {
+      return kTooShort;
+    }
     first_ = static_cast<std::size_t>(first);
     for (std::size_t i = first_; i < last_; ++i) {
-      if (imu_[i + 1].t_ns - imu_[i].t_ns > kMaxGapNs) return false;
+      if (imu_[i + 1].t_ns - imu_[i].t_ns > kMaxGapNs)
+        return "a hole in the IMU of more than 0.05 s";
     }
     span_s_ = seconds_between(imu_[first_].t_ns, imu_[last_].t_ns);
-    return true;
+    return {};
   }
 
   /// Measures at the prior estimate, decides how the bias is weighed, and how large the offsets
-  /// are. False when the measurements cannot be used.
-  bool measure() {
+  /// are. Why the measurements cannot be used, or nothing.
+  std::string_view measure() {
     const VectorXd none = VectorXd::Zero(kIntrinsics + options_.wheels.wheels.x_WI.size());
-    if (!integrate(none)) return false;
+    if (!integrate(none)) return kUnusableWheels;
     const double T = span_s_;
     covariance_ = MatrixXd::Zero(none.size(), none.size());
     const auto add = [&](Eigen::Index first, double variance) {
@@ -124,7 +132,8 @@ class Window {
     const Matrix3d S = V + bias_variance * Matrix3d::Identity();
     share_ = bias_variance * S.inverse();
     const Vector3d difference = rate_difference(none, prior.wheels.R_ItoO);
-    return (difference.cwiseAbs().array() < kGate * S.diagonal().cwiseSqrt().array()).all();
+    if ((difference.cwiseAbs().array() < kGate * S.diagonal().cwiseSqrt().array()).all()) return {};
+    return "gyro and wheels turn otherwise by more than four sigma";
   }
 
   /// Everything at the inputs with these offsets on top. False: no such measurement.
@@ -271,21 +280,24 @@ Eigen::Matrix<double, kOutputs + 3, kOutputs + 3> covariance_of(const Window& wi
 
 }  // namespace
 
-std::optional<ImuPrior> start_from_motion(std::span<const ImuSample> imu,
-                                          std::span<const EncoderSample> encoders,
-                                          const MovingStartOptions& options) {
+StartAttempt start_from_motion(std::span<const ImuSample> imu,
+                               std::span<const EncoderSample> encoders,
+                               const MovingStartOptions& options) {
   Window window(imu, encoders, options);
   Outputs found;
   MatrixXd D;
-  if (!window.find() || !window.measure() ||
-      !window.solve(VectorXd::Zero(window.covariance().cols()), found) ||
+  for (const auto step : {&Window::find, &Window::measure}) {
+    const std::string_view obstacle = (window.*step)();
+    if (!obstacle.empty()) return no_start(obstacle);
+  }
+  if (!window.solve(VectorXd::Zero(window.covariance().cols()), found) ||
       !differentiate(window, D)) {
-    return std::nullopt;
+    return no_start(kUnusableWheels);
   }
   const auto P_found = covariance_of(window, D, options);
   const double gravity_off = found[kGravity] - options.gravity_m_per_s2;
   if (!(std::abs(gravity_off) < kGate * std::sqrt(P_found(kGravity, kGravity)))) {
-    return std::nullopt;
+    return no_start("what the wheels leave of the specific force is not gravity within four sigma");
   }
 
   ImuPrior prior;
@@ -314,7 +326,7 @@ std::optional<ImuPrior> start_from_motion(std::span<const ImuSample> imu,
   prior.P =
       M * P_found * M.transpose() + squared(options.sigma_yaw_rad) * by_yaw * by_yaw.transpose();
   prior.P.diagonal().segment<3>(kPositionColumn).setConstant(squared(options.sigma_position_m));
-  return prior;
+  return {prior, {}};
 }
 
 }  // namespace viwo

@@ -1,6 +1,7 @@
 #include "viwo/filter/standstill_start.hpp"
 
 #include <cmath>
+#include <string_view>
 
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
@@ -43,14 +44,15 @@ bool wheels_turn(std::span<const std::vector<EncoderSample>> encoders, double wi
 
 }  // namespace
 
-std::optional<ImuPrior> start_from_standstill(std::span<const ImuSample> imu,
-                                              std::span<const std::vector<EncoderSample>> encoders,
-                                              const StandstillOptions& options) {
-  if (imu.size() < 20) return std::nullopt;
+StartAttempt start_from_standstill(std::span<const ImuSample> imu,
+                                   std::span<const std::vector<EncoderSample>> encoders,
+                                   const StandstillOptions& options) {
+  constexpr std::string_view kTooShort = "fewer IMU samples than start_window_s asks for";
+  if (imu.size() < 20) return no_start(kTooShort);
   std::size_t first = imu.size() - 1;
   while (first > 0 && seconds_between(imu[first].t_ns, imu.back().t_ns) < options.window_s) --first;
   const double span_s = seconds_between(imu[first].t_ns, imu.back().t_ns);
-  if (span_s < options.window_s) return std::nullopt;
+  if (span_s < options.window_s) return no_start(kTooShort);
   const auto window = imu.subspan(first);
   const double dt = span_s / static_cast<double>(window.size() - 1);
   const Moments gyro = moments(window, [](const ImuSample& s) { return s.gyro_rad_per_s; });
@@ -60,10 +62,18 @@ std::optional<ImuPrior> start_from_standstill(std::span<const ImuSample> imu,
   const double gyro_variance = squared(options.noise.gyro_rad_per_s_sqrt_hz) / dt;
   const double accel_variance = squared(options.noise.accel_m_per_s2_sqrt_hz) / dt;
   const double gravity_off = std::abs(accel.mean.norm() - options.gravity_m_per_s2);
-  if (gyro.variance > kVibration * gyro_variance || accel.variance > kVibration * accel_variance ||
-      gyro.mean.cwiseAbs().maxCoeff() > 3. * options.sigma_gyro_bias_rad_per_s ||
-      gravity_off > 4. * options.sigma_accel_bias_m_per_s2 || wheels_turn(encoders, span_s)) {
-    return std::nullopt;
+  if (wheels_turn(encoders, span_s)) return no_start("a wheel turns faster than 0.05 rad/s");
+  if (gyro.variance > kVibration * gyro_variance) {
+    return no_start("the gyro's readings scatter by more than three times their noise");
+  }
+  if (accel.variance > kVibration * accel_variance) {
+    return no_start("the accelerometer's readings scatter by more than three times their noise");
+  }
+  if (gyro.mean.cwiseAbs().maxCoeff() > 3. * options.sigma_gyro_bias_rad_per_s) {
+    return no_start("the mean rate of the gyro is beyond three sigma of its bias");
+  }
+  if (gravity_off > 4. * options.sigma_accel_bias_m_per_s2) {
+    return no_start("the mean specific force is not gravity within four sigma of its bias");
   }
 
   ImuPrior prior;
@@ -99,7 +109,7 @@ std::optional<ImuPrior> start_from_standstill(std::span<const ImuSample> imu,
       .segment<3>(kGyroBiasColumn)
       .setConstant(noise_of_mean(options.noise.gyro_rad_per_s_sqrt_hz,
                                  options.noise.gyro_walk_rad_per_s2_sqrt_hz));
-  return prior;
+  return {prior, {}};
 }
 
 }  // namespace viwo

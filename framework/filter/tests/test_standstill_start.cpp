@@ -114,7 +114,7 @@ MeanNees monte_carlo(double correlation) {
   int n = 0;
   for (int run = 0; run < kRuns; ++run) {
     const Rest rest = make_rest(options, random);
-    const auto prior = start_from_standstill(rest.imu, {}, options);
+    const auto prior = start_from_standstill(rest.imu, {}, options).prior;
     if (!prior) continue;
     StartError start = start_error(rest, *prior);
     start.P.block<2, 3>(0, 2) *= correlation;
@@ -155,7 +155,7 @@ TEST(StandstillStart, KnowsTheCombinationOfTiltAndBiasAsWellAsTheReadingsTellIt)
   int n = 0;
   for (int run = 0; run < kRuns; ++run) {
     const Rest rest = make_rest(options, random);
-    const auto prior = start_from_standstill(rest.imu, {}, options);
+    const auto prior = start_from_standstill(rest.imu, {}, options).prior;
     if (!prior) continue;
     const StartError start = start_error(rest, *prior);
     const Vector3d z = prior->state.R_GtoI.col(2);
@@ -179,7 +179,7 @@ TEST(StandstillStart, IsExactForReadingsWithoutNoiseAndBias) {
     sample.gyro_rad_per_s = {0.001, -0.002, 0.003};
     put(rest.R_GtoI.col(2) * kGravity, sample.accel_m_per_s2);
   }
-  const auto prior = start_from_standstill(imu, {}, options);
+  const auto prior = start_from_standstill(imu, {}, options).prior;
   ASSERT_TRUE(prior);
   EXPECT_EQ(prior->t_ns, imu.back().t_ns);
   EXPECT_LT((prior->state.R_GtoI.col(2) - rest.R_GtoI.col(2)).norm(), 1e-12);
@@ -205,7 +205,7 @@ TEST(StandstillStart, HasYawZeroWhicheverWayTheImuIsMounted) {
       imu[i].t_ns = static_cast<std::int64_t>(i) * 5'000'000;
       put(R_GtoI.col(2) * kGravity, imu[i].accel_m_per_s2);
     }
-    const auto prior = start_from_standstill(imu, {}, {});
+    const auto prior = start_from_standstill(imu, {}, {}).prior;
     ASSERT_TRUE(prior) << turn.transpose();
     EXPECT_TRUE(prior->state.R_GtoI.allFinite());
     EXPECT_LT((prior->state.R_GtoI.col(2) - R_GtoI.col(2)).norm(), 1e-12);
@@ -213,11 +213,19 @@ TEST(StandstillStart, HasYawZeroWhicheverWayTheImuIsMounted) {
   }
 }
 
-bool starts(const RestOptions& rest_options,
-            const std::vector<std::vector<EncoderSample>>& encoders = {}) {
+/// What is in the way of a start; empty when there is one.
+std::string_view obstacle(const RestOptions& rest_options,
+                          const std::vector<std::vector<EncoderSample>>& encoders = {}) {
   Random random(23);
   const Rest rest = make_rest({}, random, rest_options);
-  return start_from_standstill(rest.imu, encoders, {}).has_value();
+  const StartAttempt attempt = start_from_standstill(rest.imu, encoders, {});
+  EXPECT_NE(attempt.prior.has_value(), !attempt.obstacle.empty());
+  return attempt.obstacle;
+}
+
+bool starts(const RestOptions& rest_options,
+            const std::vector<std::vector<EncoderSample>>& encoders = {}) {
+  return obstacle(rest_options, encoders).empty();
 }
 
 TEST(StandstillStart, RefusesABaseThatMoves) {
@@ -265,17 +273,35 @@ TEST(StandstillStart, RefusesWheelsThatTurnWithinTheWindow) {
   EXPECT_TRUE(with_rate(100, 5., 4)) << "a channel that the base does not have";
 }
 
+TEST(StandstillStart, SaysWhatIsInItsWay) {
+  EXPECT_EQ(obstacle({.duration_s = 0.9, .bias_scale = 0.}),
+            "fewer IMU samples than start_window_s asks for");
+  EXPECT_EQ(obstacle({.rate = {0., 0., 0.065}, .bias_scale = 0.}),
+            "the mean rate of the gyro is beyond three sigma of its bias");
+  EXPECT_EQ(obstacle({.acceleration = {0., 0., 0.3}, .bias_scale = 0.}),
+            "the mean specific force is not gravity within four sigma of its bias");
+  EXPECT_EQ(obstacle({.vibration_gyro = 1., .bias_scale = 0.}),
+            "the gyro's readings scatter by more than three times their noise");
+  EXPECT_EQ(obstacle({.vibration_accel = 1., .bias_scale = 0.}),
+            "the accelerometer's readings scatter by more than three times their noise");
+  std::vector<EncoderSample> turning(1);
+  turning[0].t_ns = 0;
+  turning[0].n_drive = 4;
+  turning[0].drive_rad_per_s[2] = 1.;
+  EXPECT_EQ(obstacle({.bias_scale = 0.}, {turning}), "a wheel turns faster than 0.05 rad/s");
+}
+
 TEST(StandstillStart, WaitsForAWholeWindow) {
   EXPECT_FALSE(starts({.duration_s = 0.9, .bias_scale = 0.}));
   EXPECT_TRUE(starts({.duration_s = 1.01, .bias_scale = 0.}));
-  EXPECT_FALSE(start_from_standstill({}, {}, {}).has_value());
+  EXPECT_FALSE(start_from_standstill({}, {}, {}).prior.has_value());
 }
 
 TEST(StandstillStart, LooksAtTheLastWindowOnly) {
   Random random(24);
   Rest rest = make_rest({}, random, {.duration_s = 2., .bias_scale = 0.});
   for (std::size_t i = 0; i < 150; ++i) rest.imu[i].gyro_rad_per_s[0] = 3.;
-  EXPECT_TRUE(start_from_standstill(rest.imu, {}, {}).has_value());
+  EXPECT_TRUE(start_from_standstill(rest.imu, {}, {}).prior.has_value());
 }
 
 }  // namespace

@@ -9,11 +9,13 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "viwo/api/update.hpp"
 #include "viwo/filter/excitation_monitor.hpp"
 #include "viwo/filter/filter.hpp"
+#include "viwo/filter/start_attempt.hpp"
 
 namespace viwo {
 
@@ -87,9 +89,15 @@ class EstimatorObserver {
   virtual void on_epoch(const Filter& /*filter*/, const EpochData& /*data*/) {}
 };
 
-/// Finds a state to start from, given everything that was measured so far. Nothing: not yet.
-using Initializer = std::function<std::optional<ImuPrior>(
+/// Finds a state to start from, given everything that was measured so far, or says why not yet.
+using Initializer = std::function<StartAttempt(
     std::span<const ImuSample> imu, std::span<const std::vector<EncoderSample>> encoders)>;
+
+/// How often something was in the way of a start.
+struct StartObstacle {
+  std::string_view text;
+  std::int64_t count = 0;
+};
 
 class Estimator {
  public:
@@ -121,6 +129,8 @@ class Estimator {
   bool step();
   /// Why the filter cannot go on (it has diverged); empty as long as it can.
   const std::string& failure() const { return failure_; }
+  /// What every attempt to start has met so far, in the order of their first times.
+  std::span<const StartObstacle> start_obstacles() const { return start_obstacles_; }
 
   const Filter& filter() const { return filter_; }
   std::span<const UpdateEntry> updates() const { return updates_; }
@@ -168,6 +178,7 @@ class Estimator {
   ResidualFactor residual_factor_;
   InformationFactor information_factor_;
   Initializer initializer_;
+  std::vector<StartObstacle> start_obstacles_;
   EstimatorObserver* observer_ = nullptr;
   std::vector<ExcitationMonitor> monitors_;
   std::vector<std::size_t> monitored_;  // wheel set of each

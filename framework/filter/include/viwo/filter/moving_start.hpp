@@ -4,10 +4,9 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <span>
 
-#include "viwo/filter/filter.hpp"
+#include "viwo/filter/start_attempt.hpp"
 #include "viwo/wheel/wheel_model.hpp"
 
 namespace viwo {
@@ -34,8 +33,8 @@ struct MovingStartOptions {
 ///
 /// Nothing: the measurements do not fill the window, have holes in it, or contradict what the
 /// options say of biases, gravity and motion by more than four sigma.
-std::optional<ImuPrior> start_from_motion(std::span<const ImuSample> imu,
-                                          std::span<const EncoderSample> encoders,
-                                          const MovingStartOptions& options);
+StartAttempt start_from_motion(std::span<const ImuSample> imu,
+                               std::span<const EncoderSample> encoders,
+                               const MovingStartOptions& options);
 
 }  // namespace viwo

@@ -1,11 +1,11 @@
 // A first state from a rest: gravity gives roll and pitch, the gyro its bias.
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 
-#include "viwo/filter/estimator.hpp"
+#include "viwo/api/measurement.hpp"
+#include "viwo/filter/start_attempt.hpp"
 
 namespace viwo {
 
@@ -23,8 +23,8 @@ struct StandstillOptions {
 /// the readings scatter as their noise does (with room for vibration), the mean specific force is
 /// gravity within the bias prior, the mean rate within the bias prior, and no wheel turned.
 /// G is below the IMU's first position, yaw zero.
-std::optional<ImuPrior> start_from_standstill(std::span<const ImuSample> imu,
-                                              std::span<const std::vector<EncoderSample>> encoders,
-                                              const StandstillOptions& options);
+StartAttempt start_from_standstill(std::span<const ImuSample> imu,
+                                   std::span<const std::vector<EncoderSample>> encoders,
+                                   const StandstillOptions& options);
 
 }  // namespace viwo
