@@ -8,6 +8,7 @@
 #include <system_error>
 #include <vector>
 
+#include "asl_columns.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/image/image_file.hpp"
 #include "viwo/log/stamp_filter.hpp"
@@ -28,13 +29,6 @@ std::string folders_beside(const fs::path& missing) {
   }
   std::sort(names.begin(), names.end());
   return names.empty() ? std::string() : did_you_mean(missing.filename().string(), names);
-}
-
-std::size_t stamp_column(const TableReader& table) {
-  for (const char* name : {"timestamp_ns", "timestamp"}) {
-    if (table.has_column(name)) return table.column(name);
-  }
-  return table.column("timestamp [ns]");
 }
 
 /// The table of one camera.

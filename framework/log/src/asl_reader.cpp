@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "asl_columns.hpp"
 #include "viwo/log/asl.hpp"
 #include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/table_reader.hpp"
@@ -17,13 +18,6 @@ namespace {
 std::filesystem::path table_file(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::is_directory(path, ignored) ? path / "data.csv" : path;
-}
-
-std::size_t stamp_column(const TableReader& table) {
-  for (const char* name : {"timestamp [ns]", "timestamp"}) {
-    if (table.has_column(name)) return table.column(name);
-  }
-  return table.column("timestamp_ns");
 }
 
 /// Columns prefix_1, prefix_2, ... as far as the file has them.

@@ -9,7 +9,7 @@
 namespace viwo::log {
 namespace {
 
-constexpr std::size_t kBlock = std::size_t{1} << 16;
+constexpr std::size_t kFlushBytes = std::size_t{1} << 16;
 
 }  // namespace
 
@@ -35,7 +35,7 @@ void TextWriter::flush() {
 
 TextWriter& TextWriter::operator<<(std::string_view text) {
   pending_ += text;
-  if (pending_.size() >= kBlock) flush();
+  if (pending_.size() >= kFlushBytes) flush();
   return *this;
 }
 
