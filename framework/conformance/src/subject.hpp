@@ -44,6 +44,13 @@ class Subject {
   std::string no_section_;
 };
 
+template <>
+Loaded<KinematicModel> Subject::make(const config::Node& section, std::uint64_t seed) const;
+template <>
+Loaded<Sensor> Subject::make(const config::Node& section, std::uint64_t seed) const;
+template <>
+Loaded<Update> Subject::make(const config::Node& section, std::uint64_t seed) const;
+
 /// Sections to try, `type` and a value for every parameter without a default; empty when one of
 /// them cannot be made up, then `missing` names it.
 std::vector<config::Node> made_up_sections(const PluginInfo& info, std::string& missing);
