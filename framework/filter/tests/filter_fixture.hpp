@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -11,6 +12,8 @@
 #include "viwo/math/so3.hpp"
 
 namespace viwo::testing {
+
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 class Random {
  public:

@@ -1,9 +1,8 @@
 // Both forms of the update against the textbook equations.
-#include <random>
-
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
+#include "filter_fixture.hpp"
 #include "viwo/filter/covariance.hpp"
 
 namespace viwo {
@@ -11,20 +10,9 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using testing::Random;
 
 constexpr int kSize = 40;
-
-class Random {
- public:
-  explicit Random(unsigned seed) : engine_(seed) {}
-  MatrixXd matrix(Eigen::Index rows, Eigen::Index cols) {
-    return MatrixXd::NullaryExpr(rows, cols, [this] { return normal_(engine_); });
-  }
-
- private:
-  std::mt19937_64 engine_;
-  std::normal_distribution<double> normal_;
-};
 
 MatrixXd random_covariance(Random& random) {
   const MatrixXd A = random.matrix(kSize, kSize);

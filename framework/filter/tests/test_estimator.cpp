@@ -21,14 +21,13 @@ using testing::expect_same;
 using testing::FakeUpdate;
 using testing::imu_at;
 using testing::kMs;
+using testing::kNaN;
 using testing::kStart;
 using testing::level_prior;
 using testing::observation;
 using testing::Random;
 using testing::Rig;
 using testing::Seen;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Estimator, MakesEpochsAtImagesBetweenImuSamples) {
   Rig rig;

@@ -22,12 +22,11 @@ using testing::FakeUpdate;
 using testing::image_at;
 using testing::imu_at;
 using testing::kMs;
+using testing::kNaN;
 using testing::kStart;
 using testing::level_prior;
 using testing::Rig;
 using testing::Seen;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Estimator, StorageOfFormerImagesDoesNotLeakIntoLaterOnes) {
   Rig rig;
@@ -233,10 +232,10 @@ TEST(Estimator, AsksTheInitializerUntilItFindsAStart) {
   const auto update = std::make_shared<FakeUpdate>();
   Estimator estimator({}, {camera_prior()}, {}, {{"fake", update, -1}});
   int asked = 0;
-  estimator.start([&](auto imu, auto) -> std::optional<ImuPrior> {
+  estimator.start([&](auto imu, auto) -> StartAttempt {
     ++asked;
-    if (imu.size() < 21) return std::nullopt;
-    return level_prior(imu.back().t_ns);
+    if (imu.size() < 21) return no_start(imu.size() < 6 ? "far too short" : "too short");
+    return {level_prior(imu.back().t_ns), {}};
   });
   for (std::int64_t t = 0; t <= 400; t += 10) {
     estimator.add(imu_at(kStart + t * kMs));
@@ -244,6 +243,11 @@ TEST(Estimator, AsksTheInitializerUntilItFindsAStart) {
     estimator.step();
   }
   EXPECT_EQ(asked, 21);
+  ASSERT_EQ(estimator.start_obstacles().size(), 2u);
+  EXPECT_EQ(estimator.start_obstacles()[0].text, "far too short");
+  EXPECT_EQ(estimator.start_obstacles()[0].count, 5);
+  EXPECT_EQ(estimator.start_obstacles()[1].text, "too short");
+  EXPECT_EQ(estimator.start_obstacles()[1].count, 15);
   ASSERT_EQ(update->seen.size(), 3u);  // 250, 300, 350: nothing is later than the last image
   EXPECT_EQ(update->seen[0].begin_ns, kStart + 200 * kMs);
   EXPECT_EQ(update->seen[0].end_ns, kStart + 250 * kMs);
@@ -258,11 +262,11 @@ TEST(Estimator, ForgetsWhatNoStartLooksAtWhileItWaitsForOne) {
   Estimator estimator({}, {camera_prior()}, {}, {{"fake", update, -1}});
   std::size_t most = 0;
   double least_s = 1e9;
-  estimator.start([&](auto imu, auto) -> std::optional<ImuPrior> {
+  estimator.start([&](auto imu, auto) -> StartAttempt {
     most = std::max(most, imu.size());
     const double s = seconds_between(imu.front().t_ns, imu.back().t_ns);
     if (imu.back().t_ns > kStart + 200'000 * kMs) least_s = std::min(least_s, s);
-    return std::nullopt;
+    return no_start("never");
   });
   for (std::int64_t t = 0; t <= 600'000; t += 100) {
     estimator.add(imu_at(kStart + t * kMs));

@@ -18,8 +18,6 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using namespace testing;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 std::string refusal(const FilterOptions& options, const CameraPrior& camera,
                     const WheelsPrior& wheels) {
   try {

@@ -17,14 +17,14 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::Random;
 
-constexpr int kSize = 40;
-constexpr int kFirst = 28;  // the columns of which directions are held
+constexpr int kHeldStateSize = 40;
+constexpr int kFirstHeld = 28;  // the columns of which directions are held
 constexpr int kCount = 9;
 constexpr int kGauge = 30;  // held altogether, without variance
 
-MatrixXd random_covariance(Random& random) {
-  const MatrixXd A = random.matrix(kSize, kSize);
-  MatrixXd P = A * A.transpose() + 0.1 * MatrixXd::Identity(kSize, kSize);
+MatrixXd covariance_with_gauge(Random& random) {
+  const MatrixXd A = random.matrix(kHeldStateSize, kHeldStateSize);
+  MatrixXd P = A * A.transpose() + 0.1 * MatrixXd::Identity(kHeldStateSize, kHeldStateSize);
   P.row(kGauge).setZero();
   P.col(kGauge).setZero();
   return P;
@@ -35,11 +35,11 @@ struct Held {
   std::vector<int> columns;
   VectorXd sigma;
   MatrixXd N;
-  HeldDirections held{kFirst, kCount};
-  MatrixXd Q = MatrixXd::Zero(kSize, kSize);
+  HeldDirections held{kFirstHeld, kCount};
+  MatrixXd Q = MatrixXd::Zero(kHeldStateSize, kHeldStateSize);
 
   explicit Held(Random& random) {
-    for (int i = kFirst; i < kFirst + kCount; ++i) {
+    for (int i = kFirstHeld; i < kFirstHeld + kCount; ++i) {
       if (i != kGauge) columns.push_back(i);
     }
     const auto n = static_cast<Eigen::Index>(columns.size());
@@ -58,7 +58,7 @@ struct Held {
 
   /// N^T D^-1, on all columns.
   MatrixXd along() const {
-    MatrixXd W = MatrixXd::Zero(3, kSize);
+    MatrixXd W = MatrixXd::Zero(3, kHeldStateSize);
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const auto k = static_cast<Eigen::Index>(i);
       W.col(columns[i]) = N.row(k).transpose() / sigma[k];
@@ -74,7 +74,7 @@ struct Joseph {
 };
 Joseph joseph(const MatrixXd& P, const MatrixXd& Q, const MatrixXd& H, const MatrixXd& R,
               const VectorXd& r) {
-  const MatrixXd I = MatrixXd::Identity(kSize, kSize);
+  const MatrixXd I = MatrixXd::Identity(kHeldStateSize, kHeldStateSize);
   const MatrixXd K = (I - Q) * P * H.transpose() * (H * P * H.transpose() + R).inverse();
   const MatrixXd F = I - K * H;
   return {F * P * F.transpose() + K * R * K.transpose(), K * r};
@@ -95,7 +95,7 @@ void expect_joseph(const Held& held, const MatrixXd& before, const Covariance& c
 
 /// Rows on columns inside and outside of what is held.
 MatrixXd rows_of(Random& random, Eigen::Index rows) {
-  MatrixXd H = MatrixXd::Zero(rows, kSize);
+  MatrixXd H = MatrixXd::Zero(rows, kHeldStateSize);
   H.middleCols(3, 4) = random.matrix(rows, 4);
   H.middleCols(27, 8) = random.matrix(rows, 8);
   return H;
@@ -110,7 +110,7 @@ MatrixXd compact(const MatrixXd& H) {
 TEST(HeldDirections, ResidualFactorIsJosephsFormWithTheReducedGain) {
   Random random(11);
   Held held(random);
-  const MatrixXd P = random_covariance(random);
+  const MatrixXd P = covariance_with_gauge(random);
   const MatrixXd H = rows_of(random, 4);
   ResidualFactor factor;
   factor.columns.add(3, 4);
@@ -120,9 +120,9 @@ TEST(HeldDirections, ResidualFactorIsJosephsFormWithTheReducedGain) {
   factor.residual = random.matrix(4, 1);
   const MatrixXd A = random.matrix(4, 4);
   factor.R = A * A.transpose() + MatrixXd::Identity(4, 4);
-  Covariance covariance(kSize);
+  Covariance covariance(kHeldStateSize);
   covariance.set_block(0, P);
-  VectorXd dx(kSize);
+  VectorXd dx(kHeldStateSize);
   held.held.before(covariance.matrix());
   ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
   EXPECT_GT((held.along() * dx).norm(), 1e-3);  // it would move them
@@ -133,7 +133,7 @@ TEST(HeldDirections, ResidualFactorIsJosephsFormWithTheReducedGain) {
 TEST(HeldDirections, InformationFactorIsTheSame) {
   Random random(12);
   Held held(random);
-  const MatrixXd P = random_covariance(random);
+  const MatrixXd P = covariance_with_gauge(random);
   const MatrixXd H = rows_of(random, 50);
   const VectorXd r = random.matrix(50, 1);
   InformationFactor factor;
@@ -141,9 +141,9 @@ TEST(HeldDirections, InformationFactorIsTheSame) {
   factor.columns.add(27, 8);
   factor.Lambda = compact(H).transpose() * compact(H);
   factor.eta = compact(H).transpose() * r;
-  Covariance covariance(kSize);
+  Covariance covariance(kHeldStateSize);
   covariance.set_block(0, P);
-  VectorXd dx(kSize);
+  VectorXd dx(kHeldStateSize);
   held.held.before(covariance.matrix());
   ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
   covariance.hold(held.held, dx);
@@ -152,12 +152,12 @@ TEST(HeldDirections, InformationFactorIsTheSame) {
 
 TEST(HeldDirections, NoneOfThemIsTheNormalUpdateToTheBit) {
   Random random(13);
-  const MatrixXd P = random_covariance(random);
-  Covariance covariance(kSize), normal(kSize);
+  const MatrixXd P = covariance_with_gauge(random);
+  Covariance covariance(kHeldStateSize), normal(kHeldStateSize);
   covariance.set_block(0, P);
   normal.set_block(0, P);
-  HeldDirections held(kFirst, kCount);
-  VectorXd dx(kSize), dx_normal(kSize);
+  HeldDirections held(kFirstHeld, kCount);
+  VectorXd dx(kHeldStateSize), dx_normal(kHeldStateSize);
   const ResidualFactor factor = testing::observation(29, random.matrix(1, 1), 0.3);
   held.before(covariance.matrix());
   covariance.apply(factor, dx);
@@ -168,11 +168,11 @@ TEST(HeldDirections, NoneOfThemIsTheNormalUpdateToTheBit) {
 }
 
 TEST(HeldDirections, RefusesColumnsThatAreNotTheirs) {
-  HeldDirections held(kFirst, 2);
+  HeldDirections held(kFirstHeld, 2);
   const VectorXd one = VectorXd::Ones(1);
-  const std::array outside{kFirst + 2};
+  const std::array outside{kFirstHeld + 2};
   EXPECT_THROW(held.add(outside, one, one), std::out_of_range);
-  const std::array inside{kFirst};
+  const std::array inside{kFirstHeld};
   held.add(inside, one, one);
   held.add(inside, one, one);
   EXPECT_THROW(held.add(inside, one, one), std::out_of_range);

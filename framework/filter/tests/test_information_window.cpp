@@ -18,14 +18,14 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using testing::Random;
 
-constexpr int kSize = 20;
-constexpr int kFirst = 12;
+constexpr int kStateSize = 20;
+constexpr int kWatched = 12;
 const VectorXd kSigma = (VectorXd(5) << 0.1, 0.02, 0., 3., 0.5).finished();  // 14 is held
 
 ResidualFactor random_rows(Random& random) {
   ResidualFactor factor;
   factor.columns.add(2, 6);
-  factor.columns.add(kFirst, 5);
+  factor.columns.add(kWatched, 5);
   factor.set_rows(3);
   factor.H = random.matrix(3, 11);
   const MatrixXd A = random.matrix(3, 3);
@@ -37,19 +37,20 @@ InformationWindow::Vector ones(int n) { return InformationWindow::Vector::Ones(n
 
 TEST(InformationWindow, OfAResidualFactorIsWhatAnUpdateAddsToAnIndependentPrior) {
   Random random(21);
-  const MatrixXd A = random.matrix(kFirst, kFirst);
-  MatrixXd P = MatrixXd::Zero(kSize, kSize);
-  P.topLeftCorner(kFirst, kFirst) = A * A.transpose() + 0.1 * MatrixXd::Identity(kFirst, kFirst);
-  P.diagonal().segment(kFirst, 5) = kSigma.cwiseAbs2();
+  const MatrixXd A = random.matrix(kWatched, kWatched);
+  MatrixXd P = MatrixXd::Zero(kStateSize, kStateSize);
+  P.topLeftCorner(kWatched, kWatched) =
+      A * A.transpose() + 0.1 * MatrixXd::Identity(kWatched, kWatched);
+  P.diagonal().segment(kWatched, 5) = kSigma.cwiseAbs2();
   const ResidualFactor factor = random_rows(random);
-  InformationWindow window(kFirst, kSigma, 2);
+  InformationWindow window(kWatched, kSigma, 2);
   ASSERT_TRUE(window.measure(factor, P));
   window.add();
   window.decompose(ones(4));
 
-  Covariance covariance(kSize);
+  Covariance covariance(kStateSize);
   covariance.set_block(0, P);
-  VectorXd dx(kSize);
+  VectorXd dx(kStateSize);
   ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
   const std::vector<int> columns(window.columns().begin(), window.columns().end());
   EXPECT_EQ(columns, (std::vector{12, 13, 15, 16}));
@@ -72,9 +73,9 @@ TEST(InformationWindow, OfAnInformationFactorIsItsBlockInUnitsOfThePrior) {
   factor.columns.add(15, 2);  // parameters 2 and 3
   factor.columns.add(4, 3);
   factor.columns.add(13, 1);  // parameter 1
-  factor.Lambda = MatrixXd::Constant(kSize, kSize, std::nan(""));
+  factor.Lambda = MatrixXd::Constant(kStateSize, kStateSize, std::nan(""));
   factor.Lambda.topLeftCorner(6, 6).triangularView<Eigen::Lower>() = rows.transpose() * rows;
-  InformationWindow window(kFirst, kSigma, 1);
+  InformationWindow window(kWatched, kSigma, 1);
   ASSERT_TRUE(window.measure(factor));
   window.add();
   window.decompose(ones(4));
@@ -90,10 +91,10 @@ TEST(InformationWindow, OfAnInformationFactorIsItsBlockInUnitsOfThePrior) {
 }
 
 TEST(InformationWindow, ForgetsTheOldestBinAndCountsOnlyWhatIsBelieved) {
-  InformationWindow window(kFirst, VectorXd::Ones(2), 3);
-  const MatrixXd P = MatrixXd::Identity(kSize, kSize);
+  InformationWindow window(kWatched, VectorXd::Ones(2), 3);
+  const MatrixXd P = MatrixXd::Identity(kStateSize, kStateSize);
   const auto add = [&](double sigma) {
-    ASSERT_TRUE(window.measure(testing::observation(kFirst, VectorXd::Zero(2), sigma), P));
+    ASSERT_TRUE(window.measure(testing::observation(kWatched, VectorXd::Zero(2), sigma), P));
     window.add();
   };
   add(0.5);  // information 4
@@ -112,11 +113,11 @@ TEST(InformationWindow, ForgetsTheOldestBinAndCountsOnlyWhatIsBelieved) {
 }
 
 TEST(InformationWindow, SeesNothingInFactorsOfOtherColumnsOrThatAreNotFinite) {
-  InformationWindow window(kFirst, kSigma, 2);
-  const MatrixXd P = MatrixXd::Identity(kSize, kSize);
+  InformationWindow window(kWatched, kSigma, 2);
+  const MatrixXd P = MatrixXd::Identity(kStateSize, kStateSize);
   EXPECT_FALSE(window.measure(testing::observation(5, VectorXd::Zero(3), 1.), P));
   EXPECT_FALSE(window.measure(testing::observation(14, VectorXd::Zero(1), 1.), P));  // held
-  ResidualFactor broken = testing::observation(kFirst, VectorXd::Zero(2), 1.);
+  ResidualFactor broken = testing::observation(kWatched, VectorXd::Zero(2), 1.);
   broken.H(0, 0) = std::nan("");
   EXPECT_FALSE(window.measure(broken, P));
   EXPECT_THROW(InformationWindow(0, VectorXd::Ones(40), 1), std::invalid_argument);
