@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 using ResultsTest = CommandLineTest;
 
-const std::string kConfigs = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/";
+const std::string kConfigFolder = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/";
 
 std::vector<std::string> fields_of(const std::string& line) {
   std::vector<std::string> fields;
@@ -165,16 +165,16 @@ TEST_F(ResultsTest, AreWrittenForARunThatDiverges) {
 }
 
 TEST_F(ResultsTest, OfTheDeliveredSimulatedConfigurations) {
-  expect_done({"run", kConfigs + "runs/simulated_swerve.yaml", "--out", "run"});
+  expect_done({"run", kConfigFolder + "runs/simulated_swerve.yaml", "--out", "run"});
   EXPECT_EQ(summary("run").at("status"), "ok");
-  expect_done({"experiment", kConfigs + "experiments/simulated_dead_reckoning.yaml", "--seeds", "1",
-               "--out", "demo"});
+  expect_done({"experiment", kConfigFolder + "experiments/simulated_dead_reckoning.yaml", "--seeds",
+               "1", "--out", "demo"});
   const nlohmann::json variants = summary("demo").at("variants");
   for (const char* variant : {"drive_only", "redundant", "redundant_weighted"}) {
     EXPECT_TRUE(variants.contains(variant)) << variant;
   }
-  expect_done({"calibrate", kConfigs + "calibrations/simulated_swerve.yaml", "--out", "calibrated",
-               "--set", "sensors.simulator0.duration_s=20"});
+  expect_done({"calibrate", kConfigFolder + "calibrations/simulated_swerve.yaml", "--out",
+               "calibrated", "--set", "sensors.simulator0.duration_s=20"});
   EXPECT_TRUE(fs::exists(at("calibrated/calibration.yaml")));
 }
 
@@ -182,30 +182,30 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsForTheRecordings) {
   const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/4wis4wid";
   if (!fs::exists(data)) GTEST_SKIP() << "the recordings are not here";
   const std::string set = "placeholders.data=" + fs::canonical(data).string();
-  expect_done({"run", kConfigs + "runs/recording.yaml", "--out", "run", "--set", set});
-  expect_done({"run", kConfigs + "runs/hybrid.yaml", "--out", "hybrid_run", "--set", set});
+  expect_done({"run", kConfigFolder + "runs/recording.yaml", "--out", "run", "--set", set});
+  expect_done({"run", kConfigFolder + "runs/hybrid.yaml", "--out", "hybrid_run", "--set", set});
   for (const char* name : {"nominal_dead_reckoning", "three_models", "hybrid"}) {
-    expect_done(
-        {"experiment", kConfigs + "experiments/" + name + ".yaml", "--out", name, "--set", set});
+    expect_done({"experiment", kConfigFolder + "experiments/" + name + ".yaml", "--out", name,
+                 "--set", set});
   }
-  expect_done({"calibrate", kConfigs + "calibrations/recordings.yaml", "--out", "calibrated",
+  expect_done({"calibrate", kConfigFolder + "calibrations/recordings.yaml", "--out", "calibrated",
                "--set", set});
 }
 
 TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfTheFilter) {
   // runs/viwo_log.yaml: FilterTest.
   const std::string shorter = "sensors.simulator0.duration_s=5";
-  expect_done({"run", kConfigs + "runs/viwo_swerve.yaml", "--out", "run", "--set", shorter});
+  expect_done({"run", kConfigFolder + "runs/viwo_swerve.yaml", "--out", "run", "--set", shorter});
   EXPECT_EQ(summary("run").at("status"), "ok");
-  expect_done({"run", kConfigs + "runs/viwo_swerve.yaml", "--out", "pinhole", "--set", shorter,
-               "--set", "sensors.simulator0.cameras=" + kConfigs + "cameras/pinhole.yaml", "--set",
-               "sensors.simulator0.n_cameras=1", "--set",
-               "cameras.kalibr=" + kConfigs + "cameras/pinhole.yaml"});
+  expect_done({"run", kConfigFolder + "runs/viwo_swerve.yaml", "--out", "pinhole", "--set", shorter,
+               "--set", "sensors.simulator0.cameras=" + kConfigFolder + "cameras/pinhole.yaml",
+               "--set", "sensors.simulator0.n_cameras=1", "--set",
+               "cameras.kalibr=" + kConfigFolder + "cameras/pinhole.yaml"});
   EXPECT_EQ(summary("pinhole").at("status"), "ok");
-  expect_done({"experiment", kConfigs + "experiments/paper_accuracy.yaml", "--seeds", "1", "--out",
-               "paper", "--set", shorter});
-  expect_done({"experiment", kConfigs + "experiments/drive_only_twist_full.yaml", "--seeds", "1",
-               "--out", "lateral", "--set", shorter});
+  expect_done({"experiment", kConfigFolder + "experiments/paper_accuracy.yaml", "--seeds", "1",
+               "--out", "paper", "--set", shorter});
+  expect_done({"experiment", kConfigFolder + "experiments/drive_only_twist_full.yaml", "--seeds",
+               "1", "--out", "lateral", "--set", shorter});
   EXPECT_TRUE(summary("lateral").at("by").at("motion").contains("figure_eight"));
   const nlohmann::json variants = summary("paper").at("variants");
   for (const char* variant : {"true_init_calib_on", "true_init_calib_off", "bad_init_calib_on",
@@ -217,7 +217,7 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfTheFilter) {
 TEST_F(ResultsTest, OfTheDeliveredConfigurationsForObservability) {
   for (const std::string name :
        {"degenerate_motions", "differential", "ackermann", "skid_steer", "mecanum", "swerve"}) {
-    expect_done({"observability", kConfigs + "observability/" + name + ".yaml", "--out", name,
+    expect_done({"observability", kConfigFolder + "observability/" + name + ".yaml", "--out", name,
                  "--set", "sensors.simulator0.duration_s=2"});
     std::ifstream in(at(name) / "observability.json");
     const auto motions = nlohmann::json::parse(in).at("motions");
@@ -235,10 +235,10 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfOtherBases) {
       {"swerve", {"three_wheels", "four_wheels", "six_wheels"}}};
   for (const auto& [base, names] : variants) {
     const std::string run = "runs/viwo_" + base + ".yaml";
-    expect_done({"run", kConfigs + run, "--out", base, "--set", shorter});
+    expect_done({"run", kConfigFolder + run, "--out", base, "--set", shorter});
     EXPECT_EQ(summary(base).at("status"), "ok") << base;
-    expect_done({"experiment", kConfigs + "experiments/calibrate_" + base + ".yaml", "--seeds", "1",
-                 "--out", base + "_experiment", "--set", shorter});
+    expect_done({"experiment", kConfigFolder + "experiments/calibrate_" + base + ".yaml", "--seeds",
+                 "1", "--out", base + "_experiment", "--set", shorter});
     const nlohmann::json results = summary(base + "_experiment").at("variants");
     EXPECT_EQ(results.size(), names.size()) << base;
     for (const std::string& name : names) EXPECT_EQ(results.at(name).at("runs"), 1) << name;
@@ -247,10 +247,10 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfOtherBases) {
 
 TEST_F(ResultsTest, OfTheDeliveredConfigurationsWithAPoseReference) {
   const std::string shorter = "sensors.simulator0.duration_s=5";
-  expect_done({"run", kConfigs + "runs/viwo_gnss.yaml", "--out", "run", "--set", shorter});
+  expect_done({"run", kConfigFolder + "runs/viwo_gnss.yaml", "--out", "run", "--set", shorter});
   EXPECT_EQ(summary("run").at("status"), "ok");
-  expect_done({"experiment", kConfigs + "experiments/plane_and_gnss.yaml", "--seeds", "1", "--out",
-               "experiment", "--set", shorter});
+  expect_done({"experiment", kConfigFolder + "experiments/plane_and_gnss.yaml", "--seeds", "1",
+               "--out", "experiment", "--set", shorter});
   EXPECT_TRUE(summary("experiment").at("variants").contains("wheels_plane_gnss"));
 }
 
@@ -258,7 +258,7 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationForOpenVinsMeasurements) {
   const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/openvins_sim";
   if (!fs::exists(data)) GTEST_SKIP() << "the measurements are not here";
   const std::string set = "placeholders.data=" + fs::canonical(data).string();
-  expect_done({"run", kConfigs + "runs/openvins_sim.yaml", "--out", "run", "--set", set});
+  expect_done({"run", kConfigFolder + "runs/openvins_sim.yaml", "--out", "run", "--set", set});
   // OpenVINS itself: 0.594 deg and 0.144 m.
   const nlohmann::json accuracy = summary("run").at("accuracy");
   EXPECT_LT(accuracy.at("ate_deg").get<double>(), 0.594);
@@ -267,9 +267,9 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationForOpenVinsMeasurements) {
 
 TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
   std::set<std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(kConfigs)) {
+  for (const auto& entry : fs::recursive_directory_iterator(kConfigFolder)) {
     if (entry.path().extension() == ".yaml") {
-      files.insert(fs::relative(entry.path(), kConfigs).string());
+      files.insert(fs::relative(entry.path(), kConfigFolder).string());
     }
   }
   EXPECT_EQ(files, (std::set<std::string>{"calibrations/recordings.yaml",

@@ -6,7 +6,7 @@
 namespace viwo::conformance {
 namespace {
 
-std::string failures(const std::string& defect) { return failures_of("sensor", defect); }
+std::string sensor_failures(const std::string& defect) { return failures_of("sensor", defect); }
 
 /// With a file that the sensor reads.
 std::string failures_with_file(const std::string& defect) {
@@ -23,23 +23,23 @@ std::string failures_with_file(const std::string& defect) {
 }
 
 TEST(BrokenSensor, WithoutAMistakeItPasses) {
-  EXPECT_EQ(failures("none"), "");
+  EXPECT_EQ(sensor_failures("none"), "");
   EXPECT_EQ(failures_with_file("none"), "");
 }
 
 TEST(BrokenSensor, StampsOutOfOrder) {
-  EXPECT_EQ(failures("order"),
+  EXPECT_EQ(sensor_failures("order"),
             "measurements: IMU sample 12 at 59000000 ns comes after one at 60000000 ns - "
             "next() gives measurements in time order");
 }
 
 TEST(BrokenSensor, AValueThatIsNotFinite) {
-  EXPECT_EQ(failures("nan"),
+  EXPECT_EQ(sensor_failures("nan"),
             "measurements: IMU sample 16 at 85000000 ns has values that are not finite");
 }
 
 TEST(BrokenSensor, NumbersThatDependOnWhatRanBefore) {
-  EXPECT_EQ(failures("clock"),
+  EXPECT_EQ(sensor_failures("clock"),
             "repeatable: not the same for the same seed: measurement 0 differs - take random "
             "numbers from HostServices::seed, and no clock\nindependent instances: two "
             "instances that are read in turn see each other: measurement 0 differs - no static "
@@ -47,7 +47,7 @@ TEST(BrokenSensor, NumbersThatDependOnWhatRanBefore) {
 }
 
 TEST(BrokenSensor, MeasurementsBehindTheEnd) {
-  EXPECT_EQ(failures("goes_on"),
+  EXPECT_EQ(sensor_failures("goes_on"),
             "measurements: next() goes on after kEnd - once at the end it stays there");
 }
 

@@ -38,7 +38,7 @@ ParamSet read(std::string_view yaml, Errors& errors, std::span<const ParamSpec> 
 }
 
 /// What is wrong with one more entry of an otherwise right section, without its position.
-std::string error_of(const std::string& entry) {
+std::string entry_error(const std::string& entry) {
   const bool has_track = entry.starts_with("track_m:");
   Errors errors;
   read("{" + std::string(has_track ? "" : "track_m: 1, ") + entry + "}", errors);
@@ -119,75 +119,75 @@ TEST(Params, ReportASectionThatIsNone) {
 }
 
 TEST(Params, ReportUnknownKeys) {
-  EXPECT_EQ(error_of("tpye: x"),
+  EXPECT_EQ(entry_error("tpye: x"),
             "kinematics (diff_drive): unknown key 'tpye' - did you mean 'type'?");
-  EXPECT_EQ(error_of("gravity: x"),
+  EXPECT_EQ(entry_error("gravity: x"),
             "kinematics (diff_drive): unknown key 'gravity' - known: track_m,"
             " sigma_drive_rad_per_s, sigma_lateral_m_per_s, wheels, radii_m, solve, log, channels,"
             " enabled, type");
 }
 
 TEST(Params, ReportAKeyInAnotherUnit) {
-  EXPECT_EQ(error_of("sigma_drive_deg_per_s: 1"),
+  EXPECT_EQ(entry_error("sigma_drive_deg_per_s: 1"),
             "kinematics (diff_drive): unknown key 'sigma_drive_deg_per_s' - sigma_drive is in"
             " rad/s, did you mean 'sigma_drive_rad_per_s'?");
-  EXPECT_EQ(error_of("radii_mm: 1"),
+  EXPECT_EQ(entry_error("radii_mm: 1"),
             "kinematics (diff_drive): unknown key 'radii_mm' - radii is in m, did you mean"
             " 'radii_m'?");
-  EXPECT_EQ(error_of("sigma_lateral: 1"),
+  EXPECT_EQ(entry_error("sigma_lateral: 1"),
             "kinematics (diff_drive): unknown key 'sigma_lateral' - sigma_lateral is in m/s, did"
             " you mean 'sigma_lateral_m_per_s'?");
 }
 
 TEST(Params, ReportNumbersThatAreNone) {
-  EXPECT_EQ(error_of("track_m: \"0,1\""),
+  EXPECT_EQ(entry_error("track_m: \"0,1\""),
             "kinematics.track_m: '0,1' is not a number - the decimal sign is a point");
-  EXPECT_EQ(error_of("track_m: 0.5 m"),
+  EXPECT_EQ(entry_error("track_m: 0.5 m"),
             "kinematics.track_m: '0.5 m' is not a number - write the number alone, it is in m");
-  EXPECT_EQ(error_of("sigma_lateral_m_per_s: 3cm"),
+  EXPECT_EQ(entry_error("sigma_lateral_m_per_s: 3cm"),
             "kinematics.sigma_lateral_m_per_s: '3cm' is not a number - write the number alone");
-  EXPECT_EQ(error_of("track_m: wide"), "kinematics.track_m: 'wide' is not a number");
-  EXPECT_EQ(error_of("track_m: \"\""), "kinematics.track_m: '' is not a number");
-  EXPECT_EQ(error_of("track_m: +-1"), "kinematics.track_m: '+-1' is not a number");
-  EXPECT_EQ(error_of("track_m: .nan"), "kinematics.track_m: '.nan' is not a finite number");
-  EXPECT_EQ(error_of("track_m: -.inf"), "kinematics.track_m: '-.inf' is not a finite number");
-  EXPECT_EQ(error_of("track_m: NaN"), "kinematics.track_m: 'NaN' is not a finite number");
-  EXPECT_EQ(error_of("track_m: 1e999"),
+  EXPECT_EQ(entry_error("track_m: wide"), "kinematics.track_m: 'wide' is not a number");
+  EXPECT_EQ(entry_error("track_m: \"\""), "kinematics.track_m: '' is not a number");
+  EXPECT_EQ(entry_error("track_m: +-1"), "kinematics.track_m: '+-1' is not a number");
+  EXPECT_EQ(entry_error("track_m: .nan"), "kinematics.track_m: '.nan' is not a finite number");
+  EXPECT_EQ(entry_error("track_m: -.inf"), "kinematics.track_m: '-.inf' is not a finite number");
+  EXPECT_EQ(entry_error("track_m: NaN"), "kinematics.track_m: 'NaN' is not a finite number");
+  EXPECT_EQ(entry_error("track_m: 1e999"),
             "kinematics.track_m: '1e999' is outside of what a computer number can hold");
 }
 
 TEST(Params, ReportAnotherKindOfValue) {
-  EXPECT_EQ(error_of("track_m: [1]"),
+  EXPECT_EQ(entry_error("track_m: [1]"),
             "kinematics.track_m: expected a number, got a list"
             " (distance between wheel contact lines, m)");
-  EXPECT_EQ(error_of("wheels: "), "kinematics.wheels: expected an integer, got nothing");
-  EXPECT_EQ(error_of("radii_m: {a: 1}"),
+  EXPECT_EQ(entry_error("wheels: "), "kinematics.wheels: expected an integer, got nothing");
+  EXPECT_EQ(entry_error("radii_m: {a: 1}"),
             "kinematics.radii_m: expected a list of numbers, got a section (wheel radii, m)");
-  EXPECT_EQ(error_of("radii_m: [0.1, [0.2]]"),
+  EXPECT_EQ(entry_error("radii_m: [0.1, [0.2]]"),
             "kinematics.radii_m[1]: expected a single value, got a list");
-  EXPECT_EQ(error_of("solve: [plain]"), "kinematics.solve: expected text, got a list");
+  EXPECT_EQ(entry_error("solve: [plain]"), "kinematics.solve: expected text, got a list");
 }
 
 TEST(Params, ReportIntegersThatAreNone) {
-  EXPECT_EQ(error_of("wheels: 2.5"), "kinematics.wheels: '2.5' is not an integer");
-  EXPECT_EQ(error_of("wheels: 3 wheels"),
+  EXPECT_EQ(entry_error("wheels: 2.5"), "kinematics.wheels: '2.5' is not an integer");
+  EXPECT_EQ(entry_error("wheels: 3 wheels"),
             "kinematics.wheels: '3 wheels' is not an integer - write the number alone");
-  EXPECT_EQ(error_of("wheels: 99999999999999999999"),
+  EXPECT_EQ(entry_error("wheels: 99999999999999999999"),
             "kinematics.wheels: '99999999999999999999' is outside of what a computer number can"
             " hold");
 }
 
 TEST(Params, ReportBoundsOfListElements) {
-  EXPECT_EQ(error_of("radii_m: [0.1, 0]"),
+  EXPECT_EQ(entry_error("radii_m: [0.1, 0]"),
             "kinematics.radii_m[1]: 0 violates 0 < radii_m <= 1 (wheel radii, m)");
 }
 
 TEST(Params, ReportUnknownChoicesAndFlags) {
-  EXPECT_EQ(error_of("solve: wieghted"),
+  EXPECT_EQ(entry_error("solve: wieghted"),
             "kinematics.solve: unknown value 'wieghted' - did you mean 'weighted'?");
-  EXPECT_EQ(error_of("channels: [drive, yaw]"),
+  EXPECT_EQ(entry_error("channels: [drive, yaw]"),
             "kinematics.channels[1]: unknown value 'yaw' - known: drive, steer");
-  EXPECT_EQ(error_of("enabled: yes"), "kinematics.enabled: 'yes' is not true or false");
+  EXPECT_EQ(entry_error("enabled: yes"), "kinematics.enabled: 'yes' is not true or false");
 }
 
 TEST(Params, ResolvePathsAgainstTheFileTheyAreWrittenIn) {

@@ -104,7 +104,7 @@ class PriorCost final : public ceres::CostFunction {
 
 /// Residuals of one size, and their information about all unknowns [shared, clock of each
 /// recording].
-struct Group {
+struct NoiseGroup {
   Eigen::MatrixXd information;  ///< J^T J
   double squares = 0.;
   int residuals = 0;
@@ -112,7 +112,7 @@ struct Group {
 
 /// All residuals at a solution.
 struct Linearisation {
-  Group position, yaw, parity;
+  NoiseGroup position, yaw, parity;
 };
 
 class Fit {
@@ -172,14 +172,14 @@ class Fit {
     const int n = prior_.n_shared();
     const int size = n + static_cast<int>(problems_.size());
     Linearisation all;
-    for (Group* group : {&all.position, &all.yaw, &all.parity}) {
+    for (NoiseGroup* group : {&all.position, &all.yaw, &all.parity}) {
       group->information.setZero(size, size);
     }
     const Eigen::VectorXd scale = prior_.scale();
     for (std::size_t k = 0; k < problems_.size(); ++k) {
       RecordingResiduals at;
       problems_[k]->evaluate(point(k), true, at);
-      const auto add = [&](double r, const Eigen::VectorXd& by_all, Group& group) {
+      const auto add = [&](double r, const Eigen::VectorXd& by_all, NoiseGroup& group) {
         const Eigen::VectorXd scaled = scale.cwiseProduct(by_all);
         Eigen::VectorXd J = Eigen::VectorXd::Zero(size);
         J.head(n) = scaled.head(n);
@@ -200,7 +200,7 @@ class Fit {
   /// Variance components: squares over redundancy, group by group.
   void rescale(const Linearisation& at) {
     const Eigen::MatrixXd P = covariance(at);
-    const auto factor = [&](const Group& group) {
+    const auto factor = [&](const NoiseGroup& group) {
       const double redundancy = group.residuals - (P * group.information).trace();
       // What fits exactly, or has nothing to spare, says nothing about its own size.
       if (redundancy < 1. || group.squares < 1e-12) return 1.;

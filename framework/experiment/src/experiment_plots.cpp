@@ -14,12 +14,10 @@ namespace {
 
 using namespace report;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 /// Curves that differ by more than this factor are only seen together on a logarithmic axis.
 constexpr double kLogarithmicFrom = 20.;
 
-constexpr int kTopViewHeight = 560;  ///< and of the plot beside it, px
+constexpr int kMapHeight = 560;  ///< and of the plot beside it, px
 
 Series series_of(const std::string& variant) {
   Series series;
@@ -111,7 +109,7 @@ std::optional<Plot> nees_plot(const ExperimentResult& result, std::size_t record
   constexpr int kPoseDof = 6;
   Plot plot{"Consistency of the pose (NEES)", "time [s]", "mean NEES"};
   plot.half_width = true;
-  plot.height_px = kTopViewHeight;
+  plot.height_px = kMapHeight;
   int most_runs = 0;
   double most = 0., least = kNan;
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
@@ -140,7 +138,7 @@ std::optional<Plot> nees_plot(const ExperimentResult& result, std::size_t record
 Plot end_error_plot(const ExperimentResult& result, std::size_t recording) {
   Plot plot{"Error at the end of each run", "seed", "position error [m]"};
   plot.half_width = true;
-  plot.height_px = kTopViewHeight;
+  plot.height_px = kMapHeight;
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
     Series series = series_of(result.setup.variants[v].name);
     series.draw = Draw::kMarkers;
@@ -282,7 +280,7 @@ std::vector<Section> recording_sections(const ExperimentResult& result) {
     Plot position{"Position error", "time [s]", "error [m]"};
     Plot yaw{"Yaw error", "time [s]", "error [deg]"};
     top.equal_axes = top.half_width = position.half_width = yaw.half_width = true;
-    top.height_px = kTopViewHeight;
+    top.height_px = kMapHeight;
     for (const ExperimentRun* run : first_runs(result, r)) {
       const std::string& variant = result.setup.variants[run->variant].name;
       if (top.series.empty() && !run->result.reference.empty()) {

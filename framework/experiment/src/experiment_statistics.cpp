@@ -8,8 +8,6 @@
 namespace viwo::experiment {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 const Metric kMetrics[] = {
     {"end_m", "end [mm]", 1e3,
      [](const RunResult& r) { return r.accuracy ? r.accuracy->end_m : kNan; }},

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 
 namespace viwo::experiment {
 
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 inline constexpr double kConfidence = 0.95;  ///< of the intervals of paired differences
 
 /// A number of a run that tables show; NaN where a run has none.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include <Eigen/Dense>
@@ -26,8 +25,6 @@ const char* name(RunStatus status) {
 }
 
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 StampedPose stamped(std::int64_t t_ns, const Eigen::Vector3d& pose) {
   const Eigen::AngleAxisd about_z(pose[0], Eigen::Vector3d::UnitZ());
@@ -73,7 +70,7 @@ class PlanarNees {
     sum_ += value;
     ++count_;
   }
-  double mean() const { return count_ > 0 ? sum_ / count_ : kNan; }
+  double mean() const { return count_ > 0 ? sum_ / count_ : std::nan(""); }
 
  private:
   double sum_ = 0.;

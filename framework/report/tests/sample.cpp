@@ -9,8 +9,6 @@ namespace viwo::report {
 
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 Series path(const std::string& name, double drift, bool reference) {
   Series series{.name = name, .x = {}, .y = {}};
   series.reference = reference;

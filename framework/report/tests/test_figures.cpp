@@ -30,7 +30,6 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kBlue = "rgb(  0, 114, 178)";
 constexpr const char* kVermillion = "rgb(213,  94,   0)";
 

@@ -23,7 +23,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Document one_block(Block block) { return {"T", "", {{"S", {std::move(block)}}}}; }
@@ -33,12 +32,6 @@ std::string own_part(const Document& document) {
   std::string html = to_html(document);
   const std::size_t at = html.find(assets::plotly());
   return html.erase(at, assets::plotly().size());
-}
-
-int count(const std::string& text, const std::string& part) {
-  int n = 0;
-  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
-  return n;
 }
 
 std::string data_text(const std::string& html) {

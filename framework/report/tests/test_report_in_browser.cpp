@@ -13,12 +13,6 @@ namespace {
 
 using ::testing::HasSubstr;
 
-int count(const std::string& text, const std::string& part) {
-  int n = 0;
-  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
-  return n;
-}
-
 TEST(ReportInBrowser, DrawsEveryPlotWithoutAScriptError) {
   const std::string program = browser();
   if (program.empty()) GTEST_SKIP() << "no chromium, chromium-browser or google-chrome in PATH";

@@ -22,7 +22,7 @@ constexpr std::size_t kTextures = 4;
 constexpr float kTexelsPerMetreOfWalls = 220.F;
 constexpr float kTexelsPerMetreOfFloor = 350.F;
 constexpr float kTexelsPerMetreOfBlocks = 400.F;
-constexpr int kTries = 50;  ///< to find a place for a block
+constexpr int kPlaceTries = 50;  ///< to find a place for a block
 
 /// Draws of one room; the textures have streams of their own.
 class Builder {
@@ -49,7 +49,7 @@ class Builder {
   }
 
   std::optional<Block> block() {
-    for (int i = 0; i < kTries; ++i) {
+    for (int i = 0; i < kPlaceTries; ++i) {
       Block out = candidate();
       if (!fits(out)) continue;
       for (Face& on : out.faces) on = face(kTexelsPerMetreOfBlocks);

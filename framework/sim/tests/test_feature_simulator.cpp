@@ -46,7 +46,7 @@ const BodyTrajectory& trajectory() {
   return kTrajectory;
 }
 
-FeatureSimulation silent(double duration_s = 10.) {
+FeatureSimulation noiseless(double duration_s = 10.) {
   FeatureSimulation options;
   options.duration_s = duration_s;
   options.phase_s = 0.0137;
@@ -89,7 +89,7 @@ INSTANTIATE_TEST_SUITE_P(RadtanAndEquidistant, EachCamera,
 
 TEST_P(EachCamera, PointsAreTheProjectionsOfTheirLandmarks) {
   const auto cameras = stereo(GetParam());
-  const auto features = simulate_features(trajectory(), kMounting, cameras, silent(), 4);
+  const auto features = simulate_features(trajectory(), kMounting, cameras, noiseless(), 4);
   ASSERT_EQ(features.samples.size(), 200U);
   for (const FeatureSample& sample : features.samples) {
     const CameraView& cam = cameras[static_cast<std::size_t>(sample.camera)];
@@ -109,7 +109,7 @@ TEST_P(EachCamera, PointsAreTheProjectionsOfTheirLandmarks) {
 
 TEST_P(EachCamera, ImagesAreFullAndTheirTimesFallBetweenImuSamples) {
   const auto cameras = stereo(GetParam());
-  const auto features = simulate_features(trajectory(), kMounting, cameras, silent(), 4);
+  const auto features = simulate_features(trajectory(), kMounting, cameras, noiseless(), 4);
   for (std::size_t k = 0; k < features.samples.size(); ++k) {
     const FeatureSample& sample = features.samples[k];
     EXPECT_EQ(sample.t_ns, 13'700'000 + 100'000'000 * static_cast<std::int64_t>(k / 2));
@@ -123,7 +123,7 @@ TEST_P(EachCamera, ImagesAreFullAndTheirTimesFallBetweenImuSamples) {
 
 TEST_P(EachCamera, ATrackHasNoBreaksAndBothCamerasShareIt) {
   const auto cameras = stereo(GetParam());
-  const auto features = simulate_features(trajectory(), kMounting, cameras, silent(30.), 4);
+  const auto features = simulate_features(trajectory(), kMounting, cameras, noiseless(30.), 4);
   std::map<std::int64_t, std::set<std::int64_t>> images_of;
   std::set<std::int64_t> left, right;
   for (const FeatureSample& sample : features.samples) {
@@ -149,7 +149,7 @@ TEST(FeatureSimulator, ALandmarkSeenAgainHasANewId) {
   const auto spin =
       BodyTrajectory::drive(PlanarMotion("spin", {0.5, 0.6, 0.}), Ground(), -0.5, 17.);
   const std::vector<CameraView> cameras{camera(CameraDistortion::kRadtan, 0.)};
-  const auto features = simulate_features(spin, kMounting, cameras, silent(16.), 4);
+  const auto features = simulate_features(spin, kMounting, cameras, noiseless(16.), 4);
   const auto less = [](const Vector3d& a, const Vector3d& b) {
     return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
   };
@@ -175,10 +175,10 @@ std::vector<double> differences(const SimulatedFeatures& a, const SimulatedFeatu
 
 TEST(FeatureSimulator, PixelNoiseIsWhiteWithItsSigmaAndIndependentOfOutliers) {
   const auto cameras = stereo(CameraDistortion::kEquidistant);
-  FeatureSimulation noisy = silent(30.);
+  FeatureSimulation noisy = noiseless(30.);
   noisy.noise = true;
   noisy.sigma_px = 1.5;
-  const auto truth = simulate_features(trajectory(), kMounting, cameras, silent(30.), 4);
+  const auto truth = simulate_features(trajectory(), kMounting, cameras, noiseless(30.), 4);
   const auto measured = simulate_features(trajectory(), kMounting, cameras, noisy, 4);
   double sum = 0., squares = 0.;
   const auto errors = differences(measured, truth);
@@ -204,7 +204,7 @@ TEST(FeatureSimulator, PixelNoiseIsWhiteWithItsSigmaAndIndependentOfOutliers) {
 
 TEST(FeatureSimulator, DropoutsTakePointsAwayAndLeaveTheOthersAsTheyWere) {
   const auto cameras = stereo(CameraDistortion::kEquidistant);
-  FeatureSimulation all = silent(20.);
+  FeatureSimulation all = noiseless(20.);
   all.noise = true;
   FeatureSimulation some = all;
   some.dropout_probability = 0.2;
@@ -227,17 +227,17 @@ TEST(FeatureSimulator, DropoutsTakePointsAwayAndLeaveTheOthersAsTheyWere) {
 
 TEST(FeatureSimulator, NoiseDoesNotMoveTheLandmarksAndEqualSeedsGiveEqualBits) {
   const auto cameras = stereo(CameraDistortion::kEquidistant);
-  FeatureSimulation noisy = silent(3.);
+  FeatureSimulation noisy = noiseless(3.);
   noisy.noise = true;
   const auto a = simulate_features(trajectory(), kMounting, cameras, noisy, 4);
   const auto b = simulate_features(trajectory(), kMounting, cameras, noisy, 4);
   for (const double difference : differences(a, b)) EXPECT_EQ(difference, 0.);
-  EXPECT_EQ(a.p_FinG, simulate_features(trajectory(), kMounting, cameras, silent(3.), 4).p_FinG);
+  EXPECT_EQ(a.p_FinG, simulate_features(trajectory(), kMounting, cameras, noiseless(3.), 4).p_FinG);
   EXPECT_NE(a.p_FinG[0], simulate_features(trajectory(), kMounting, cameras, noisy, 5).p_FinG[0]);
 }
 
 TEST(FeatureSimulator, WithoutCamerasThereAreNoImages) {
-  EXPECT_TRUE(simulate_features(trajectory(), kMounting, {}, silent(1.), 4).samples.empty());
+  EXPECT_TRUE(simulate_features(trajectory(), kMounting, {}, noiseless(1.), 4).samples.empty());
 }
 
 }  // namespace

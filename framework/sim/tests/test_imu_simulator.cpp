@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 Vector3d gyro(const ImuSample& sample) { return Vector3d(sample.gyro_rad_per_s.data()); }
 Vector3d accel(const ImuSample& sample) { return Vector3d(sample.accel_m_per_s2.data()); }
 
-ImuSimulation silent(double duration_s, double rate_hz) {
+ImuSimulation silent_imu(double duration_s, double rate_hz) {
   ImuSimulation options;
   options.duration_s = duration_s;
   options.rate_hz = rate_hz;
@@ -31,7 +31,7 @@ BodyTrajectory still(double end_s) {
 
 TEST(ImuSimulator, AtRestItReadsGravityOnlyUpwards) {
   const Mounting tilted{rotation_from_euler(0., 0., M_PI / 6.), {1., 2., 3.}};
-  for (const ImuSample& sample : simulate_imu(still(2.), tilted, silent(1., 200.), 1).samples) {
+  for (const ImuSample& sample : simulate_imu(still(2.), tilted, silent_imu(1., 200.), 1).samples) {
     EXPECT_EQ(gyro(sample), Vector3d::Zero());
     // Rolled by 30 degrees to the right side down: up is half along its y axis.
     EXPECT_NEAR((accel(sample) - 9.81 * Vector3d(0., 0.5, std::sqrt(0.75))).norm(), 0., 1e-12);
@@ -42,7 +42,8 @@ TEST(ImuSimulator, OnACircleItReadsTheCentripetalAcceleration) {
   const auto trajectory =
       BodyTrajectory::drive(PlanarMotion("circle", {0.5, 0.6, 0.}), Ground(), -0.5, 11.);
   const Mounting ahead{Matrix3d::Identity(), {0.4, 0., 0.}};
-  for (const ImuSample& sample : simulate_imu(trajectory, ahead, silent(10., 100.), 1).samples) {
+  for (const ImuSample& sample :
+       simulate_imu(trajectory, ahead, silent_imu(10., 100.), 1).samples) {
     EXPECT_NEAR((gyro(sample) - Vector3d(0., 0., 0.6)).norm(), 0., 1e-7);
     const Vector3d expected(-0.4 * 0.36, 0.5 * 0.6, 9.81);
     EXPECT_NEAR((accel(sample) - expected).norm(), 0., 1e-6);
@@ -50,7 +51,7 @@ TEST(ImuSimulator, OnACircleItReadsTheCentripetalAcceleration) {
 }
 
 TEST(ImuSimulator, StampsCoverTheDurationAndKeepTheirEpoch) {
-  ImuSimulation options = silent(1.0037, 200.);
+  ImuSimulation options = silent_imu(1.0037, 200.);
   options.start_ns = 1'700'000'000'000'000'001;
   const auto samples = simulate_imu(still(2.), {}, options, 1).samples;
   EXPECT_EQ(samples.front().t_ns, options.start_ns);
@@ -63,7 +64,7 @@ TEST(ImuSimulator, IntegratesBackToTheTrajectory) {
   const auto trajectory =
       BodyTrajectory::drive(PlanarMotion("icr_sweep"), Ground::uneven(0.05, 3.), -0.5, 21.);
   const Mounting mounting{rotation_from_euler(0.7, -0.4, 1.1), {0.3, -0.2, 0.5}};
-  const auto samples = simulate_imu(trajectory, mounting, silent(20., 1000.), 1).samples;
+  const auto samples = simulate_imu(trajectory, mounting, silent_imu(20., 1000.), 1).samples;
   const BodyMotion start = trajectory.imu(0., mounting);
   Matrix3d R_ItoG = start.R_BtoG;
   Vector3d p = start.p_BinG, v = start.v_BinG;
@@ -127,7 +128,7 @@ TEST(ImuSimulator, NoiseAndBiasWalkHaveTheDensitiesThatWereAskedFor) {
 }
 
 TEST(ImuSimulator, FirstBiasesAreGivenAndDrawn) {
-  ImuSimulation options = silent(0.1, 200.);
+  ImuSimulation options = silent_imu(0.1, 200.);
   options.gyro_bias = {0.1, 0.2, 0.3};
   options.accel_bias = {1., 2., 3.};
   options.sigma_gyro_bias_rad_per_s = 0.01;

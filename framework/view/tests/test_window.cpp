@@ -68,7 +68,7 @@ class Screen {
     }
     close(pipe_ends[1]);
     char digit = 0;
-    while (read(pipe_ends[0], &digit, 1) == 1 && digit != '\n') number_ += digit;
+    while (::read(pipe_ends[0], &digit, 1) == 1 && digit != '\n') number_ += digit;
     close(pipe_ends[0]);
     if (!number_.empty()) setenv("DISPLAY", (":" + number_).c_str(), 1);
   }

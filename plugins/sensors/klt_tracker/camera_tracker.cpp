@@ -13,8 +13,8 @@
 namespace viwo::klt {
 namespace {
 
-constexpr int kMaxSteps = 30;
-constexpr double kStepPx = 0.01;
+constexpr int kFlowSteps = 30;
+constexpr double kFlowStepPx = 0.01;
 /// A point that correlates less with what it was when it was found is another one, or hidden.
 constexpr float kMinAlike = 0.7F;
 constexpr float kMaxRefinePx = 3.F;
@@ -27,7 +27,7 @@ void lucas_kanade(const Frame& from, const Frame& to, const TrackerOptions& opti
   cv::calcOpticalFlowPyrLK(
       from.pyramid, to.pyramid, from_points, to_points, status, error,
       cv::Size(options.win_size, options.win_size), levels,
-      cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kMaxSteps, kStepPx),
+      cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kFlowSteps, kFlowStepPx),
       cv::OPTFLOW_USE_INITIAL_FLOW);
 }
 

@@ -28,7 +28,7 @@ constexpr int kSolveSteps = 5;
 constexpr int kPolishSteps = 3;
 constexpr int kPolishRounds = 4;
 /// Keeps the direction of translation where it is when the rays do not tell it.
-constexpr double kDamping = 1e-10;
+constexpr double kNormalDamping = 1e-10;
 
 /// Rotation that takes rays_1 next to rays_2, least squares over the pairs of `chosen` (Wahba).
 Eigen::Matrix3d best_rotation(Rays rays_1, Rays rays_2, std::span<const std::size_t> chosen) {
@@ -82,7 +82,7 @@ void improve(RelativeMotion& motion, Rays rays_1, Rays rays_2, std::span<const s
   for (int step = 0; step < steps; ++step) {
     Eigen::Vector3d b1 = motion.t.unitOrthogonal();
     const Eigen::Vector3d b2 = motion.t.cross(b1);
-    Eigen::Matrix<double, 5, 5> A = Eigen::Matrix<double, 5, 5>::Identity() * kDamping;
+    Eigen::Matrix<double, 5, 5> A = Eigen::Matrix<double, 5, 5>::Identity() * kNormalDamping;
     Eigen::Matrix<double, 5, 1> b = Eigen::Matrix<double, 5, 1>::Zero();
     for (const std::size_t i : chosen) {
       const Eigen::Vector3d u = motion.R * rays_1[i];

@@ -70,9 +70,9 @@ std::unique_ptr<File> open_file(const fs::path& path) {
   return file;
 }
 
-class Ros1Bag final : public Bag {
+class Ros1Recording final : public Bag {
  public:
-  Ros1Bag(std::string name, std::vector<std::unique_ptr<File>> files)
+  Ros1Recording(std::string name, std::vector<std::unique_ptr<File>> files)
       : name_(std::move(name)), files_(std::move(files)) {
     for (const auto& file : files_) {
       rosbag::View all(file->bag);
@@ -182,7 +182,7 @@ std::shared_ptr<const Bag> open_ros1(const fs::path& path, const std::vector<std
                        "names of bags need a folder as path, not the file " + path.string());
     }
     files.push_back(open_file(path));
-    return std::make_shared<Ros1Bag>(path.string(), std::move(files));
+    return std::make_shared<Ros1Recording>(path.string(), std::move(files));
   }
   for (const std::string& name : names) {
     if (!fs::exists(path / name, ignored)) {
@@ -205,7 +205,7 @@ std::shared_ptr<const Bag> open_ros1(const fs::path& path, const std::vector<std
       return std::pair(a->begin_ns, a->name) < std::pair(b->begin_ns, b->name);
     });
   }
-  return std::make_shared<Ros1Bag>(path.string(), std::move(files));
+  return std::make_shared<Ros1Recording>(path.string(), std::move(files));
 }
 
 }  // namespace viwo::bag

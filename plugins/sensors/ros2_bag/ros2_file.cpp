@@ -71,9 +71,9 @@ std::vector<fs::path> files_of(const fs::path& path) {
   return files;
 }
 
-class Ros2Bag final : public Bag {
+class Ros2Recording final : public Bag {
  public:
-  Ros2Bag(std::string name, std::vector<std::unique_ptr<Database>> files)
+  Ros2Recording(std::string name, std::vector<std::unique_ptr<Database>> files)
       : name_(std::move(name)), files_(std::move(files)) {
     std::sort(files_.begin(), files_.end(), [](const auto& a, const auto& b) {
       return std::pair(a->begin_ns(), a->name()) < std::pair(b->begin_ns(), b->name());
@@ -122,7 +122,7 @@ class Ros2Bag final : public Bag {
 std::shared_ptr<const Bag> open_ros2(const fs::path& path) {
   std::vector<std::unique_ptr<Database>> files;
   for (const fs::path& file : files_of(path)) files.push_back(std::make_unique<Database>(file));
-  return std::make_shared<Ros2Bag>(path.string(), std::move(files));
+  return std::make_shared<Ros2Recording>(path.string(), std::move(files));
 }
 
 }  // namespace viwo::bag
