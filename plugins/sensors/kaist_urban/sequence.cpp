@@ -59,6 +59,7 @@ fs::path required(const fs::path& path, const std::string& what, const std::stri
 
 /// The nearest rotation to a matrix with rounded entries; nothing when it is none.
 std::optional<Eigen::Matrix3d> rotation_from(const Eigen::Matrix3d& R) {
+  if (!R.allFinite()) return std::nullopt;  // maxCoeff() may pass over a NaN
   const double off = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(off <= kRotationTolerance) || R.determinant() < 0.) return std::nullopt;
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);

@@ -224,6 +224,23 @@ TEST_F(KaistUrban, CountsWhatItDrops) {
                         "previous one (1, first at global_pose.csv:6)"));
 }
 
+TEST_F(KaistUrban, DropsPosesWithoutANumberAnywhereInTheMatrix) {
+  const std::vector<std::string> identity{"1", "0", "0", "0", "1", "0", "0", "0", "1"};
+  std::string poses = "10,1,0,0,1,0,1,0,2,0,0,1,3\n";
+  for (std::size_t k = 0; k < identity.size(); ++k) {
+    poses += std::to_string(20 + 10 * k);
+    for (std::size_t i = 0; i < identity.size(); ++i) {
+      poses += "," + (i == k ? "nan" : identity[i]) + (i % 3 == 2 ? ",1" : "");
+    }
+    poses += "\n";
+  }
+  write("global_pose.csv", poses);
+  const std::string yaml = only_yaml("reference", ", max_rejected_fraction: 0.95");
+  EXPECT_THAT(rejections(yaml),
+              ElementsAre("pose whose matrix is no rotation x9 global_pose.csv:2"));
+  EXPECT_EQ(play_only<PoseSample>(yaml).size(), 1U);
+}
+
 TEST_F(KaistUrban, RefusesImagesOfWhichManyAreMissing) {
   for (const int i : {0, 4}) {
     fs::remove(folder_ / "image/stereo_left" /
