@@ -155,12 +155,31 @@ TEST_F(ViwoBag, RefusesWrongInputAndWritesNothing) {
   EXPECT_FALSE(fs::exists(out));
 }
 
+TEST_F(ViwoBag, KeepsTheBagThatIsThereUntilThereIsAnother) {
+  const auto content = [this] {
+    std::ifstream in(path("a.bag"), std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  write_log("log");
+  ASSERT_EQ(run(path("log") + " " + path("a.bag")), 0) << output_;
+  const std::string whole = content();
+  fs::remove(folder_ / "log/cam1/data/2.png");
+  EXPECT_EQ(run(path("log") + " " + path("a.bag")), 2);
+  EXPECT_EQ(content(), whole);
+  EXPECT_FALSE(fs::exists(folder_ / "a.bag.part"));
+  fs::remove_all(folder_ / "log/cam1");
+  fs::create_symlink("a.bag", folder_ / "link.bag");
+  ASSERT_EQ(run(path("log") + " " + path("link.bag")), 0) << output_;
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link.bag"));
+  EXPECT_LT(content().size(), whole.size());
+}
+
 TEST_F(ViwoBag, AFullDiskIsAnError) {
   write_log("log");
   EXPECT_EQ(run(path("log") + " /dev/full"), 1);
   EXPECT_THAT(output_, HasSubstr("/dev/full  cannot be written: "));
   EXPECT_EQ(run(path("log") + " " + path("no/such/folder/a.bag")), 1);
-  EXPECT_THAT(output_, HasSubstr("a.bag  cannot be written: "));
+  EXPECT_THAT(output_, HasSubstr("a.bag.part  cannot be written: "));
 }
 
 }  // namespace

@@ -193,6 +193,26 @@ void check_output(const fs::path& file) {
   if (begin != kMagic) throw InputError(file.string() + "  exists and is no bag");
 }
 
+/// Writes a bag beside `file`, which it replaces when it is complete. What is no regular file is
+/// written as it is.
+void write_bag(const Log& log, const std::vector<Entry>& entries, const fs::path& file) {
+  std::error_code ignored;
+  const bool in_place = fs::exists(file, ignored) && !fs::is_regular_file(file, ignored);
+  // A link stays one.
+  const fs::path whole = fs::is_symlink(file, ignored) ? fs::weakly_canonical(file) : file;
+  const fs::path part = in_place ? file : fs::path(whole.string() + ".part");
+  if (!in_place) check_output(part);
+  try {
+    bag::Ros1Writer out(part.string());
+    for (const Entry& entry : entries) write(log, entry, out);
+    out.close();
+    if (!in_place) fs::rename(part, whole);
+  } catch (...) {
+    if (!in_place) fs::remove(part, ignored);  // half a bag is of no use
+    throw;
+  }
+}
+
 void convert(const fs::path& folder, const fs::path& file) {
   const Log log = read_log(folder);
   const std::vector<Entry> entries = schedule(log);
@@ -200,15 +220,7 @@ void convert(const fs::path& folder, const fs::path& file) {
     throw InputError(folder.string() + "  has stamps before 0, which a bag cannot hold");
   }
   check_output(file);
-  try {
-    bag::Ros1Writer out(file.string());
-    for (const Entry& entry : entries) write(log, entry, out);
-    out.close();
-  } catch (...) {
-    std::error_code ignored;  // half a bag is of no use
-    if (fs::is_regular_file(file, ignored)) fs::remove(file, ignored);
-    throw;
-  }
+  write_bag(log, entries, file);
   std::cout << file.string() << ": " << entries.size() << " messages (" << log.imu.size()
             << " IMU, " << log.wheels.size() << " wheels, " << log.images.size() << " images, "
             << log.poses.size() + log.truth.size() << " poses)\n";
