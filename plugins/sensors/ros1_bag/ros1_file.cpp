@@ -138,13 +138,15 @@ class Ros1Recording final : public Bag {
       names.push_back(topic.name);
     }
     std::vector<std::int64_t> numbers(wanted.size(), 0);
-    rosbag::View view(file.bag, rosbag::TopicQuery(names), from, to);
+    // From the beginning, for the numbers: what is passed over is not loaded.
+    rosbag::View view(file.bag, rosbag::TopicQuery(names), ros::TIME_MIN, to);
     Bytes bytes;
     for (const rosbag::MessageInstance& instance : view) {
       Message message;
       message.topic = index.at(instance.getTopic());
       message.number = ++numbers[message.topic];
       if (message.number == 1) check_definition(file, instance);
+      if (instance.getTime() < from) continue;
       message.received_ns = to_ns(instance.getTime());
       message.file = &file.name;
       load(instance, bytes);

@@ -74,6 +74,10 @@ TEST_F(Ros1Bag, CountsStampsThatGoBackGapsAndValuesThatAreNoNumbers) {
   EXPECT_EQ(rejections[2].reason, "/imu0: value that is not finite");
   EXPECT_EQ(rejections[2].count, 1);
   EXPECT_THAT(error_of(section("imu_topic: /imu0")), HasSubstr("2 of 6 messages rejected"));
+  const auto later =
+      rejections_of(section("imu_topic: /imu0, start_s: 0.001, max_rejected_fraction: 0.5"));
+  ASSERT_EQ(later.size(), 3U);
+  EXPECT_EQ(later[0].first, "a.bag: message 3") << "of the file, wherever the reading begins";
 }
 
 TEST_F(Ros1Bag, CountsAMessageThatIsBroken) {

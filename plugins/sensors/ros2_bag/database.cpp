@@ -65,13 +65,12 @@ void Database::read_topics() {
   begin_ns_ = sqlite3_column_int64(begin.get(), 0);
 }
 
-std::vector<Database::Row> Database::rows(const std::vector<Wanted>& wanted, std::int64_t from_ns,
+std::vector<Database::Row> Database::rows(const std::vector<Wanted>& wanted,
                                           std::int64_t to_ns) const {
   const Statement messages = prepare(
-      "SELECT rowid, topic_id, timestamp FROM messages WHERE timestamp BETWEEN ?1 AND ?2 "
+      "SELECT rowid, topic_id, timestamp FROM messages WHERE timestamp <= ?1 "
       "ORDER BY timestamp, rowid");
-  sqlite3_bind_int64(messages.get(), 1, from_ns);
-  sqlite3_bind_int64(messages.get(), 2, to_ns);
+  sqlite3_bind_int64(messages.get(), 1, to_ns);
   std::vector<Row> rows;
   while (step(messages)) {
     const std::int64_t id = sqlite3_column_int64(messages.get(), 1);
@@ -106,13 +105,15 @@ void Database::read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std
   constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
   std::vector<std::int64_t> numbers(wanted.size(), 0);
   Bytes bytes;
-  for (const Row& row : rows(wanted, from_ns, to_ns)) {
+  for (const Row& row : rows(wanted, to_ns)) {
+    const std::int64_t number = ++numbers[row.topic];
+    if (row.received_ns < from_ns) continue;
     const bool large = wanted[row.topic].large;
     load(row.id, large ? kHeadBytes : kAll, bytes);
     Message message;
     message.topic = row.topic;
     message.received_ns = row.received_ns;
-    message.number = ++numbers[row.topic];
+    message.number = number;
     message.file = &name_;
     message.bytes = bytes;
     if (large) message.load = [this, id = row.id](Bytes& out) { load(id, kAll, out); };

@@ -50,8 +50,7 @@ class Database {
   Statement prepare(const std::string& sql) const;
   bool step(const Statement& statement) const;
   void read_topics();
-  std::vector<Row> rows(const std::vector<Wanted>& wanted, std::int64_t from_ns,
-                        std::int64_t to_ns) const;
+  std::vector<Row> rows(const std::vector<Wanted>& wanted, std::int64_t to_ns) const;
   /// At most `limit` bytes of a message.
   void load(std::int64_t id, std::size_t limit, Bytes& out) const;
 

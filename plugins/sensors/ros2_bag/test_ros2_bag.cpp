@@ -343,6 +343,11 @@ TEST_F(Ros2Bag, CountsMessagesThatAreBroken) {
   EXPECT_EQ(rejections[0].first, "bag_0.db3: message 1");
   EXPECT_EQ(rejections[1].reason, "/imu0: broken message: it does not begin like CDR");
   EXPECT_EQ(rejections[2].reason, "/joints: broken message: a list is longer than its message");
+  rejections.clear();
+  make_sensor(section("imu_topic: /imu0, start_s: 1e-9, max_rejected_fraction: 0.7"))
+      ->rejections(rejections);
+  ASSERT_EQ(rejections.size(), 1U);
+  EXPECT_EQ(rejections[0].first, "bag_0.db3: message 3") << "of the file, wherever reading begins";
 }
 
 TEST_F(Ros2Bag, ABrokenImageIsAnErrorWhenItIsRead) {
