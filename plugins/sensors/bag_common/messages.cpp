@@ -157,6 +157,10 @@ ImageHead read_image_head(FieldReader& in) {
 
 bool is_known_encoding(std::string_view encoding) { return find_encoding(encoding) != nullptr; }
 
+bool is_depth(std::string_view format) {
+  return format.find("compressedDepth") != std::string_view::npos;
+}
+
 std::string known_encodings() {
   std::string names;
   for (const Encoding& known : kEncodings) {

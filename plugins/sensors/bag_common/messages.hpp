@@ -63,6 +63,9 @@ ImageHead read_image_head(FieldReader& in);
 bool is_known_encoding(std::string_view encoding);
 std::string known_encodings();
 
+/// Whether a sensor_msgs/CompressedImage of this format has depths, which are not read.
+bool is_depth(std::string_view format);
+
 /// Grey pixels of a sensor_msgs/Image; 16 bit become the upper 8, colours and Bayer patterns become
 /// grey as OpenCV does it. BrokenMessage for sizes that contradict each other.
 void to_grey(const ImageHead& head, std::span<const std::uint8_t> pixels, Image& out);

@@ -98,7 +98,7 @@ class ImageReader final : public TopicReader {
   std::int64_t read_format(FieldReader& in) const {
     const std::int64_t t_ns = in.header();
     const std::string_view format = in.text();
-    if (format.find("compressedDepth") == std::string_view::npos) return t_ns;
+    if (!is_depth(format)) return t_ns;
     throw InputError(bag_->name() + "  topic '" + filter_.topic() +
                      "' has images of depth (format " + log::quoted(format) +
                      "): grey or colour ones are needed");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include "bag_image.hpp"
@@ -117,6 +118,13 @@ void Intake::read(std::size_t topic, Kind kind,
     }
     case Kind::kCompressedImage: {
       const std::int64_t t_ns = in.header();
+      const std::string_view format = in.text();
+      if (bag::is_depth(format)) {
+        return reject(
+            topic,
+            "image of depth (format " + log::quoted(format) + "): grey or colour ones are needed",
+            t_ns);
+      }
       return take_image(
           topic, {t_ns, topics_[topic].camera,
                   std::make_shared<MessageImage>(message, true,

@@ -316,6 +316,23 @@ TEST_F(IntakeTest, SaysWhichImagesAreNotRead) {
   }
 }
 
+TEST_F(IntakeTest, RefusesCompressedImagesOfDepthAndSaysItOnce) {
+  TopicOptions options;
+  options.image_topics = {"/cam0"};
+  Intake intake = make(options);
+  msg::CompressedImage depth;
+  depth.format = "16UC1; compressedDepth png";
+  for (int k = 1; k <= 2; ++k) {
+    depth.header.stamp = time_of(k * kSecond);
+    take(intake, 0, depth);
+  }
+  EXPECT_TRUE(taken().empty());
+  EXPECT_THAT(rejections(intake),
+              ElementsAre("/cam0: image of depth (format '16UC1; compressedDepth png'): grey or "
+                          "colour ones are needed | 2 | stamp 1000000000 ns"));
+  EXPECT_EQ(warnings_.size(), 1U);
+}
+
 TEST_F(IntakeTest, KnowsWhichTopicsAreSilent) {
   TopicOptions options = imu_only();
   options.image_topics = {"/cam0"};
