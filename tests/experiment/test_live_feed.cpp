@@ -3,6 +3,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -170,6 +171,55 @@ TEST(LiveFeed, FeedsWhatWorksOnPicturesAndTellsTheLatency) {
   for (const auto& [stage, time] : live.stages) stages.push_back(stage);
   EXPECT_NE(std::find(stages.begin(), stages.end(), "sensor tracks"), stages.end());
   EXPECT_NE(std::find(stages.begin(), stages.end(), "latency from image to pose"), stages.end());
+}
+
+TEST(LiveFeed, DropsTheWholeOldestPairAlsoWhenItsStampsDifferALittle) {
+  std::promise<void> all_given;
+  class Camera final : public Device {
+   public:
+    Camera(std::vector<Measurement> images, std::promise<void>& end)
+        : Device(std::move(images), false), end_(end) {}
+    Status next(Measurement& out) override {
+      const Status status = Device::next(out);
+      if (status == Status::kEnd) end_.set_value();
+      return status;
+    }
+
+   private:
+    std::promise<void>& end_;
+  };
+  /// Begins when all has been given.
+  class Late final : public Sensor {
+   public:
+    Late(std::future<void> begin, std::vector<int>& cameras)
+        : begin_(std::move(begin)), cameras_(cameras) {}
+    bool takes_input() const override { return true; }
+    void connect(Sensor& input) override { input_ = &input; }
+    Status next(Measurement& /*out*/) override {
+      begin_.wait();
+      Measurement in;
+      while (input_->next(in) == Status::kOk) cameras_.push_back(std::get<ImageSample>(in).camera);
+      return Status::kEnd;
+    }
+
+   private:
+    Sensor* input_ = nullptr;
+    std::future<void> begin_;
+    std::vector<int>& cameras_;
+  };
+  std::vector<Measurement> images;
+  for (std::int64_t k = 0; k < 11; ++k) {
+    const std::int64_t t_ns = k / 2 * 100'000'000 + k % 2 * 1'000'000;
+    images.emplace_back(ImageSample{t_ns, static_cast<int>(k % 2), nullptr});
+  }
+  RunSetup setup = standing_then_driving();
+  RunData data;
+  std::vector<int> cameras;
+  data.live.push_back(stream("device", std::make_shared<Camera>(std::move(images), all_given)));
+  data.streams.push_back(
+      stream("tracks", std::make_shared<Late>(all_given.get_future(), cameras), "device"));
+  run_filter(setup, data);
+  EXPECT_EQ(cameras, (std::vector{0, 1, 0, 1, 0, 1, 0}));
 }
 
 TEST(LiveFeed, EndsWhenItIsInterruptedAndKeepsTheResults) {

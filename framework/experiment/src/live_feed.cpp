@@ -43,7 +43,7 @@ class LiveInput final : public Sensor {
       if (images_.size() == kMaxWaitingImages) {
         // All images of the oldest instant: one of a stereo pair alone is of little use.
         const std::int64_t oldest_ns = images_.front().t_ns;
-        while (!images_.empty() && images_.front().t_ns == oldest_ns) {
+        while (!images_.empty() && images_.front().t_ns <= oldest_ns + kSameInstantNs) {
           if (dropped_++ == 0) first_dropped_ns_ = oldest_ns;
           images_.pop_front();
         }

@@ -17,9 +17,6 @@
 
 namespace viwo::ros1 {
 
-/// Images of several cameras whose stamps differ by no more are of one instant.
-inline constexpr std::int64_t kSameInstantNs = 3'000'000;
-
 /// Gives the images of all cameras in the order of their stamps (those of one instant by camera),
 /// whichever of their messages came first. An image waits until every camera has given one of its
 /// instant or a later one; a camera that gives nothing for kMaxWaiting instants is waited for no

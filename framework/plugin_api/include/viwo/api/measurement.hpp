@@ -105,6 +105,9 @@ class VIWO_API ImageSource {
   virtual void read(Image& out) const = 0;
 };
 
+/// Images of several cameras whose stamps differ by no more are of one instant.
+inline constexpr std::int64_t kSameInstantNs = 3'000'000;
+
 /// One image of a camera.
 struct ImageSample {
   std::int64_t t_ns = 0;  ///< stamp in the clock of the camera
