@@ -345,27 +345,6 @@ bool wants_filter(const Node& run) {
   return run.find("updates") != nullptr;
 }
 
-std::vector<std::string> calibration_names(const WheelSet& wheels) {
-  return viwo::calibration_names(wheels.name, wheels.model->description().intrinsics);
-}
-
-std::vector<CalibrationValue> calibration_of(const Filter& filter, std::size_t wheels) {
-  const WheelsView& view = filter.wheels()[wheels];
-  std::vector<CalibrationValue> out;
-  const auto add = [&](double value, int first, int i) {
-    const int column = first + i;
-    out.push_back({value, first < 0 ? 0. : std::sqrt(filter.covariance()(column, column))});
-  };
-  const Eigen::Vector3d theta_ItoO = log_so3(view.R_ItoO);
-  for (int i = 0; i < 3; ++i) add(theta_ItoO[i], view.extrinsics_column, i);
-  for (int i = 0; i < 3; ++i) {
-    add(view.p_IinO[i], view.extrinsics_column < 0 ? -1 : view.extrinsics_column + 3, i);
-  }
-  add(view.t_OtoI_s, view.time_offset_column, 0);
-  for (int i = 0; i < view.x_WI.size(); ++i) add(view.x_WI[i], view.intrinsics_column, i);
-  return out;
-}
-
 FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>& model,
                         const Intrinsics& x_WI, const Intrinsics& sigma, std::uint64_t seed,
                         PluginRegistry& plugins, Node& resolved, Errors& errors) {
