@@ -136,6 +136,24 @@ TEST_F(FilterTest, RefusesWrongValuesInEachSection) {
          "run.yaml:19:35  estimator: unknown key 'clone' - did you mean 'clones'?");
 }
 
+TEST_F(FilterTest, TakesTheNoisesOfTheImuFromAFileOrAsNumbers) {
+  write("imu.yaml",
+        "imu0: {gyroscope_noise_density: 1.25e-4, gyroscope_random_walk: 0,\n"
+        "  accelerometer_noise_density: 0.0017, accelerometer_random_walk: 0.003}\n");
+  refuse("imu: {}", "imu: {kalibr: imu.yaml, sigma_gyro_rad_per_s_sqrt_hz: 1e-3}",
+         "run.yaml:17:25  imu.sigma_gyro_rad_per_s_sqrt_hz: imu.kalibr gives it, too - write "
+         "either");
+  change("imu: {}", "imu: {kalibr: imu.yaml}");
+  expect_done({"run", "run.yaml", "--out", "out"});
+  const std::string resolved = read("out/config.resolved.yaml");
+  EXPECT_NE(resolved.find("sigma_gyro_rad_per_s_sqrt_hz: 0.000125\n"), std::string::npos)
+      << resolved;
+  fs::remove(at("imu.yaml"));
+  expect_done({"run", "out/config.resolved.yaml", "--out", "again"});
+  EXPECT_EQ(read("out/trajectory.tum"), read("again/trajectory.tum"));
+  EXPECT_EQ(resolved, read("again/config.resolved.yaml"));
+}
+
 TEST_F(FilterTest, RefusesCamerasThatAreNotThere) {
   refuse(
       "{kalibr: cam.yaml}", "{kalibr: none.yaml}",

@@ -1,6 +1,7 @@
 #include "viwo/experiment/filter_setup.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "filter_params.hpp"
 #include "section.hpp"
@@ -78,16 +79,31 @@ auto from_kalibr(const ParamSet& p, const Node& section, const std::string& path
   }
 }
 
-void read_imu(const ParamSet& p, const Node& section, FilterSetup& setup, Errors& errors) {
+/// The noises of the section `imu`, as numbers or in a Kalibr file, whose numbers then are written
+/// into the resolved section in its place.
+void read_imu(ParamSet p, const Node& section, FilterSetup& setup, Node& resolved, Errors& errors) {
+  ImuNoise noise;
+  const std::pair<const char*, double&> numbers[] = {
+      {"sigma_gyro_rad_per_s_sqrt_hz", noise.gyro_rad_per_s_sqrt_hz},
+      {"sigma_accel_m_per_s2_sqrt_hz", noise.accel_m_per_s2_sqrt_hz},
+      {"sigma_gyro_walk_rad_per_s2_sqrt_hz", noise.gyro_walk_rad_per_s2_sqrt_hz},
+      {"sigma_accel_walk_m_per_s3_sqrt_hz", noise.accel_walk_m_per_s3_sqrt_hz}};
   if (!p.text("kalibr").empty()) {
-    const auto noise = from_kalibr(p, section, "imu", log::read_kalibr_imu, errors);
-    if (noise) setup.options.filter.imu_noise = *noise;
-    return;
+    for (const auto& [key, value] : numbers) {
+      const Node::Entry* const written = section.find_entry(key);
+      if (written == nullptr) continue;
+      errors.add(written->key_mark,
+                 "imu." + std::string(key) + ": imu.kalibr gives it, too - write either");
+    }
+    const auto from_file = from_kalibr(p, section, "imu", log::read_kalibr_imu, errors);
+    if (!from_file) return;
+    noise = *from_file;
+    for (const auto& [key, value] : numbers) p.set(key, value);
+    p.set("kalibr", std::string());
+    resolved.set("imu", config::write_params(kImuParams, p));
   }
-  setup.options.filter.imu_noise = {p.number("sigma_gyro_rad_per_s_sqrt_hz"),
-                                    p.number("sigma_accel_m_per_s2_sqrt_hz"),
-                                    p.number("sigma_gyro_walk_rad_per_s2_sqrt_hz"),
-                                    p.number("sigma_accel_walk_m_per_s3_sqrt_hz")};
+  for (const auto& [key, value] : numbers) value = p.number(key);
+  setup.options.filter.imu_noise = noise;
 }
 
 void read_cameras(const ParamSet& p, const Node& section, FilterSetup& setup, Errors& errors) {
@@ -365,7 +381,7 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
     error_scale = params->number("calibration_error_scale");
   }
   if (const auto params = read("imu", kImuParams)) {
-    read_imu(*params, section_or_empty(run, "imu"), setup, errors);
+    read_imu(*params, section_or_empty(run, "imu"), setup, resolved, errors);
   }
   if (run.find("cameras") != nullptr) {
     if (const auto params = read("cameras", kCamerasParams)) {
