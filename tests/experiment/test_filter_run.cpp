@@ -6,6 +6,7 @@
 
 #include "held_gauge.hpp"
 #include "simulated.hpp"
+#include "stream.hpp"
 #include "viwo/experiment/progress.hpp"
 #include "viwo/experiment/simulate.hpp"
 #include "viwo/math/so3.hpp"
@@ -50,6 +51,40 @@ TEST(FilterRun, TellsItsProgressAsPartOfTheTimeOfTheLog) {
   }
   EXPECT_GT(fractions.back(), 0.95);
   EXPECT_LE(fractions.back(), 1.);
+}
+
+TEST(FilterRun, RefusesTwoSensorsWhereAWheelSetNamesNone) {
+  RunSetup setup = inertia_and_wheels();
+  setup.filter->wheels.push_back(setup.filter->wheels.front());
+  setup.filter->wheels.front().sensor = "simulator0";
+  const auto encoders = std::make_shared<const std::vector<Measurement>>(1, EncoderSample());
+  setup.sensors.push_back({"other", {}, ""});
+  setup.sensors.back().sensor.object = std::make_shared<Replay>(encoders);
+  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
+            "run.yaml:2:3  both 'simulator0' and 'other' give encoder samples: a run takes them "
+            "from one sensor");
+}
+
+TEST(FilterRun, TakesTracksFromOneSensor) {
+  RunSetup setup = inertia_and_wheels();
+  RunData data = collect(setup);
+  ASSERT_FALSE(data.images.empty());
+  const auto tracks = std::make_shared<const std::vector<Measurement>>(1, data.images.front());
+  const auto add_stream = [&](const std::string& name) {
+    data.streams.push_back({name, {}, std::make_shared<Replay>(tracks), "images", nullptr});
+  };
+  const auto both = [](const std::string& names) {
+    return "run.yaml:2:3  both " + names + " give tracks: a run takes them from one sensor";
+  };
+  add_stream("tracks0");
+  EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }),
+            both("'simulator0' and 'tracks0'"));
+  data.images.clear();
+  data.tracks_name.clear();
+  data.streams.clear();
+  add_stream("tracks0");
+  add_stream("tracks1");
+  EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }), both("'tracks0' and 'tracks1'"));
 }
 
 TEST(HeldGauge, BringsATruthOfAnotherFrameIntoTheOneThatTheEstimateHolds) {

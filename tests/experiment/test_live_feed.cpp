@@ -222,6 +222,44 @@ TEST(LiveFeed, DropsTheWholeOldestPairAlsoWhenItsStampsDifferALittle) {
   EXPECT_EQ(cameras, (std::vector{0, 1, 0, 1, 0, 1, 0}));
 }
 
+/// The error of a run on two live sensors 'a' and 'b', each of which gives one measurement.
+std::string error_of_two(const RunSetup& setup, const Measurement& a, const Measurement& b) {
+  RunData data;
+  data.live.push_back(stream("a", std::make_shared<Device>(std::vector{a}, false)));
+  data.live.push_back(stream("b", std::make_shared<Device>(std::vector{b}, false)));
+  const std::string error = testing::error_of([&] { run_filter(setup, data); });
+  // Either may be the first to give something.
+  const std::size_t other = error.find("both 'b' and 'a'");
+  return other == std::string::npos ? error
+                                    : std::string(error).replace(other, 16, "both 'a' and 'b'");
+}
+
+TEST(LiveFeed, TakesEachKindOfMeasurementFromOneSensor) {
+  RunSetup setup = standing_then_driving();
+  const RunData recorded = collect(setup);
+  const auto expect_refused = [&](const Measurement& measurement, const std::string& what) {
+    EXPECT_EQ(
+        error_of_two(setup, measurement, measurement),
+        "run.yaml:1:10  both 'a' and 'b' give " + what + ": a run takes them from one sensor");
+  };
+  expect_refused(recorded.imu.front(), "IMU samples");
+  expect_refused(recorded.images.front(), "tracks");
+  expect_refused(recorded.samples.front(), "encoder samples");
+  expect_refused(PoseSample(), "reference poses");
+}
+
+TEST(LiveFeed, TakesEncodersOfWheelSetsFromASensorEach) {
+  RunSetup setup = standing_then_driving();
+  const RunData recorded = collect(setup);
+  WheelSet second = setup.filter->wheels.front();
+  second.name = second.prior.name = "second";
+  second.sensor = "b";
+  setup.filter->wheels.front().sensor = "a";
+  setup.filter->wheels.push_back(second);
+  const Measurement wheels = recorded.samples.front();
+  EXPECT_EQ(error_of_two(setup, wheels, wheels), "(no error)");
+}
+
 TEST(LiveFeed, EndsWhenItIsInterruptedAndKeepsTheResults) {
   RunSetup setup = standing_then_driving();
   const RunData recorded = collect(setup);

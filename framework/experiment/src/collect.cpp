@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "inputs.hpp"
+#include "sources.hpp"
 #include "viwo/experiment/run.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/se2.hpp"
@@ -48,9 +49,11 @@ void require_what_the_filter_needs(const RunSetup& setup, const RunData& data) {
 class Collector {
  public:
   Collector(const RunSetup& setup, RunData& data) : setup_(setup), data_(data) {
-    if (setup.filter && !setup.filter->wheels.empty()) {
-      wheels_sensor_ = setup.filter->wheels.front().sensor;
-    }
+    if (!setup.filter || setup.filter->wheels.empty()) return;
+    const auto& sets = setup.filter->wheels;
+    wheels_sensor_ = sets.front().sensor;
+    some_set_is_unnamed_ =
+        std::any_of(sets.begin(), sets.end(), [](const auto& set) { return set.sensor.empty(); });
   }
 
   void add(const std::string& sensor, const Measurement& measurement) {
@@ -58,22 +61,19 @@ class Collector {
   }
 
  private:
-  void claim(std::string& owner, const std::string& sensor, const char* what) {
-    if (owner.empty()) owner = sensor;
-    if (owner != sensor) {
-      config::fail(setup_.sensors_mark, "both '" + owner + "' and '" + sensor + "' give " + what +
-                                            ": a run takes them from one sensor");
-    }
+  void claim(std::string& owner, const std::string& sensor, const char* what) const {
+    experiment::claim(owner, sensor, what, setup_.sensors_mark);
   }
 
   void add(const std::string& sensor, const EncoderSample& sample) {
+    if (some_set_is_unnamed_) claim(encoders_name_, sensor, kEncoderSamples);
     if (!wheels_sensor_.empty() && sensor != wheels_sensor_) {
       auto& samples = data_.other_wheels[sensor];
       if (samples.empty()) require_channels_of_set(setup_, sample, sensor);
       samples.push_back(sample);
       return;
     }
-    claim(data_.wheels_name, sensor, "encoder samples");
+    claim(data_.wheels_name, sensor, kEncoderSamples);
     if (data_.samples.empty() && setup_.model) {
       require_channels(*setup_.model, setup_.kinematics_mark, sample, sensor);
     }
@@ -85,18 +85,18 @@ class Collector {
       data_.poses[sensor].push_back(pose);
       return;
     }
-    claim(reference_name_, sensor, "reference poses");
+    claim(reference_name_, sensor, kReferencePoses);
     const Eigen::Quaterniond q_BtoW = to_quaternion(pose.q_BtoW_xyzw).normalized();
     data_.reference.push_back(setup_.filter
                                   ? StampedPose{pose.t_ns, to_vector(pose.p_BinW_m), q_BtoW}
                                   : planar_pose(pose.t_ns, pose.p_BinW_m, q_BtoW));
   }
   void add(const std::string& sensor, const ImuSample& imu) {
-    claim(imu_name_, sensor, "IMU samples");
+    claim(imu_name_, sensor, kImuSamples);
     data_.imu.push_back(imu);
   }
   void add(const std::string& sensor, const FeatureSample& image) {
-    claim(images_name_, sensor, "images");
+    claim(data_.tracks_name, sensor, kTracks);
     data_.images.push_back(image);
   }
   void add(const std::string& sensor, const StateSample& state) {
@@ -113,7 +113,8 @@ class Collector {
 
   const RunSetup& setup_;
   RunData& data_;
-  std::string wheels_sensor_, reference_name_, imu_name_, images_name_, pixels_name_;
+  std::string wheels_sensor_, encoders_name_, reference_name_, imu_name_, pixels_name_;
+  bool some_set_is_unnamed_ = false;  ///< then only one sensor gives encoder samples
 };
 
 /// The live sensors of a run and those that work on them, unread.

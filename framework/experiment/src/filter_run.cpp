@@ -268,7 +268,7 @@ class Recorder {
 
 Estimator make_estimator(const FilterSetup& setup, bool live) {
   EstimatorOptions options = setup.options;
-  // The trackers of two cameras give what they found at one instant a little after each other.
+  // What a tracker finds in the images of two cameras at one instant comes one after the other.
   if (live) options.max_image_wait_s = 0.05;
   std::vector<WheelsPrior> wheels;
   for (const WheelSet& set : setup.wheels) wheels.push_back(set.prior);

@@ -10,13 +10,13 @@
 #include <exception>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "feed.hpp"
+#include "sources.hpp"
 #include "viwo/math/arrays.hpp"
 
 namespace viwo::experiment {
@@ -91,7 +91,7 @@ class LiveInput final : public Sensor {
 class LiveFeed final : public Feed {
  public:
   LiveFeed(const RunSetup& setup, const RunData& data, const RunHooks& hooks)
-      : setup_(setup), data_(data), hooks_(hooks) {
+      : setup_(setup), data_(data), hooks_(hooks), encoders_names_(setup.filter->wheels.size()) {
     for (const SensorStream& stream : data.streams) {
       workers_.push_back({&stream, std::make_unique<LiveInput>(), {}});
       LiveInput& input = *workers_.back().input;
@@ -257,17 +257,24 @@ class LiveFeed final : public Feed {
     threads_.clear();
   }
 
-  void add(const std::string& /*sensor*/, const ImuSample& imu, Estimator& estimator) {
+  void claim(std::string& owner, const std::string& sensor, const char* what) const {
+    experiment::claim(owner, sensor, what, setup_.sensors_mark);
+  }
+
+  void add(const std::string& sensor, const ImuSample& imu, Estimator& estimator) {
+    claim(imu_name_, sensor, kImuSamples);
     estimator.add(imu);
   }
-  void add(const std::string& /*sensor*/, const FeatureSample& image, Estimator& estimator) {
+  void add(const std::string& sensor, const FeatureSample& image, Estimator& estimator) {
+    claim(tracks_name_, sensor, kTracks);
     estimator.add(image);
   }
   void add(const std::string& sensor, const EncoderSample& sample, Estimator& estimator) {
     const auto& sets = setup_.filter->wheels;
     for (std::size_t k = 0; k < sets.size(); ++k) {
       if (sets[k].sensor != sensor && !sets[k].sensor.empty()) continue;
-      if (checked_.insert({sensor, k}).second) require_channels(sets[k], sample, sensor);
+      if (encoders_names_[k].empty()) require_channels(sets[k], sample, sensor);
+      claim(encoders_names_[k], sensor, kEncoderSamples);
       estimator.add(sample, static_cast<int>(k));
     }
   }
@@ -276,6 +283,7 @@ class LiveFeed final : public Feed {
     for (std::size_t k = 0; k < measured.size(); ++k) {
       if (measured[k] == sensor) return estimator.add(pose, static_cast<int>(k));
     }
+    claim(reference_name_, sensor, kReferencePoses);
     reference_.push_back(
         {pose.t_ns, to_vector(pose.p_BinW_m), to_quaternion(pose.q_BtoW_xyzw).normalized()});
   }
@@ -325,7 +333,8 @@ class LiveFeed final : public Feed {
   const RunData& data_;
   const RunHooks& hooks_;
   std::vector<Worker> workers_;
-  std::set<std::pair<std::string, std::size_t>> checked_;  ///< sensor and wheel set
+  std::string imu_name_, tracks_name_, reference_name_;
+  std::vector<std::string> encoders_names_;  ///< of each wheel set
   Trajectory reference_;
   std::vector<double> latency_ms_;
 

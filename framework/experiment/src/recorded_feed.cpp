@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "feed.hpp"
+#include "sources.hpp"
 #include "stream.hpp"
 
 namespace viwo::experiment {
@@ -12,7 +13,8 @@ namespace {
 
 class RecordedFeed final : public Feed {
  public:
-  RecordedFeed(const RunSetup& setup, const RunData& data) : data_(data) {
+  RecordedFeed(const RunSetup& setup, const RunData& data)
+      : setup_(setup), data_(data), tracks_name_(data.tracks_name) {
     for (const WheelSet& wheels : setup.filter->wheels) {
       const auto other = data.other_wheels.find(wheels.sensor);
       wheels_.push_back(other != data.other_wheels.end() ? &other->second : &data.samples);
@@ -102,18 +104,21 @@ class RecordedFeed final : public Feed {
     });
   }
 
-  static void add_streamed(Prefetch& stream, Estimator& estimator) {
+  void add_streamed(Prefetch& stream, Estimator& estimator) {
     const auto* image = std::get_if<FeatureSample>(stream.head());
     if (image == nullptr) {
       throw InputError("sensor '" + stream.name() +
                        "', which takes an input, gives something else than tracks of features - "
                        "only those are used while the filter runs");
     }
+    claim(tracks_name_, stream.name(), kTracks, setup_.sensors_mark);
     estimator.add(*image);
     stream.pop();
   }
 
+  const RunSetup& setup_;
   const RunData& data_;
+  std::string tracks_name_;
   std::vector<const std::vector<EncoderSample>*> wheels_;
   std::vector<std::size_t> next_wheel_;
   std::vector<const std::vector<PoseSample>*> poses_;  // null: none, or nobody uses them

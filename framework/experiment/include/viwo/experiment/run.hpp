@@ -71,6 +71,7 @@ struct RunData {
   std::vector<EncoderSample> samples;  ///< in time order
   Trajectory reference;                ///< planar; empty if there is none
   std::vector<ImuSample> imu;
+  std::string tracks_name;  ///< sensor that gave the tracks
   std::vector<FeatureSample> images;
   std::vector<ImageSample> pixels;            ///< of the images, in time order; for pictures
   std::vector<SensorStream> streams;          ///< not read yet
