@@ -169,6 +169,11 @@ TEST_F(FilterTest, RefusesCamerasThatAreNotThere) {
          "run.yaml:21:3  updates.visual_features: visual_features needs a camera");
 }
 
+TEST_F(FilterTest, RefusesAnUpdateWhoseSensorGivesNoPoses) {
+  refuse("wheel_parity: {}", "fix: {type: pose_reference, sensor: sim, sigma_position_m: 0.01}",
+         "run.yaml:23:3  sensor 'sim' gave no poses, which update fix needs");
+}
+
 TEST_F(FilterTest, RefusesUpdatesOfWheelsThatAreNotThere) {
   refuse("kinematics: *robot\n", "\n",
          "run.yaml:22:3  updates.wheel_odometry needs wheels: the run has no section 'kinematics'\n"

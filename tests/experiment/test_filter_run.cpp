@@ -6,6 +6,7 @@
 
 #include "held_gauge.hpp"
 #include "simulated.hpp"
+#include "sources.hpp"
 #include "stream.hpp"
 #include "viwo/experiment/progress.hpp"
 #include "viwo/experiment/simulate.hpp"
@@ -51,6 +52,31 @@ TEST(FilterRun, TellsItsProgressAsPartOfTheTimeOfTheLog) {
   }
   EXPECT_GT(fractions.back(), 0.95);
   EXPECT_LE(fractions.back(), 1.);
+}
+
+TEST(FilterRun, RefusesSensorsThatDoNotGiveWhatUpdatesNeed) {
+  RunSetup setup = inertia_and_wheels();
+  setup.filter->wheels.front().sensor = "imu0";
+  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
+            "run.yaml:4:11  sensor 'imu0' gave no encoder samples, which update wheel_odometry "
+            "needs");
+  setup = inertia_and_wheels();
+  setup.filter->updates.front().wheels = -1;
+  setup.filter->updates.front().poses = 0;
+  setup.filter->pose_sensors = {"simulator0"};
+  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
+            "run.yaml:4:11  sensor 'simulator0' gave no poses, which update wheel_odometry needs");
+}
+
+TEST(FilterRun, AWheelSetHasTheSamplesOfItsOwnSensor) {
+  RunData data;
+  data.wheels_name = "wheels0";
+  data.samples.resize(2);
+  data.other_wheels["wheels1"].resize(3);
+  EXPECT_EQ(encoder_samples(data, "").size(), 2U);
+  EXPECT_EQ(encoder_samples(data, "wheels0").size(), 2U);
+  EXPECT_EQ(encoder_samples(data, "wheels1").size(), 3U);
+  EXPECT_EQ(encoder_samples(data, "imu0").size(), 0U);
 }
 
 TEST(FilterRun, RefusesTwoSensorsWhereAWheelSetNamesNone) {

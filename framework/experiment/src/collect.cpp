@@ -36,6 +36,29 @@ void require_channels_of_set(const RunSetup& setup, const EncoderSample& sample,
   }
 }
 
+/// What every update measures with has been given. What a stream gives is still to be seen.
+void require_what_the_updates_need(const RunSetup& setup, const RunData& data) {
+  const FilterSetup& filter = *setup.filter;
+  for (const FilterSetup::Entry& update : filter.updates) {
+    const auto require = [&](const std::string& sensor, bool is_given, const char* what) {
+      const bool is_stream = std::any_of(data.streams.begin(), data.streams.end(),
+                                         [&](const auto& s) { return s.name == sensor; });
+      if (is_given || is_stream) return;
+      const std::string who =
+          sensor.empty() ? "no sensor of this run gave " : "sensor '" + sensor + "' gave no ";
+      config::fail(update.mark, who + what + ", which update " + update.name + " needs");
+    };
+    if (update.wheels >= 0) {
+      const std::string& sensor = filter.wheels[static_cast<std::size_t>(update.wheels)].sensor;
+      require(sensor, !encoder_samples(data, sensor).empty(), kEncoderSamples);
+    }
+    if (update.poses >= 0) {
+      const std::string& sensor = filter.pose_sensors[static_cast<std::size_t>(update.poses)];
+      require(sensor, !pose_samples(data, sensor).empty(), "poses");
+    }
+  }
+}
+
 void require_what_the_filter_needs(const RunSetup& setup, const RunData& data) {
   if (data.imu.empty()) config::fail(setup.sensors_mark, "no sensor of this run gave IMU samples");
   if (setup.filter->start.mode == StartMode::kReference && data.states.empty()) {
@@ -43,6 +66,7 @@ void require_what_the_filter_needs(const RunSetup& setup, const RunData& data) {
                  "no sensor of this run gave reference states, which estimator.start: reference "
                  "needs - choose start: standstill or moving");
   }
+  require_what_the_updates_need(setup, data);
 }
 
 /// Sorts what the sensors of a run give into the data of the run.

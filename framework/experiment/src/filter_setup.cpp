@@ -325,7 +325,7 @@ void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, 
       try_update(setup, trial.object, wheels, entry.key_mark, path, errors);
     }
     if (kind != UpdateKind::kWheels) {
-      setup.updates.push_back({entry.key, std::move(loaded), -1, poses});
+      setup.updates.push_back({entry.key, std::move(loaded), -1, poses, entry.key_mark});
       continue;
     }
     if (run.find("kinematics") == nullptr && run.find("wheel_sets") == nullptr) {
@@ -336,7 +336,7 @@ void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, 
       const std::string name =
           setup.wheels[i].name.empty() ? entry.key : setup.wheels[i].name + "." + entry.key;
       if (i > 0) loaded = plugins.make_update(section, path, errors, kHostKeys);
-      setup.updates.push_back({name, loaded, static_cast<int>(i)});
+      setup.updates.push_back({name, loaded, static_cast<int>(i), -1, entry.key_mark});
     }
   }
   resolved.set("updates", resolved_updates);

@@ -16,16 +16,14 @@ class RecordedFeed final : public Feed {
   RecordedFeed(const RunSetup& setup, const RunData& data)
       : setup_(setup), data_(data), tracks_name_(data.tracks_name) {
     for (const WheelSet& wheels : setup.filter->wheels) {
-      const auto other = data.other_wheels.find(wheels.sensor);
-      wheels_.push_back(other != data.other_wheels.end() ? &other->second : &data.samples);
+      wheels_.push_back(&encoder_samples(data, wheels.sensor));
     }
     next_wheel_.resize(wheels_.size(), 0);
     poses_.resize(setup.filter->pose_sensors.size(), nullptr);
     for (const FilterSetup::Entry& update : setup.filter->updates) {
       if (update.poses < 0) continue;
       const auto stream = static_cast<std::size_t>(update.poses);
-      const auto found = data.poses.find(setup.filter->pose_sensors[stream]);
-      if (found != data.poses.end()) poses_[stream] = &found->second;
+      poses_[stream] = &pose_samples(data, setup.filter->pose_sensors[stream]);
     }
     next_pose_.resize(poses_.size(), 0);
     for (const SensorStream& stream : data.streams) {
@@ -121,7 +119,7 @@ class RecordedFeed final : public Feed {
   std::string tracks_name_;
   std::vector<const std::vector<EncoderSample>*> wheels_;
   std::vector<std::size_t> next_wheel_;
-  std::vector<const std::vector<PoseSample>*> poses_;  // null: none, or nobody uses them
+  std::vector<const std::vector<PoseSample>*> poses_;  // null: nobody uses them
   std::vector<std::size_t> next_pose_;
   std::size_t next_imu_ = 0;
   std::size_t next_image_ = 0;

@@ -1,7 +1,9 @@
 // Which sensor of a run gives what: each kind of measurement comes from one.
 #pragma once
 
+#include <map>
 #include <string>
+#include <vector>
 
 #include "viwo/experiment/run.hpp"
 
@@ -20,6 +22,27 @@ inline void claim(std::string& owner, const std::string& sensor, const char* wha
   if (owner == sensor) return;
   config::fail(mark, "both '" + owner + "' and '" + sensor + "' give " + what +
                          ": a run takes them from one sensor");
+}
+
+/// The value at `key`, or an empty one.
+template <class Samples>
+const Samples& samples_or_none(const std::map<std::string, Samples>& by_sensor,
+                               const std::string& key) {
+  static const Samples kNone;
+  const auto found = by_sensor.find(key);
+  return found != by_sensor.end() ? found->second : kNone;
+}
+
+/// What the sensor of a wheel set gave; "" for the only sensor that gave encoder samples.
+inline const std::vector<EncoderSample>& encoder_samples(const RunData& data,
+                                                         const std::string& sensor) {
+  if (sensor.empty() || sensor == data.wheels_name) return data.samples;
+  return samples_or_none(data.other_wheels, sensor);
+}
+
+/// What a sensor gave for updates that measure with poses.
+inline const std::vector<PoseSample>& pose_samples(const RunData& data, const std::string& sensor) {
+  return samples_or_none(data.poses, sensor);
 }
 
 }  // namespace viwo::experiment

@@ -49,6 +49,7 @@ struct FilterSetup {
     Loaded<Update> update;
     int wheels = -1;
     int poses = -1;  ///< index into pose_sensors
+    config::Mark mark;
   };
   std::vector<Entry> updates;
   /// Sensors that updates name as `sensor`, also updates that are turned off: what they give is
