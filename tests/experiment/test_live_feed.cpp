@@ -248,9 +248,11 @@ TEST(LiveFeed, TakesEachKindOfMeasurementFromOneSensor) {
   expect_refused(PoseSample(), "reference poses");
 }
 
-TEST(LiveFeed, TakesEncodersOfWheelSetsFromASensorEach) {
+TEST(LiveFeed, TakesPosesThatUpdatesNameAndEncodersOfWheelSetsFromASensorEach) {
   RunSetup setup = standing_then_driving();
   const RunData recorded = collect(setup);
+  setup.filter->pose_sensors = {"a"};  // b gives the reference; the update of a is turned off
+  EXPECT_EQ(error_of_two(setup, PoseSample(), PoseSample()), "(no error)");
   WheelSet second = setup.filter->wheels.front();
   second.name = second.prior.name = "second";
   second.sensor = "b";

@@ -1,6 +1,7 @@
 // Sensors that give measurements as they happen. Each has a thread, and so has each sensor that
 // works on what another one gives; all of them put what they give into one queue, from which the
 // estimator takes it in the order of arrival.
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -281,7 +282,15 @@ class LiveFeed final : public Feed {
   void add(const std::string& sensor, const PoseSample& pose, Estimator& estimator) {
     const auto& measured = setup_.filter->pose_sensors;
     for (std::size_t k = 0; k < measured.size(); ++k) {
-      if (measured[k] == sensor) return estimator.add(pose, static_cast<int>(k));
+      if (measured[k] != sensor) continue;
+      const auto& updates = setup_.filter->updates;
+      const auto stream = static_cast<int>(k);
+      // Otherwise all updates that measure with them are turned off.
+      if (std::any_of(updates.begin(), updates.end(),
+                      [stream](const auto& update) { return update.poses == stream; })) {
+        estimator.add(pose, stream);
+      }
+      return;
     }
     claim(reference_name_, sensor, kReferencePoses);
     reference_.push_back(
