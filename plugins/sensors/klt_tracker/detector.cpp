@@ -80,13 +80,17 @@ Detector::Detector(const CameraView& camera, const TrackerOptions& options, cv::
       per_cell_((options.num_pts + options.grid_x * options.grid_y - 1) /
                 (options.grid_x * options.grid_y)) {}
 
+bool Detector::masked(const cv::Point& at) const {
+  return !mask_.empty() && mask_.at<uchar>(at) != 0;
+}
+
 bool Detector::usable(const cv::Point2f& uv) const {
   const auto border = static_cast<float>(border_px(options_));
   if (!(uv.x >= border && uv.y >= border && uv.x <= static_cast<float>(size_.width - 1) - border &&
         uv.y <= static_cast<float>(size_.height - 1) - border)) {
     return false;
   }
-  if (!mask_.empty() && mask_.at<uchar>(cvRound(uv.y), cvRound(uv.x)) != 0) return false;
+  if (masked({cvRound(uv.x), cvRound(uv.y)})) return false;
   return unproject(camera_, Eigen::Vector2d(uv.x, uv.y)).has_value();
 }
 
@@ -121,6 +125,14 @@ std::vector<Detector::Candidate> Detector::candidates(const Frame& frame,
                         cv::Rect(cv::Point(), size_);
   std::vector<cv::KeyPoint> corners;
   cv::FAST(frame.image()(seen), corners, options_.fast_threshold, /*nonmaxSuppression=*/true);
+  // First what is not wanted goes: it would take the places of weaker corners that are.
+  const auto place = [&seen](const cv::KeyPoint& corner) {
+    return cv::Point(cvRound(corner.pt.x) + seen.x, cvRound(corner.pt.y) + seen.y);
+  };
+  std::erase_if(corners, [&](const cv::KeyPoint& corner) {
+    const cv::Point at = place(corner);
+    return !wanted.contains(at) || masked(at);
+  });
   const auto keep = static_cast<std::size_t>(kCandidatesPerPoint * per_cell_);
   if (corners.size() > keep) {
     std::nth_element(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(keep),
@@ -131,8 +143,7 @@ std::vector<Detector::Candidate> Detector::candidates(const Frame& frame,
     corners.resize(keep);
   }
   for (const cv::KeyPoint& corner : corners) {
-    const cv::Point at(cvRound(corner.pt.x) + seen.x, cvRound(corner.pt.y) + seen.y);
-    if (!wanted.contains(at)) continue;
+    const cv::Point at = place(corner);
     const Candidate candidate{cv::Point2f(at), cornerness(frame.pyramid[1], at)};
     if (candidate.score >= kMinScore && usable(candidate.uv)) found.push_back(candidate);
   }

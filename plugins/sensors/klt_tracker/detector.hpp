@@ -44,6 +44,7 @@ class Detector {
     float score = 0.F;
   };
   cv::Rect cell(int index) const;
+  bool masked(const cv::Point& at) const;
   int cell_of(const cv::Point2f& uv) const;
   /// Corners of a cell, the best first.
   std::vector<Candidate> candidates(const Frame& frame, const cv::Rect& cell) const;

@@ -41,16 +41,24 @@ cv::Mat draw(int width_px, int height_px, Grey grey) {
 
 Image to_image(const cv::Mat& mat) { return {mat.cols, mat.rows, {mat.datastart, mat.dataend}}; }
 
-/// White squares on black, blurred as by a lens, with the noise of a camera.
-Image squares(int width_px, int height_px, int step, int side) {
+/// Blurred as by a lens, with the noise of a camera.
+Image as_seen(cv::Mat sharp) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> noise(0., 1.);
-  cv::Mat sharp = draw(width_px, height_px, [&](int x, int y) {
-    return x % step >= step - side && y % step >= step - side ? 220. : 30.;
-  });
   cv::GaussianBlur(sharp, sharp, cv::Size(), 0.7);
-  return to_image(draw(width_px, height_px,
+  return to_image(draw(sharp.cols, sharp.rows,
                        [&](int x, int y) { return sharp.at<uchar>(y, x) + noise(random); }));
+}
+
+/// Whether a pixel is in one of the squares that end every `step` pixels.
+bool in_square(int x, int y, int step, int side) {
+  return x % step >= step - side && y % step >= step - side;
+}
+
+/// White squares on black.
+Image squares(int width_px, int height_px, int step, int side) {
+  return as_seen(draw(width_px, height_px,
+                      [&](int x, int y) { return in_square(x, y, step, side) ? 220. : 30.; }));
 }
 
 TEST(Patch, FindsItsPlaceUnderAnAffineDeformationAndOtherLight) {
@@ -154,6 +162,23 @@ TEST(Detector, LeavesOutWhatIsMasked) {
   const auto points = detect(pinhole(320, 240), TrackerOptions{}, squares(320, 240, 16, 8), mask);
   EXPECT_GT(points.size(), 20U);
   for (const cv::Point2f& uv : points) EXPECT_LT(uv.x, 99.6F);
+}
+
+TEST(Detector, IsNotKeptFromWeakCornersByStrongOnesUnderAMask) {
+  // GIVEN cells of 80 x 80 px, the left half of each masked and full of corners
+  TrackerOptions options;
+  options.num_pts = 60;
+  options.grid_x = 4;
+  options.grid_y = 3;
+  cv::Mat mask = cv::Mat::zeros(240, 320, CV_8UC1);
+  const cv::Mat image = draw(320, 240, [&](int x, int y) {
+    if (x % 80 >= 40) return in_square(x, y, 16, 8) ? 150. : 100.;
+    mask.at<uchar>(y, x) = 255;
+    return in_square(x, y, 8, 4) ? 220. : 30.;
+  });
+  const auto points = detect(pinhole(320, 240), options, as_seen(image), mask);
+  EXPECT_EQ(points.size(), 60U);
+  for (const cv::Point2f& uv : points) EXPECT_GT(std::fmod(uv.x, 80.F), 39.4F);
 }
 
 TEST(Frame, IsBlankWhenDarkOrFlatButNotWhenDim) {
