@@ -172,30 +172,41 @@ void Detector::detect(const Frame& frame, std::vector<cv::Point2f>& points) cons
     ++counts[static_cast<std::size_t>(cell_of(uv))];
   }
   auto total = static_cast<int>(points.size());
-  std::vector<int> lacking;
+  struct Lacking {
+    int cell = 0;
+    std::vector<Candidate> found = {};
+    std::size_t next = 0;
+    float best() const { return found.empty() ? 0.F : found.front().score; }
+  };
+  std::vector<Lacking> lacking;
   for (int i = 0; i < n_cells; ++i) {
-    if (counts[static_cast<std::size_t>(i)] < per_cell_) lacking.push_back(i);
+    if (counts[static_cast<std::size_t>(i)] < per_cell_) lacking.push_back({i});
   }
   if (lacking.empty() || total >= options_.num_pts) return;
 
-  std::vector<std::vector<Candidate>> found(lacking.size());
   cv::parallel_for_(cv::Range(0, static_cast<int>(lacking.size())), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      found[k] = candidates(frame, cell(lacking[k]));
+      Lacking& one = lacking[static_cast<std::size_t>(i)];
+      one.found = candidates(frame, cell(one.cell));
     }
   });
-  // One point of each cell after the other, so that the limit does not starve the last cells.
-  std::vector<std::size_t> next(lacking.size(), 0);
+  // One point of each cell after the other, beginning where the best ones are: the limit starves
+  // the worst cells, and not the last ones of the image.
+  std::sort(lacking.begin(), lacking.end(), [](const Lacking& a, const Lacking& b) {
+    return std::tuple(-a.best(), a.cell) < std::tuple(-b.best(), b.cell);
+  });
   std::vector<cv::Point2f> fresh;
   for (bool progress = true; progress && total < options_.num_pts;) {
     progress = false;
-    for (std::size_t k = 0; k < lacking.size() && total < options_.num_pts; ++k) {
-      int& count = counts[static_cast<std::size_t>(lacking[k])];
+    for (Lacking& one : lacking) {
+      int& count = counts[static_cast<std::size_t>(one.cell)];
+      if (total >= options_.num_pts) break;
       if (count >= per_cell_) continue;
-      while (next[k] < found[k].size() && !spacing.add_if_free(found[k][next[k]].uv)) ++next[k];
-      if (next[k] == found[k].size()) continue;
-      fresh.push_back(found[k][next[k]++].uv);
+      while (one.next < one.found.size() && !spacing.add_if_free(one.found[one.next].uv)) {
+        ++one.next;
+      }
+      if (one.next == one.found.size()) continue;
+      fresh.push_back(one.found[one.next++].uv);
       ++count;
       ++total;
       progress = true;

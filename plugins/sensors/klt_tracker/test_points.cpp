@@ -181,6 +181,20 @@ TEST(Detector, IsNotKeptFromWeakCornersByStrongOnesUnderAMask) {
   for (const cv::Point2f& uv : points) EXPECT_GT(std::fmod(uv.x, 80.F), 39.4F);
 }
 
+TEST(Detector, PrefersTheBestCellsWhenThereAreMoreCellsThanPoints) {
+  // GIVEN five times as many cells as points, and more contrast in the lower half of the image
+  TrackerOptions options;
+  options.num_pts = 20;
+  options.grid_x = 10;
+  options.grid_y = 10;
+  const cv::Mat image = draw(320, 240, [](int x, int y) {
+    return !in_square(x, y, 16, 8) ? 30. : y < 120 ? 90. : 210.;
+  });
+  const auto points = detect(pinhole(320, 240), options, as_seen(image));
+  EXPECT_EQ(points.size(), 20U);
+  for (const cv::Point2f& uv : points) EXPECT_GT(uv.y, 110.F);
+}
+
 TEST(Frame, IsBlankWhenDarkOrFlatButNotWhenDim) {
   TrackerOptions options;
   Frame frame;
