@@ -69,7 +69,6 @@ bool ImageGroups::next(Sensor& input, Rejections& rejections, ImageGroup& out) {
       ahead_ ? std::exchange(ahead_, std::nullopt) : next_image(input, rejections);
   if (!image) return false;
   const std::int64_t begin_ns = image->t_ns;
-  int lowest_camera = kMaxCameras;
   for (int count = 0; image; image = next_image(input, rejections)) {
     auto& source = out.sources[static_cast<std::size_t>(image->camera)];
     if (source != nullptr || std::abs(image->t_ns - begin_ns) > tolerance_ns_) {
@@ -77,8 +76,8 @@ bool ImageGroups::next(Sensor& input, Rejections& rejections, ImageGroup& out) {
       break;
     }
     source = std::move(image->source);
-    if (image->camera < lowest_camera) {
-      lowest_camera = image->camera;
+    if (image->camera < out.first_camera) {
+      out.first_camera = image->camera;
       out.t_ns = image->t_ns;
     }
     if (++count == n_cameras_) break;

@@ -30,8 +30,9 @@ class Rejections {
 };
 
 struct ImageGroup {
-  /// Of the first camera's image, or of the only one; camera clock.
+  /// Of the image of `first_camera`, in its clock.
   std::int64_t t_ns = 0;
+  int first_camera = kMaxCameras;  ///< the lowest that has an image
   std::array<std::shared_ptr<const ImageSource>, kMaxCameras> sources;  ///< null: no image
 };
 

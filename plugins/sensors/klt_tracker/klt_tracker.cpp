@@ -72,8 +72,7 @@ KltTracker::KltTracker(const ParamSet& params, const HostServices& services)
       options_(read_options(params)),
       chain_file_(params.text("cameras")),
       max_gap_s_(params.number("max_gap_s")),
-      cameras_(read_cameras(params)),
-      shift_ns_(std::llround(cameras_[0].t_CtoI_s * 1e9)) {
+      cameras_(read_cameras(params)) {
   const bool stereo = cameras_.size() > 1 && params.flag("stereo");
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     eyes_.emplace_back(options_);
@@ -205,9 +204,11 @@ void KltTracker::process(const ImageGroup& group) {
                       });
   }
   for (CameraTracker& tracker : trackers_) give_ids(tracker.tracks());
+  const double shift_s = cameras_[static_cast<std::size_t>(group.first_camera)].t_CtoI_s;
+  const std::int64_t t_imu_ns = group.t_ns + std::llround(1e9 * shift_s);
   for (std::size_t i = 0; i < eyes_.size(); ++i) {
     if (!eyes_[i].is_read) continue;
-    FeatureSample sample{group.t_ns + shift_ns_, static_cast<int>(i), {}};
+    FeatureSample sample{t_imu_ns, static_cast<int>(i), {}};
     if (i < trackers_.size()) {
       for (const Track& track : trackers_[i].tracks()) {
         sample.points.push_back({track.id, track.uv.x, track.uv.y});

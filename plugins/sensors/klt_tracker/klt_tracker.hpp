@@ -60,7 +60,6 @@ class KltTracker final : public Sensor {
   std::string chain_file_;
   double max_gap_s_;
   std::vector<CameraView> cameras_;
-  std::int64_t shift_ns_ = 0;  ///< from the clock of camera 0 to that of the IMU
   std::vector<Eye> eyes_;
   std::vector<CameraTracker> trackers_;  ///< of every camera, or of the left one of a pair
   std::vector<StereoMatcher> matchers_;  ///< one or none

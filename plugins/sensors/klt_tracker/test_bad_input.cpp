@@ -48,6 +48,18 @@ TEST(KltTracker, CountsARightImageWithoutItsLeftOne) {
   EXPECT_GT(common(played.of(0)[0], played.of(0)[1]), 170U);
 }
 
+TEST(KltTracker, GivesAnImageAloneTheClockOfItsOwnCamera) {
+  std::vector<Measurement> input = drive(3, 2);
+  input.erase(input.begin() + 2);  // left, second pair
+  const Played played = track(input, section("stereo: false\n"));
+  const auto right = played.of(1);
+  ASSERT_EQ(right.size(), 3U);
+  EXPECT_EQ(right[0].t_ns, stamp_of(0) + kShiftNs);
+  EXPECT_EQ(right[1].t_ns, stamp_of(1) + 4'500'000);
+  EXPECT_EQ(right[2].t_ns, stamp_of(2) + kShiftNs);
+  EXPECT_TRUE(played.rejections.empty());
+}
+
 TEST(KltTracker, StartsAnewAfterALongGapAndAfterDarkness) {
   // GIVEN images 0 to 2, then none for 0.6 s, then 8 to 10, of which 9 is dark
   std::vector<Measurement> input = drive(11, 1);
