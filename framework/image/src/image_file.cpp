@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string_view>
+#include <system_error>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -58,11 +58,18 @@ void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, 
 }
 
 void read_image(const std::filesystem::path& file, Image& out) {
+  const auto refuse = [&] {
+    throw InputError(file.string() + ": the image is missing or cannot be read");
+  };
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);  // also refuses folders
+  if (error) refuse();
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw InputError(file.string() + ": the image is missing or cannot be read");
-  const std::vector<char> bytes((std::istreambuf_iterator<char>(stream)), {});
-  decode_image({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, file.string(),
-               out);
+  std::vector<std::uint8_t> bytes(size);
+  if (!stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size))) {
+    refuse();
+  }
+  decode_image(bytes, file.string(), out);
 }
 
 std::vector<std::uint8_t> encode_png(const Image& image) {

@@ -85,6 +85,10 @@ TEST_F(ImageFileTest, SaysWhatIsNoImage) {
             (folder_ / "empty.png").string() + ": the image is empty");
 }
 
+TEST_F(ImageFileTest, AFolderIsNoImage) {
+  EXPECT_EQ(failure(folder_), folder_.string() + ": the image is missing or cannot be read");
+}
+
 TEST_F(ImageFileTest, ColoursAndSixteenBitsBecomeGrey) {
   cv::Mat deep(2, 2, CV_16UC1, cv::Scalar(0x4321));
   cv::imwrite((folder_ / "deep.png").string(), deep);
