@@ -23,8 +23,11 @@ bool cut_short(std::span<const std::uint8_t> bytes) {
                       [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
   };
   const auto has_near_end = [&](std::string_view mark) {
-    // Some writers pad the file.
-    const auto tail = bytes.last(std::min<std::size_t>(bytes.size(), 64));
+    // Some writers pad the file: with zeros to the end of a block, or with a few bytes of anything.
+    const auto last =
+        std::find_if(bytes.rbegin(), bytes.rend(), [](auto byte) { return byte != 0; });
+    const auto whole = bytes.first(static_cast<std::size_t>(bytes.rend() - last));
+    const auto tail = whole.last(std::min<std::size_t>(whole.size(), 64));
     const auto same = [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); };
     return std::search(tail.begin(), tail.end(), mark.begin(), mark.end(), same) != tail.end();
   };

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -67,6 +68,11 @@ TEST_F(ImageFileTest, EveryCutOfAFileIsRefusedByName) {
       EXPECT_THROW(decode_image(std::span(bytes).first(size), "cut", image), InputError) << size;
     }
   }
+  for (auto bytes : {png, jpeg}) {  // zeros are no end
+    bytes.resize(bytes.size() / 2);
+    bytes.resize(bytes.size() + 1000, 0);
+    EXPECT_THROW(decode_image(bytes, "cut and padded", image), InputError);
+  }
   const fs::path file = folder_ / "cut.png";
   std::ofstream(file, std::ios::binary)
       .write(reinterpret_cast<const char*>(png.data()),
@@ -83,6 +89,21 @@ TEST_F(ImageFileTest, SaysWhatIsNoImage) {
   std::ofstream(folder_ / "empty.png").flush();
   EXPECT_EQ(failure(folder_ / "empty.png"),
             (folder_ / "empty.png").string() + ": the image is empty");
+}
+
+TEST_F(ImageFileTest, AWholeFileMayBePadded) {
+  std::vector<std::uint8_t> png = encode_png(pattern()), jpeg;
+  cv::imencode(".jpg", cv::Mat(20, 30, CV_8UC1, cv::Scalar(90)), jpeg);
+  Image image;
+  for (auto bytes : {png, jpeg}) {
+    for (const auto& [size, value] : {std::pair{40U, 0xffU}, {4096U, 0U}, {0U, 0U}}) {
+      auto padded = bytes;
+      padded.resize(bytes.size() + size, static_cast<std::uint8_t>(value));
+      EXPECT_NO_THROW(decode_image(padded, "padded", image)) << size << " x " << value;
+    }
+  }
+  decode_image(png, "png", image);
+  EXPECT_EQ(image.pixels, pattern().pixels);
 }
 
 TEST_F(ImageFileTest, AFolderIsNoImage) {
