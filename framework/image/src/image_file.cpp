@@ -50,7 +50,8 @@ void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, 
                     const_cast<std::uint8_t*>(bytes.data()));
   cv::Mat grey;
   try {
-    grey = cv::imdecode(raw, cv::IMREAD_GRAYSCALE);
+    // As the sensor gave it: turned by what EXIF says, it would not be that of the calibration.
+    grey = cv::imdecode(raw, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception& error) {
     throw InputError(name + ": " + error.err);
   }

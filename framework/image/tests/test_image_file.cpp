@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -108,6 +109,28 @@ TEST_F(ImageFileTest, AWholeFileMayBePadded) {
 
 TEST_F(ImageFileTest, AFolderIsNoImage) {
   EXPECT_EQ(failure(folder_), folder_.string() + ": the image is missing or cannot be read");
+}
+
+TEST_F(ImageFileTest, IsNotTurnedByWhatExifSays) {
+  // GIVEN a JPEG, white on the left, whose EXIF says that it is upside down
+  cv::Mat grey(8, 16, CV_8UC1, cv::Scalar(0));
+  grey.colRange(0, 8).setTo(255);
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", grey, jpeg);
+  // A segment with a TIFF of one entry: 0x112, the orientation, is 3.
+  const std::string_view exif(
+      "\xff\xe1\0\x22"
+      "Exif\0\0"
+      "II\x2a\0\x08\0\0\0"
+      "\1\0\x12\1\3\0\1\0\0\0\3\0\0\0"
+      "\0\0\0\0",
+      36);
+  jpeg.insert(jpeg.begin() + 2, exif.begin(), exif.end());
+  Image image;
+  decode_image(jpeg, "a.jpg", image);
+  ASSERT_EQ(image.pixels.size(), 128U);
+  EXPECT_GT(image.pixels[1], 200);
+  EXPECT_LT(image.pixels[14], 50);
 }
 
 TEST_F(ImageFileTest, ColoursAndSixteenBitsBecomeGrey) {

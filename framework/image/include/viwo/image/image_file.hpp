@@ -12,7 +12,8 @@
 
 namespace viwo {
 
-/// Decodes a PNG, JPEG, ... that is in memory. Colours become grey, 16 bit become the upper 8.
+/// Decodes a PNG, JPEG, ... that is in memory. Colours become grey, 16 bit become the upper 8; rows
+/// and columns stay as they are, whatever EXIF says of the orientation.
 /// InputError when it is none or is cut short; `name` says where it comes from.
 void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out);
 
