@@ -101,7 +101,8 @@ inline constexpr std::array kEstimatorParams{
               .fallback = "0.01",
               .min = 0.,
               .min_exclusive = true,
-              .help = "prior of the first orientation, each axis (start: reference)"},
+              .help = "prior of the first orientation, each axis; of a start without reference its "
+                      "yaw only"},
     ParamSpec{.name = "sigma_start_position_m",
               .type = ParamType::kNumber,
               .unit = "m",
@@ -115,7 +116,8 @@ inline constexpr std::array kEstimatorParams{
               .fallback = "0.05",
               .min = 0.,
               .min_exclusive = true,
-              .help = "prior of the first velocity (start: reference)"},
+              .help = "prior of the first velocity; start: moving: what slip adds to that of the "
+                      "wheels; start: standstill: not used"},
     ParamSpec{.name = "sigma_start_gyro_bias_rad_per_s",
               .type = ParamType::kNumber,
               .unit = "rad/s",
