@@ -22,7 +22,8 @@ struct StandstillOptions {
 /// The state at the end of the last `window_s` of the IMU if the base stood still in it (F-9):
 /// the readings scatter as their noise does (with room for vibration), the mean specific force is
 /// gravity within the bias prior, the mean rate within the bias prior, and no wheel turned.
-/// G is below the IMU's first position, yaw zero.
+/// The origin of G is there where the IMU is then, and the x axis of G in the IMU's x-z plane (y-z,
+/// if x is nearly vertical).
 StartAttempt start_from_standstill(std::span<const ImuSample> imu,
                                    std::span<const std::vector<EncoderSample>> encoders,
                                    const StandstillOptions& options);
