@@ -10,8 +10,6 @@ namespace {
 
 constexpr int kMaxFactorsPerUpdate = 16;
 constexpr std::size_t kFirstWindow = 3;
-/// No start looks at more than this before it, s (estimator.start_window_s has that bound).
-constexpr double kMaxStartWindowS = 60.;
 constexpr std::size_t kEpochsPerClone = 3;
 
 /// CPU time of this thread: what an epoch costs, however busy the machine is with other things.
@@ -102,11 +100,6 @@ std::vector<std::string> Estimator::stage_names() const {
   return names;
 }
 
-void Estimator::start(const ImuPrior& prior) {
-  filter_.initialize(prior);
-  initializer_ = nullptr;
-}
-
 void Estimator::add(const ImuSample& sample) {
   if (!finite(sample.gyro_rad_per_s) || !finite(sample.accel_m_per_s2)) {
     return reject("IMU value that is not finite", sample.t_ns);
@@ -161,6 +154,7 @@ void Estimator::add(const PoseSample& pose, int stream) {
   }
   if (pose.t_ns <= poses.last_ns) return reject("pose stamp not after the last", pose.t_ns);
   poses.last_ns = pose.t_ns;
+  if (pose.t_ns <= start_ns_) return reject("pose before the start", pose.t_ns);
   poses.waiting.push_back(pose);
 }
 
@@ -237,13 +231,11 @@ void Estimator::take_images(std::int64_t t_ns) {
   n_waiting_ -= taken;
 }
 
-void Estimator::take_poses(std::int64_t t_ns) {
-  for (PoseStream& stream : poses_) {
-    const auto end = std::find_if(stream.waiting.begin(), stream.waiting.end(),
-                                  [t_ns](const PoseSample& pose) { return pose.t_ns > t_ns; });
-    stream.taken.assign(stream.waiting.begin(), end);
-    stream.waiting.erase(stream.waiting.begin(), end);
-  }
+void Estimator::PoseStream::take(std::int64_t t_ns) {
+  const auto end = std::find_if(waiting.begin(), waiting.end(),
+                                [t_ns](const PoseSample& pose) { return pose.t_ns > t_ns; });
+  taken.assign(waiting.begin(), end);
+  waiting.erase(waiting.begin(), end);
 }
 
 void Estimator::forget_used() {
@@ -264,40 +256,6 @@ void Estimator::forget_used() {
   }
 }
 
-void Estimator::forget_before_start() {
-  if (imu_.empty() || seconds_between(imu_.front().t_ns, latest_ns_) < 2. * kMaxStartWindowS)
-    return;
-  const std::int64_t keep_ns = latest_ns_ - to_ns(kMaxStartWindowS);
-  const auto drop = [keep_ns](auto& samples) {
-    const auto keep = std::find_if(samples.begin(), samples.end(),
-                                   [keep_ns](const auto& s) { return s.t_ns >= keep_ns; });
-    samples.erase(samples.begin(), keep);
-  };
-  drop(imu_);
-  for (auto& samples : encoders_) drop(samples);
-  while (n_waiting_ > 0 && waiting_.front().t_ns < keep_ns) {
-    reject("image before the start", waiting_.front().t_ns);
-    take_images(waiting_.front().t_ns);
-  }
-}
-
-bool Estimator::try_to_initialize() {
-  if (!initializer_) return false;
-  const StartAttempt attempt = initializer_(imu_, encoders_);
-  if (attempt.prior) {
-    start(*attempt.prior);
-    return true;
-  }
-  const auto is_known = [&](const StartObstacle& known) { return known.text == attempt.obstacle; };
-  auto known = std::find_if(start_obstacles_.begin(), start_obstacles_.end(), is_known);
-  if (known == start_obstacles_.end()) {
-    known = start_obstacles_.insert(known, {attempt.obstacle, 0});
-  }
-  ++known->count;
-  forget_before_start();
-  return false;
-}
-
 void Estimator::update_monitors() {
   bool any_new = false;
   for (std::size_t i = 0; i < monitors_.size(); ++i) {
@@ -311,10 +269,6 @@ void Estimator::update_monitors() {
 bool Estimator::step() {
   if (!failure_.empty()) return false;
   if (!filter_.initialized() && !try_to_initialize()) return false;
-  while (n_waiting_ > 0 && waiting_.front().t_ns <= filter_.t_ns()) {
-    reject("image before the start", waiting_.front().t_ns);
-    take_images(waiting_.front().t_ns);
-  }
   const auto t_ns = next_epoch_ns();
   if (!t_ns) return false;
 
@@ -328,7 +282,7 @@ bool Estimator::step() {
   data.begin_ns = filter_.t_ns();
   data.end_ns = *t_ns;
   take_images(*t_ns);
-  take_poses(*t_ns);
+  for (PoseStream& stream : poses_) stream.take(*t_ns);
   cut_imu(*t_ns);
   if (options_.growing_window) {
     filter_.limit_window(kFirstWindow + static_cast<std::size_t>(epochs_) / kEpochsPerClone);

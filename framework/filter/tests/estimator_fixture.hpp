@@ -24,6 +24,7 @@ struct Seen {
   std::vector<ImuSample> imu;
   std::vector<FeatureSample> features;
   std::vector<EncoderSample> encoders;
+  std::vector<PoseSample> poses;
   std::vector<std::int64_t> clones;
   bool oldest_leaves;
 };
@@ -42,6 +43,7 @@ class FakeUpdate final : public Update {
     now.imu.assign(data.imu.begin(), data.imu.end());
     now.features.assign(data.features.begin(), data.features.end());
     now.encoders.assign(data.encoders.begin(), data.encoders.end());
+    now.poses.assign(data.poses.begin(), data.poses.end());
     for (const CloneView& clone : filter.clones) now.clones.push_back(clone.t_ns);
     now.oldest_leaves = filter.oldest_leaves;
     if (emit_) emit_(filter, sink);

@@ -114,7 +114,7 @@ class Estimator {
   void observe(EstimatorObserver* observer) { observer_ = observer; }
 
   /// Measurements of one kind must come in time order; others are counted and dropped, as are
-  /// values that are not finite and images before the start.
+  /// values that are not finite and images and poses before the start.
   void add(const ImuSample& sample);
   void add(const FeatureSample& image);
   void add(const EncoderSample& sample, int wheels);
@@ -147,14 +147,24 @@ class Estimator {
   std::span<const double> stage_ms() const { return stage_ms_; }
 
  private:
+  /// Poses of one sensor; nothing waits for them.
+  struct PoseStream {
+    void take(std::int64_t t_ns);     ///< those up to then
+    std::vector<PoseSample> waiting;  // in time order
+    std::vector<PoseSample> taken;    // of the present epoch
+    std::int64_t last_ns = std::numeric_limits<std::int64_t>::min();
+  };
+
   std::optional<std::int64_t> next_epoch_ns() const;
   bool encoders_reach(std::int64_t t_ns) const;
   /// Whether no further image of an epoch's instant is to be expected.
   bool images_arrived(std::int64_t t_ns) const;
   void cut_imu(std::int64_t end_ns);
   void take_images(std::int64_t t_ns);
-  void take_poses(std::int64_t t_ns);
   void forget_used();
+  /// Count what came for nothing up to then.
+  void drop_images(std::int64_t t_ns);
+  void drop_poses(PoseStream& stream, std::int64_t t_ns);
   bool try_to_initialize();
   /// A base that waits for hours before it moves: what no start looks at any more.
   void forget_before_start();
@@ -179,6 +189,7 @@ class Estimator {
   InformationFactor information_factor_;
   Initializer initializer_;
   std::vector<StartObstacle> start_obstacles_;
+  std::int64_t start_ns_ = std::numeric_limits<std::int64_t>::min();
   EstimatorObserver* observer_ = nullptr;
   std::vector<ExcitationMonitor> monitors_;
   std::vector<std::size_t> monitored_;  // wheel set of each
@@ -189,12 +200,6 @@ class Estimator {
   std::size_t n_waiting_ = 0;
   std::vector<FeatureSample> images_;  // of the present epoch; spare ones behind
   std::size_t n_images_ = 0;
-  /// Poses of one sensor; nothing waits for them.
-  struct PoseStream {
-    std::vector<PoseSample> waiting;  // in time order
-    std::vector<PoseSample> taken;    // of the present epoch
-    std::int64_t last_ns = std::numeric_limits<std::int64_t>::min();
-  };
   std::vector<PoseStream> poses_;
   std::vector<ImuSample> cut_;  // IMU of the present epoch, interpolated at its ends
   std::int64_t latest_ns_ = 0;  // largest stamp of anything
