@@ -1,6 +1,7 @@
 // How the estimator comes to a start, and what becomes of the measurements before it.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "viwo/filter/estimator.hpp"
 
@@ -9,6 +10,8 @@ namespace {
 
 /// No start looks at more than this before it (estimator.start_window_s has that bound).
 constexpr std::int64_t kMaxStartWindowNs = 60'000'000'000;
+/// Between two attempts: one may take longer than the IMU to its next sample.
+constexpr std::int64_t kAttemptPeriodNs = 50'000'000;
 
 /// Until when a stream from `front_ns` to `newest_ns` is forgotten; nothing as long as moving the
 /// rest is not worth while.
@@ -70,9 +73,17 @@ void Estimator::forget_before_start() {
   }
 }
 
+bool Estimator::attempt_is_due() {
+  if (finished_) return !std::exchange(attempted_at_end_, true);
+  if (imu_.empty() || imu_.back().t_ns < next_attempt_ns_) return false;
+  next_attempt_ns_ = imu_.back().t_ns + kAttemptPeriodNs;
+  return true;
+}
+
 bool Estimator::try_to_initialize() {
   if (!initializer_) return false;
   forget_before_start();
+  if (!attempt_is_due()) return false;
   const StartAttempt attempt = initializer_(imu_, encoders_);
   if (attempt.prior) {
     start(*attempt.prior);

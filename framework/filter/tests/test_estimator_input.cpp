@@ -242,12 +242,12 @@ TEST(Estimator, AsksTheInitializerUntilItFindsAStart) {
     if (t % 50 == 0) estimator.add(image_at(kStart + t * kMs));
     estimator.step();
   }
-  EXPECT_EQ(asked, 21);
+  EXPECT_EQ(asked, 5);  // every 50 ms
   ASSERT_EQ(estimator.start_obstacles().size(), 2u);
   EXPECT_EQ(estimator.start_obstacles()[0].text, "far too short");
-  EXPECT_EQ(estimator.start_obstacles()[0].count, 5);
+  EXPECT_EQ(estimator.start_obstacles()[0].count, 1);
   EXPECT_EQ(estimator.start_obstacles()[1].text, "too short");
-  EXPECT_EQ(estimator.start_obstacles()[1].count, 15);
+  EXPECT_EQ(estimator.start_obstacles()[1].count, 3);
   ASSERT_EQ(update->seen.size(), 3u);  // 250, 300, 350: nothing is later than the last image
   EXPECT_EQ(update->seen[0].begin_ns, kStart + 200 * kMs);
   EXPECT_EQ(update->seen[0].end_ns, kStart + 250 * kMs);

@@ -62,6 +62,33 @@ struct Waiting {
   }
 };
 
+TEST(EstimatorStart, IsTriedEvery50MsAndOnceMoreAtTheEnd) {
+  Waiting waiting;
+  for (std::int64_t t = 0; t <= 120; t += 10) {
+    waiting.estimator.add(imu_at(kStart + t * kMs));
+    waiting.estimator.add(encoder_at(kStart + t * kMs), 0);
+    EXPECT_FALSE(waiting.estimator.step());
+    EXPECT_FALSE(waiting.estimator.step());
+  }
+  EXPECT_EQ(waiting.asked_ms, (std::vector<std::int64_t>{0, 50, 100}));
+  waiting.estimator.finish();
+  EXPECT_FALSE(waiting.estimator.step());
+  EXPECT_FALSE(waiting.estimator.step());
+  EXPECT_EQ(waiting.asked_ms, (std::vector<std::int64_t>{0, 50, 100, 120}));
+  ASSERT_EQ(waiting.estimator.start_obstacles().size(), 1u);
+  EXPECT_EQ(waiting.estimator.start_obstacles()[0].count, 4);
+}
+
+TEST(EstimatorStart, IsTriedAtTheEndWithoutAnyImuSoThatItSaysWhatIsMissing) {
+  Waiting waiting;
+  waiting.estimator.add(image_at(kStart));
+  EXPECT_FALSE(waiting.estimator.step());
+  EXPECT_TRUE(waiting.asked_ms.empty());
+  waiting.estimator.finish();
+  EXPECT_FALSE(waiting.estimator.step());
+  EXPECT_EQ(waiting.asked_ms, (std::vector<std::int64_t>{-1}));
+}
+
 TEST(EstimatorStart, IsNotSpoiltByAStampInTheFuture) {
   // GIVEN an image and a pose of an hour later; then the IMU for a second
   const std::int64_t ahead = kStart + 3600'000 * kMs;

@@ -90,10 +90,11 @@ class EstimatorObserver {
 };
 
 /// Finds a state to start from, given everything that was measured so far, or says why not yet.
+/// Asked at most every 50 ms of the IMU's stamps, and once when no further measurement will come.
 using Initializer = std::function<StartAttempt(
     std::span<const ImuSample> imu, std::span<const std::vector<EncoderSample>> encoders)>;
 
-/// How often something was in the way of a start.
+/// In how many attempts something was in the way of a start.
 struct StartObstacle {
   std::string_view text;
   std::int64_t count = 0;
@@ -165,6 +166,8 @@ class Estimator {
   /// Count what came for nothing up to then.
   void drop_images(std::int64_t t_ns);
   void drop_poses(PoseStream& stream, std::int64_t t_ns);
+  /// Whether there is enough new since the last attempt to start, or nothing more to wait for.
+  bool attempt_is_due();
   bool try_to_initialize();
   /// A base that waits for hours before it moves: what no start looks at any more.
   void forget_before_start();
@@ -189,6 +192,8 @@ class Estimator {
   InformationFactor information_factor_;
   Initializer initializer_;
   std::vector<StartObstacle> start_obstacles_;
+  std::int64_t next_attempt_ns_ = std::numeric_limits<std::int64_t>::min();
+  bool attempted_at_end_ = false;
   std::int64_t start_ns_ = std::numeric_limits<std::int64_t>::min();
   EstimatorObserver* observer_ = nullptr;
   std::vector<ExcitationMonitor> monitors_;
