@@ -150,6 +150,33 @@ TEST(Pictures, ShowTheImageThatTheTracksAreOfInTheClockOfTheCamera) {
   EXPECT_LT(grey_of(run.result.pictures[1]), last);
 }
 
+TEST(Pictures, ShowTheNearestImageWhereTheTracksHaveTheStampOfTheOtherCamera) {
+  // GIVEN images 4 ms later than their tracks, and others 9 ms later; recorded, or as they arrive
+  for (const bool live : {false, true}) {
+    RunSetup setup = driving();
+    RunData data = collect(setup);
+    std::vector<ImageSample> pixels;
+    int last = -1;
+    for (ImageSample image : pixels_of(data, [](int i) { return 60 + i; })) {
+      if (image.camera == 0) last = static_cast<const Grey&>(*image.source).value;
+      image.t_ns += 4'000'000;
+      pixels.push_back(image);
+      pixels.push_back({image.t_ns + 5'000'000, image.camera, std::make_shared<Grey>(30)});
+    }
+    if (!live) data.pixels = pixels;
+    RunPictures pictures(setup, data, {});
+    RunHooks hooks;
+    pictures.watch(hooks);
+    for (const ImageSample& image : pixels) {
+      if (live) hooks.on_live_image(image);
+    }
+    RunResult result = run_filter(setup, data, hooks);
+    EXPECT_EQ(pictures.finish(result), "");
+    ASSERT_EQ(result.pictures.size(), 3U);
+    EXPECT_EQ(grey_of(result.pictures[2]), last) << live;
+  }
+}
+
 TEST(Pictures, ShowImagesThatArriveWhileTheRunGoesOn) {
   RunSetup setup = driving();
   RunData data = collect(setup);

@@ -15,8 +15,9 @@ namespace {
 
 /// Images of a live run that are kept until the filter has come to them.
 constexpr std::size_t kMaxArrived = 100;
-/// Stamps of tracks are those of their image plus the offset of its clock.
-constexpr double kSameStamp_s = 1e-3;
+/// Stamps of tracks are those of their image plus the offset of its clock; those of a pair are both
+/// of the first camera, whose image may be earlier or later by some milliseconds.
+constexpr double kMaxStampOff_s = 0.02;
 constexpr std::size_t kMaxCurves = 8;
 constexpr std::size_t kMaxPoints = 400;
 constexpr double kReferenceGap_s = 0.5;
@@ -219,19 +220,22 @@ std::shared_ptr<const ImageSource> RunPictures::source_of(std::size_t index) {
   if (!camera.t_ns) return nullptr;
   const double offset_s = setup_.filter->cameras[index].camera.t_CtoI_s;
   const auto t_ns = *camera.t_ns - static_cast<std::int64_t>(std::llround(1e9 * offset_s));
-  const auto is_it = [&](const ImageSample& image) {
-    return static_cast<std::size_t>(image.camera) == index &&
-           std::abs(seconds_between(image.t_ns, t_ns)) < kSameStamp_s;
+  double least_s = kMaxStampOff_s;
+  std::shared_ptr<const ImageSource> nearest;
+  const auto consider = [&](const ImageSample& image) {
+    const double off_s = std::abs(seconds_between(image.t_ns, t_ns));
+    if (static_cast<std::size_t>(image.camera) != index || off_s >= least_s) return;
+    least_s = off_s;
+    nearest = image.source;
   };
-  const std::scoped_lock lock(mutex_);
-  const auto arrived = std::find_if(arrived_.rbegin(), arrived_.rend(), is_it);
-  if (arrived != arrived_.rend()) return arrived->source;
   const auto after = std::lower_bound(
       camera.images.begin(), camera.images.end(), t_ns,
       [](const ImageSample& image, std::int64_t stamp) { return image.t_ns < stamp; });
-  if (after != camera.images.end() && is_it(*after)) return after->source;
-  if (after != camera.images.begin() && is_it(*(after - 1))) return (after - 1)->source;
-  return nullptr;
+  if (after != camera.images.end()) consider(*after);
+  if (after != camera.images.begin()) consider(*(after - 1));
+  const std::scoped_lock lock(mutex_);
+  for (const ImageSample& image : arrived_) consider(image);
+  return nearest;
 }
 
 view::CameraImage RunPictures::camera_image(std::size_t index) {
