@@ -150,7 +150,7 @@ inline constexpr std::array kImuParams{
     ParamSpec{.name = "kalibr",
               .type = ParamType::kPath,
               .fallback = "''",
-              .help = "Kalibr file with the noises; they overrule the four numbers below"},
+              .help = "Kalibr file with the noises, instead of the four numbers below"},
     ParamSpec{.name = "sigma_gyro_rad_per_s_sqrt_hz",
               .type = ParamType::kNumber,
               .unit = "rad/s/sqrt(Hz)",
