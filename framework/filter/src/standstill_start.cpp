@@ -30,12 +30,13 @@ Moments moments(std::span<const ImuSample> samples, const Get& get) {
 
 /// Wheels that turn faster than encoder noise and resolution explain.
 bool wheels_turn(std::span<const std::vector<EncoderSample>> encoders, double window_s) {
-  constexpr double kStillRadPerS = 0.05;
+  constexpr double kWheelStillRadPerS = 0.05;
   for (const auto& samples : encoders) {
     for (auto s = samples.rbegin(); s != samples.rend(); ++s) {
       if (seconds_between(s->t_ns, samples.back().t_ns) > window_s) break;
       for (int i = 0; i < s->n_drive; ++i) {
-        if (std::abs(s->drive_rad_per_s[static_cast<std::size_t>(i)]) > kStillRadPerS) return true;
+        if (std::abs(s->drive_rad_per_s[static_cast<std::size_t>(i)]) > kWheelStillRadPerS)
+          return true;
       }
     }
   }
