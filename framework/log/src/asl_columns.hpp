@@ -7,12 +7,12 @@
 
 namespace viwo::log {
 
-/// The column of the stamps: EuRoC's name, or what others call it.
-inline std::size_t stamp_column(const TableReader& table) {
-  for (const char* name : {"timestamp [ns]", "timestamp"}) {
+/// The column of the stamps, whichever of its names it has; `usual` is the one that is missed.
+inline std::size_t stamp_column(const TableReader& table, const char* usual = "timestamp_ns") {
+  for (const char* name : {"timestamp_ns", "timestamp [ns]", "timestamp"}) {
     if (table.has_column(name)) return table.column(name);
   }
-  return table.column("timestamp_ns");
+  return table.column(usual);
 }
 
 }  // namespace viwo::log
