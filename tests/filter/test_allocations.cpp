@@ -1,28 +1,8 @@
 // An epoch of the whole filter does not touch the heap in the steady state.
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include <gtest/gtest.h>
 
+#include "allocations.hpp"
 #include "filter_runs.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-// Eigen allocates with malloc, not with operator new: count there. Sanitizers need malloc
-// themselves, glibc offers the original under this name.
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-constexpr bool kCountsMalloc = true;
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-#else
-constexpr bool kCountsMalloc = false;
-#endif
 
 namespace viwo {
 namespace {
@@ -42,10 +22,10 @@ Counted count(const std::vector<std::string>& assignments, double warm_up_s) {
   for (const Measurement& measurement : measurements) {
     const bool warm =
         seconds_between(stamp_ns(measurements.front()), stamp_ns(measurement)) > warm_up_s;
-    const long before = allocations;
+    const long before = testing::allocations();
     testing::add(estimator, measurement);
     while (estimator.step()) counted.epochs += warm ? 1 : 0;
-    if (warm) counted.allocations += allocations - before;
+    if (warm) counted.allocations += testing::allocations() - before;
   }
   EXPECT_EQ(estimator.failure(), "");
   EXPECT_EQ(estimator.filter().clones().size(), 11u);
@@ -55,7 +35,7 @@ Counted count(const std::vector<std::string>& assignments, double warm_up_s) {
 }
 
 TEST(FilterAllocations, ThereAreNoneInTheSteadyStateWithVisionAndWheels) {
-  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  if (!testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
   const Counted counted = count({"sensors.simulator0.duration_s=12"}, 4.);
   EXPECT_EQ(counted.allocations, 0);
   EXPECT_GT(counted.epochs, 70);
@@ -63,7 +43,7 @@ TEST(FilterAllocations, ThereAreNoneInTheSteadyStateWithVisionAndWheels) {
 }
 
 TEST(FilterAllocations, ThereAreNoneWithFewFeaturesAndOneCamera) {
-  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  if (!testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
   const Counted counted =
       count({"sensors.simulator0.duration_s=12", "sensors.simulator0.features=30",
              "sensors.simulator0.n_cameras=1", "cameras.use=1"},
@@ -73,7 +53,7 @@ TEST(FilterAllocations, ThereAreNoneWithFewFeaturesAndOneCamera) {
 }
 
 TEST(FilterAllocations, ThereAreNoneWhileUnexcitedDirectionsAreHeld) {
-  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  if (!testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
   // The straight begins at 20 s; its warnings are given by 30 s.
   const Counted counted =
       count({"sensors.simulator0.duration_s=40", "sensors.simulator0.motion=sweep_then_straight",
@@ -84,12 +64,12 @@ TEST(FilterAllocations, ThereAreNoneWhileUnexcitedDirectionsAreHeld) {
 }
 
 TEST(FilterAllocations, CountingSeesAnAllocationOfEigen) {
-  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
-  const long before = allocations;
+  if (!testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  const long before = testing::allocations();
   Eigen::MatrixXd matrix(50, 50);
   matrix.setZero();
   EXPECT_EQ(matrix.sum(), 0.);
-  EXPECT_GT(allocations - before, 0);
+  EXPECT_GT(testing::allocations() - before, 0);
 }
 
 }  // namespace

@@ -1,35 +1,8 @@
 // The steady state of the update does not touch the heap, however it is reached.
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include <gtest/gtest.h>
 
+#include "allocations.hpp"
 #include "test_support.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-// Eigen allocates with malloc, not with operator new: count there. Sanitizers need malloc
-// themselves, glibc offers the original under this name.
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-constexpr bool kCountsMalloc = true;
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-#else
-constexpr bool kCountsMalloc = false;
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-#endif
 
 namespace viwo::visual {
 namespace {
@@ -67,10 +40,10 @@ void check(const testing::SceneOptions& window, double gate_probability) {
     data.features = samples;
     data.end_ns = path.clones[k].t_ns;
     sink.clear();
-    const long before = allocations;
+    const long before = viwo::testing::allocations();
     update.update(filter, data, sink);
     if (k > n) {
-      counted += allocations - before;
+      counted += viwo::testing::allocations() - before;
       applied += sink.applied();
     }
   }
@@ -79,18 +52,19 @@ void check(const testing::SceneOptions& window, double gate_probability) {
 }
 
 TEST(VisualFeatures, DoesNotAllocateInTheSteadyState) {
+  if (!viwo::testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
   check({.n_clones = 12}, 0.05);
   check({.n_clones = 12, .n_cameras = 2}, 0.9);
   check({.n_clones = 8, .n_cameras = 2, .calibrates = true}, 0.9);
 }
 
 TEST(VisualFeatures, CountingSeesAnAllocationOfEigen) {
-  if (!kCountsMalloc) GTEST_SKIP() << "malloc belongs to the sanitizer";
-  const long before = allocations;
+  if (!viwo::testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  const long before = viwo::testing::allocations();
   Eigen::MatrixXd matrix(50, 50);
   matrix.setZero();
   EXPECT_EQ(matrix.sum(), 0.);
-  EXPECT_GT(allocations - before, 0);
+  EXPECT_GT(viwo::testing::allocations() - before, 0);
 }
 
 }  // namespace
