@@ -142,9 +142,6 @@ void Estimator::add(const EncoderSample& sample, int wheels) {
     return reject("encoder sample that begins before the end of the last", sample.t_ns);
   }
   samples.push_back(sample);
-  // Their clock is not that of the filter.
-  const double t_OtoI_s = filter_.wheels()[static_cast<std::size_t>(wheels)].t_OtoI_s;
-  latest_ns_ = std::max(latest_ns_, sample.t_ns + to_ns(t_OtoI_s));
 }
 
 void Estimator::add(const PoseSample& pose, int stream) {

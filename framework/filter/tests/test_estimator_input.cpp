@@ -281,6 +281,33 @@ TEST(Estimator, ForgetsWhatNoStartLooksAtWhileItWaitsForOne) {
   EXPECT_GT(estimator.rejections()[1].count, 400);
 }
 
+TEST(Estimator, TakesBothImagesOfAnInstantWhateverTheClockOfTheWheels) {
+  // Cameras that are triggered with the IMU; in the order of the stamps the wheels are in between.
+  for (const double t_OtoI_s : {-0.02, 0., 0.02}) {
+    const auto update = std::make_shared<FakeUpdate>();
+    WheelsPrior wheels = testing::wheels_prior();
+    wheels.wheels.t_OtoI_s = t_OtoI_s;
+    Estimator estimator({}, {camera_prior(), camera_prior()}, {wheels}, {{"fake", update, 0}});
+    estimator.start(level_prior(kStart));
+    for (std::int64_t t = 0; t <= 500; t += 10) {
+      const auto step = [&] {
+        while (estimator.step()) {
+        }
+      };
+      estimator.add(imu_at(kStart + t * kMs));
+      step();
+      estimator.add(encoder_at(kStart + t * kMs), 0);
+      step();
+      for (const int camera : {0, 1}) {
+        if (t % 100 == 0 && t > 0) estimator.add(image_at(kStart + t * kMs, camera));
+        step();
+      }
+    }
+    ASSERT_EQ(update->seen.size(), 4U) << t_OtoI_s;
+    for (const Seen& seen : update->seen) EXPECT_EQ(seen.features.size(), 2U) << t_OtoI_s;
+  }
+}
+
 TEST(Estimator, OfLiveMeasurementsWaitsForTheImageOfTheOtherCamera) {
   const auto images_of_epoch = [](bool second_comes, std::int64_t imu_until_ms) {
     EstimatorOptions options;

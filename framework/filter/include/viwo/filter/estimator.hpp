@@ -207,7 +207,7 @@ class Estimator {
   std::size_t n_images_ = 0;
   std::vector<PoseStream> poses_;
   std::vector<ImuSample> cut_;  // IMU of the present epoch, interpolated at its ends
-  std::int64_t latest_ns_ = 0;  // largest stamp of anything
+  std::int64_t latest_ns_ = 0;  // largest stamp of IMU and images: wheels have their own clock
   bool finished_ = false;
   std::string failure_;
   std::int64_t epochs_ = 0;
