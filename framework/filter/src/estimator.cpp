@@ -11,6 +11,9 @@ namespace {
 constexpr int kMaxFactorsPerUpdate = 16;
 constexpr std::size_t kFirstWindow = 3;
 constexpr std::size_t kEpochsPerClone = 3;
+/// A stamp this far after that of the newest IMU sample is of another clock, or broken: taken, it
+/// would make all that come after it late.
+constexpr double kMaxAheadS = 10.;
 
 /// CPU time of this thread: what an epoch costs, however busy the machine is with other things.
 double thread_ms() {
@@ -100,6 +103,10 @@ std::vector<std::string> Estimator::stage_names() const {
   return names;
 }
 
+bool Estimator::far_ahead(std::int64_t t_ns) const {
+  return !imu_.empty() && seconds_between(imu_.back().t_ns, t_ns) > kMaxAheadS;
+}
+
 void Estimator::add(const ImuSample& sample) {
   if (!finite(sample.gyro_rad_per_s) || !finite(sample.accel_m_per_s2)) {
     return reject("IMU value that is not finite", sample.t_ns);
@@ -118,6 +125,7 @@ void Estimator::add(const FeatureSample& image) {
   if (filter_.initialized() && image.t_ns <= filter_.t_ns()) {
     return reject("image at or before the present epoch", image.t_ns);
   }
+  if (far_ahead(image.t_ns)) return reject("image more than 10 s ahead of the IMU", image.t_ns);
   if (n_waiting_ > 0 && image.t_ns < waiting_[n_waiting_ - 1].t_ns) {
     return reject("image before the last one", image.t_ns);
   }
@@ -137,6 +145,10 @@ void Estimator::add(const EncoderSample& sample, int wheels) {
   }
   if (sample.end_ns < sample.begin_ns) {
     return reject("encoder sample that ends before it begins", sample.t_ns);
+  }
+  const double t_OtoI_s = filter_.wheels()[static_cast<std::size_t>(wheels)].t_OtoI_s;
+  if (far_ahead(sample.t_ns + to_ns(t_OtoI_s))) {
+    return reject("encoder sample more than 10 s ahead of the IMU", sample.t_ns);
   }
   if (!samples.empty() && sample.begin_ns < samples.back().end_ns) {
     return reject("encoder sample that begins before the end of the last", sample.t_ns);

@@ -308,6 +308,24 @@ TEST(Estimator, TakesBothImagesOfAnInstantWhateverTheClockOfTheWheels) {
   }
 }
 
+TEST(Estimator, IsNotSpoiltByAStampInTheFuture) {
+  Rig rig(true);
+  rig.imu(-10, 0);
+  rig.image(3'600'000);
+  rig.estimator.add(encoder_at(kStart + 3'600'000 * kMs), 0);
+  for (std::int64_t t = 10; t <= 300; t += 10) {
+    rig.imu(t - 10, t);
+    rig.estimator.add(encoder_at(kStart + t * kMs), 0);
+    if (t % 100 == 0) rig.image(t);
+    rig.steps();
+  }
+  ASSERT_EQ(rig.update->seen.size(), 2U);
+  EXPECT_EQ(rig.update->seen[1].features.size(), 1U);
+  EXPECT_GT(rig.update->seen[1].encoders.size(), 15U);
+  EXPECT_EQ(rig.rejected(), (Counts{{"image more than 10 s ahead of the IMU", 1},
+                                    {"encoder sample more than 10 s ahead of the IMU", 1}}));
+}
+
 TEST(Estimator, OfLiveMeasurementsWaitsForTheImageOfTheOtherCamera) {
   const auto images_of_epoch = [](bool second_comes, std::int64_t imu_until_ms) {
     EstimatorOptions options;

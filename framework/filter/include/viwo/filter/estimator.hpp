@@ -115,7 +115,8 @@ class Estimator {
   void observe(EstimatorObserver* observer) { observer_ = observer; }
 
   /// Measurements of one kind must come in time order; others are counted and dropped, as are
-  /// values that are not finite and images and poses before the start.
+  /// values that are not finite, images and poses before the start, and images and encoder samples
+  /// more than ten seconds ahead of the IMU.
   void add(const ImuSample& sample);
   void add(const FeatureSample& image);
   void add(const EncoderSample& sample, int wheels);
@@ -156,6 +157,7 @@ class Estimator {
     std::int64_t last_ns = std::numeric_limits<std::int64_t>::min();
   };
 
+  bool far_ahead(std::int64_t t_ns) const;
   std::optional<std::int64_t> next_epoch_ns() const;
   bool encoders_reach(std::int64_t t_ns) const;
   /// Whether no further image of an epoch's instant is to be expected.
