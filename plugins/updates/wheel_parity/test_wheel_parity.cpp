@@ -41,6 +41,7 @@ class ParityInterval : public ::testing::Test {
     view.clones = view.clones.first(1);
     update.update(view, data, sink);
     EXPECT_EQ(sink.information(), nullptr);
+    data.end_ns = filter.clones.back().t_ns;
     update.update(filter.view(), data, sink);
   }
 
@@ -118,10 +119,18 @@ TEST_F(ParityInterval, GatesASlippingWheelButNotWrongIntrinsics) {
   EXPECT_EQ(sink.rejected(), 0);
   for (std::size_t i = 110; i < 130; ++i) encoders_[i].drive_rad_per_s[2] *= 1.1;
   sink.clear();
-  run(*testing::load_update("{type: wheel_parity, period_s: 0}"), filter_, sink);
+  const auto update = testing::load_update("{type: wheel_parity, period_s: 0}");
+  run(*update, filter_, sink);
   EXPECT_EQ(sink.applied(), 0);
   EXPECT_EQ(sink.rejected(), 1);
   EXPECT_EQ(sink.information(), nullptr);
+  // THEN what the run lists as rejected has it, with the time of the first
+  std::vector<RejectionCount> counts;
+  update->rejections(counts);
+  ASSERT_EQ(counts.size(), 1U);
+  EXPECT_EQ(counts[0].reason, "interval dropped by the chi-square gate");
+  EXPECT_EQ(counts[0].count, 1);
+  EXPECT_EQ(counts[0].first, "t = 1.500 s");
 }
 
 TEST_F(ParityInterval, DoesNotAllocateInTheSteadyState) {

@@ -99,7 +99,10 @@ class WheelParity final : public Update {
     // (WP-5): what no change of the intrinsics within their prior explains.
     const bool believed = cost_ - gain <= gate(pose_.parity.dof);
     sink.count(believed ? 1 : 0, believed ? 0 : 1);
-    if (!believed) return;
+    if (!believed) {
+      gated_.add(1, data.end_ns);
+      return;
+    }
     ++intervals_used_;
     if (second_order_noise_ && --unchecked_ < 0) add_second_order_noise(data, *interval);
     emit(filter.wheels->intrinsics_column, sink.add_information());
@@ -108,6 +111,7 @@ class WheelParity final : public Update {
   void rejections(std::vector<RejectionCount>& out) const override {
     intervals_.append_rejections(out);
     tallies_.append_rejections(out);
+    gated_.append_to(out);
   }
 
  private:
@@ -273,6 +277,7 @@ class WheelParity final : public Update {
 
   EncoderIntervals intervals_;
   SampleTallies tallies_;
+  Tally gated_{"interval dropped by the chi-square gate"};
   std::optional<Preintegrator> preintegrator_;
   double gate_ = 0.;
   int gate_dof_ = 0;
