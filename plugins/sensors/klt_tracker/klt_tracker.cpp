@@ -20,6 +20,8 @@ constexpr double kContradictingShare = 0.7;
 /// Pairs in a row that contradict the extrinsics before it is said.
 constexpr int kContradictingPairs = 10;
 constexpr double kMinBaseline = 1e-3;  // m
+/// Images of another size in a row that are not a slip of the log any more.
+constexpr int kOtherSizes = 10;
 
 std::string size_text(int width_px, int height_px) {
   return std::to_string(width_px) + " x " + std::to_string(height_px) + " pixels";
@@ -87,20 +89,26 @@ KltTracker::KltTracker(const ParamSet& params, const HostServices& services)
                   std::llround(params.number("max_camera_dt_s") * 1e9));
 }
 
-void KltTracker::read_one(const ImageSource* source, bool with_derivatives, Eye& eye) const {
+void KltTracker::read_one(const ImageSource* source, std::size_t camera, Eye& eye) const {
   eye.is_read = false;
   eye.unreadable.clear();
+  eye.other_size.clear();
   eye.failure = nullptr;
   if (source == nullptr) return;
   try {
     source->read(eye.image);
-    eye.is_read = true;
     const auto pixels = static_cast<std::size_t>(std::max(eye.image.width_px, 0)) *
                         static_cast<std::size_t>(std::max(eye.image.height_px, 0));
     if (pixels == 0 || eye.image.pixels.size() != pixels) throw InputError("no pixels");
-    eye.maker.make(eye.image, with_derivatives, eye.now);
+    const CameraView& view = cameras_[camera];
+    if (eye.image.width_px != view.width_px || eye.image.height_px != view.height_px) {
+      eye.other_size = size_text(eye.image.width_px, eye.image.height_px);
+      return;
+    }
+    // Points are followed from the images of trackers; the right image of a pair is only searched.
+    eye.maker.make(eye.image, camera < trackers_.size(), eye.now);
+    eye.is_read = true;
   } catch (const InputError& error) {
-    eye.is_read = false;
     eye.unreadable = error.what();
   } catch (...) {  // nothing may leave a thread of OpenCV
     eye.failure = std::current_exception();
@@ -111,9 +119,7 @@ void KltTracker::read(const ImageGroup& group) {
   cv::parallel_for_(cv::Range(0, static_cast<int>(eyes_.size())), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
       const auto camera = static_cast<std::size_t>(i);
-      // Points are followed from the images of trackers; the right image of a pair is only
-      // searched.
-      read_one(group.sources[camera].get(), camera < trackers_.size(), eyes_[camera]);
+      read_one(group.sources[camera].get(), camera, eyes_[camera]);
     }
   });
 }
@@ -126,20 +132,30 @@ void KltTracker::check(const ImageGroup& group) {
     if (!eye.unreadable.empty()) {
       rejections_.add("image that cannot be read", where + ": " + eye.unreadable);
     }
-    if (!eye.is_read) continue;
-    const CameraView& camera = cameras_[i];
-    if (eye.image.width_px != camera.width_px || eye.image.height_px != camera.height_px) {
-      throw InputError("the image of " + where + " has " +
-                       size_text(eye.image.width_px, eye.image.height_px) + ", but cam" +
-                       std::to_string(i) + " of " + chain_file_ + " has " +
-                       size_text(camera.width_px, camera.height_px) +
-                       ": is the calibration that of another camera?");
-    }
+    check_size(i, where);
   }
   if (is_stereo() && !eyes_[0].is_read && eyes_[1].is_read) {
     rejections_.add("right image without its left one", place(1, group.t_ns));
     eyes_[1].is_read = false;
   }
+}
+
+void KltTracker::check_size(std::size_t camera, const std::string& where) {
+  Eye& eye = eyes_[camera];
+  if (eye.is_read) {
+    eye.has_fitted = true;
+    eye.other_sizes = 0;
+  }
+  if (eye.other_size.empty()) return;
+  rejections_.add("image of another size than the camera's", where + ": " + eye.other_size);
+  if (++eye.other_sizes == 1) {
+    const CameraView& view = cameras_[camera];
+    eye.first_other_size = "the image of " + where + " has " + eye.other_size + ", but cam" +
+                           std::to_string(camera) + " of " + chain_file_ + " has " +
+                           size_text(view.width_px, view.height_px) +
+                           ": is the calibration that of another camera?";
+  }
+  if (eye.other_sizes >= kOtherSizes) throw InputError(eye.first_other_size);
 }
 
 void KltTracker::advance(std::size_t camera, std::int64_t t_ns) {
@@ -223,16 +239,23 @@ void KltTracker::process(const ImageGroup& group) {
   }
 }
 
+void KltTracker::check_end() const {
+  if (groups_->images() == 0 && groups_->others() > 0) {
+    throw InputError("klt_tracker: its input gives no image of " +
+                     std::string(cameras_.size() == 1 ? "camera 0" : "camera 0 or 1") + ", only " +
+                     std::to_string(groups_->others()) + " other measurements");
+  }
+  for (const Eye& eye : eyes_) {
+    if (!eye.has_fitted && eye.other_sizes > 0) throw InputError(eye.first_other_size);
+  }
+}
+
 Status KltTracker::next(Measurement& out) {
   if (input_ == nullptr) throw InputError("klt_tracker: it has no input to take images from");
   while (ready_.empty()) {
     ImageGroup group;
     if (!groups_->next(*input_, rejections_, group)) {
-      if (groups_->images() == 0 && groups_->others() > 0) {
-        throw InputError("klt_tracker: its input gives no image of " +
-                         std::string(cameras_.size() == 1 ? "camera 0" : "camera 0 or 1") +
-                         ", only " + std::to_string(groups_->others()) + " other measurements");
-      }
+      check_end();
       return Status::kEnd;
     }
     process(group);

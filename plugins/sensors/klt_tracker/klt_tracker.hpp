@@ -40,20 +40,27 @@ class KltTracker final : public Sensor {
     bool is_read = false;                   ///< `now` is of this group
     std::string unreadable;
     std::exception_ptr failure;
+    std::string other_size;        ///< of this image, when it is not the camera's
+    int other_sizes = 0;           ///< such images in a row
+    std::string first_other_size;  ///< what there is to say about the first of them
+    bool has_fitted = false;       ///< there was an image of the camera's size
   };
 
   bool is_stereo() const { return !matchers_.empty(); }
   /// Reads and prepares the images of a group, at the same time.
   void read(const ImageGroup& group);
-  void read_one(const ImageSource* source, bool with_derivatives, Eye& eye) const;
-  /// Counts images that cannot be read. InputError for one that is not of this camera.
+  void read_one(const ImageSource* source, std::size_t camera, Eye& eye) const;
+  /// Counts images that cannot be used. InputError when a camera's are not of this camera.
   void check(const ImageGroup& group);
+  void check_size(std::size_t camera, const std::string& where);
   /// Follows and refills the points of one camera; ids are given later.
   void advance(std::size_t camera, std::int64_t t_ns);
   void give_ids(std::vector<Track>& tracks);
   void match_right(std::int64_t t_ns, FeatureSample& sample);
   void watch_stereo(const StereoCounts& counts, std::int64_t t_ns);
   void process(const ImageGroup& group);
+  /// At the end of the input: InputError when it had nothing that could be used.
+  void check_end() const;
 
   HostServices services_;
   TrackerOptions options_;

@@ -90,50 +90,86 @@ TEST(KltTracker, CountsImagesWhoseStampsGoBack) {
   EXPECT_EQ(count.first, "camera 0 at 5.000000000 s");
 }
 
-TEST(KltTracker, RefusesAnImageOfAnotherSize) {
-  std::vector<Measurement> input = drive(2, 1);
-  std::get<ImageSample>(input[1]) =
-      sample_of({320, 240, std::vector<std::uint8_t>(320 * 240, 99)}, 0, stamp_of(1));
-  EXPECT_THAT(
-      failure_of(input, section({}, 1)),
-      HasSubstr("the image of camera 0 at 5.100000000 s has 320 x 240 pixels, but cam0 of " +
-                temporary("chain.yaml").string() +
-                " has 424 x 400 pixels: is the calibration that of another camera?"));
+/// `n` images of camera 0, those of [from, to) of another size.
+std::vector<Measurement> drive_with_small_images(int n, int from, int to) {
+  std::vector<Measurement> input = drive(n, 1);
+  for (int i = from; i < to; ++i) {
+    std::get<ImageSample>(input[static_cast<std::size_t>(i)]) =
+        sample_of({320, 240, std::vector<std::uint8_t>(320 * 240, 99)}, 0, stamp_of(i));
+  }
+  return input;
+}
+
+TEST(KltTracker, TracksOverAnImageOfAnotherSize) {
+  const Played played = track(drive_with_small_images(4, 2, 3), section({}, 1));
+  ASSERT_EQ(played.samples.size(), 3U);
+  EXPECT_GT(common(played.samples[1], played.samples[2]), 170U);
+  const RejectionCount& count = played.rejections.at("image of another size than the camera's");
+  EXPECT_EQ(count.count, 1);
+  EXPECT_EQ(count.first, "camera 0 at 5.200000000 s: 320 x 240 pixels");
+}
+
+TEST(KltTracker, RefusesImagesThatAreAllOrTenInARowOfAnotherSize) {
+  const auto failure = [](int n, int from, int to) {
+    return failure_of(drive_with_small_images(n, from, to), section({}, 1));
+  };
+  const auto refusal = [](const char* stamp) {
+    return "the image of camera 0 at " + std::string(stamp) +
+           " has 320 x 240 pixels, but cam0 of " + temporary("chain.yaml").string() +
+           " has 424 x 400 pixels: is the calibration that of another camera?";
+  };
+  EXPECT_THAT(failure(2, 0, 2), HasSubstr(refusal("5.000000000 s")));
+  EXPECT_THAT(failure(12, 1, 11), HasSubstr(refusal("5.100000000 s")));
+  EXPECT_EQ(failure(12, 1, 10), "");
+  EXPECT_EQ(failure(2, 0, 1), "");
+}
+
+struct Told {
+  std::vector<std::string> warnings;
+  std::vector<FeatureSample> samples;
+  std::vector<RejectionCount> rejections;
+};
+
+/// What the tracker says of `input` while it runs.
+Told told_of(const std::vector<Measurement>& input) {
+  static std::vector<std::string> warnings;
+  warnings.clear();
+  PluginRegistry own({VIWO_TEST_PLUGIN_DIR},
+                     [](const PluginInfo&, LogLevel level, std::string_view text) {
+                       if (level == LogLevel::kWarning) warnings.emplace_back(text);
+                     });
+  FakeInput images(input);
+  config::Errors errors;
+  const auto sensor =
+      own.make_sensor(config::parse(section(), "test.yaml"), "sensor", 1, errors).object;
+  errors.throw_if_any();
+  sensor->connect(images);
+  Told told;
+  told.samples = only<FeatureSample>(play(*sensor));
+  sensor->rejections(told.rejections);
+  told.warnings = warnings;
+  return told;
 }
 
 TEST(KltTracker, WarnsOnceWhenTheCamerasAreSwapped) {
-  static std::vector<std::string> told;
-  PluginRegistry own({VIWO_TEST_PLUGIN_DIR},
-                     [](const PluginInfo&, LogLevel level, std::string_view text) {
-                       if (level == LogLevel::kWarning) told.emplace_back(text);
-                     });
   for (const bool swapped : {false, true}) {
-    told.clear();
     std::vector<Measurement> input = drive(13, 2);
     for (Measurement& measurement : input) {
       auto& image = std::get<ImageSample>(measurement);
       if (swapped) image.camera = 1 - image.camera;
     }
-    FakeInput images(input);
-    config::Errors errors;
-    const auto sensor =
-        own.make_sensor(config::parse(section(), "test.yaml"), "sensor", 1, errors).object;
-    errors.throw_if_any();
-    sensor->connect(images);
-    const auto samples = only<FeatureSample>(play(*sensor));
-    std::vector<RejectionCount> rejections;
-    sensor->rejections(rejections);
+    const Told told = told_of(input);
     if (!swapped) {
-      EXPECT_TRUE(told.empty());
-      EXPECT_TRUE(rejections.empty());
+      EXPECT_TRUE(told.warnings.empty());
+      EXPECT_TRUE(told.rejections.empty());
       continue;
     }
-    ASSERT_EQ(told.size(), 1U);
-    EXPECT_THAT(told[0], HasSubstr("the two cameras are probably swapped"));
-    ASSERT_EQ(rejections.size(), 1U);
-    EXPECT_EQ(rejections[0].reason, "stereo pair that contradicts the extrinsics");
-    EXPECT_EQ(rejections[0].count, 13);
-    EXPECT_LT(samples.back().points.size(), 60U);
+    ASSERT_EQ(told.warnings.size(), 1U);
+    EXPECT_THAT(told.warnings[0], HasSubstr("the two cameras are probably swapped"));
+    ASSERT_EQ(told.rejections.size(), 1U);
+    EXPECT_EQ(told.rejections[0].reason, "stereo pair that contradicts the extrinsics");
+    EXPECT_EQ(told.rejections[0].count, 13);
+    EXPECT_LT(told.samples.back().points.size(), 60U);
   }
 }
 
