@@ -30,6 +30,15 @@ void Rejections::append_to(std::vector<RejectionCount>& out) const {
   out.insert(out.end(), counts_.begin(), counts_.end());
 }
 
+void ImageGroups::note_distance(const ImageSample& image) {
+  for (int other = 0; other < n_cameras_; ++other) {
+    const std::int64_t last_ns = last_ns_[static_cast<std::size_t>(other)];
+    if (other == image.camera || last_ns == kNever) continue;
+    const std::int64_t distance_ns = std::abs(image.t_ns - last_ns);
+    nearest_ns_ = std::min(nearest_ns_.value_or(distance_ns), distance_ns);
+  }
+}
+
 std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& rejections) {
   Measurement measurement;
   while (!ended_) {
@@ -49,6 +58,7 @@ std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& re
       rejections.add("image without pixels", where);
       continue;
     }
+    note_distance(*image);
     std::int64_t& last_ns = last_ns_[static_cast<std::size_t>(image->camera)];
     if (image->t_ns <= last_ns || (group_ns_ && image->t_ns <= *group_ns_) ||
         (newest_ns_ && image->t_ns < *newest_ns_ - tolerance_ns_)) {

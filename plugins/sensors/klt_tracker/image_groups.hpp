@@ -42,17 +42,22 @@ class ImageGroups {
  public:
   ImageGroups(int n_cameras, std::int64_t tolerance_ns)
       : n_cameras_(n_cameras), tolerance_ns_(tolerance_ns) {
-    last_ns_.fill(std::numeric_limits<std::int64_t>::min());
+    last_ns_.fill(kNever);
   }
 
   /// False at the end.
   bool next(Sensor& input, Rejections& rejections, ImageGroup& out);
   std::int64_t images() const { return images_; }  ///< that were taken so far
   std::int64_t others() const { return others_; }  ///< measurements that were not
+  /// Least distance of the stamps of two cameras so far; nothing while only one gives images.
+  std::optional<std::int64_t> nearest_ns() const { return nearest_ns_; }
 
  private:
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+
   /// The next image of one of the cameras whose stamp can be.
   std::optional<ImageSample> next_image(Sensor& input, Rejections& rejections);
+  void note_distance(const ImageSample& image);
 
   int n_cameras_;
   std::int64_t tolerance_ns_;
@@ -60,6 +65,7 @@ class ImageGroups {
   std::array<std::int64_t, kMaxCameras> last_ns_{};
   std::optional<std::int64_t> newest_ns_;
   std::optional<std::int64_t> group_ns_;  ///< of the last group
+  std::optional<std::int64_t> nearest_ns_;
   std::int64_t images_ = 0;
   std::int64_t others_ = 0;
   bool ended_ = false;

@@ -1,8 +1,10 @@
 #include "klt_tracker.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
@@ -20,6 +22,8 @@ constexpr double kContradictingShare = 0.7;
 /// Pairs in a row that contradict the extrinsics before it is said.
 constexpr int kContradictingPairs = 10;
 constexpr double kMinBaseline = 1e-3;  // m
+/// Images of two cameras that come without a pair before it is said.
+constexpr int kGroupsWithoutPair = 10;
 /// Images of another size in a row that are not a slip of the log any more.
 constexpr int kOtherSizes = 10;
 
@@ -74,6 +78,7 @@ KltTracker::KltTracker(const ParamSet& params, const HostServices& services)
       options_(read_options(params)),
       chain_file_(params.text("cameras")),
       max_gap_s_(params.number("max_gap_s")),
+      max_camera_dt_s_(params.number("max_camera_dt_s")),
       cameras_(read_cameras(params)) {
   const bool stereo = cameras_.size() > 1 && params.flag("stereo");
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
@@ -85,8 +90,7 @@ KltTracker::KltTracker(const ParamSet& params, const HostServices& services)
       trackers_.emplace_back(cameras_[i], options_, mask, services.seed + i);
     }
   }
-  groups_.emplace(static_cast<int>(cameras_.size()),
-                  std::llround(params.number("max_camera_dt_s") * 1e9));
+  groups_.emplace(static_cast<int>(cameras_.size()), std::llround(max_camera_dt_s_ * 1e9));
 }
 
 void KltTracker::read_one(const ImageSource* source, std::size_t camera, Eye& eye) const {
@@ -200,6 +204,21 @@ void KltTracker::watch_stereo(const StereoCounts& counts, std::int64_t t_ns) {
                     "Such matches are not used");
 }
 
+void KltTracker::watch_pairs(const ImageGroup& group) {
+  if (!is_stereo() || pair_seen_) return;
+  pair_seen_ = group.sources[0] != nullptr && group.sources[1] != nullptr;
+  if (pair_seen_ || ++groups_without_pair_ != kGroupsWithoutPair) return;
+  std::string why = "only camera " + std::to_string(group.first_camera) + " gives images";
+  if (const auto nearest_ns = groups_->nearest_ns()) {
+    std::array<char, 96> text{};
+    std::snprintf(text.data(), text.size(),
+                  "the nearest stamps differ by %.1f ms, max_camera_dt_s is %g",
+                  1e-6 * static_cast<double>(*nearest_ns), max_camera_dt_s_);
+    why = text.data();
+  }
+  services_.log(LogLevel::kWarning, "no pair of images yet: " + why);
+}
+
 void KltTracker::match_right(std::int64_t t_ns, FeatureSample& sample) {
   if (eyes_[0].now.blank || eyes_[1].now.blank) return;
   watch_stereo(matchers_[0].match(eyes_[0].now, eyes_[1].now, trackers_[0].tracks(), sample.points),
@@ -207,6 +226,7 @@ void KltTracker::match_right(std::int64_t t_ns, FeatureSample& sample) {
 }
 
 void KltTracker::process(const ImageGroup& group) {
+  watch_pairs(group);
   read(group);
   check(group);
   if (trackers_.size() == 1) {

@@ -58,6 +58,8 @@ class KltTracker final : public Sensor {
   void give_ids(std::vector<Track>& tracks);
   void match_right(std::int64_t t_ns, FeatureSample& sample);
   void watch_stereo(const StereoCounts& counts, std::int64_t t_ns);
+  /// Warns when left and right images do not come together.
+  void watch_pairs(const ImageGroup& group);
   void process(const ImageGroup& group);
   /// At the end of the input: InputError when it had nothing that could be used.
   void check_end() const;
@@ -65,7 +67,7 @@ class KltTracker final : public Sensor {
   HostServices services_;
   TrackerOptions options_;
   std::string chain_file_;
-  double max_gap_s_;
+  double max_gap_s_, max_camera_dt_s_;
   std::vector<CameraView> cameras_;
   std::vector<Eye> eyes_;
   std::vector<CameraTracker> trackers_;  ///< of every camera, or of the left one of a pair
@@ -77,6 +79,8 @@ class KltTracker final : public Sensor {
   std::deque<FeatureSample> ready_;
   int contradicting_pairs_ = 0;  ///< in a row
   bool told_contradiction_ = false;
+  int groups_without_pair_ = 0;  ///< before the first pair
+  bool pair_seen_ = false;
 };
 
 }  // namespace viwo::klt

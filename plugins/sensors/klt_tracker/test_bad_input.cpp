@@ -173,6 +173,23 @@ TEST(KltTracker, WarnsOnceWhenTheCamerasAreSwapped) {
   }
 }
 
+TEST(KltTracker, WarnsOnceWhenLeftAndRightDoNotComeTogether) {
+  // GIVEN right images behind the left ones, and before them though they come later
+  for (const std::int64_t offset_ns : {5'000'000, -5'000'000}) {
+    std::vector<Measurement> input = drive(12, 2);
+    for (Measurement& measurement : input) {
+      auto& image = std::get<ImageSample>(measurement);
+      if (image.camera == 1) image.t_ns += offset_ns;
+    }
+    EXPECT_THAT(told_of(input).warnings,
+                ::testing::ElementsAre("no pair of images yet: the nearest stamps differ by 5.0 "
+                                       "ms, max_camera_dt_s is 0.003"));
+  }
+  EXPECT_THAT(told_of(drive(12, 1)).warnings,
+              ::testing::ElementsAre("no pair of images yet: only camera 0 gives images"));
+  EXPECT_TRUE(told_of(drive(9, 1)).warnings.empty());
+}
+
 TEST(KltTracker, SaysWhatIsWrongWithItsParameters) {
   write_png(temporary("small.png"), {32, 24, std::vector<std::uint8_t>(32 * 24, 0)});
   EXPECT_THAT(error_of(section("mask0: " + temporary("small.png").string() + "\n")),
