@@ -71,7 +71,7 @@ void EncoderCollector::add(const EncoderReading& reading, const TextReader& at) 
   }
 }
 
-EncoderRecording EncoderCollector::finish(const TextReader& at) const {
+EncoderRecording EncoderCollector::finish(const TextReader& at) {
   filter_.finish(at);
   EncoderRecording out;
   out.rejections = filter_.counts();
@@ -99,7 +99,7 @@ void SampleCollector<Sample>::add(Sample sample, const TextReader& at) {
 }
 
 template <class Sample>
-Recording<Sample> SampleCollector<Sample>::finish(const TextReader& at) const {
+Recording<Sample> SampleCollector<Sample>::finish(const TextReader& at) {
   filter_.finish(at);
   return {samples_, filter_.counts()};
 }
@@ -144,7 +144,7 @@ void FeatureCollector::add_image(std::int64_t t_ns, int camera, const TextReader
   if (filter_.accept_or_same(t_ns, at)) find_or_make(t_ns, camera);
 }
 
-FeatureRecording FeatureCollector::finish(const TextReader& at) const {
+FeatureRecording FeatureCollector::finish(const TextReader& at) {
   filter_.finish(at);
   return {images_, filter_.counts()};
 }

@@ -46,7 +46,8 @@ bool StampFilter::accept_or_same(std::int64_t t_ns, const TextReader& at) {
   return true;
 }
 
-void StampFilter::finish(const TextReader& at) const {
+void StampFilter::finish(const TextReader& at) {
+  if (at.last_left_out()) reject(kLastLineCutShort, at);
   const std::int64_t total = accepted_ + rejected_;
   if (total == 0) throw InputError(at.file().string() + "  holds no data after its header");
   const double fraction = static_cast<double>(rejected_) / static_cast<double>(total);

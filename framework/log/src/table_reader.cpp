@@ -17,6 +17,14 @@ void split(std::string_view line, char separator, std::vector<std::string_view>&
   }
 }
 
+/// What a number or a list is like when its end is missing: one more digit, or the bracket, would
+/// make it one.
+bool is_begun(std::string_view field) {
+  if (field.starts_with('[')) return !field.ends_with(']');
+  if (field.starts_with('(')) return !field.ends_with(')');
+  return !parse_number(field) && parse_number(std::string(field) + '0');
+}
+
 std::string fields_text(std::size_t n) {
   return std::to_string(n) + (n == 1 ? " field" : " fields");
 }
@@ -66,6 +74,11 @@ bool TableReader::next() {
     if (!reader_.next(line)) return false;
   } while (trim(line).empty());
   split(line, separator_, fields_);
+  if (reader_.unterminated() && (fields_.size() < columns_.size() ||
+                                 (fields_.size() == columns_.size() && is_begun(fields_.back())))) {
+    reader_.leave_out_last();
+    return false;
+  }
   if (fields_.size() != columns_.size()) {
     reader_.fail(fields_text(fields_.size()) + " where the header has " +
                  std::to_string(columns_.size()));

@@ -97,6 +97,7 @@ bool TextReader::next(std::string_view& line) {
       }
     }
     ++line_;
+    unterminated_ = found == nullptr;
     line = std::string_view(buffer_.data() + begin_, length);
     begin_ += std::min(length + 1, size);
     if (!line.empty() && line.back() == '\r') line.remove_suffix(1);

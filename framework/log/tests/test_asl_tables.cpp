@@ -99,6 +99,20 @@ TEST_F(AslTables, StatesReadBackToTheSameBits) {
   }
 }
 
+TEST_F(AslTables, ALastLineThatIsCutShortIsCountedAndTheRestIsRead) {
+  std::string text = "timestamp_ns,drive_1 [rad/s],steer_1 [rad]\n";
+  for (int k = 1; k <= 20; ++k) text += std::to_string(k * 10'000'000) + ",1,0.25\n";
+  const auto file = write("wheels.csv", text + "210000000,1");
+  const EncoderRecording read = read_asl_encoders(file, {});
+  EXPECT_EQ(read.samples.size(), 20U);
+  ASSERT_EQ(read.rejections.size(), 1U);
+  EXPECT_EQ(read.rejections[0].reason, "last line cut short");
+  EXPECT_EQ(read.rejections[0].count, 1);
+  EXPECT_EQ(read.rejections[0].first, "wheels.csv:22");
+  EXPECT_EQ(refusal(text + "210000000,1\n", [](const auto& f) { read_asl_encoders(f, {}); }),
+            ":22  2 fields where the header has 3");
+}
+
 TEST_F(AslTables, ImagesReadBackToTheSameBitsAlsoWithoutPoints) {
   std::vector<Measurement> written;
   std::uniform_int_distribution<int> count(0, 3);

@@ -15,6 +15,7 @@ namespace viwo::log {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 
 class TextReaderTest : public InFolder {};
 class TableReaderTest : public InFolder {};
@@ -179,6 +180,26 @@ TEST_F(TableReaderTest, SaysFileLineAndColumnOfWhatIsWrong) {
             at + "7  column 't': '4000000000000000001' is no stamp in nanoseconds");
   EXPECT_EQ(message_of([&] { table.number(1); }),
             at + "7  column 'drive_1 [rpm]': '?" + std::string(39, 'y') + "...' is not a number");
+}
+
+TEST_F(TableReaderTest, LeavesOutALastLineThatIsCutShort) {
+  const auto rows = [this](const std::string& last, const std::string& before = "1,2\n") {
+    TableReader table(write("cut.csv", "t,x\n" + before + last));
+    int n = 0;
+    while (table.next()) ++n;
+    return std::pair(n, table.cut_short());
+  };
+  for (const char* cut : {"2", "2,", "2,-", "2,1e", "2,1.5e-", "2,[1", "2,("}) {
+    EXPECT_EQ(rows(cut), std::pair(1, true)) << cut;
+  }
+  // WHEN a line is whole, only without an ending, or of words that nobody can tell to be cut
+  for (const char* whole : {"2,3", "2,nan", "2,[1]", "2,abc"}) {
+    EXPECT_EQ(rows(whole), std::pair(2, false)) << whole;
+  }
+  EXPECT_EQ(rows("", "1,2\n2,\n"), std::pair(2, false));
+  // THEN wrong lines stay errors that power loss does not explain
+  EXPECT_THAT(message_of([&] { rows("2\n"); }), EndsWith(":3  1 field where the header has 2"));
+  EXPECT_THAT(message_of([&] { rows("2,3,4"); }), EndsWith(":3  3 fields where the header has 2"));
 }
 
 TEST_F(TableReaderTest, RefusesAHeaderWithAmbiguousColumns) {

@@ -50,7 +50,7 @@ class EncoderCollector {
   void add(const EncoderReading& reading, const TextReader& at);
   void reject(const std::string& reason, const TextReader& at) { filter_.reject(reason, at); }
   /// InputError when too little is left (see StampFilter::finish).
-  EncoderRecording finish(const TextReader& at) const;
+  EncoderRecording finish(const TextReader& at);
 
  private:
   EncoderRecordingOptions options_;
@@ -68,7 +68,7 @@ class SampleCollector {
   /// `at` is at the row of the sample.
   void add(Sample sample, const TextReader& at);
   /// InputError when too little is left (see StampFilter::finish).
-  Recording<Sample> finish(const TextReader& at) const;
+  Recording<Sample> finish(const TextReader& at);
 
  private:
   StampFilter filter_;
@@ -91,7 +91,7 @@ class FeatureCollector {
   void add(std::int64_t t_ns, int camera, const FeaturePoint& point, const TextReader& at);
   /// An image, whether or not points of it follow.
   void add_image(std::int64_t t_ns, int camera, const TextReader& at);
-  FeatureRecording finish(const TextReader& at) const;
+  FeatureRecording finish(const TextReader& at);
 
  private:
   /// Its index in images_; images_.size() when there is none.

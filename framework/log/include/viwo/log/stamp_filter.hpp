@@ -19,6 +19,7 @@ struct LogLimits {
 };
 
 inline constexpr const char* kStampNotAfter = "stamp not after the previous one";
+inline constexpr const char* kLastLineCutShort = "last line cut short";
 inline constexpr const char* kNotFinite = "value that is not finite";
 inline constexpr const char* kIdTwice = "point whose id the image already has";
 inline constexpr const char* kNotUnit = "quaternion that is not of unit norm";
@@ -35,9 +36,9 @@ class StampFilter {
   /// Counts a datum that is dropped.
   void reject(const std::string& reason, const TextReader& at);
 
-  /// To be called at the end of the file: InputError when nothing was accepted or more than
-  /// max_rejected_fraction of the data were rejected.
-  void finish(const TextReader& at) const;
+  /// To be called once at the end of the file: InputError when nothing was accepted or more than
+  /// max_rejected_fraction of the data were rejected. A last line that was left out counts.
+  void finish(const TextReader& at);
 
   /// Rejected data and gaps by reason, in order of first occurrence.
   const std::vector<RejectionCount>& counts() const { return counts_; }

@@ -27,8 +27,11 @@ class TableReader {
   /// Column "name [unit]", or "name" where the file gives no unit; InputError for another unit.
   std::size_t column(std::string_view name, std::string_view unit) const;
 
-  /// Goes to the next row; false at the end. InputError for a wrong number of fields.
+  /// Goes to the next row; false at the end. InputError for a wrong number of fields. A last line
+  /// that has no line ending, and too few fields or half a number at its end, is left out: whoever
+  /// wrote it did not come further.
   bool next();
+  bool cut_short() const { return reader_.last_left_out(); }  ///< a last line was left out
 
   std::string_view text(std::size_t column) const { return fields_[column]; }
   /// NaN and infinite values are numbers here: the caller counts them.

@@ -24,6 +24,12 @@ class TextReader {
   /// for an empty file, a truncated or corrupt gzip stream and a line of more than 1 MiB.
   bool next(std::string_view& line);
 
+  /// Whether the line read last, the file's last, has no line ending.
+  bool unterminated() const { return unterminated_; }
+  /// For who reads the lines: the last one is incomplete, and left out.
+  void leave_out_last() { last_left_out_ = true; }
+  bool last_left_out() const { return last_left_out_; }
+
   const std::filesystem::path& file() const { return file_; }
   std::int64_t line_number() const { return line_; }  ///< of the line read last, from 1
   std::string where() const;  ///< "name:line" of the line read last, without folders
@@ -45,6 +51,8 @@ class TextReader {
   std::size_t begin_ = 0;  ///< first byte not consumed
   std::size_t end_ = 0;    ///< behind the last byte read
   std::int64_t line_ = 0;
+  bool unterminated_ = false;
+  bool last_left_out_ = false;
 };
 
 }  // namespace viwo::log
