@@ -30,7 +30,9 @@ constexpr const char* kHelp =
     "Writes a log folder, as `viwo simulate` makes it, as a ROS 1 bag:\n"
     "  imu0                         /imu0             sensor_msgs/Imu\n"
     "  wheels0                      /joint_states     sensor_msgs/JointState, joints drive_1 ..\n"
-    "                                                 (velocity) and steer_1 .. (position)\n"
+    "                                                 (velocity) and steer_1 .. (position); NaN "
+    "for\n"
+    "                                                 their positions and velocities\n"
     "  cam0, cam1, ..               /camN/image_raw   sensor_msgs/Image, mono8\n"
     "  poses0                       /poses0           geometry_msgs/PoseStamped\n"
     "  state_groundtruth_estimate0  /ground_truth     geometry_msgs/PoseStamped\n"
@@ -74,6 +76,9 @@ void read_images(const fs::path& folder, std::size_t camera, std::vector<ImageOn
   const std::size_t name = table.column("filename");
   while (table.next()) {
     out.push_back({table.stamp_ns(stamp), camera, folder / "data" / std::string(table.text(name))});
+  }
+  if (table.cut_short()) {
+    std::cerr << folder.string() << "  dropped: " << log::kLastLineCutShort << "\n";
   }
 }
 
@@ -134,18 +139,19 @@ std::vector<Entry> schedule(const Log& log) {
 }
 
 void write_wheels(const EncoderSample& sample, const bag::Stamps& stamps, bag::Ros1Writer& out) {
-  // Values that are not known stand as zero, so that every joint has both.
+  // A reader that asks for what the log does not have shall not take it for a wheel that stands.
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   std::vector<std::string> names;
   std::vector<double> positions, velocities;
   for (int i = 0; i < sample.n_drive; ++i) {
     names.push_back("drive_" + std::to_string(i + 1));
-    positions.push_back(0.);
+    positions.push_back(kUnknown);
     velocities.push_back(sample.drive_rad_per_s[static_cast<std::size_t>(i)]);
   }
   for (int i = 0; i < sample.n_steer; ++i) {
     names.push_back("steer_" + std::to_string(i + 1));
     positions.push_back(sample.steer_rad[static_cast<std::size_t>(i)]);
-    velocities.push_back(0.);
+    velocities.push_back(kUnknown);
   }
   out.write_joints("/joint_states", stamps, names, positions, velocities);
 }
