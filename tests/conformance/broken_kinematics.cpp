@@ -73,7 +73,7 @@ class Broken final : public KinematicModel {
     double extra = 0.;
     if (is("race")) ++unsynchronised_calls_;  // only the thread sanitizer sees it
     if (is("random")) extra = 1e-12 * ++calls_;
-    out.A << 1., 0., -0.5 * x_WI[2], 1., 0., 0.5 * x_WI[2], 0., 1., 0.;
+    out.A << 1., 0., left() * x_WI[2], 1., 0., 0.5 * x_WI[2], 0., 1., 0.;
     if (is("constant_A")) out.A(2, 0) = 1e-3 * drive[0];
     out.b << x_WI[0] * drive[0] + extra, x_WI[1] * drive[1], 0.;
     cached_ = out.b[0];
@@ -86,10 +86,10 @@ class Broken final : public KinematicModel {
     const RowVector& signal = is("measured") ? rows.b : b;
     out.J(0, 0) = (is("cache") ? cached_.load() : signal[0]) / x_WI[0];
     out.J(1, 1) = signal[1] / x_WI[1];
-    out.J(0, 2) = 0.5 * xi.z();
+    out.J(0, 2) = -left() * xi.z();
     out.J(1, 2) = (is("sign") ? 0.5 : -0.5) * xi.z();
     if (!is("adds")) out.DtE.setZero();
-    out.DtE(2, 2) += 0.5 * ((is("dte") ? e[0] : -e[0]) + e[1]);
+    out.DtE(2, 2) += (is("dte") ? 0.5 : left()) * e[0] + 0.5 * e[1];
   }
 
   void noise_derivatives(const EncoderSample& /*y*/, const Intrinsics& x_WI,
@@ -103,6 +103,7 @@ class Broken final : public KinematicModel {
   Status inverse(const Twist& xi, const Intrinsics& x_WI, const RowVector& /*slip*/,
                  EncoderSample& y) const override {
     if (std::abs(xi.y()) > 1e-9) return Status::kRejected;
+    if (is("rank") && std::abs(xi.z()) > 1e-9) return Status::kRejected;
     const double turn = 0.5 * x_WI[2] * (is("inverse") ? -xi.z() : xi.z());
     y.n_drive = 2;
     y.n_steer = 0;
@@ -118,6 +119,9 @@ class Broken final : public KinematicModel {
   }
 
  private:
+  /// Where the left wheel is, in units of the baseline.
+  static double left() { return is("rank") ? 0.5 : -0.5; }
+
   double radius_m_, baseline_m_;
   mutable std::atomic<int> calls_ = 0;
   mutable int unsynchronised_calls_ = 0;

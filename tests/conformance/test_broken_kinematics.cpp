@@ -58,6 +58,13 @@ TEST(BrokenKinematics, AnAThatIsNotConstant) {
             "describe()");
 }
 
+TEST(BrokenKinematics, BothWheelsOnOneSide) {
+  EXPECT_EQ(failures("rank"),
+            "rank of A: A has rank 2 at all readings tried: v_x and omega cannot be told apart - "
+            "check the signs of A; a direction that no wheel measures needs a row with a slip "
+            "source (v_y = 0)");
+}
+
 TEST(BrokenKinematics, AGaugeEntryThatIsNotGauge) {
   EXPECT_EQ(failures("gauge"),
             "gauge: entry 'r_left' is not gauge: motion shows it (rank 6 falls to 5 when it is "

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -44,11 +46,31 @@ TEST_P(InTree, IsConformant) {
   EXPECT_GE(result.checks.size(), 7u) << "construction did not come about";
   for (const CheckResult& check : result.checks) {
     EXPECT_TRUE(check.passed()) << to_text(check, true);
+    EXPECT_TRUE(check.warnings.empty()) << to_text(check, true);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Plugins, InTree, ::testing::ValuesIn(plugins()),
                          [](const auto& plugin) { return short_name(plugin.param); });
+
+TEST(TwoDrivenWheels, AreConformantWithAWarning) {
+  const fs::path config = fs::temp_directory_path() / "viwo_conformance_two_wheels.yaml";
+  std::ofstream(config) << "kinematics: {type: four_wis_wid_drive_only, x_m: [0.3, -0.3], "
+                           "y_m: [0.2, -0.2], radius_m: [0.1], steer_offset_rad: [0]}\n";
+  Options options;
+  options.config = config;
+  const Conformance result = check_plugin(
+      fs::path(VIWO_TEST_PLUGIN_DIR) / "libviwo_kinematics_four_wis_wid_drive_only.so", options);
+  std::string warnings;
+  for (const CheckResult& check : result.checks) {
+    EXPECT_TRUE(check.passed()) << to_text(check, true);
+    for (const std::string& warning : check.warnings) warnings += check.name + ": " + warning;
+  }
+  EXPECT_EQ(warnings,
+            "rank of A: A has rank 2 at most: no reading alone tells the whole twist, and the base "
+            "needs another source of motion - if that is not meant, check the signs of A");
+  fs::remove(config);
+}
 
 TEST(Program, SaysWhatItFindsAndEndsWithACode) {
   const std::string program = VIWO_TEST_BINARY_DIR "/bin/viwo_conformance ";

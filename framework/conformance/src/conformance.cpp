@@ -49,6 +49,7 @@ Conformance check_plugin(const std::filesystem::path& file, const Options& optio
 std::string to_text(const CheckResult& result, bool verbose) {
   std::string text = (result.passed() ? "ok      " : "FAILED  ") + result.name + "\n";
   for (const std::string& failure : result.failures) text += "          " + failure + "\n";
+  for (const std::string& warning : result.warnings) text += "          warning: " + warning + "\n";
   if (!verbose) return text;
   for (const std::string& note : result.notes) text += "          note: " + note + "\n";
   return text;

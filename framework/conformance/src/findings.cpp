@@ -14,19 +14,23 @@ namespace {
 
 constexpr char kFailure = 'F';
 constexpr char kNote = 'N';
+constexpr char kWarning = 'W';
 
 /// What the child has to say, each text with its kind in front and a zero behind.
 std::string packed(const Findings& findings) {
   std::string bytes;
   for (const std::string& text : findings.failures()) bytes += kFailure + text + '\0';
   for (const std::string& text : findings.notes()) bytes += kNote + text + '\0';
+  for (const std::string& text : findings.warnings()) bytes += kWarning + text + '\0';
   return bytes;
 }
 
 void unpack(const std::string& bytes, CheckResult& result) {
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t end = std::min(bytes.find('\0', at), bytes.size());
-    auto& to = bytes[at] == kFailure ? result.failures : result.notes;
+    auto& to = bytes[at] == kFailure   ? result.failures
+               : bytes[at] == kWarning ? result.warnings
+                                       : result.notes;
     to.push_back(bytes.substr(at + 1, end - at - 1));
     at = end + 1;
   }

@@ -15,8 +15,11 @@ class Findings {
  public:
   void fail(const std::string& text) { add(failures_, text); }
   void note(const std::string& text) { add(notes_, text); }
+  /// Like note(), but shown without being asked for.
+  void warn(const std::string& text) { add(warnings_, text); }
   const std::vector<std::string>& failures() const { return failures_; }
   const std::vector<std::string>& notes() const { return notes_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
   static void add(std::vector<std::string>& to, const std::string& text) {
@@ -27,6 +30,7 @@ class Findings {
 
   std::vector<std::string> failures_;
   std::vector<std::string> notes_;
+  std::vector<std::string> warnings_;
 };
 
 using Check = std::function<void(Findings&)>;

@@ -263,6 +263,7 @@ std::vector<NamedCheck> kinematics_checks(const Subject& subject) {
           {"repeatable", on_subject(check_repeatable)},
           {"noise model", on_bench(check_noise_model)},
           {"constant A", on_bench(check_constant_A)},
+          {"rank of A", on_bench(check_rank)},
           {"derivatives by the intrinsics", on_bench(check_intrinsic_derivatives)},
           {"derivatives at the fitted signal", on_bench(check_fitted_signal)},
           {"derivatives by the noise", on_bench(check_noise_derivatives)},

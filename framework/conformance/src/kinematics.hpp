@@ -13,6 +13,8 @@ void check_description(const Subject& subject, Findings& findings);
 void check_noise_model(const Bench& bench, Findings& findings);
 /// constant_A is what it says.
 void check_constant_A(const Bench& bench, Findings& findings);
+/// The rows of some reading tell the whole twist.
+void check_rank(const Bench& bench, Findings& findings);
 /// Results depend on the arguments alone: the same bits again, whatever was called in between.
 void check_repeatable(const Subject& subject, Findings& findings);
 /// Two instances with different parameters do not see each other.

@@ -1,5 +1,8 @@
-// Gauge, change of the odometry frame, inverse kinematics.
+// Rank of the rows, gauge, change of the odometry frame, inverse kinematics.
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include <Eigen/SVD>
 
@@ -20,6 +23,23 @@ int rank_of(const MatrixXd& M) {
   if (M.cols() == 0 || M.rows() == 0) return 0;
   const VectorXd values = Eigen::JacobiSVD<MatrixXd>(M).singularValues();
   return static_cast<int>((values.array() > kRankTolerance * values[0]).count());
+}
+
+/// "v_x and omega cannot be told apart": what A xi does not depend on, for a rank below 3.
+std::string hidden_in(const MatrixXd& A, int rank) {
+  const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeFullV);
+  const MatrixXd hidden = svd.matrixV().rightCols(3 - rank);
+  constexpr const char* kNames[] = {"v_x", "v_y", "omega"};
+  std::vector<std::string> names;
+  for (int j = 0; j < 3; ++j) {
+    if (hidden.row(j).norm() > 1e-6) names.emplace_back(kNames[j]);
+  }
+  std::string text = names.front();
+  for (std::size_t i = 1; i < names.size(); ++i) {
+    text += (i + 1 < names.size() ? ", " : " and ") + names[i];
+  }
+  const bool mixed = static_cast<int>(names.size()) > 3 - rank;
+  return text + (mixed ? " cannot be told apart" : " cannot be told");
 }
 
 /// The twist of O' from that of O; `g` = [yaw, x, y] of O' in O.
@@ -102,6 +122,32 @@ std::vector<int> movable(const Bench& bench) {
 }
 
 }  // namespace
+
+void check_rank(const Bench& bench, Findings& findings) {
+  // At the same intrinsics, so that rows of one direction stay of one direction.
+  const Intrinsics x_WI = bench.nominal();
+  MatrixXd all(0, 3);
+  int best = 0;
+  for (const Probe& probe : bench.probes()) {
+    const auto rows = bench.rows(probe.y, x_WI);
+    if (!rows || !rows->A.allFinite()) continue;
+    best = std::max(best, rank_of(rows->A));
+    all.conservativeResize(all.rows() + rows->A.rows(), 3);
+    all.bottomRows(rows->A.rows()) = rows->A;
+  }
+  if (all.rows() == 0) return findings.note("the model answers none of the readings tried");
+  const int rank = rank_of(all);
+  if (rank < 3) {
+    findings.fail("A has rank " + std::to_string(rank) +
+                  " at all readings tried: " + hidden_in(all, rank) +
+                  " - check the signs of A; a direction that no wheel measures needs a row with "
+                  "a slip source (v_y = 0)");
+  } else if (best < 3) {
+    findings.warn("A has rank " + std::to_string(best) +
+                  " at most: no reading alone tells the whole twist, and the base needs another "
+                  "source of motion - if that is not meant, check the signs of A");
+  }
+}
 
 void check_gauge(const Bench& bench, Findings& findings) {
   std::vector<int> gauge;

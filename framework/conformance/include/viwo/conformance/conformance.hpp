@@ -15,7 +15,8 @@ namespace viwo::conformance {
 struct CheckResult {
   std::string name;  ///< "derivatives by the intrinsics"
   std::vector<std::string> failures;
-  std::vector<std::string> notes;  ///< what is worth knowing, and what could not be checked
+  std::vector<std::string> notes;     ///< what is worth knowing, and what could not be checked
+  std::vector<std::string> warnings;  ///< what is allowed, and more often a mistake
   bool passed() const { return failures.empty(); }
 };
 
@@ -41,7 +42,7 @@ struct Conformance {
 /// InputError when `config` cannot be used.
 Conformance check_plugin(const std::filesystem::path& file, const Options& options = {});
 
-/// "ok      NAME" or "FAILED  NAME" and a line for each failure; `verbose`: notes too.
+/// "ok      NAME" or "FAILED  NAME" and a line for each failure and warning; `verbose`: notes too.
 std::string to_text(const CheckResult& result, bool verbose = false);
 
 }  // namespace viwo::conformance
