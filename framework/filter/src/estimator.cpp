@@ -39,6 +39,7 @@ Estimator::Estimator(const EstimatorOptions& options, std::vector<CameraPrior> c
       filter_(options.filter, std::move(cameras), wheels),
       updates_(std::move(updates)),
       counts_(updates_.size()),
+      gated_(updates_.size()),
       failures_(updates_.size()),
       sink_(kMaxFactorsPerUpdate, filter_.size()),
       moved_(Eigen::VectorXd::Zero(filter_.size())),
@@ -86,9 +87,14 @@ void Estimator::reject(const char* reason, std::int64_t t_ns) {
 
 std::vector<RejectionCount> Estimator::rejections() const {
   std::vector<RejectionCount> all = rejections_;
-  for (const UpdateEntry& entry : updates_) {
+  for (std::size_t k = 0; k < updates_.size(); ++k) {
+    const UpdateEntry& entry = updates_[k];
     const std::size_t before = all.size();
     entry.update->rejections(all);
+    if (gated_[k].count > 0) {
+      all.push_back({"measurement dropped by the chi-square gate", gated_[k].count,
+                     "stamp " + std::to_string(gated_[k].first_ns) + " ns"});
+    }
     for (std::size_t i = before; i < all.size(); ++i) {
       all[i].reason = entry.name + ": " + all[i].reason;
     }

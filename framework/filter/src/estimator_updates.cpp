@@ -102,7 +102,11 @@ void Estimator::run_update(std::size_t index, const EpochData& data) {
       if (options_.frozen) residual_factor_.residual.setZero();
       next = &residual_factor_;
     }
-    const bool applied = apply(entry, *next) == FactorResult::kApplied;
+    const FactorResult result = apply(entry, *next);
+    if (result == FactorResult::kGated && gated_[index].count++ == 0) {
+      gated_[index].first_ns = filter_.t_ns();
+    }
+    const bool applied = result == FactorResult::kApplied;
     ++(applied ? counts.applied : counts.rejected);
     if (!applied) continue;
     if (!has_moved) moved_.setZero();

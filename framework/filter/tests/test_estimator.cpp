@@ -206,8 +206,15 @@ TEST(Estimator, CountsFactorsAndWhatUpdatesCountThemselves) {
   EXPECT_EQ(rig.estimator.counts()[0].rejected, 2 * (2 + 2));
   EXPECT_LT(rig.estimator.filter().imu().p_IinG.norm(), 1.);
   EXPECT_EQ(rig.estimator.updates()[0].name, "fake");
-  EXPECT_EQ(rig.estimator.rejections().back().reason, "fake: a reason of its own");
-  EXPECT_EQ(rig.estimator.rejections().back().count, 3);
+  const std::vector<RejectionCount> rejections = rig.estimator.rejections();
+  ASSERT_GE(rejections.size(), 2U);
+  const RejectionCount& own = rejections[rejections.size() - 2];
+  EXPECT_EQ(own.reason, "fake: a reason of its own");
+  EXPECT_EQ(own.count, 3);
+  const RejectionCount& gated = rejections.back();
+  EXPECT_EQ(gated.reason, "fake: measurement dropped by the chi-square gate");
+  EXPECT_EQ(gated.count, 2);
+  EXPECT_EQ(gated.first, "stamp " + std::to_string(kStart + 100 * kMs) + " ns");
 }
 
 TEST(Estimator, CountsInformationThatIsNotFinite) {

@@ -185,6 +185,12 @@ class Estimator {
   Filter filter_;
   std::vector<UpdateEntry> updates_;
   std::vector<UpdateCounts> counts_;
+  /// Residual factors that the gate dropped, by update: how many, and the time of the first.
+  struct Gated {
+    std::int64_t count = 0;
+    std::int64_t first_ns = 0;
+  };
+  std::vector<Gated> gated_;
   std::vector<UpdateFailures> failures_;
   FactorSink sink_;
   // Factors of one call are linearised at one estimate: what those before them have corrected, and
