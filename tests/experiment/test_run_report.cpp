@@ -33,26 +33,30 @@ struct FinishedRun {
 };
 
 /// Ten seconds of a swerve robot on a circle, with everything that the filter estimates.
+RunSetup filter_setup() {
+  const config::Node node = config::parse(
+      "name: page\n"
+      "sensors:\n"
+      "  simulator0: {type: simulator, motion: circle, duration_s: 10, features: 40, "
+      "cameras: " VIWO_TEST_SOURCE_DIR
+      "/configs/cameras/pinhole.yaml, "
+      "robot: {type: four_wis_wid, " +
+          testing::kSwerve +
+          "}}\n"
+          "kinematics: {type: four_wis_wid, " +
+          testing::kSwerve +
+          "}\n"
+          "wheels: {sigma_p_IinO_m: [0.1, 0.1, 0.1], sigma_t_OtoI_s: 0.01}\n"
+          "cameras: {kalibr: " VIWO_TEST_SOURCE_DIR
+          "/configs/cameras/pinhole.yaml}\n"
+          "updates: {visual_features: {}, wheel_odometry: {}}\n",
+      "run.yaml");
+  return read_run(node, registry(), 7);
+}
+
 const FinishedRun& filter_run() {
   static const FinishedRun run = [] {
-    const config::Node node = config::parse(
-        "name: page\n"
-        "sensors:\n"
-        "  simulator0: {type: simulator, motion: circle, duration_s: 10, features: 40, "
-        "cameras: " VIWO_TEST_SOURCE_DIR
-        "/configs/cameras/pinhole.yaml, "
-        "robot: {type: four_wis_wid, " +
-            testing::kSwerve +
-            "}}\n"
-            "kinematics: {type: four_wis_wid, " +
-            testing::kSwerve +
-            "}\n"
-            "wheels: {sigma_p_IinO_m: [0.1, 0.1, 0.1], sigma_t_OtoI_s: 0.01}\n"
-            "cameras: {kalibr: " VIWO_TEST_SOURCE_DIR
-            "/configs/cameras/pinhole.yaml}\n"
-            "updates: {visual_features: {}, wheel_odometry: {}}\n",
-        "run.yaml");
-    RunSetup setup = read_run(node, registry(), 7);
+    RunSetup setup = filter_setup();
     const RunData data = collect(setup);
     RunResult result = experiment::run(setup, data);
     return FinishedRun{std::move(setup), std::move(result)};
@@ -95,6 +99,37 @@ int estimated_parameters(const RunResult& result) {
   return static_cast<int>(
       std::count_if(result.calibration.begin(), result.calibration.end(),
                     [](const CalibrationTrack& track) { return track.sigma.front() > 0.; }));
+}
+
+TEST(Contradictions, AreUpdatesMostOfWhoseFactorsAreRejected) {
+  const auto warned = [](std::int64_t applied, std::int64_t rejected) {
+    return !contradictions({{"wheel_odometry", {applied, rejected}, {}, {}, {}}}).empty();
+  };
+  EXPECT_TRUE(warned(9, 11));
+  EXPECT_FALSE(warned(10, 10));
+  EXPECT_FALSE(warned(0, 19));
+  EXPECT_FALSE(warned(12227, 12));
+  EXPECT_TRUE(warned(0, 20));
+}
+
+TEST(Contradictions, AreTellTalesOfSwappedJoints) {
+  // Left and right wheels are each other's: the base seems to turn the other way.
+  RunSetup setup = filter_setup();
+  RunData data = collect(setup);
+  for (EncoderSample& sample : data.samples) {
+    for (auto* joints : {&sample.drive_rad_per_s, &sample.steer_rad}) {
+      std::swap((*joints)[0], (*joints)[3]);
+      std::swap((*joints)[1], (*joints)[2]);
+    }
+  }
+  const RunResult result = experiment::run(setup, data);
+  ASSERT_EQ(result.warnings.size(), 1U);
+  EXPECT_THAT(result.warnings[0],
+              HasSubstr(" rejected: what it measures and the rest contradict each other - check"));
+  EXPECT_THAT(describe(result), HasSubstr("warning: wheel_odometry: "));
+  EXPECT_EQ(summary_of(setup, result).at("warnings").at(0), result.warnings[0]);
+  EXPECT_THAT(report::to_html(report_of(setup, result)), HasSubstr(result.warnings[0]));
+  EXPECT_TRUE(filter_run().result.warnings.empty());
 }
 
 TEST(DisplayUnit, IsSmallWhereValuesAre) {

@@ -337,6 +337,9 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
     result.status = RunStatus::kFailed;
     result.cause = no_epoch(*setup.filter, estimator);
   }
+  for (std::string& line : contradictions(result.updates)) {
+    result.warnings.push_back(std::move(line));
+  }
   if (result.status == RunStatus::kOk && !result.reference.empty()) {
     result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);
   }

@@ -89,6 +89,22 @@ StageTime stage_time(std::vector<double> ms) {
   return stage;
 }
 
+std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates) {
+  // Gates reject five percent (gate_probability) of what is good: that more than half of twenty
+  // are, has a probability below 1e-9. Fewer would report the first seconds of a start that is off.
+  constexpr std::int64_t kFewest = 20;
+  std::vector<std::string> lines;
+  for (const UpdateTrack& update : updates) {
+    const auto& [applied, rejected] = update.total;
+    if (applied + rejected < kFewest || rejected <= applied) continue;
+    lines.push_back(update.name + ": " + std::to_string(rejected) + " of " +
+                    std::to_string(applied + rejected) +
+                    " rejected: what it measures and the rest contradict each other - check "
+                    "calibration and axes of cameras and IMU, order of the joints, kinematics");
+  }
+  return lines;
+}
+
 RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   RunResult result;
   result.rejections = data.rejections;

@@ -117,6 +117,7 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
       {"viwo_version", viwo_version()},
       {"status", name(result.status)},
       {"cause", result.cause},
+      {"warnings", result.warnings},
       {"name", setup.name},
       {"seed", setup.seed},
       {"epochs", result.epochs},
@@ -192,6 +193,7 @@ std::string describe(const RunResult& result) {
   for (const MonitorWarning& warning : result.monitor.warnings) {
     out << "at " << significant(warning.t_s, 4) << " s: " << warning.text << "\n";
   }
+  for (const std::string& line : result.warnings) out << "warning: " << line << "\n";
   for (const std::string& line : describe_failures(result)) out << "warning: " << line << "\n";
   for (const std::string& line : describe_rejections(result)) out << line << "\n";
   return out.str();

@@ -60,8 +60,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MonitorTrack, t_s, parameters, sigma_ratio, h
 // `accuracy` is optional: see below.
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunResult, status, cause, epochs, duration_s, wall_s, estimate,
                                    reference, nees_planar, total, epoch_ms, stages, total_ms,
-                                   rejections, nees, errors, epoch_t_s, calibration, updates,
-                                   monitor)
+                                   rejections, warnings, nees, errors, epoch_t_s, calibration,
+                                   updates, monitor)
 
 namespace {
 

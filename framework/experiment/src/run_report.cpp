@@ -81,6 +81,9 @@ void add_result_section(const RunSetup& setup, const RunResult& result, Document
     section.blocks.emplace_back(Paragraph{std::string(name(result.status)) + ": " + result.cause,
                                           Paragraph::Tone::kWarning});
   }
+  for (const std::string& line : result.warnings) {
+    section.blocks.emplace_back(Paragraph{line, Paragraph::Tone::kWarning});
+  }
   section.blocks.emplace_back(facts_of(setup, result));
   if (result.accuracy) {
     section.blocks.emplace_back(accuracy_table(*result.accuracy));

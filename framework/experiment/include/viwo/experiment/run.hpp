@@ -181,6 +181,7 @@ struct RunResult {
   std::vector<std::pair<std::string, StageTime>> stages;  ///< without the total
   StageTime total_ms;                                     ///< of an epoch
   std::vector<std::pair<std::string, RejectionCount>> rejections;
+  std::vector<std::string> warnings;  ///< what is suspicious of the run as a whole
 
   // Of the filter.
   PoseNees nees;
@@ -218,6 +219,9 @@ struct RunHooks {
 /// Runs the filter over all measurements and evaluates. A filter that diverges, or a kinematic
 /// model that throws, ends the run with the epoch and the cause.
 RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks& hooks = {});
+
+/// Warnings of updates most of whose factors were rejected.
+std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates);
 
 /// What the configuration asks for.
 inline RunResult run(const RunSetup& setup, const RunData& data, const RunHooks& hooks = {}) {
