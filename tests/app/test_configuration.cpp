@@ -174,6 +174,37 @@ TEST_F(ConfigurationTest, RefusesUnknownPlaceholders) {
       "run.yaml:12:13  unknown placeholder '{motoin}' in '{motoin}' - did you mean 'motion'?");
 }
 
+TEST_F(ConfigurationTest, RefusesPlaceholdersThatAreUsedNowhere) {
+  refuse_run("motion: circle\n",
+             "motion: \"{motion}\"\nplaceholders: {motion: circle, motoin: a}\n",
+             "run.yaml:13:32  placeholder 'motoin' is used nowhere - did you mean 'motion'?");
+  write("run.yaml", replaced(kRun, "motion: circle\n",
+                             "motion: \"{motion}\"\nplaceholders: {motion: circle}\n"));
+  expect_refused({"run", "run.yaml", "--set", "placeholders.motoin=a"},
+                 "--set placeholders.motoin  placeholder 'motoin' is used nowhere - did you mean "
+                 "'motion'?");
+  expect_done({"run", "run.yaml", "--set", "sensors.sim.motion=straight", "--out", "out"});
+}
+
+TEST_F(ConfigurationTest, RefusesPlaceholdersThatNoVariantUses) {
+  const auto refuse = [&](const std::string& from, const std::string& to, const char* mark) {
+    refuse_experiment(
+        from, to,
+        std::string(mark) + "  placeholder 'motoin' is used nowhere - did you mean 'motion'?");
+  };
+  refuse("redundant:", "redundant: {placeholders.motoin: 3}", "e.yaml:6:15");
+  refuse("circle, straight", "{motion: circle, name: a, motoin: b}", "e.yaml:4:37");
+  refuse("seeds: 2", "set: {placeholders: {motoin: 2}}", "e.yaml:3:22");
+  // Used by one variant only, written over in another, and a label to know what is what.
+  write("run.yaml", replaced(kRun, "motion: circle\n", "motion: \"{motion}\"\n"));
+  write("e.yaml",
+        replaced(replaced(kExperiment, "circle, straight", "{motion: circle, made_on: monday}"),
+                 "redundant:",
+                 "redundant: {sensors.sim.motion: \"{a}\", "
+                 "placeholders.a: straight}"));
+  expect_done({"experiment", "e.yaml", "--out", "out"});
+}
+
 TEST_F(ConfigurationTest, RefusesACalibrationThatDoesNotFit) {
   write("run.yaml", kRun);
   write("c.yaml", "calibration: c\nbase: run.yaml\nsegment_s: 1\n");

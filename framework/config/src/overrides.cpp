@@ -68,9 +68,9 @@ bool is_identifier(std::string_view text) {
   return true;
 }
 
-std::string substituted(const Node& scalar, const std::map<std::string, std::string>& values,
-                        Errors& errors) {
-  const std::string& text = scalar.scalar();
+/// `text` with every {name} replaced by what `value_of` gives for its name.
+template <class ValueOf>
+std::string replaced(const std::string& text, const ValueOf& value_of) {
   std::string out;
   std::size_t from = 0;
   while (from < text.size()) {
@@ -83,19 +83,24 @@ std::string substituted(const Node& scalar, const std::map<std::string, std::str
       from = open + 1;
       continue;
     }
-    out += text.substr(from, open - from);
-    const auto value = values.find(name);
-    if (value != values.end()) {
-      out += value->second;
-    } else {
-      std::vector<std::string> known;
-      for (const auto& entry : values) known.push_back(entry.first);
-      errors.add(scalar.mark(), "unknown placeholder '{" + name + "}' in '" + text + "'" +
-                                    did_you_mean(name, known));
-    }
+    out += text.substr(from, open - from) + value_of(name);
     from = close + 1;
   }
   return out + text.substr(from);
+}
+
+std::string substituted(const Node& scalar, const std::map<std::string, std::string>& values,
+                        Errors& errors) {
+  const std::string& text = scalar.scalar();
+  return replaced(text, [&](const std::string& name) {
+    const auto value = values.find(name);
+    if (value != values.end()) return value->second;
+    std::vector<std::string> known;
+    for (const auto& entry : values) known.push_back(entry.first);
+    errors.add(scalar.mark(), "unknown placeholder '{" + name + "}' in '" + text + "'" +
+                                  did_you_mean(name, known));
+    return std::string();
+  });
 }
 
 }  // namespace
@@ -138,6 +143,14 @@ Assignment parse_assignment(std::string_view text) {
   std::string path{text.substr(0, equals)};
   Node value = parse_text(text.substr(equals + 1), "--set " + path, false);
   return {std::move(path), std::move(value)};
+}
+
+void find_placeholders(const Node& node, std::set<std::string>& names) {
+  if (node.is_scalar()) {
+    replaced(node.scalar(), [&](const std::string& name) { return *names.insert(name).first; });
+  }
+  for (const Node& item : node.items()) find_placeholders(item, names);
+  for (const Node::Entry& entry : node.entries()) find_placeholders(entry.value, names);
 }
 
 void substitute(Node& node, const std::map<std::string, std::string>& values, Errors& errors) {

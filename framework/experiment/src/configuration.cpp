@@ -42,6 +42,68 @@ Recording read_recording(const Node& item) {
                "called by");
 }
 
+/// A placeholder's value: where it is given.
+struct Definition {
+  std::string name;
+  config::Mark mark;
+};
+
+/// Adds those in the section `placeholders` of a run.
+void find_definitions(const Node& run, std::vector<Definition>& defined) {
+  const Node* section = run.find("placeholders");
+  if (section == nullptr) return;
+  for (const auto& entry : section->entries()) defined.push_back({entry.key, entry.key_mark});
+}
+
+/// Adds the labels of the recordings that replace placeholders or, by their spelling, were to.
+void find_labels(const Node& configuration, const std::set<std::string>& used,
+                 std::vector<Definition>& defined) {
+  const std::vector<std::string> names(used.begin(), used.end());
+  std::set<std::string> grouped{"name"};
+  for (const char* key : {"report_by", "leave_out_by"}) {
+    const Node* labels = configuration.find(key);
+    if (labels == nullptr) continue;
+    if (labels->is_scalar()) grouped.insert(labels->scalar());
+    for (const Node& label : labels->items()) {
+      if (label.is_scalar()) grouped.insert(label.scalar());
+    }
+  }
+  for (const char* axis : {"recordings", "motions"}) {
+    const Node* list = configuration.find(axis);
+    if (list == nullptr) continue;
+    for (const Node& item : list->items()) {
+      if (item.is_scalar()) {
+        defined.push_back({axis == std::string("motions") ? "motion" : "recording", item.mark()});
+        break;  // all of them are the same placeholder
+      }
+      for (const auto& label : item.entries()) {
+        // Others are there to group by, or to know what is what.
+        const bool misspelt =
+            !grouped.contains(label.key) && !config::nearest(label.key, names).empty();
+        if (used.contains(label.key) || misspelt) defined.push_back({label.key, label.key_mark});
+      }
+    }
+  }
+}
+
+/// InputError for placeholders that are given a value and are used nowhere. Nothing where some are
+/// used that have none: that is an error of its own, likely of the same spelling.
+void refuse_unused(const std::vector<Definition>& defined, const Node& run,
+                   const std::set<std::string>& used) {
+  std::set<std::string> missing;
+  config::find_placeholders(run, missing);
+  for (const Definition& definition : defined) missing.erase(definition.name);
+  if (!missing.empty()) return;
+  const std::vector<std::string> names(used.begin(), used.end());
+  config::Errors errors;
+  for (const Definition& definition : defined) {
+    if (used.contains(definition.name)) continue;
+    errors.add(definition.mark, "placeholder '" + definition.name + "' is used nowhere" +
+                                    config::did_you_mean(definition.name, names));
+  }
+  errors.throw_if_any();
+}
+
 void apply(Node& run, const std::vector<std::string>& assignments) {
   for (const std::string& text : assignments) {
     const config::Assignment assignment = config::parse_assignment(text);
@@ -49,10 +111,7 @@ void apply(Node& run, const std::vector<std::string>& assignments) {
   }
 }
 
-}  // namespace
-
-Node load_run_configuration(const std::filesystem::path& file,
-                            const std::vector<std::string>& assignments) {
+Node load_run(const std::filesystem::path& file) {
   Node run = config::load_file(file);
   if (!run.is_map()) config::fail(run.mark(), "a run configuration is a section of keys");
   for (const char* kind : {"experiment", "calibration"}) {
@@ -62,7 +121,21 @@ Node load_run_configuration(const std::filesystem::path& file,
                      ", not a run: viwo " + (kind[0] == 'e' ? "experiment" : "calibrate") +
                      " takes it");
   }
+  return run;
+}
+
+}  // namespace
+
+Node load_run_configuration(const std::filesystem::path& file,
+                            const std::vector<std::string>& assignments) {
+  Node run = load_run(file);
+  std::set<std::string> used;
+  config::find_placeholders(run, used);  // also what assignments then write over
   apply(run, assignments);
+  config::find_placeholders(run, used);
+  std::vector<Definition> defined;
+  find_definitions(run, defined);
+  refuse_unused(defined, run, used);
   return run;
 }
 
@@ -145,9 +218,24 @@ Node load_base(const Node& configuration, const std::vector<std::string>& assign
   if (base == nullptr) config::fail(configuration.mark(), "required key 'base' is missing");
   const std::filesystem::path file =
       std::filesystem::path(base->mark().file).parent_path() / scalar(*base, "'base'");
-  Node run = load_run_configuration(file.lexically_normal(), {});
+  Node run = load_run(file.lexically_normal());
+  std::set<std::string> used;
+  config::find_placeholders(run, used);
   if (const Node* overrides = configuration.find("set")) config::merge(run, *overrides);
   apply(run, assignments);
+  config::find_placeholders(run, used);
+  config::find_placeholders(configuration, used);  // of all variants
+  std::vector<Definition> defined;
+  find_definitions(run, defined);
+  if (const Node* variants = configuration.find("variants")) {
+    for (const auto& variant : variants->entries()) {
+      Node overrides = Node::empty_map();
+      if (variant.value.is_map()) config::merge(overrides, variant.value);
+      find_definitions(overrides, defined);
+    }
+  }
+  find_labels(configuration, used, defined);
+  refuse_unused(defined, run, used);
   return run;
 }
 

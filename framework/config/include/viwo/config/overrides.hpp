@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -31,6 +32,9 @@ struct Assignment {
 /// Reads the argument of --set; VALUE is YAML. All positions are "--set path.to.key". Throws
 /// viwo::InputError.
 Assignment parse_assignment(std::string_view text);
+
+/// Adds the name of every {name} in the scalars below `node` to `names`.
+void find_placeholders(const Node& node, std::set<std::string>& names);
 
 /// Replaces {name} in all scalars below `node` by its value. Names are identifiers; other braces
 /// stay. An unknown name is an error at the scalar.

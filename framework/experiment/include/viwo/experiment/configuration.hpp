@@ -18,7 +18,7 @@ struct Recording {
 };
 
 /// A run configuration, with `--set` assignments ("path.to.key=VALUE") applied. Placeholders are
-/// still in it. Throws InputError.
+/// still in it. Throws InputError, also for a placeholder that is given a value and used nowhere.
 config::Node load_run_configuration(const std::filesystem::path& file,
                                     const std::vector<std::string>& assignments);
 
@@ -33,7 +33,8 @@ config::Node resolve_placeholders(const config::Node& run,
 std::vector<Recording> read_recordings(const config::Node& section);
 
 /// The run configuration that an experiment or a calibration is based on: its file `base` (relative
-/// to its folder), its section `set` of overrides, then `assignments`. Throws InputError.
+/// to its folder), its section `set` of overrides, then `assignments`. Throws InputError, also for
+/// a placeholder that is given a value, by a variant or as a label, and that no variant uses.
 config::Node load_base(const config::Node& configuration,
                        const std::vector<std::string>& assignments);
 
