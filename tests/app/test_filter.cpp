@@ -241,6 +241,24 @@ TEST_F(FilterTest, SaysThatItFoundNoStateToStartFrom) {
       << outcome.out;
 }
 
+TEST_F(FilterTest, WarnsWhenSensorAndFilterKnowOtherCameras) {
+  EXPECT_EQ(expect_done({"run", "run.yaml", "--out", "same"}).out.find("warning"),
+            std::string::npos);
+  // The same in other words: no difference.
+  const std::string chain = read("cam.yaml");
+  write("other.yaml", "# a copy\n" + chain);
+  change("{kalibr: cam.yaml}", "{kalibr: other.yaml}");
+  EXPECT_EQ(expect_done({"run", "run.yaml", "--out", "copy"}).out.find("warning"),
+            std::string::npos);
+  write("other.yaml", replaced(chain, "intrinsics: [", "intrinsics: [1"));
+  const Outcome outcome = viwo({"run", "run.yaml", "--out", "out"});
+  const std::string warning = summary().at("warnings").at(0);
+  EXPECT_EQ(warning.find("sensors.sim.cameras and cameras.kalibr differ: fx [px] of cam0 is "), 0U)
+      << warning;
+  EXPECT_NE(outcome.out.find("warning: " + warning + "\n"), std::string::npos) << outcome.out;
+  EXPECT_NE(read("out/report.html").find(warning), std::string::npos);
+}
+
 TEST_F(FilterTest, CountsWhatItSimulates) {
   // 200 Hz, 100 Hz and 10 Hz for five seconds, both ends included; 16 intrinsics, 6 of the mounting
   // and a time offset.

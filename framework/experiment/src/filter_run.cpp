@@ -350,6 +350,7 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
 RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks& hooks) {
   RunResult result;
   result.rejections = data.rejections;
+  result.warnings = setup.warnings;
   const bool live = !data.live.empty();
   Estimator estimator = make_estimator(*setup.filter, live);
   start(estimator, setup, data);

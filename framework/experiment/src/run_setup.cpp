@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration_file.hpp"
+#include "camera_check.hpp"
 #include "section.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/experiment/run.hpp"
@@ -264,6 +265,7 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
   }
   read_sensors(run, plugins, setup, errors);
   errors.throw_if_any();
+  setup.warnings = compare_cameras(setup);
   return setup;
 }
 

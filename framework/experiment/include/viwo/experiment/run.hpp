@@ -48,7 +48,8 @@ struct RunSetup {
   std::vector<std::string> measured_poses;
   std::optional<FilterSetup> filter;           ///< nothing: dead reckoning from the wheels alone
   config::Mark kinematics_mark, sensors_mark;  ///< where the sections are written
-  config::Node resolved;  ///< all of it, with defaults: a valid run configuration
+  config::Node resolved;              ///< all of it, with defaults: a valid run configuration
+  std::vector<std::string> warnings;  ///< what is suspicious in it, for those of the result
 };
 
 /// Reads a run configuration without placeholders. `seed` overrules the configured one. Throws
