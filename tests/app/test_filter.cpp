@@ -239,6 +239,9 @@ TEST_F(FilterTest, SaysThatItFoundNoStateToStartFrom) {
                              "a wheel turns faster than 0.05 rad/s ("),
             0U)
       << outcome.out;
+  EXPECT_NE(outcome.out.find(" attempts) - choose start: moving, or reference\n"),
+            std::string::npos)
+      << outcome.out;
 }
 
 TEST_F(FilterTest, WarnsWhenSensorAndFilterKnowOtherCameras) {

@@ -278,6 +278,16 @@ TEST(LiveFeed, EndsWhenItIsInterruptedAndKeepsTheResults) {
   EXPECT_GT(live.estimate.size(), 10U);
 }
 
+TEST(LiveFeed, SaysThatNothingHasCome) {
+  RunSetup setup = standing_then_driving();
+  RunData data;
+  data.live.push_back(
+      stream("device", std::make_shared<Device>(std::vector<Measurement>(), false)));
+  const RunResult live = run_filter(setup, data);
+  EXPECT_EQ(live.status, RunStatus::kFailed);
+  EXPECT_EQ(live.cause, "nothing has come: no IMU sample arrived");
+}
+
 TEST(LiveFeed, EndsWithTheErrorOfItsSensor) {
   class Broken final : public Device {
    public:

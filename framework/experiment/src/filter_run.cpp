@@ -318,6 +318,10 @@ std::string no_epoch(const FilterSetup& setup, const Estimator& estimator) {
             " of " + std::to_string(attempts) + " attempts)";
     separator = ", ";
   }
+  if (setup.start.mode == StartMode::kStandstill) {
+    text += setup.wheels.empty() ? " - choose start: reference"
+                                 : " - choose start: moving, or reference";
+  }
   return text;
 }
 

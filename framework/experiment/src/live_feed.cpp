@@ -151,6 +151,9 @@ class LiveFeed final : public Feed {
   void finish(RunResult& result) override {
     stop();
     result.reference = std::move(reference_);
+    if (imu_name_.empty() && result.cause.empty()) {
+      result.cause = "nothing has come: no IMU sample arrived";
+    }
     for (const Worker& worker : workers_) {
       result.stages.emplace_back("sensor " + worker.stream->name, stage_time(worker.ms_per_stamp));
     }
