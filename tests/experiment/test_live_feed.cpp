@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "simulated.hpp"
+#include "viwo/experiment/output.hpp"
 #include "viwo/experiment/run.hpp"
 
 namespace viwo::experiment {
@@ -276,6 +277,9 @@ TEST(LiveFeed, EndsWhenItIsInterruptedAndKeepsTheResults) {
   const RunResult live = run_filter(setup, data, hooks);
   EXPECT_EQ(live.status, RunStatus::kOk) << live.cause;
   EXPECT_GT(live.estimate.size(), 10U);
+  // Slower than real time it would be behind; that says nothing of what was waited for.
+  EXPECT_EQ(describe(live).find("x real time"), std::string::npos) << describe(live);
+  EXPECT_NE(describe(run_filter(setup, recorded)).find("x real time"), std::string::npos);
 }
 
 TEST(LiveFeed, SaysThatNothingHasCome) {

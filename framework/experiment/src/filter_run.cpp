@@ -356,6 +356,7 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks&
   result.rejections = data.rejections;
   result.warnings = setup.warnings;
   const bool live = !data.live.empty();
+  result.live = live;
   Estimator estimator = make_estimator(*setup.filter, live);
   start(estimator, setup, data);
   if (hooks.on_start) estimator.observe(hooks.on_start(estimator));

@@ -174,7 +174,7 @@ std::string describe(const RunResult& result) {
       if (update.total.rejected > 0) out << " (" << update.total.rejected << " rejected)";
     }
   }
-  if (result.wall_s > 0.) {
+  if (result.wall_s > 0. && !result.live) {
     out << ", " << significant(result.duration_s / result.wall_s, 3) << " x real time";
   }
   out << "\n";

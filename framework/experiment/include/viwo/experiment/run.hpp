@@ -172,6 +172,7 @@ struct RunResult {
   std::int64_t epochs = 0;
   double duration_s = 0.;
   double wall_s = 0.;    ///< of the odometry, without reading
+  bool live = false;     ///< from sensors that gave what happened just then
   Trajectory estimate;   ///< of the reference body B
   Trajectory reference;  ///< planar
   std::optional<eval::Accuracy> accuracy;
