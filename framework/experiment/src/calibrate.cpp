@@ -92,8 +92,8 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   setup.leave_out_by = params.text("leave_out_by");
   const auto report_by = params.texts("report_by");
   setup.report_by.assign(report_by.begin(), report_by.end());
-  const Node base = load_base(file, assignments);
   const std::vector<Recording> recordings = read_recordings(file);
+  const Node base = load_base(file, assignments);
   require_labels(setup.report_by, recordings, file, "report_by");
   for (const Recording& recording : recordings) {
     if (!setup.leave_out_by.empty() && !recording.labels.contains(setup.leave_out_by)) {

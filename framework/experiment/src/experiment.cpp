@@ -288,8 +288,8 @@ ExperimentSetup read_experiment(const std::filesystem::path& path,
   const auto report_by = params.texts("report_by");
   setup.report_by.assign(report_by.begin(), report_by.end());
   setup.base_file = params.text("base");
-  setup.base = load_base(file, options.assignments);
   setup.recordings = read_recordings(file);
+  setup.base = load_base(file, options.assignments);
   require_labels(setup.report_by, setup.recordings, file, "report_by");
   read_variants(file, setup);
   find_baseline(file, params.text("baseline"), setup);
