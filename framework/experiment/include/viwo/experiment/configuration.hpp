@@ -34,7 +34,8 @@ std::vector<Recording> read_recordings(const config::Node& section);
 
 /// The run configuration that an experiment or a calibration is based on: its file `base` (relative
 /// to its folder), its section `set` of overrides, then `assignments`. Throws InputError, also for
-/// a placeholder that is given a value, by a variant or as a label, and that no variant uses.
+/// a placeholder that is given a value, by a variant or as a label, and that no variant uses; what
+/// else is wrong with the recordings is for read_recordings(), before this.
 config::Node load_base(const config::Node& configuration,
                        const std::vector<std::string>& assignments);
 
