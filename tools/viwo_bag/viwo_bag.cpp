@@ -17,6 +17,7 @@
 #include "viwo/api/status.hpp"
 #include "viwo/image/image_file.hpp"
 #include "viwo/log/asl.hpp"
+#include "viwo/log/asl_columns.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"
 
@@ -62,17 +63,9 @@ std::vector<Sample> samples_of(const log::Recording<Sample>& recording, const fs
   return recording.samples;
 }
 
-/// The column of stamps as the datasets and our own logs call it.
-std::size_t stamp_column(const log::TableReader& table) {
-  for (const char* name : {"timestamp [ns]", "timestamp"}) {
-    if (table.has_column(name)) return table.column(name);
-  }
-  return table.column("timestamp_ns");
-}
-
 void read_images(const fs::path& folder, std::size_t camera, std::vector<ImageOnDisk>& out) {
   log::TableReader table(folder / "data.csv");
-  const std::size_t stamp = stamp_column(table);
+  const std::size_t stamp = log::stamp_column(table);
   const std::size_t name = table.column("filename");
   while (table.next()) {
     out.push_back({table.stamp_ns(stamp), camera, folder / "data" / std::string(table.text(name))});

@@ -8,9 +8,9 @@
 #include <system_error>
 #include <vector>
 
-#include "asl_columns.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/image/image_file.hpp"
+#include "viwo/log/asl_columns.hpp"
 #include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"
