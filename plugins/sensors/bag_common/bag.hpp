@@ -20,6 +20,10 @@ struct Topic {
   std::string type;  ///< as the bag has it
 };
 
+/// Adds a topic of the bag `bag` to `topics`, which stay in the order of their names; one that is
+/// there already must have the same type (InputError).
+void add_topic(const std::string& bag, const Topic& topic, std::vector<Topic>& topics);
+
 /// A topic that is wanted.
 struct Wanted {
   std::string name;

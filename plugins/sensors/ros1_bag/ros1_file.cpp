@@ -80,11 +80,9 @@ class Ros1Recording final : public Bag {
         begin_ns_ = file->begin_ns;
       }
       for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
-        add_topic({connection->topic, connection->datatype});
+        add_topic(name_, {connection->topic, connection->datatype}, topics_);
       }
     }
-    std::sort(topics_.begin(), topics_.end(),
-              [](const Topic& a, const Topic& b) { return a.name < b.name; });
   }
 
   const std::string& name() const override { return name_; }
@@ -110,16 +108,6 @@ class Ros1Recording final : public Bag {
   }
 
  private:
-  void add_topic(const Topic& topic) {
-    for (const Topic& known : topics_) {
-      if (known.name != topic.name) continue;
-      if (known.type == topic.type) return;
-      throw InputError(name_ + "  topic '" + topic.name + "' is of two types, " + known.type +
-                       " and " + topic.type);
-    }
-    topics_.push_back(topic);
-  }
-
   /// The layout of the messages must be the one that is read.
   static void check_definition(const File& file, const rosbag::MessageInstance& message) {
     const auto kind = kind_of(message.getDataType());

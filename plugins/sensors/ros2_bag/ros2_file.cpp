@@ -80,13 +80,11 @@ class Ros2Recording final : public Bag {
     });
     bool is_first = true;
     for (const auto& file : files_) {
-      for (const Topic& topic : file->topics()) add_topic(topic);
+      for (const Topic& topic : file->topics()) add_topic(name_, topic, topics_);
       if (file->is_empty() || !is_first) continue;
       is_first = false;
       begin_ns_ = file->begin_ns();
     }
-    std::sort(topics_.begin(), topics_.end(),
-              [](const Topic& a, const Topic& b) { return a.name < b.name; });
   }
 
   const std::string& name() const override { return name_; }
@@ -101,16 +99,6 @@ class Ros2Recording final : public Bag {
   }
 
  private:
-  void add_topic(const Topic& topic) {
-    for (const Topic& known : topics_) {
-      if (known.name != topic.name) continue;
-      if (known.type == topic.type) return;
-      throw InputError(name_ + "  topic '" + topic.name + "' is of two types, " + known.type +
-                       " and " + topic.type);
-    }
-    topics_.push_back(topic);
-  }
-
   std::string name_;
   std::vector<std::unique_ptr<Database>> files_;
   std::vector<Topic> topics_;
