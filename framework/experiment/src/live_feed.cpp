@@ -1,7 +1,6 @@
 // Sensors that give measurements as they happen. Each has a thread, and so has each sensor that
 // works on what another one gives; all of them put what they give into one queue, from which the
 // estimator takes it in the order of arrival.
-#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -286,13 +285,7 @@ class LiveFeed final : public Feed {
     const auto& measured = setup_.filter->pose_sensors;
     for (std::size_t k = 0; k < measured.size(); ++k) {
       if (measured[k] != sensor) continue;
-      const auto& updates = setup_.filter->updates;
-      const auto stream = static_cast<int>(k);
-      // Otherwise all updates that measure with them are turned off.
-      if (std::any_of(updates.begin(), updates.end(),
-                      [stream](const auto& update) { return update.poses == stream; })) {
-        estimator.add(pose, stream);
-      }
+      if (is_measured(*setup_.filter, k)) estimator.add(pose, static_cast<int>(k));
       return;
     }
     claim(reference_name_, sensor, kReferencePoses);

@@ -20,10 +20,9 @@ class RecordedFeed final : public Feed {
     }
     next_wheel_.resize(wheels_.size(), 0);
     poses_.resize(setup.filter->pose_sensors.size(), nullptr);
-    for (const FilterSetup::Entry& update : setup.filter->updates) {
-      if (update.poses < 0) continue;
-      const auto stream = static_cast<std::size_t>(update.poses);
-      poses_[stream] = &pose_samples(data, setup.filter->pose_sensors[stream]);
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      if (!is_measured(*setup.filter, k)) continue;
+      poses_[k] = &pose_samples(data, setup.filter->pose_sensors[k]);
     }
     next_pose_.resize(poses_.size(), 0);
     for (const SensorStream& stream : data.streams) {

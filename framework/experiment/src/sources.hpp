@@ -1,6 +1,8 @@
 // Which sensor of a run gives what: each kind of measurement comes from one.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <map>
 #include <string>
 #include <vector>
@@ -38,6 +40,14 @@ inline const std::vector<EncoderSample>& encoder_samples(const RunData& data,
                                                          const std::string& sensor) {
   if (sensor.empty() || sensor == data.wheels_name) return data.samples;
   return samples_or_none(data.other_wheels, sensor);
+}
+
+/// Whether an update measures with the poses of `pose_sensors[stream]`; not if all that would are
+/// turned off.
+inline bool is_measured(const FilterSetup& setup, std::size_t stream) {
+  return std::any_of(setup.updates.begin(), setup.updates.end(), [stream](const auto& update) {
+    return update.poses == static_cast<int>(stream);
+  });
 }
 
 /// What a sensor gave for updates that measure with poses.
