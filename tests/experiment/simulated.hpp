@@ -16,6 +16,16 @@ inline const std::string kSwerve =
     "radius_m: 0.0255, prior_sigma_radius_m: 0.00005, prior_sigma_position_m: 0.001, "
     "prior_sigma_steer_offset_rad: 0.003";
 
+/// Sensors and kinematics of a swerve robot on a circle for ten seconds: wheels, IMU, a camera.
+inline std::string swerve_with_camera(int features) {
+  return "sensors:\n"
+         "  simulator0: {type: simulator, motion: circle, duration_s: 10, features: " +
+         std::to_string(features) +
+         ", cameras: " VIWO_TEST_SOURCE_DIR
+         "/configs/cameras/pinhole.yaml, robot: {type: four_wis_wid, " +
+         kSwerve + "}}\nkinematics: {type: four_wis_wid, " + kSwerve + "}\n";
+}
+
 /// A simulated swerve robot, 20 s of `motion`, with overrides as --set would give them.
 inline config::Node simulated(const std::string& motion,
                               const std::vector<std::string>& assignments = {}) {

@@ -21,18 +21,7 @@ using testing::registry;
 /// A simulated swerve robot for ten seconds; images only make the epochs.
 RunSetup inertia_and_wheels() {
   const config::Node run = config::parse(
-      "sensors:\n"
-      "  simulator0: {type: simulator, motion: circle, duration_s: 10, features: 10, "
-      "cameras: " VIWO_TEST_SOURCE_DIR
-      "/configs/cameras/pinhole.yaml, "
-      "robot: {type: four_wis_wid, " +
-          testing::kSwerve +
-          "}}\n"
-          "kinematics: {type: four_wis_wid, " +
-          testing::kSwerve +
-          "}\n"
-          "updates: {wheel_odometry: {}}\n",
-      "run.yaml");
+      testing::swerve_with_camera(10) + "updates: {wheel_odometry: {}}\n", "run.yaml");
   return read_run(run, registry(), 1);
 }
 

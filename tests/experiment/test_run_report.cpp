@@ -34,23 +34,13 @@ struct FinishedRun {
 
 /// Ten seconds of a swerve robot on a circle, with everything that the filter estimates.
 RunSetup filter_setup() {
-  const config::Node node = config::parse(
-      "name: page\n"
-      "sensors:\n"
-      "  simulator0: {type: simulator, motion: circle, duration_s: 10, features: 40, "
-      "cameras: " VIWO_TEST_SOURCE_DIR
-      "/configs/cameras/pinhole.yaml, "
-      "robot: {type: four_wis_wid, " +
-          testing::kSwerve +
-          "}}\n"
-          "kinematics: {type: four_wis_wid, " +
-          testing::kSwerve +
-          "}\n"
-          "wheels: {sigma_p_IinO_m: [0.1, 0.1, 0.1], sigma_t_OtoI_s: 0.01}\n"
-          "cameras: {kalibr: " VIWO_TEST_SOURCE_DIR
-          "/configs/cameras/pinhole.yaml}\n"
-          "updates: {visual_features: {}, wheel_odometry: {}}\n",
-      "run.yaml");
+  const config::Node node =
+      config::parse("name: page\n" + testing::swerve_with_camera(40) +
+                        "wheels: {sigma_p_IinO_m: [0.1, 0.1, 0.1], sigma_t_OtoI_s: 0.01}\n"
+                        "cameras: {kalibr: " VIWO_TEST_SOURCE_DIR
+                        "/configs/cameras/pinhole.yaml}\n"
+                        "updates: {visual_features: {}, wheel_odometry: {}}\n",
+                    "run.yaml");
   return read_run(node, registry(), 7);
 }
 
