@@ -1,111 +1,12 @@
-// Prints what a plugin that was compiled against viwo/api relies on: sizes, alignments, offsets,
-// types of members, values of enumerators, order of virtual functions. Compiled without flags for
-// the processor, so that it prints the same everywhere (64 bit, Itanium C++ ABI).
-#include <bit>
-#include <cstddef>
-#include <cstdint>
-#include <iostream>
-#include <string>
-#include <string_view>
-#include <typeinfo>
-#include <utility>
-
-#include <cxxabi.h>
+// Prints what a plugin that was compiled against viwo/api relies on. Compiled without flags for the
+// processor, so that it prints the same everywhere (64 bit, Itanium C++ ABI).
+#include "api_record.hpp"
 
 #include "viwo/api/plugin.hpp"
 
 namespace {
 
 using namespace viwo;
-
-std::string type_name(const std::type_info& type) {
-  int status = 0;
-  char* const text = abi::__cxa_demangle(type.name(), nullptr, nullptr, &status);
-  std::string name = status == 0 ? text : type.name();
-  std::free(text);
-  const std::string_view string =
-      "std::__cxx11::basic_string<char, std::char_traits<char>, "
-      "std::allocator<char> >";
-  for (std::size_t at; (at = name.find(string)) != std::string::npos;) {
-    name.replace(at, string.size(), "std::string");
-  }
-  return name;
-}
-
-// How many members an aggregate has: as many as it can be initialised with.
-struct Anything {
-  template <class T>
-  operator T() const;  // never defined
-};
-template <class T, std::size_t... I>
-constexpr bool takes(std::index_sequence<I...> /*counted*/) {
-  return requires { T{(static_cast<void>(I), Anything{})...}; };
-}
-template <class T, std::size_t kCount = 40>
-constexpr std::size_t member_count() {
-  if constexpr (kCount == 0 || takes<T>(std::make_index_sequence<kCount>())) {
-    return kCount;
-  } else {
-    return member_count<T, kCount - 1>();
-  }
-}
-
-template <class T>
-void print_size(const char* name) {
-  std::cout << "\n" << name << "  size " << sizeof(T) << ", align " << alignof(T);
-  if constexpr (std::is_aggregate_v<T>) std::cout << ", members " << member_count<T>();
-  std::cout << "\n";
-}
-
-#define RECORD(T) print_size<T>(#T)
-#define MEMBER(T, m)                                                                        \
-  std::cout << "  " << #m << "  at " << offsetof(T, m) << ", size " << sizeof(T::m) << ", " \
-            << type_name(typeid(decltype(T::m))) << "\n"
-
-template <auto kValue>
-constexpr std::string_view enumerator() {
-  std::string_view text = __PRETTY_FUNCTION__;
-  const std::string_view key = "kValue = ";
-  text.remove_prefix(text.find(key) + key.size());
-  return text.substr(0, text.find_first_of(";]"));
-}
-template <class E, int kValue = 0>
-void print_enumerators() {
-  if constexpr (kValue < 16) {
-    constexpr std::string_view name = enumerator<static_cast<E>(kValue)>();
-    if (name.front() != '(') {
-      std::cout << "  " << name.substr(name.rfind(':') + 1) << " = " << kValue << "\n";
-    }
-    print_enumerators<E, kValue + 1>();
-  }
-}
-#define ENUM(E)      \
-  print_size<E>(#E); \
-  print_enumerators<E>()
-
-/// Place of a virtual function in the table. Its address is coded in the pointer to member: as
-/// 1 + offset, or, where code may have odd addresses, in the adjustment.
-template <class F>
-std::size_t slot(F function) {
-  struct Words {
-    std::uintptr_t address, adjustment;
-  };
-  const Words words = std::bit_cast<Words>(function);
-  const std::uintptr_t offset = (words.address & 1) != 0 ? words.address - 1 : words.address;
-  return offset / sizeof(void*);
-}
-#define VIRTUAL(T, f) \
-  std::cout << "  " << #f << "  slot " << slot(&T::f) << ", " << type_name(typeid(&T::f)) << "\n"
-
-/// Adds a virtual function: it comes behind all that the interface has.
-template <class T>
-struct WithOneMore : T {
-  virtual void one_more() {}
-};
-#define SLOTS(T) \
-  std::cout << "  slots " << slot(&WithOneMore<T>::one_more) << " (two of the destructor)\n"
-
-#define CONSTANT(c) std::cout << #c << " = " << (c) << "\n"
 
 void constants() {
   CONSTANT(kApiVersion);
@@ -124,6 +25,33 @@ void constants() {
   CONSTANT(kAccelBiasColumn);
   CONSTANT(kImuSize);
   CONSTANT(kPoseSize);
+  CONSTANT(kMaxRoomEntries);
+  CONSTANT(kSameInstantNs);
+}
+
+void samples() {
+  RECORD(SampleExtent);
+  MEMBER(SampleExtent, t_ns);
+  MEMBER(SampleExtent, begin_ns);
+  MEMBER(SampleExtent, end_ns);
+  RECORD(SampleType);
+  MEMBER(SampleType, name);
+  MEMBER(SampleType, version);
+  MEMBER(SampleType, size);
+  MEMBER(SampleType, align);
+  MEMBER(SampleType, layout);
+  MEMBER(SampleType, extent);
+  MEMBER(SampleType, channel);
+  MEMBER(SampleType, fault);
+  MEMBER(SampleType, make_buffer);
+  RECORD(SampleView);
+  RECORD(SampleBuffer);
+  SLOTS(SampleBuffer);
+  VIRTUAL(SampleBuffer, type);
+  VIRTUAL(SampleBuffer, push);
+  VIRTUAL(SampleBuffer, drop_front);
+  VIRTUAL(SampleBuffer, at);
+  RECORD(Measurement);
 }
 
 void measurements() {
@@ -135,10 +63,12 @@ void measurements() {
   MEMBER(EncoderSample, n_steer);
   MEMBER(EncoderSample, drive_rad_per_s);
   MEMBER(EncoderSample, steer_rad);
+  SAMPLE(EncoderSample);
   RECORD(ImuSample);
   MEMBER(ImuSample, t_ns);
   MEMBER(ImuSample, gyro_rad_per_s);
   MEMBER(ImuSample, accel_m_per_s2);
+  SAMPLE(ImuSample);
   RECORD(FeaturePoint);
   MEMBER(FeaturePoint, id);
   MEMBER(FeaturePoint, u_px);
@@ -147,10 +77,19 @@ void measurements() {
   MEMBER(FeatureSample, t_ns);
   MEMBER(FeatureSample, camera);
   MEMBER(FeatureSample, points);
+  SAMPLE(FeatureSample);
   RECORD(PoseSample);
   MEMBER(PoseSample, t_ns);
   MEMBER(PoseSample, p_BinW_m);
   MEMBER(PoseSample, q_BtoW_xyzw);
+  SAMPLE(PoseSample);
+  RECORD(GnssSample);
+  MEMBER(GnssSample, t_ns);
+  MEMBER(GnssSample, latitude_deg);
+  MEMBER(GnssSample, longitude_deg);
+  MEMBER(GnssSample, altitude_m);
+  MEMBER(GnssSample, covariance_ENU_m2);
+  SAMPLE(GnssSample);
   RECORD(StateSample);
   MEMBER(StateSample, t_ns);
   MEMBER(StateSample, q_ItoG_xyzw);
@@ -158,10 +97,12 @@ void measurements() {
   MEMBER(StateSample, v_IinG_m_per_s);
   MEMBER(StateSample, gyro_bias_rad_per_s);
   MEMBER(StateSample, accel_bias_m_per_s2);
+  SAMPLE(StateSample);
   RECORD(CalibrationSample);
   MEMBER(CalibrationSample, t_ns);
   MEMBER(CalibrationSample, name);
   MEMBER(CalibrationSample, value);
+  SAMPLE(CalibrationSample);
   RECORD(Image);
   MEMBER(Image, width_px);
   MEMBER(Image, height_px);
@@ -173,8 +114,7 @@ void measurements() {
   MEMBER(ImageSample, t_ns);
   MEMBER(ImageSample, camera);
   MEMBER(ImageSample, source);
-  RECORD(Measurement);
-  std::cout << "  is " << type_name(typeid(Measurement)) << "\n";
+  SAMPLE(ImageSample);
 }
 
 void descriptor() {
@@ -196,6 +136,7 @@ void descriptor() {
   MEMBER(HostServices, host);
   MEMBER(HostServices, log_text);
   MEMBER(HostServices, seed);
+  MEMBER(HostServices, exact);
   ENUM(ErrorText::Cause);
   RECORD(ErrorText);
   MEMBER(ErrorText, cause);
@@ -217,6 +158,7 @@ void descriptor() {
   ENUM(Status);
   RECORD(InputError);
   RECORD(ParamError);
+  RECORD(ContractError);
 }
 
 void kinematics() {
@@ -270,6 +212,79 @@ void kinematics() {
   VIRTUAL(KinematicModel, move_frame);
 }
 
+void blocks() {
+  ENUM(Excitation);
+  ENUM(Process);
+  RECORD(BlockEntry);
+  MEMBER(BlockEntry, name);
+  MEMBER(BlockEntry, unit);
+  MEMBER(BlockEntry, sigma);
+  MEMBER(BlockEntry, process_sigma);
+  MEMBER(BlockEntry, needs);
+  RECORD(BlockSpec);
+  MEMBER(BlockSpec, name);
+  MEMBER(BlockSpec, rotations);
+  MEMBER(BlockSpec, entries);
+  MEMBER(BlockSpec, value);
+  MEMBER(BlockSpec, process);
+  MEMBER(BlockSpec, time_constant_s);
+  MEMBER(BlockSpec, group);
+  RECORD(BlockId);
+  MEMBER(BlockId, index);
+  RECORD(RoomSpec);
+  MEMBER(RoomSpec, name);
+  MEMBER(RoomSpec, blocks);
+  MEMBER(RoomSpec, entries);
+  RECORD(RoomId);
+  MEMBER(RoomId, index);
+  RECORD(BlockView);
+}
+
+void rig() {
+  ENUM(CameraDistortion);
+  RECORD(CameraView);
+  MEMBER(CameraView, distortion);
+  MEMBER(CameraView, width_px);
+  MEMBER(CameraView, height_px);
+  MEMBER(CameraView, intrinsics);
+  MEMBER(CameraView, R_ItoC);
+  MEMBER(CameraView, p_IinC);
+  MEMBER(CameraView, t_CtoI_s);
+  RECORD(CameraPrior);
+  MEMBER(CameraPrior, camera);
+  MEMBER(CameraPrior, sigma_extrinsics);
+  MEMBER(CameraPrior, sigma_intrinsics);
+  MEMBER(CameraPrior, sigma_clock_s);
+  MEMBER(CameraPrior, shares_clock);
+  RECORD(CameraBlocks);
+  MEMBER(CameraBlocks, extrinsics);
+  MEMBER(CameraBlocks, intrinsics);
+  MEMBER(CameraBlocks, clock);
+  MEMBER(CameraBlocks, clock_constant_s);
+  RECORD(WheelsView);
+  MEMBER(WheelsView, model);
+  MEMBER(WheelsView, R_ItoO);
+  MEMBER(WheelsView, p_IinO);
+  MEMBER(WheelsView, t_OtoI_s);
+  MEMBER(WheelsView, x_WI);
+  MEMBER(WheelsView, extrinsics_column);
+  MEMBER(WheelsView, time_offset_column);
+  MEMBER(WheelsView, intrinsics_column);
+  RECORD(WheelsPrior);
+  MEMBER(WheelsPrior, name);
+  MEMBER(WheelsPrior, sensor);
+  MEMBER(WheelsPrior, wheels);
+  MEMBER(WheelsPrior, sigma_extrinsics);
+  MEMBER(WheelsPrior, sigma_time_offset_s);
+  MEMBER(WheelsPrior, sigma_intrinsics);
+  RECORD(WheelsBlocks);
+  MEMBER(WheelsBlocks, model);
+  MEMBER(WheelsBlocks, extrinsics);
+  MEMBER(WheelsBlocks, clock);
+  MEMBER(WheelsBlocks, intrinsics);
+  RECORD(Rig);
+}
+
 void filter_view() {
   RECORD(ImuView);
   MEMBER(ImuView, R_GtoI);
@@ -290,26 +305,6 @@ void filter_view() {
   MEMBER(CloneView, p_IinG_fej);
   MEMBER(CloneView, w_IinI);
   MEMBER(CloneView, v_IinG);
-  ENUM(CameraDistortion);
-  RECORD(CameraView);
-  MEMBER(CameraView, distortion);
-  MEMBER(CameraView, width_px);
-  MEMBER(CameraView, height_px);
-  MEMBER(CameraView, intrinsics);
-  MEMBER(CameraView, R_ItoC);
-  MEMBER(CameraView, p_IinC);
-  MEMBER(CameraView, t_CtoI_s);
-  MEMBER(CameraView, extrinsics_column);
-  MEMBER(CameraView, intrinsics_column);
-  RECORD(WheelsView);
-  MEMBER(WheelsView, model);
-  MEMBER(WheelsView, R_ItoO);
-  MEMBER(WheelsView, p_IinO);
-  MEMBER(WheelsView, t_OtoI_s);
-  MEMBER(WheelsView, x_WI);
-  MEMBER(WheelsView, extrinsics_column);
-  MEMBER(WheelsView, time_offset_column);
-  MEMBER(WheelsView, intrinsics_column);
   RECORD(ImuNoise);
   MEMBER(ImuNoise, gyro_rad_per_s_sqrt_hz);
   MEMBER(ImuNoise, accel_m_per_s2_sqrt_hz);
@@ -318,28 +313,32 @@ void filter_view() {
   RECORD(FilterView);
   MEMBER(FilterView, imu);
   MEMBER(FilterView, clones);
-  MEMBER(FilterView, cameras);
-  MEMBER(FilterView, wheels);
+  MEMBER(FilterView, blocks);
   MEMBER(FilterView, imu_noise);
   MEMBER(FilterView, gravity_m_per_s2);
   MEMBER(FilterView, oldest_leaves);
   MEMBER(FilterView, size);
   MEMBER(FilterView, covariance_data);
   MEMBER(FilterView, covariance_stride);
+  RECORD(StreamId);
+  MEMBER(StreamId, index);
+  RECORD(SampleSpan);
+  MEMBER(SampleSpan, type);
+  MEMBER(SampleSpan, data);
+  MEMBER(SampleSpan, size);
   RECORD(EpochData);
   MEMBER(EpochData, begin_ns);
   MEMBER(EpochData, end_ns);
-  MEMBER(EpochData, features);
   MEMBER(EpochData, imu);
-  MEMBER(EpochData, encoders);
-  MEMBER(EpochData, poses);
+  MEMBER(EpochData, streams);
 }
 
-void sensors_and_updates() {
+void sensors() {
   RECORD(RejectionCount);
   MEMBER(RejectionCount, reason);
   MEMBER(RejectionCount, count);
   MEMBER(RejectionCount, first);
+  RECORD(Rejections);
   RECORD(EstimateSample);
   MEMBER(EstimateSample, t_ns);
   MEMBER(EstimateSample, q_ItoG_xyzw);
@@ -353,13 +352,18 @@ void sensors_and_updates() {
   MEMBER(EstimateSample, calibration_sigma);
   RECORD(Sensor);
   SLOTS(Sensor);
+  VIRTUAL(Sensor, yields);
   VIRTUAL(Sensor, next);
+  VIRTUAL(Sensor, can_be_exact);
   VIRTUAL(Sensor, rejections);
   VIRTUAL(Sensor, takes_input);
   VIRTUAL(Sensor, connect);
   VIRTUAL(Sensor, live);
   VIRTUAL(Sensor, stop);
   VIRTUAL(Sensor, estimate);
+}
+
+void factors() {
   RECORD(ColumnRange);
   MEMBER(ColumnRange, first);
   MEMBER(ColumnRange, count);
@@ -374,18 +378,56 @@ void sensors_and_updates() {
   MEMBER(InformationFactor, columns);
   MEMBER(InformationFactor, Lambda);
   MEMBER(InformationFactor, eta);
+  RECORD(AddedBlock);
+  MEMBER(AddedBlock, id);
+  MEMBER(AddedBlock, value);
+  RECORD(FactorSink::FreeBlocks);
+  MEMBER(FactorSink::FreeBlocks, free);
+  MEMBER(FactorSink::FreeBlocks, entries);
+  MEMBER(FactorSink::FreeBlocks, taken);
   RECORD(FactorSink);
+  RECORD(BlockRewrite);
+  MEMBER(BlockRewrite, id);
+  MEMBER(BlockRewrite, columns);
+  MEMBER(BlockRewrite, J);
+  MEMBER(BlockRewrite, value);
+  MEMBER(BlockRewrite, first_estimate);
+  RECORD(BlockEdits);
+  SLOTS(BlockEdits);
+  VIRTUAL(BlockEdits, drop);
+  VIRTUAL(BlockEdits, rewrite);
+}
+
+void updates() {
+  ENUM(Given);
+  RECORD(StreamSpec::Clock);
+  MEMBER(StreamSpec::Clock, constant_s);
+  MEMBER(StreamSpec::Clock, block);
+  RECORD(StreamSpec);
+  MEMBER(StreamSpec, type);
+  MEMBER(StreamSpec, sensor);
+  MEMBER(StreamSpec, given);
+  MEMBER(StreamSpec, ends_epochs);
+  MEMBER(StreamSpec, awaited);
+  MEMBER(StreamSpec, optional);
+  MEMBER(StreamSpec, per_instant);
+  MEMBER(StreamSpec, clocks);
+  RECORD(Declarations);
+  SLOTS(Declarations);
+  VIRTUAL(Declarations, rig);
+  VIRTUAL_OF(Declarations, block, BlockId(Declarations::*)(const BlockSpec&));
+  VIRTUAL_OF(Declarations, block, BlockId(Declarations::*)(std::string_view));
+  VIRTUAL(Declarations, room);
+  VIRTUAL(Declarations, stream);
   RECORD(UpdateSetup);
   MEMBER(UpdateSetup, max_clones);
   MEMBER(UpdateSetup, max_state_size);
-  MEMBER(UpdateSetup, cameras);
-  MEMBER(UpdateSetup, wheels);
-  ENUM(UpdateKind);
   RECORD(Update);
   SLOTS(Update);
-  VIRTUAL(Update, kind);
+  VIRTUAL(Update, declare);
   VIRTUAL(Update, start);
   VIRTUAL(Update, update);
+  VIRTUAL(Update, settle);
   VIRTUAL(Update, rejections);
 }
 
@@ -393,9 +435,14 @@ void sensors_and_updates() {
 
 int main() {
   constants();
+  samples();
   measurements();
   descriptor();
   kinematics();
+  blocks();
+  rig();
   filter_view();
-  sensors_and_updates();
+  sensors();
+  factors();
+  updates();
 }

@@ -148,7 +148,10 @@ TEST_F(ConfigurationTest, RefusesSensorsThatDoNotFitTheModel) {
   ends_with("kinematics: *robot",
             "  sim2: {type: planar_simulator, robot: *robot, duration_s: 5}\n"
             "kinematics: *robot",
-            "both 'sim' and 'sim2' give encoder samples: a run takes them from one sensor");
+            "run.yaml:3:3  both 'sim' and 'sim2' give encoders: a run takes them from one sensor - "
+            "name it: wheels.sensor: NAME\n"
+            "run.yaml:3:3  both 'sim' and 'sim2' give poses: a run takes them from one sensor as "
+            "reference");
 }
 
 TEST_F(ConfigurationTest, RefusesNonsenseInSet) {

@@ -166,18 +166,22 @@ TEST_F(FilterTest, RefusesCamerasThatAreNotThere) {
   refuse("imu: {}", "imu: {kalibr: none.yaml}",
          "run.yaml:17:15  imu.kalibr: TMP/none.yaml  cannot be read: No such file or directory");
   refuse("cameras: {kalibr: cam.yaml}\n", "\n",
-         "run.yaml:21:3  updates.visual_features: visual_features needs a camera");
+         "run.yaml:21:3  updates.visual_features: needs a camera: there is no section 'cameras'");
 }
 
 TEST_F(FilterTest, RefusesAnUpdateWhoseSensorGivesNoPoses) {
   refuse("wheel_parity: {}", "fix: {type: pose_reference, sensor: sim, sigma_position_m: 0.01}",
-         "run.yaml:23:3  sensor 'sim' gave no poses, which update fix needs");
+         "run.yaml:3:3  sensor 'sim' gives no poses, which fix needs");
+  refuse("wheel_parity: {}", "fix: {type: pose_reference, sigma_position_m: 0.01}",
+         "run.yaml:3:3  fix needs the sensor that gives its poses (sensor: NAME)");
+  refuse("wheel_parity: {}", "wheel_parity: {sensor: simm}",
+         "run.yaml:23:26  updates.wheel_parity.sensor: no sensor 'simm' - did you mean 'sim'?");
 }
 
 TEST_F(FilterTest, RefusesUpdatesOfWheelsThatAreNotThere) {
   refuse("kinematics: *robot\n", "\n",
-         "run.yaml:22:3  updates.wheel_odometry needs wheels: the run has no section 'kinematics'\n"
-         "run.yaml:23:3  updates.wheel_parity needs wheels: the run has no section 'kinematics'");
+         "run.yaml:22:3  updates.wheel_odometry: needs wheels: there is no section 'kinematics'\n"
+         "run.yaml:23:3  updates.wheel_parity: needs wheels: there is no section 'kinematics'");
   refuse("t_OtoI_s: 0", "sensor: simm",
          "run.yaml:18:18  wheels.sensor: no sensor 'simm' - did you mean 'sim'?");
   refuse("kinematics: *robot",
@@ -187,8 +191,9 @@ TEST_F(FilterTest, RefusesUpdatesOfWheelsThatAreNotThere) {
 }
 
 TEST_F(FilterTest, RefusesFurtherWheelsWhoseSensorDoesNotFit) {
+  expect_done({"simulate", "run.yaml", "--out", "log"});
   write("run.yaml", replaced(replaced(kVio, "t_OtoI_s: 0", "sensor: sim"), "kinematics: *robot\n",
-                             "  back: {type: planar_simulator, robot: *robot, duration_s: 5}\n"
+                             "  back: {type: asl_encoders, path: log/wheels0}\n"
                              "kinematics: *robot\n"
                              "wheel_sets:\n"
                              "  back:\n"
@@ -210,9 +215,15 @@ TEST_F(FilterTest, RefusesToRunWithoutTheMeasurementsItNeeds) {
   const std::string images = "sensors:\n  images: {type: asl_features, path: log/features0}\n";
   const std::string rest = robot + replaced(kVio, from + "kinematics: *robot\n", "");
   write("run.yaml", images + rest);
-  expect_refused({"run", "run.yaml", "--out", "out"},
-                 "run.yaml:2:3  no sensor of this run gave IMU samples");
-  write("run.yaml", images + "  imu: {type: asl_imu, path: log/imu0}\n" + rest);
+  expect_refused(
+      {"run", "run.yaml", "--out", "out"},
+      "run.yaml:2:3  no sensor of this run gives imu, which the filter needs\n"
+      "run.yaml:2:3  no sensor of this run gives encoders, which wheel_odometry, wheel_parity "
+      "needs");
+  write("run.yaml", images +
+                        "  imu: {type: asl_imu, path: log/imu0}\n"
+                        "  wheels: {type: asl_encoders, path: log/wheels0}\n" +
+                        rest);
   expect_refused(
       {"run", "run.yaml", "--out", "out"},
       "run.yaml:2:3  no sensor of this run gave reference states, which estimator.start: "
@@ -267,7 +278,7 @@ TEST_F(FilterTest, CountsWhatItSimulates) {
   // and a time offset.
   EXPECT_EQ(
       expect_done({"simulate", "run.yaml", "--out", "log"}).out,
-      "1001 IMU samples, 50 tracked images, 501 encoder samples, 51 reference states and 23 true "
+      "1001 IMU samples, 50 tracked images, 501 encoder samples, 51 reference states and 38 true "
       "parameters in log\n");
   write("run.yaml", kRun);
   EXPECT_EQ(expect_done({"simulate", "run.yaml", "--out", "log"}).out,

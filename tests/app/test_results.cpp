@@ -265,6 +265,38 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationForOpenVinsMeasurements) {
   EXPECT_LT(accuracy.at("ate_m").get<double>(), 0.144);
 }
 
+TEST_F(ResultsTest, OfTheDeliveredConfigurationForACalibrationBoard) {
+  const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/real/euroc_imu_april";
+  if (!fs::exists(data)) GTEST_SKIP() << "the measurements are not here";
+  expect_done({"run", kConfigFolder + "runs/euroc_board.yaml", "--out", "run", "--set",
+               "placeholders.data=" + fs::canonical(data).string()});
+  const nlohmann::json result = summary("run");
+  EXPECT_EQ(result.at("status"), "ok");
+  // Of both cameras, which have one clock.
+  const nlohmann::json calibration = result.at("calibration");
+  EXPECT_EQ(calibration.size(), 2U * 14U + 1U);
+  EXPECT_LT(calibration.at("cam0.t_CtoI").at("sigma").get<double>(), 1e-3);
+  EXPECT_LT(calibration.at("cam1.fx").at("sigma").get<double>(), 0.5);
+}
+
+TEST_F(ResultsTest, OfTheDeliveredExperimentWithWrongCameras) {
+  if (!fs::exists(fs::path(VIWO_TEST_SHARED_DIR) / "data/openvins_sim")) {
+    GTEST_SKIP() << "the measurements are not here";
+  }
+  expect_done({"experiment", kConfigFolder + "experiments/openvins_cameras.yaml", "--seeds", "1",
+               "--set",
+               "placeholders.data=" +
+                   fs::canonical(fs::path(VIWO_TEST_SHARED_DIR) / "data/openvins_sim").string(),
+               "--out", "cameras"});
+  // Estimated, the cameras cost little; held as they are, everything.
+  const nlohmann::json variants = summary("cameras").at("variants");
+  const auto ate_m = [&](const char* variant) {
+    return variants.at(variant).at("metrics").at("ate_m").at("mean").get<double>();
+  };
+  EXPECT_LT(ate_m("estimated"), 1.3 * ate_m("exact"));
+  EXPECT_GT(ate_m("held_wrong"), 5. * ate_m("exact"));
+}
+
 TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
   std::set<std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(kConfigFolder)) {
@@ -286,6 +318,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                                           "experiments/hybrid.yaml",
                                           "experiments/images.yaml",
                                           "experiments/nominal_dead_reckoning.yaml",
+                                          "experiments/openvins_cameras.yaml",
                                           "experiments/paper_accuracy.yaml",
                                           "experiments/plane_and_gnss.yaml",
                                           "experiments/simulated_dead_reckoning.yaml",
@@ -297,6 +330,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                                           "observability/degenerate_motions.yaml",
                                           "observability/differential.yaml",
                                           "runs/euroc.yaml",
+                                          "runs/euroc_board.yaml",
                                           "runs/hybrid.yaml",
                                           "runs/kaist_urban.yaml",
                                           "runs/openvins_sim.yaml",

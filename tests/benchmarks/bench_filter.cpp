@@ -46,9 +46,9 @@ class Runs {
       assignments_.emplace_back("updates.wheel_parity.enabled=false");
     }
     restart();
-    const auto data = experiment::collect(*setup_);
-    start_ = data.states.front();
-    measurements_ = testing::in_time_order(data);
+    data_ = experiment::collect(*setup_);
+    start_ = data_.states().front();
+    measurements_ = testing::in_time_order(data_);
     next_ = measurements_.size();
   }
 
@@ -61,7 +61,7 @@ class Runs {
         next_ = 0;
       }
       while (!estimator_->step() && next_ < measurements_.size()) {
-        testing::add(*estimator_, measurements_[next_++]);
+        testing::add(*estimator_, *setup_, measurements_[next_++]);
       }
       if (!estimator_->failure().empty()) return 0.;
       if (next_ == measurements_.size() || estimator_->epochs() < kWarmUpEpochs) continue;
@@ -79,7 +79,8 @@ class Runs {
   std::vector<std::string> assignments_;
   std::optional<experiment::RunSetup> setup_;
   StateSample start_;
-  std::vector<Measurement> measurements_;
+  experiment::RunData data_;
+  std::vector<testing::Given> measurements_;
   std::size_t next_ = 0;
   std::unique_ptr<Estimator> estimator_;
 };

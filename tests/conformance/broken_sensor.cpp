@@ -42,6 +42,11 @@ class Broken final : public Sensor {
     }
   }
 
+  SampleTypes yields() const override {
+    if (is("yields_nothing")) return {};
+    return is("yields") ? sample_types<PoseSample, EncoderSample>() : sample_types<ImuSample>();
+  }
+
   Status next(Measurement& out) override {
     if (left_-- <= 0) {
       left_ = is("goes_on") ? 5 : 0;

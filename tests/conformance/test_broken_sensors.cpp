@@ -29,13 +29,20 @@ TEST(BrokenSensor, WithoutAMistakeItPasses) {
 
 TEST(BrokenSensor, StampsOutOfOrder) {
   EXPECT_EQ(sensor_failures("order"),
-            "measurements: IMU sample 12 at 59000000 ns comes after one at 60000000 ns - "
+            "measurements: measurement 12 (imu) at 59000000 ns comes after one at 60000000 ns - "
             "next() gives measurements in time order");
 }
 
 TEST(BrokenSensor, AValueThatIsNotFinite) {
   EXPECT_EQ(sensor_failures("nan"),
-            "measurements: IMU sample 16 at 85000000 ns has values that are not finite");
+            "measurements: measurement 16 (imu) at 85000000 ns has values that are not finite");
+}
+
+TEST(BrokenSensor, AKindOfSamplesThatYieldsDoesNotName) {
+  EXPECT_EQ(sensor_failures("yields"),
+            "measurements: measurement 0 (imu) at 5000000 ns is of a kind that yields() does not "
+            "name - it names all that next() may give");
+  EXPECT_EQ(sensor_failures("yields_nothing"), "measurements: yields() names no kind of samples");
 }
 
 TEST(BrokenSensor, NumbersThatDependOnWhatRanBefore) {

@@ -51,6 +51,8 @@ TEST(Conformance, SaysWhatIsWrongWithTheConfiguration) {
 TEST(Conformance, IsSaidInLines) {
   EXPECT_EQ(to_text({"schema", {}, {"a note"}, {}}), "ok      schema\n");
   EXPECT_EQ(to_text({"rank", {}, {"a note"}, {"odd"}}), "ok      rank\n          warning: odd\n");
+  EXPECT_EQ(to_text({"factors", {}, {}, {}, "no samples"}),
+            "skipped factors\n          no samples\n");
   EXPECT_EQ(to_text({"gauge", {"one", "two"}, {"a note"}, {}}, true),
             "FAILED  gauge\n          one\n          two\n          note: a note\n");
 }

@@ -26,7 +26,7 @@ std::vector<Sample> play(const std::string& yaml) {
   const auto sensor = registry.make_sensor(config::parse(yaml, "test"), "sensor", 1, errors);
   errors.throw_if_any();
   std::vector<Sample> out;
-  for (Measurement m; sensor.object->next(m) == Status::kOk;) out.push_back(std::get<Sample>(m));
+  for (Measurement m; sensor.object->next(m) == Status::kOk;) out.push_back(*m.get_if<Sample>());
   return out;
 }
 

@@ -12,7 +12,7 @@ import re
 import sys
 
 # Folder below framework/, in the order of the dependencies. Headers of plugin_api are viwo/api/.
-MODULES = ["plugin_api", "math", "testing", "config", "image", "log", "plugin_host", "wheel", "camera", "filter",
+MODULES = ["plugin_api", "math", "testing", "config", "image", "log", "plugin_host", "wheel", "camera", "filter", "start",
            "sim", "eval",
            "report", "observability", "view", "experiment", "conformance", "app"]
 PLUGIN_MODULES = {"plugin_api", "math", "image", "log", "sim", "wheel", "camera"}

@@ -85,8 +85,8 @@ TEST(RecordingProblem, HasTheParityGradientOfItsInformation) {
   options.parity = true;
   Preintegrator preintegrator(simulated.setup.model, options);
   PreintegratedPose pose;
-  preintegrator.integrate(simulated.data.samples, simulated.data.samples.front().begin_ns,
-                          simulated.data.samples.back().end_ns, pose);
+  const auto samples = simulated.data.wheels();
+  preintegrator.integrate(samples, samples.front().begin_ns, samples.back().end_ns, pose);
   const Eigen::MatrixXd J = residuals.J_parity.leftCols(16);
   const Eigen::VectorXd gradient = J.transpose() * residuals.parity;
   // The margin at both ends leaves out a few samples of a robot at rest or in steady motion.

@@ -60,7 +60,7 @@ RunResult odd_result() {
   run.nees.series = {{0.1, 6.1}};
   run.errors = {{0.1, {0.1, 0.2, 0.3}, {0.4, 0.5, 0.6}, 0.7, 0.8}};
   run.epoch_t_s = {0., 0.1};
-  run.calibration = {{"r_1", {0.1, 0.2}, {0.3, 0.4}, 0.5, 0.6}};
+  run.calibration = {{"r_1", "m", {0.1, 0.2}, {0.3, 0.4}, 0.5, 0.6}};
   run.updates = {{"parity", {8, 9}, {1, 2}, {3, 4}, {2, true, "lost"}}};
   run.monitor.t_s = {0.5};
   run.monitor.sigma_ratio = {{0.25}};

@@ -90,6 +90,34 @@ TEST_F(Summary, PairsTheRunsOfOneRecordingAndSeed) {
   EXPECT_DOUBLE_EQ(summary["paired"]["variants"]["a"]["ate_m"]["mean"], -2.);
 }
 
+TEST_F(Summary, HasTheRelativeErrorsOverTheLengthsThatTheRunsAreConfiguredWith) {
+  ExperimentOptions options;
+  options.assignments = {"sensors.simulator0.duration_s=60"};  // longer than 10 m
+  const auto file = write(
+      "experiment: test\nbase: run.yaml\nmotions: [circle]\nvariants:\n"
+      "  usual:\n  short: {evaluation.segment_lengths_m: [2.5, 0.5]}\n");
+  const auto result = run_experiment(read_experiment(file, options), options, registry(), {});
+  const auto summary = summary_of(result);
+  // Both variants have the lengths of both; what one was not evaluated over is empty.
+  const auto& usual = summary["variants"]["usual"];
+  const auto& brief = summary["variants"]["short"];
+  const eval::Accuracy& accuracy = *result.runs[1].result.accuracy;
+  EXPECT_EQ(brief["metrics"]["rpe_2.5_m"]["mean"], accuracy.rpe[0].mean_m);
+  EXPECT_EQ(brief["metrics"]["rpe_0.5_deg"]["mean"], accuracy.rpe[1].mean_deg);
+  EXPECT_EQ(brief["rpe"]["0.5"]["m"], accuracy.rpe[1].mean_m);
+  EXPECT_EQ(brief["metrics"]["rpe_10_m"]["n"], 0);
+  EXPECT_EQ(usual["metrics"]["rpe_10_m"]["mean"], result.runs[0].result.accuracy->rpe[0].mean_m);
+  EXPECT_EQ(usual["metrics"]["rpe_0.5_m"]["n"], 0);
+  EXPECT_TRUE(usual["metrics"]["rpe_0.5_m"]["mean"].is_null());
+  EXPECT_EQ(summary["paired"]["variants"]["short"]["rpe_2.5_m"]["pairs"], 0);
+  const std::string csv = text_of(folder_ / "out" / "runs.csv");
+  EXPECT_THAT(csv.substr(0, csv.find('\n')),
+              HasSubstr(",ate_deg,rpe_0.5_m,rpe_0.5_deg,rpe_2.5_m,rpe_2.5_deg,rpe_10_m,rpe_10_deg,"
+                        "rpe_25_m,rpe_25_deg,nees_planar,"));
+  EXPECT_THAT(describe(result), HasSubstr("RPE 0.5 m [mm]"));
+  EXPECT_THAT(text_of(folder_ / "out" / "report.html"), HasSubstr("RPE 2.5 m [deg]"));
+}
+
 TEST_F(Summary, IsBrokenDownByLabels) {
   const auto summary = summary_of(with_errors({1., 2., 3., 6., 2., 4., 6., kNan}));
   const auto& by = summary["by"]["motion"];

@@ -1,13 +1,16 @@
 // Runs of the filter: their progress, and what is written of what their sensors give.
 #include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <memory>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "held_gauge.hpp"
+#include "sensors_in_memory.hpp"
 #include "simulated.hpp"
-#include "sources.hpp"
-#include "stream.hpp"
 #include "viwo/experiment/progress.hpp"
 #include "viwo/experiment/simulate.hpp"
 #include "viwo/math/so3.hpp"
@@ -16,9 +19,11 @@ namespace viwo {
 namespace {
 
 using namespace experiment;
+using testing::InMemory;
 using testing::registry;
+using testing::set_sensors;
 
-/// A simulated swerve robot for ten seconds; images only make the epochs.
+/// A simulated swerve robot for ten seconds; nobody takes the images.
 RunSetup inertia_and_wheels() {
   const config::Node run = config::parse(
       testing::swerve_with_camera(10) + "updates: {wheel_odometry: {}}\n", "run.yaml");
@@ -34,72 +39,62 @@ TEST(FilterRun, TellsItsProgressAsPartOfTheTimeOfTheLog) {
   const RunResult result = experiment::run(setup, data, hooks);
   ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
   ASSERT_EQ(fractions.size(), static_cast<std::size_t>(result.epochs));
-  const double log_s = seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);
+  const auto imu = data.imu();
+  const double log_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
   for (std::size_t i = 0; i < fractions.size(); ++i) {
-    const double t_s = seconds_between(data.imu.front().t_ns, result.estimate[i].t_ns);
+    const double t_s = seconds_between(imu.front().t_ns, result.estimate[i].t_ns);
     EXPECT_DOUBLE_EQ(fractions[i], t_s / log_s);
   }
   EXPECT_GT(fractions.back(), 0.95);
   EXPECT_LE(fractions.back(), 1.);
 }
 
-TEST(FilterRun, RefusesSensorsThatDoNotGiveWhatUpdatesNeed) {
+TEST(FilterRun, TellsTheErrorOfTheCalibrationFromItsFirstEpochOn) {
   RunSetup setup = inertia_and_wheels();
-  setup.filter->wheels.front().sensor = "imu0";
-  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
-            "run.yaml:4:11  sensor 'imu0' gave no encoder samples, which update wheel_odometry "
-            "needs");
-  setup = inertia_and_wheels();
-  setup.filter->updates.front().wheels = -1;
-  setup.filter->updates.front().poses = 0;
-  setup.filter->pose_sensors = {"simulator0"};
-  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
-            "run.yaml:4:11  sensor 'simulator0' gave no poses, which update wheel_odometry needs");
-}
-
-TEST(FilterRun, AWheelSetHasTheSamplesOfItsOwnSensor) {
-  RunData data;
-  data.wheels_name = "wheels0";
-  data.samples.resize(2);
-  data.other_wheels["wheels1"].resize(3);
-  EXPECT_EQ(encoder_samples(data, "").size(), 2U);
-  EXPECT_EQ(encoder_samples(data, "wheels0").size(), 2U);
-  EXPECT_EQ(encoder_samples(data, "wheels1").size(), 3U);
-  EXPECT_EQ(encoder_samples(data, "imu0").size(), 0U);
-}
-
-TEST(FilterRun, RefusesTwoSensorsWhereAWheelSetNamesNone) {
-  RunSetup setup = inertia_and_wheels();
-  setup.filter->wheels.push_back(setup.filter->wheels.front());
-  setup.filter->wheels.front().sensor = "simulator0";
-  const auto encoders = std::make_shared<const std::vector<Measurement>>(1, EncoderSample());
-  setup.sensors.push_back({"other", {}, ""});
-  setup.sensors.back().sensor.object = std::make_shared<Replay>(encoders);
-  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
-            "run.yaml:2:3  both 'simulator0' and 'other' give encoder samples: a run takes them "
-            "from one sensor");
-}
-
-TEST(FilterRun, TakesTracksFromOneSensor) {
-  RunSetup setup = inertia_and_wheels();
-  RunData data = collect(setup);
-  ASSERT_FALSE(data.images.empty());
-  const auto tracks = std::make_shared<const std::vector<Measurement>>(1, data.images.front());
-  const auto add_stream = [&](const std::string& name) {
-    data.streams.push_back({name, {}, std::make_shared<Replay>(tracks), "images", nullptr});
+  const RunData data = collect(setup);
+  RunHooks hooks;
+  std::int64_t epochs = 0;
+  hooks.on_epoch = [&](const RunResult& result) {
+    ++epochs;
+    for (const CalibrationTrack& track : result.calibration) {
+      EXPECT_TRUE(std::isfinite(track.truth)) << track.name << " at epoch " << epochs;
+      EXPECT_TRUE(std::isfinite(track.final_error)) << track.name << " at epoch " << epochs;
+    }
   };
-  const auto both = [](const std::string& names) {
-    return "run.yaml:2:3  both " + names + " give tracks: a run takes them from one sensor";
-  };
-  add_stream("tracks0");
-  EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }),
-            both("'simulator0' and 'tracks0'"));
-  data.images.clear();
-  data.tracks_name.clear();
-  data.streams.clear();
-  add_stream("tracks0");
-  add_stream("tracks1");
-  EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }), both("'tracks0' and 'tracks1'"));
+  const RunResult result = experiment::run(setup, data, hooks);
+  EXPECT_EQ(result.calibration.size(), 23U);
+  EXPECT_EQ(epochs, result.epochs);
+  EXPECT_GT(epochs, 30);
+}
+
+TEST(FilterRun, RefusesASensorThatGivesNothingOfWhatAnUpdateNeeds) {
+  RunSetup setup = inertia_and_wheels();
+  const RunData data = collect(setup);
+  const auto imu = std::make_shared<InMemory>(sample_types<ImuSample, StateSample>(),
+                                              std::vector<Measurement>{ImuSample(), StateSample()});
+  const auto silent =
+      std::make_shared<InMemory>(sample_types<EncoderSample>(), std::vector<Measurement>());
+  set_sensors(setup, {{"imu0", imu}, {"wheels0", silent}});
+  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
+            "run.yaml:2:3  sensor 'wheels0' gave no encoders, which wheel_odometry needs");
+}
+
+TEST(FilterRun, RefusesASensorThatGivesWhatItDoesNotYield) {
+  RunSetup setup = inertia_and_wheels();
+  const auto imu = std::make_shared<InMemory>(sample_types<ImuSample, EncoderSample>(),
+                                              std::vector<Measurement>{ImuSample(), PoseSample()});
+  set_sensors(setup, {{"imu0", imu}});
+  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
+            "sensor 'imu0' gives poses, which it does not say it yields");
+}
+
+TEST(FilterRun, AStartFromMotionHasTheWheelsWithoutAnyUpdate) {
+  const config::Node run = config::parse(
+      testing::swerve_with_camera(10) + "estimator: {type: msckf, start: moving}\n", "run.yaml");
+  RunSetup setup = read_run(run, registry(), 1);
+  const RunResult result = experiment::run(setup, collect(setup));
+  EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
+  EXPECT_GT(result.epochs, 30);
 }
 
 TEST(HeldGauge, BringsATruthOfAnotherFrameIntoTheOneThatTheEstimateHolds) {
@@ -124,20 +119,24 @@ TEST(HeldGauge, BringsATruthOfAnotherFrameIntoTheOneThatTheEstimateHolds) {
 
 TEST(SimulateResult, IsDescribedByWhatThereIs) {
   SimulateResult result;
-  result.counts[Measurement(ImuSample()).index()] = 2001;
+  result.counts["imu"] = 2001;
   EXPECT_EQ(describe(result), "2001 IMU samples");
-  result.counts[Measurement(FeatureSample()).index()] = 1;
+  result.counts["tracks"] = 1;
   EXPECT_EQ(describe(result), "2001 IMU samples and 1 tracked image");
-  result.counts[Measurement(EncoderSample()).index()] = 11;
-  result.counts[Measurement(PoseSample()).index()] = 12;
+  result.counts["encoders"] = 11;
+  result.counts["poses"] = 12;
   EXPECT_EQ(describe(result),
             "2001 IMU samples, 1 tracked image, 11 encoder samples and 12 reference poses");
-  result.counts[Measurement(StateSample()).index()] = 13;  // the truth: poses are measured
-  result.counts[Measurement(CalibrationSample()).index()] = 14;
+  result.counts["reference states"] = 13;  // the truth: poses are measured
+  result.counts["true calibration"] = 14;
   EXPECT_EQ(
       describe(result),
       "2001 IMU samples, 1 tracked image, 11 encoder samples, 12 measured poses, 13 reference "
       "states and 14 true parameters");
+  result.counts = {{"imu", 1}};
+  result.left_out["gnss fixes"] = 15;  // there is no table for them
+  EXPECT_EQ(describe(result),
+            "1 IMU sample; not written, as there is no table for them: 15 gnss fixes");
 }
 
 TEST(TimeProgress, IsSilentForASecondAndThenSaysEveryTenPercent) {

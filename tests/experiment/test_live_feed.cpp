@@ -12,20 +12,26 @@
 
 #include <gtest/gtest.h>
 
+#include "sensors_in_memory.hpp"
 #include "simulated.hpp"
 #include "viwo/experiment/output.hpp"
 #include "viwo/experiment/run.hpp"
+#include "wheel_fixture.hpp"
 
 namespace viwo::experiment {
 namespace {
 
+using testing::in_time_order;
 using testing::registry;
+using testing::routes_for;
 
-/// Gives what it was made with, then waits for stop(), or ends at once.
+/// Gives what it was made with, then waits for stop(), or ends at once. What it yields is what the
+/// routes of a test say.
 class Device : public Sensor {
  public:
   Device(std::vector<Measurement> measurements, bool waits)
       : measurements_(std::move(measurements)), waits_(waits) {}
+  SampleTypes yields() const override { return {}; }
   bool live() const override { return true; }
   Status next(Measurement& out) override {
     if (next_ < measurements_.size()) {
@@ -65,12 +71,13 @@ struct Points final : ImageSource {
 /// Finds in a picture the points that are behind it.
 class Tracker final : public Sensor {
  public:
+  SampleTypes yields() const override { return sample_types<FeatureSample>(); }
   bool takes_input() const override { return true; }
   void connect(Sensor& input) override { input_ = &input; }
   Status next(Measurement& out) override {
     Measurement in;
     while (input_->next(in) == Status::kOk) {
-      const auto* image = std::get_if<ImageSample>(&in);
+      const auto* image = in.get_if<ImageSample>();
       if (image == nullptr) continue;
       out = static_cast<const Points&>(*image->source).points;
       return Status::kOk;
@@ -95,21 +102,28 @@ RunSetup standing_then_driving() {
   return read_run(run, registry(), 1);
 }
 
-/// All of a recorded run as one sensor would give it, with pictures in the place of tracks.
-std::vector<Measurement> as_they_come(const RunData& data, bool pictures) {
-  std::vector<Measurement> all;
-  for (const auto& imu : data.imu) all.emplace_back(imu);
-  for (const auto& sample : data.samples) all.emplace_back(sample);
-  for (const auto& image : data.images) {
-    if (pictures) {
-      all.emplace_back(ImageSample{image.t_ns, image.camera, std::make_shared<Points>(image)});
-    } else {
-      all.emplace_back(image);
-    }
+/// What a filter takes of a recorded run as one sensor would give it, with pictures in the place of
+/// tracks.
+std::vector<Measurement> with_pictures(const RunData& data) {
+  std::vector<Measurement> all = in_time_order(data.recorded);
+  for (Measurement& measurement : all) {
+    const auto* image = measurement.get_if<FeatureSample>();
+    if (image == nullptr) continue;
+    measurement = ImageSample{image->t_ns, image->camera, std::make_shared<Points>(*image)};
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const auto& a, const auto& b) { return stamp_ns(a) < stamp_ns(b); });
   return all;
+}
+
+/// Who gets what of a sensor 'device' that gives all that a filter takes, and of others.
+Routes routes_of_device(const RunSetup& setup, std::vector<SensorYield> others = {}) {
+  others.push_back({"device", sample_types<ImuSample, EncoderSample, FeatureSample>()});
+  return routes_for(setup, others);
+}
+
+/// The same of one that gives pictures, and of the sensor 'tracks' that works on them.
+Routes routes_of_pictures(const RunSetup& setup) {
+  return routes_for(setup, {{"device", sample_types<ImuSample, EncoderSample, ImageSample>()},
+                            {"tracks", sample_types<FeatureSample>()}});
 }
 
 SensorStream stream(const std::string& name, std::shared_ptr<Sensor> sensor,
@@ -134,7 +148,8 @@ TEST(LiveFeed, GivesTheTrajectoryOfTheSameMeasurementsRecorded) {
   const RunData recorded = collect(setup);
   const RunResult expected = run_filter(setup, recorded);
   ASSERT_EQ(expected.status, RunStatus::kOk) << expected.cause;
-  const auto device = std::make_shared<Device>(as_they_come(recorded, false), false);
+  const auto device = std::make_shared<Device>(in_time_order(recorded.recorded), false);
+  setup.routes = routes_of_device(setup);
   RunData data;
   data.live.push_back(stream("device", device));
   const RunResult live = run_filter(setup, data);
@@ -158,10 +173,11 @@ TEST(LiveFeed, FeedsWhatWorksOnPicturesAndTellsTheLatency) {
   // Pictures come faster here than they are worked on: few enough that none is dropped.
   std::vector<Measurement> measurements;
   int pictures = 0;
-  for (const Measurement& measurement : as_they_come(recorded, true)) {
-    if (std::holds_alternative<ImageSample>(measurement) && ++pictures > 8) continue;
+  for (const Measurement& measurement : with_pictures(recorded)) {
+    if (measurement.get_if<ImageSample>() != nullptr && ++pictures > 8) continue;
     measurements.push_back(measurement);
   }
+  setup.routes = routes_of_pictures(setup);
   RunData data;
   const auto device = std::make_shared<Device>(std::move(measurements), false);
   data.live.push_back(stream("device", device));
@@ -194,12 +210,15 @@ TEST(LiveFeed, DropsTheWholeOldestPairAlsoWhenItsStampsDifferALittle) {
    public:
     Late(std::future<void> begin, std::vector<int>& cameras)
         : begin_(std::move(begin)), cameras_(cameras) {}
+    SampleTypes yields() const override { return sample_types<FeatureSample>(); }
     bool takes_input() const override { return true; }
     void connect(Sensor& input) override { input_ = &input; }
     Status next(Measurement& /*out*/) override {
       begin_.wait();
       Measurement in;
-      while (input_->next(in) == Status::kOk) cameras_.push_back(std::get<ImageSample>(in).camera);
+      while (input_->next(in) == Status::kOk) {
+        cameras_.push_back(in.get_if<ImageSample>()->camera);
+      }
       return Status::kEnd;
     }
 
@@ -214,6 +233,7 @@ TEST(LiveFeed, DropsTheWholeOldestPairAlsoWhenItsStampsDifferALittle) {
     images.emplace_back(ImageSample{t_ns, static_cast<int>(k % 2), nullptr});
   }
   RunSetup setup = standing_then_driving();
+  setup.routes = routes_of_pictures(setup);
   RunData data;
   std::vector<int> cameras;
   data.live.push_back(stream("device", std::make_shared<Camera>(std::move(images), all_given)));
@@ -223,50 +243,92 @@ TEST(LiveFeed, DropsTheWholeOldestPairAlsoWhenItsStampsDifferALittle) {
   EXPECT_EQ(cameras, (std::vector{0, 1, 0, 1, 0, 1, 0}));
 }
 
-/// The error of a run on two live sensors 'a' and 'b', each of which gives one measurement.
-std::string error_of_two(const RunSetup& setup, const Measurement& a, const Measurement& b) {
+TEST(LiveFeed, EndsWithAnErrorForWhatASensorDoesNotYield) {
+  RunSetup setup = standing_then_driving();
+  setup.routes = routes_of_device(setup);
   RunData data;
-  data.live.push_back(stream("a", std::make_shared<Device>(std::vector{a}, false)));
-  data.live.push_back(stream("b", std::make_shared<Device>(std::vector{b}, false)));
-  const std::string error = testing::error_of([&] { run_filter(setup, data); });
-  // Either may be the first to give something.
-  const std::size_t other = error.find("both 'b' and 'a'");
-  return other == std::string::npos ? error
-                                    : std::string(error).replace(other, 16, "both 'a' and 'b'");
+  data.live.push_back(
+      stream("device",
+             std::make_shared<Device>(std::vector<Measurement>{ImuSample(), PoseSample()}, false)));
+  EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }),
+            "sensor 'device' gives poses, which it does not say it yields");
 }
 
-TEST(LiveFeed, TakesEachKindOfMeasurementFromOneSensor) {
+TEST(LiveFeed, LooksAtTheChannelsOfEachWheelSet) {
   RunSetup setup = standing_then_driving();
   const RunData recorded = collect(setup);
-  const auto expect_refused = [&](const Measurement& measurement, const std::string& what) {
-    EXPECT_EQ(
-        error_of_two(setup, measurement, measurement),
-        "run.yaml:1:10  both 'a' and 'b' give " + what + ": a run takes them from one sensor");
-  };
-  expect_refused(recorded.imu.front(), "IMU samples");
-  expect_refused(recorded.images.front(), "tracks");
-  expect_refused(recorded.samples.front(), "encoder samples");
-  expect_refused(PoseSample(), "reference poses");
-}
-
-TEST(LiveFeed, TakesPosesThatUpdatesNameAndEncodersOfWheelSetsFromASensorEach) {
-  RunSetup setup = standing_then_driving();
-  const RunData recorded = collect(setup);
-  setup.filter->pose_sensors = {"a"};  // b gives the reference; the update of a is turned off
-  EXPECT_EQ(error_of_two(setup, PoseSample(), PoseSample()), "(no error)");
   WheelSet second = setup.filter->wheels.front();
-  second.name = second.prior.name = "second";
-  second.sensor = "b";
-  setup.filter->wheels.front().sensor = "a";
+  second.model = testing::load_model(testing::differential());
+  second.prior.name = "second";
+  second.prior.sensor = "wheels";
   setup.filter->wheels.push_back(second);
-  const Measurement wheels = recorded.samples.front();
-  EXPECT_EQ(error_of_two(setup, wheels, wheels), "(no error)");
+  setup.routes = routes_for(setup, {{"imu", sample_types<ImuSample, FeatureSample>()},
+                                    {"wheels", sample_types<EncoderSample>()}});
+  RunData data;
+  data.live.push_back(
+      stream("wheels",
+             std::make_shared<Device>(std::vector<Measurement>{recorded.wheels().front()}, false)));
+  EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }),
+            "run.yaml:1:10  sensors.wheels has 4 drive and 4 steering channels, but the kinematic "
+            "model has 2 driven and 0 steered wheels");
+}
+
+/// Counts the images that it is given.
+class Looking final : public Update {
+ public:
+  explicit Looking(std::size_t& images) : images_(images) {}
+  void declare(Declarations& host) override {
+    stream_ = host.stream({.type = &sample_type<ImageSample>()});
+  }
+  void update(const FilterView& /*filter*/, const EpochData& data, FactorSink& /*sink*/) override {
+    images_ += data.samples<ImageSample>(stream_).size();
+  }
+
+ private:
+  std::size_t& images_;
+  StreamId stream_;
+};
+
+TEST(LiveFeed, GivesImagesToAnUpdateThatTakesThemAsARecordedRunDoes) {
+  std::size_t images = 0;
+  const auto looking = [&](const SensorYield& tracks) {
+    RunSetup setup = standing_then_driving();
+    setup.filter->updates.push_back({"looking", {}, nullptr, "", {}});
+    setup.filter->updates.back().update.object = std::make_shared<Looking>(images);
+    // Behind the streams of the updates, none of which the start adds to.
+    setup.filter->streams.push_back({{.type = &sample_type<ImageSample>()}, "looking", false});
+    const SensorYield device{"device", sample_types<ImuSample, EncoderSample, ImageSample>()};
+    setup.routes = routes_for(setup, {device, tracks});
+    return setup;
+  };
+  RunSetup simulated = standing_then_driving();
+  const RunData recorded = collect(simulated);
+  const auto measurements = with_pictures(recorded);
+  const SensorYield tracks{"tracks", sample_types<FeatureSample>()};
+
+  RunData data;
+  for (const Measurement& measurement : measurements) {
+    data.recorded.add("device", measurement.view());
+  }
+  data.recorded.set<FeatureSample>("tracks", {});
+  RunSetup setup = looking(tracks);
+  run_filter(setup, data);
+  const std::size_t expected = std::exchange(images, 0);
+  EXPECT_GT(expected, 20U);
+
+  data = {};
+  data.live.push_back(stream("device", std::make_shared<Device>(measurements, false)));
+  setup = looking(tracks);
+  run_filter(setup, data);
+  EXPECT_EQ(images, expected);
 }
 
 TEST(LiveFeed, EndsWhenItIsInterruptedAndKeepsTheResults) {
   RunSetup setup = standing_then_driving();
   const RunData recorded = collect(setup);
-  const auto device = std::make_shared<Device>(as_they_come(recorded, false), true);
+  const std::string offline = describe(run_filter(setup, recorded));
+  const auto device = std::make_shared<Device>(in_time_order(recorded.recorded), true);
+  setup.routes = routes_of_device(setup);
   RunData data;
   data.live.push_back(stream("device", device));
   RunHooks hooks;
@@ -279,11 +341,12 @@ TEST(LiveFeed, EndsWhenItIsInterruptedAndKeepsTheResults) {
   EXPECT_GT(live.estimate.size(), 10U);
   // Slower than real time it would be behind; that says nothing of what was waited for.
   EXPECT_EQ(describe(live).find("x real time"), std::string::npos) << describe(live);
-  EXPECT_NE(describe(run_filter(setup, recorded)).find("x real time"), std::string::npos);
+  EXPECT_NE(offline.find("x real time"), std::string::npos);
 }
 
 TEST(LiveFeed, SaysThatNothingHasCome) {
   RunSetup setup = standing_then_driving();
+  setup.routes = routes_of_device(setup);
   RunData data;
   data.live.push_back(
       stream("device", std::make_shared<Device>(std::vector<Measurement>(), false)));
@@ -323,8 +386,9 @@ TEST(LiveFeed, KeepsTheResultsUpToTheErrorOfOneOfItsSensors) {
   RunSetup setup = standing_then_driving();
   const RunData recorded = collect(setup);
   RunData data;
+  setup.routes = routes_of_device(setup, {{"silent", {}}});
   data.live.push_back(
-      stream("device", std::make_shared<Breaking>(as_they_come(recorded, false), false)));
+      stream("device", std::make_shared<Breaking>(in_time_order(recorded.recorded), false)));
   data.live.push_back(stream("silent", std::make_shared<Device>(std::vector<Measurement>(), true)));
   const RunResult live = run_filter(setup, data);
   EXPECT_EQ(live.status, RunStatus::kFailed);

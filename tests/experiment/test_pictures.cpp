@@ -1,6 +1,7 @@
 // Pictures of a run: what they show, and that they change nothing.
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <string>
@@ -12,6 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "run_record.hpp"
+#include "sensors_in_memory.hpp"
 #include "simulated.hpp"
 #include "viwo/experiment/output.hpp"
 #include "viwo/experiment/pictures.hpp"
@@ -22,7 +24,6 @@ namespace {
 using testing::error_of;
 using testing::registry;
 
-constexpr double kOffset_s = 0.02;  ///< of the cameras' clock
 constexpr int kWidth = 64, kHeight = 48;
 
 /// A grey image, or one that is broken.
@@ -37,9 +38,19 @@ struct Grey final : ImageSource {
   int value;
 };
 
+/// A camera whose clock is off by 20 ms.
+std::string late_camera() {
+  const auto file = std::filesystem::path(::testing::TempDir()) / "viwo_late_camera.yaml";
+  std::ofstream out(file);
+  out << std::ifstream(testing::configuration("cameras/pinhole.yaml")).rdbuf()
+      << "  timeshift_cam_imu: 0.02\n";
+  return file.string();
+}
+
+/// The simulated robot, which gives tracks; a sensor 'cameras' may give the images to them.
 RunSetup driving(const std::string& start = "reference") {
   const std::string robot = std::string("{type: four_wis_wid, ") + testing::kSwerve + "}";
-  const std::string cameras = VIWO_TEST_SOURCE_DIR "/configs/cameras/pinhole.yaml";
+  const std::string cameras = late_camera();
   const config::Node run = config::parse(
       "sensors: {sim: {type: simulator, motion: sweep_then_straight, duration_s: 4, features: 40, "
       "cameras: " +
@@ -48,18 +59,23 @@ RunSetup driving(const std::string& start = "reference") {
           "}\nupdates: {visual_features: {}, wheel_odometry: {}}\n",
       "run.yaml");
   RunSetup setup = read_run(run, registry(), 1);
-  for (CameraPrior& camera : setup.filter->cameras) camera.camera.t_CtoI_s = kOffset_s;
+  setup.routes = testing::routes_for(setup, {{"sim", setup.sensors.front().sensor.object->yields()},
+                                             {"cameras", sample_types<ImageSample>()}});
   return setup;
 }
 
-/// An image in the clock of its camera for all tracks of one; `grey_of` the index of the image.
+std::span<const FeatureSample> tracks_of(const RunData& data) {
+  return data.recorded.of<FeatureSample>();
+}
+
+/// An image for all tracks of one, both in the clock of the camera; `grey_of` the index of the
+/// image.
 template <class GreyOf>
 std::vector<ImageSample> pixels_of(const RunData& data, const GreyOf& grey_of) {
   std::vector<ImageSample> pixels;
   int index = 0;
-  for (const FeatureSample& image : data.images) {
-    const auto t_ns = image.t_ns - static_cast<std::int64_t>(std::llround(1e9 * kOffset_s));
-    pixels.push_back({t_ns, image.camera, std::make_shared<Grey>(grey_of(index++))});
+  for (const FeatureSample& image : tracks_of(data)) {
+    pixels.push_back({image.t_ns, image.camera, std::make_shared<Grey>(grey_of(index++))});
   }
   return pixels;
 }
@@ -112,7 +128,7 @@ TEST(Pictures, ChangeNothingInTheResults) {
   const RunResult without = run_filter(setup, collect(setup));
   RunSetup same = driving();  // plugins count what they do
   RunData data = collect(same);
-  data.pixels = pixels_of(data, [](int i) { return 60 + i; });
+  data.recorded.set("cameras", pixels_of(data, [](int i) { return 60 + i; }));
   const auto file = std::filesystem::path(::testing::TempDir()) / "viwo_pictures.avi";
   const Watched with = watch(same, data, open_sinks(same, false, file));
   EXPECT_EQ(with.failure, "");
@@ -138,10 +154,10 @@ TEST(Pictures, AreOfTheBeginningTheMiddleAndTheEnd) {
 TEST(Pictures, ShowTheImageThatTheTracksAreOfInTheClockOfTheCamera) {
   RunSetup setup = driving();
   RunData data = collect(setup);
-  data.pixels = pixels_of(data, [](int i) { return 60 + i; });
+  data.recorded.set("cameras", pixels_of(data, [](int i) { return 60 + i; }));
   int last = -1;  // the last image of camera 0
-  for (std::size_t i = 0; i < data.images.size(); ++i) {
-    if (data.images[i].camera == 0) last = 60 + static_cast<int>(i);
+  for (std::size_t i = 0; i < tracks_of(data).size(); ++i) {
+    if (tracks_of(data)[i].camera == 0) last = 60 + static_cast<int>(i);
   }
   const Watched run = watch(setup, data);
   ASSERT_EQ(run.result.pictures.size(), 3U);
@@ -163,7 +179,7 @@ TEST(Pictures, ShowTheNearestImageWhereTheTracksHaveTheStampOfTheOtherCamera) {
       pixels.push_back(image);
       pixels.push_back({image.t_ns + 5'000'000, image.camera, std::make_shared<Grey>(30)});
     }
-    if (!live) data.pixels = pixels;
+    if (!live) data.recorded.set("cameras", pixels);
     RunPictures pictures(setup, data, {});
     RunHooks hooks;
     pictures.watch(hooks);
@@ -198,7 +214,7 @@ TEST(Pictures, HaveADarkFieldForAnImageThatIsBrokenOrMissing) {
   RunSetup setup = driving();
   RunData data = collect(setup);
   for (const bool missing : {true, false}) {
-    if (!missing) data.pixels = pixels_of(data, [](int) { return -1; });
+    if (!missing) data.recorded.set("cameras", pixels_of(data, [](int) { return -1; }));
     const Watched run = watch(setup, data);
     EXPECT_EQ(run.failure, "");
     EXPECT_EQ(run.result.status, RunStatus::kOk);
@@ -210,7 +226,7 @@ TEST(Pictures, HaveADarkFieldForAnImageThatIsBrokenOrMissing) {
 TEST(Pictures, AreNotMadeOfARunWithoutImages) {
   RunSetup setup = driving();
   RunData data = collect(setup);
-  data.images.clear();
+  data.recorded.set<FeatureSample>("sim", {});
   const Watched run = watch(setup, data);
   EXPECT_GT(run.result.epochs, 10);
   EXPECT_TRUE(run.result.pictures.empty());

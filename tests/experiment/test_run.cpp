@@ -56,10 +56,11 @@ TEST(RunConfiguration, NamesBothCountsWhenTheRobotHasOtherWheels) {
 TEST(RunConfiguration, TakesEncoderSamplesFromOneSensor) {
   auto run = simulated("circle");
   run.find("sensors")->set("other", *run.at_path("sensors.simulator0"));
-  auto setup = read_run(run, registry());
-  EXPECT_EQ(error_of([&] { collect(setup); }),
-            "run.yaml:2:3  both 'simulator0' and 'other' give encoder samples: a run takes them "
-            "from one sensor");
+  EXPECT_EQ(error_of([&] { read_run(run, registry()); }),
+            "run.yaml:2:3  both 'simulator0' and 'other' give encoders: a run takes them from one "
+            "sensor - name it: wheels.sensor: NAME\n"
+            "run.yaml:2:3  both 'simulator0' and 'other' give poses: a run takes them from one "
+            "sensor as reference");
 }
 
 TEST(RunConfiguration, ItsResolvedFormIsAConfigurationWithTheSameResult) {
@@ -185,8 +186,9 @@ TEST(Simulate, WritesALogThatPlaysBackToTheSameBits) {
   const auto folder = fresh_folder("log");
   const auto direct = testing::run(simulated("icr_sweep"));
   RunSetup setup = read_run(simulated("icr_sweep"), registry());
-  const auto written = write_log(setup, folder);
-  EXPECT_EQ(written.counts[Measurement(EncoderSample()).index()], 2001);
+  const SimulateResult written = write_log(setup, folder);
+  EXPECT_EQ(written.counts.at("encoders"), 2001);
+  EXPECT_TRUE(written.left_out.empty());
   auto replay = simulated("icr_sweep");
   replay.set("sensors",
              config::parse("wheels0: {type: asl_encoders, path: " + (folder / "wheels0").string() +

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "registry.hpp"
@@ -39,13 +38,7 @@ inline std::vector<experiment::RunResult> paper_runs(const std::string& variant,
 /// The estimator of a run that starts at the first true state.
 inline Estimator make_estimator(const experiment::RunSetup& run, const StateSample& truth) {
   const experiment::FilterSetup& setup = *run.filter;
-  std::vector<WheelsPrior> wheels;
-  for (const auto& set : setup.wheels) wheels.push_back(set.prior);
-  std::vector<UpdateEntry> updates;
-  for (const auto& entry : setup.updates) {
-    updates.push_back({entry.name, entry.update.object, entry.wheels});
-  }
-  Estimator estimator(setup.options, setup.cameras, wheels, updates);
+  Estimator estimator = experiment::make_estimator(setup);
   const auto& q = truth.q_ItoG_xyzw;
   const auto vector = [](const std::array<double, 3>& v) { return Eigen::Vector3d(v.data()); };
   ImuPrior prior;
@@ -67,22 +60,37 @@ inline Estimator make_estimator(const experiment::RunSetup& run, const StateSamp
   return estimator;
 }
 
-/// IMU samples, encoder samples and images of a run in the order of their stamps.
-inline std::vector<Measurement> in_time_order(const experiment::RunData& data) {
-  std::vector<Measurement> all;
-  for (const auto& sample : data.imu) all.emplace_back(sample);
-  for (const auto& sample : data.samples) all.emplace_back(sample);
-  for (const auto& image : data.images) all.emplace_back(image);
-  std::stable_sort(all.begin(), all.end(), [](const Measurement& a, const Measurement& b) {
-    return stamp_ns(a) < stamp_ns(b);
+/// A sample of a run and the sensor that gave it; valid as long as the data of the run.
+struct Given {
+  const std::string* sensor;
+  SampleView sample;
+};
+
+/// What a filter takes of a run in the order of stamps: IMU, encoders, tracks.
+inline std::vector<Given> in_time_order(const experiment::RunData& data) {
+  std::vector<Given> all;
+  for (const SampleType* type : sample_types<ImuSample, EncoderSample, FeatureSample>()) {
+    for (const experiment::Recorded::Track& track : data.recorded.tracks()) {
+      if (!(track.samples->type() == *type)) continue;
+      for (std::size_t i = 0; i < track.samples->size(); ++i) {
+        all.push_back({&track.sensor, track.samples->view(i)});
+      }
+    }
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Given& a, const Given& b) {
+    return a.sample.t_ns() < b.sample.t_ns();
   });
   return all;
 }
 
-inline void add(Estimator& estimator, const Measurement& measurement) {
-  if (const auto* imu = std::get_if<ImuSample>(&measurement)) estimator.add(*imu);
-  if (const auto* image = std::get_if<FeatureSample>(&measurement)) estimator.add(*image);
-  if (const auto* encoder = std::get_if<EncoderSample>(&measurement)) estimator.add(*encoder, 0);
+inline void add(Estimator& estimator, const experiment::RunSetup& setup, const Given& given) {
+  setup.routes.dispatch(*given.sensor, given.sample.type(), [&](const experiment::Route& route) {
+    if (route.consumer == experiment::Consumer::kImu) {
+      estimator.add(*given.sample.get_if<ImuSample>());
+    } else if (route.consumer == experiment::Consumer::kStream) {
+      estimator.add(route.stream, given.sample);
+    }
+  });
 }
 
 }  // namespace viwo::testing

@@ -151,7 +151,19 @@ TEST(Excitation, HoldingKeepsTheFilterConsistentOnFlatGroundWhereNoiseLooksLikeA
   EXPECT_GT(free.at("p_IinO_z").nees, 10.);
 }
 
-/// Calibration of the first wheel set: dtheta and additive, from one estimate to the next.
+/// Calibration of the only wheel set.
+WheelsView wheels_of(const experiment::FilterSetup& setup, const Filter& filter) {
+  const auto specs = wheels_blocks(setup.wheels.front().prior);
+  const auto id = [&](std::size_t k) {
+    const auto all = filter.blocks().specs();
+    const auto found = std::find_if(
+        all.begin(), all.end(), [&](const BlockSpec& spec) { return spec.name == specs[k].name; });
+    return BlockId{static_cast<int>(found - all.begin())};
+  };
+  return WheelsBlocks{nullptr, id(0), id(1), id(2)}.view(filter.view());
+}
+
+/// dtheta and additive, from one estimate to the next.
 VectorXd change(const WheelsView& from, const WheelsView& to) {
   VectorXd d(7 + from.x_WI.size());
   d << -log_so3(to.R_ItoO * from.R_ItoO.transpose()), to.p_IinO - from.p_IinO,
@@ -165,20 +177,20 @@ TEST(Excitation, HeldDirectionsOfARunDoNotMoveAtAll) {
       moving("sweep_then_straight", "uneven",
              {"estimator.hold_unexcited=true", "sensors.simulator0.duration_s=40"}));
   const auto data = experiment::collect(setup);
-  Estimator estimator = testing::make_estimator(setup, data.states.front());
+  Estimator estimator = testing::make_estimator(setup, data.states().front());
   double largest_held = 0., largest_other = 0.;
   int steps = 0;
-  WheelsView before = estimator.filter().wheels()[0];
-  for (const Measurement& measurement : testing::in_time_order(data)) {
-    testing::add(estimator, measurement);
+  WheelsView before = wheels_of(*setup.filter, estimator.filter());
+  for (const testing::Given& given : testing::in_time_order(data)) {
+    testing::add(estimator, setup, given);
     while (estimator.step()) {
       const ExcitationMonitor& monitor = estimator.monitors()[0];
-      const WheelsView& now = estimator.filter().wheels()[0];
+      const WheelsView now = wheels_of(*setup.filter, estimator.filter());
       const VectorXd all = change(before, now);
       before = now;
       const auto columns = monitor.information().columns();
       // Once the window is full, an epoch with news has the directions of the epochs to come.
-      const double t_s = seconds_between(data.states.front().t_ns, estimator.filter().t_ns());
+      const double t_s = seconds_between(data.states().front().t_ns, estimator.filter().t_ns());
       if (t_s < kStraightS || monitor.has_news()) continue;
       EXPECT_GE(monitor.unexcited(), 6);
       ++steps;

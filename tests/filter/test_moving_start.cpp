@@ -9,12 +9,12 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
-#include "viwo/filter/moving_start.hpp"
 #include "viwo/math/chi2.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/imu_simulator.hpp"
+#include "viwo/start/moving_start.hpp"
 
 namespace viwo {
 namespace {

@@ -57,9 +57,9 @@ TEST_F(Ros1Topics, GivesAllThatIsPublishedInOrderAndEndsWhenNothingComes) {
   auto last = steady_clock::now();
   while (sensor->next(measurement) == Status::kOk) {
     last = steady_clock::now();
-    if (const auto* i = std::get_if<ImuSample>(&measurement)) imu.push_back(*i);
-    if (const auto* e = std::get_if<EncoderSample>(&measurement)) encoders.push_back(*e);
-    if (const auto* p = std::get_if<ImageSample>(&measurement)) images.push_back(*p);
+    if (const auto* i = measurement.get_if<ImuSample>()) imu.push_back(*i);
+    if (const auto* e = measurement.get_if<EncoderSample>()) encoders.push_back(*e);
+    if (const auto* p = measurement.get_if<ImageSample>()) images.push_back(*p);
   }
   const double waited_s = std::chrono::duration<double>(steady_clock::now() - last).count();
   EXPECT_GT(waited_s, 3.9);

@@ -194,16 +194,12 @@ class Disturbed final : public EstimatorObserver {
 
 /// Unobservable directions of a short general motion when the Jacobians are that much wrong.
 int unobservable_with(double jacobian_error) {
-  const config::Node run = resolve_placeholders(load_run_configuration(
-      testing::configuration("runs/viwo_swerve.yaml"),
-      {"sensors.simulator0.duration_s=10", "sensors.simulator0.noise=false",
-       "sensors.simulator0.features=50", "sensors.simulator0.ramp_s=0",
-       "estimator.start_error_scale=0", "estimator.calibration_error_scale=0",
-       "wheels.hold_gauge=false", "updates.wheel_odometry.max_iterations=1",
-       "updates.wheel_parity.max_iterations=1", "updates.wheel_odometry.second_order_noise=false",
-       "updates.wheel_parity.second_order_noise=false"}));
-  RunSetup setup = read_run(run, testing::registry());
-  setup.filter->options.frozen = true;
+  const config::Node run = resolve_placeholders(
+      load_run_configuration(testing::configuration("runs/viwo_swerve.yaml"),
+                             {"sensors.simulator0.duration_s=10", "sensors.simulator0.features=50",
+                              "sensors.simulator0.ramp_s=0", "wheels.hold_gauge=false"}));
+  RunSetup setup = read_run(run, testing::registry(), {}, true);
+  setup.filter->options.runner.frozen = true;
   const RunData data = collect(setup);
   std::optional<ObservabilityMatrix> matrix;
   std::optional<Disturbed> disturbed;

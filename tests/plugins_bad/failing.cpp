@@ -1,4 +1,5 @@
-// An update that throws in every second epoch, and says otherwise that the base stands still.
+// An update that throws in every second epoch. With `what: seed` it is one of wheels that logs its
+// seed.
 #include <array>
 #include <stdexcept>
 #include <string>
@@ -13,15 +14,23 @@ constexpr std::array<ParamSpec, 1> kParams = {{
     {.name = "what",
      .type = ParamType::kString,
      .fallback = "std",
-     .choices = "std|int|start",
-     .help = "what is thrown"},
+     .choices = "std|int|contract|declare|input|start|seed",
+     .help = "seed: that is logged; else what is thrown"},
 }};
 
 class Failing final : public Update {
  public:
-  Failing(const ParamSet& params, const HostServices&) : what_(params.text("what")) {}
+  Failing(const ParamSet& params, const HostServices& services) : what_(params.text("what")) {
+    if (what_ == "seed") services.log(LogLevel::kInfo, std::to_string(services.seed));
+  }
 
-  UpdateKind kind() const override { return UpdateKind::kBody; }
+  void declare(Declarations& host) override {
+    if (what_ == "seed") host.rig().wheels();  // an instance for each wheel set
+    if (what_ == "declare") throw std::logic_error("cannot say");
+    if (what_ == "input") throw InputError("needs a barometer");
+    // An epoch for each image.
+    host.stream({.type = &sample_type<FeatureSample>(), .ends_epochs = true, .optional = true});
+  }
 
   void start(const UpdateSetup&) override {
     if (what_ == "start") throw std::logic_error("cannot start");
@@ -31,6 +40,7 @@ class Failing final : public Update {
     sink.count(1, 0);
     if (++calls_ % 2 == 1) return;
     if (what_ == "int") throw 42;
+    if (what_ == "contract") throw ContractError("takes what it may not");
     throw std::runtime_error("lost in call " + std::to_string(calls_));
   }
 

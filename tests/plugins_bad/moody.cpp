@@ -21,14 +21,15 @@ constexpr std::array<ParamSpec, 2> kParams = {{
     {.name = "mood",
      .type = ParamType::kString,
      .fallback = "fine",
-     .choices = "fine|param|input|std|int|bad_alloc|rows_std|rows_int|rows_input",
-     .help = "what is thrown, and where"},
+     .choices = "fine|seed|param|input|std|int|bad_alloc|rows_std|rows_int|rows_input",
+     .help = "seed: that is logged; else what is thrown, and where"},
 }};
 
 class Moody final : public KinematicModel {
  public:
-  Moody(const ParamSet& params, const HostServices&)
+  Moody(const ParamSet& params, const HostServices& services)
       : radius_(params.number("radius_m")), mood_(params.text("mood")) {
+    if (mood_ == "seed") services.log(LogLevel::kInfo, std::to_string(services.seed));
     if (mood_ == "param") throw ParamError("radius_m", "is too round");
     if (mood_ == "input") throw InputError("wheels.csv:3: not a wheel");
     if (mood_ == "std") throw std::runtime_error("out of sorts");

@@ -28,12 +28,12 @@ struct Outcome {
 };
 
 /// A simulated swerve robot for four seconds, 10 epochs per second.
-Outcome run_of(const std::string& rest) {
+Outcome run_of(const std::string& rest, const std::string& sensors = "") {
   const std::string yaml =
       "sensors:\n  s: {type: simulator, motion: straight, duration_s: 4, features: 10, "
       "cameras: " VIWO_TEST_SOURCE_DIR
       "/configs/cameras/pinhole.yaml, robot: {type: four_wis_wid, " +
-      kSwerve + "}}\n" + rest;
+      kSwerve + "}}\n" + sensors + rest;
   Outcome out;
   out.setup = read_run(config::parse(yaml, "run.yaml"), registry(), 1);
   const RunData data = collect(out.setup);
@@ -86,13 +86,46 @@ TEST(FailingUpdate, ThatWorksSaysNothing) {
   EXPECT_EQ(describe(run.result).find("warning"), std::string::npos);
 }
 
-TEST(FailingUpdate, ThatCannotStartIsNamed) {
+TEST(FailingUpdate, ThatBreaksItsContractIsDisabledAtOnce) {
+  const Outcome run = run_of("updates: {failing: {what: contract}}\n");
+  EXPECT_EQ(run.result.status, RunStatus::kOk) << run.result.cause;
+  EXPECT_EQ(summary_of(run.setup, run.result)["updates"]["failing"].dump(),
+            R"({"applied":1,"cause":"takes what it may not","disabled":true,"failed":1,)"
+            R"("rejected":0})");
+}
+
+/// What the run with such an update throws.
+std::string error_of(const std::string& updates, const std::string& sensors = "") {
   try {
-    run_of("updates: {failing: {what: start}}\n");
-    FAIL() << "nothing thrown";
+    run_of("updates: {" + updates + "}\n", sensors);
   } catch (const std::exception& error) {
-    EXPECT_STREQ(error.what(), "update 'updates.failing' failed: cannot start");
+    return error.what();
   }
+  return "nothing thrown";
+}
+
+TEST(FailingUpdate, ThatCannotStartOrDeclareIsNamed) {
+  const std::string plugin = "update plugin 'failing' 0.1.0 (" + kBad +
+                             "/libviwo_update_failing.so) failed in declare or start: ";
+  EXPECT_EQ(error_of("failing: {what: start}"), plugin + "cannot start");
+  EXPECT_EQ(error_of("failing: {what: declare}"), plugin + "cannot say");
+}
+
+TEST(FailingUpdate, ThatLacksSomethingIsAnErrorOfItsSection) {
+  EXPECT_EQ(error_of("failing: {what: input}"),
+            "run.yaml:3:11  updates.failing: needs a barometer");
+}
+
+TEST(SamplesOfAnotherVersion, AreAnErrorOfTheConfigurationThatNamesBothPlugins) {
+  const std::string sensor = "  r: {type: range}\n";
+  EXPECT_EQ(error_of("failing: {}, range: {sensor: r}", sensor), "nothing thrown");
+  EXPECT_EQ(error_of("failing: {}, range: {sensor: r}, range_2: {sensor: r}", sensor),
+            "run.yaml:4:44  updates.range_2: update plugin 'range_2' 0.1.0 (" + kBad +
+                "/libviwo_update_range_2.so) has samples 'range' of version 2, 24 bytes, update "
+                "plugin 'range' 0.1.0 (" +
+                kBad +
+                "/libviwo_update_range.so) of version 1, 24 bytes - build both with the same "
+                "definition of them");
 }
 
 const std::string kMoody =

@@ -29,6 +29,8 @@ class Ticks final : public Sensor {
     services_.log(LogLevel::kInfo, "goodbye " + description.intrinsics.at(0).name);
   }
 
+  SampleTypes yields() const override { return sample_types<EncoderSample>(); }
+
   Status next(Measurement& out) override {
     if (given_ == params_.integer("count")) return Status::kEnd;
     ModelDescription description;

@@ -19,7 +19,8 @@ namespace viwo::testing {
 inline std::shared_ptr<const WheelModel> load_model(const std::string& yaml) {
   static PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
   config::Errors errors;
-  const auto loaded = registry.make_kinematics(config::parse(yaml, "test"), "kinematics", errors);
+  const auto loaded =
+      registry.make_kinematics(config::parse(yaml, "test"), "kinematics", 1, errors);
   errors.throw_if_any();
   return std::make_shared<const WheelModel>(loaded.object);
 }

@@ -62,6 +62,9 @@ class ViwoBag : public ::testing::Test {
       wheels.steer_rad = {normal(random), normal(random)};
       all.emplace_back(wheels);
       if (k % 20 != 0) continue;
+      GnssSample fix{t_ns + 1, 42.3 + 0.001 * normal(random), -71.1, normal(random), {}};
+      for (double& value : fix.covariance_ENU_m2) value = std::abs(normal(random));
+      all.emplace_back(fix);
       for (int camera = 0; camera < 2; ++camera) {
         Image image{5, 3, std::vector<std::uint8_t>(15)};
         for (std::uint8_t& pixel : image.pixels) pixel = static_cast<std::uint8_t>(random());
@@ -69,7 +72,7 @@ class ViwoBag : public ::testing::Test {
       }
     }
     log::AslWriter writer(folder_ / name);
-    for (const Measurement& measurement : all) writer.write(measurement);
+    for (const Measurement& measurement : all) EXPECT_TRUE(writer.write(measurement));
     writer.close();
     return all;
   }
@@ -93,12 +96,13 @@ void expect_same(const std::vector<Measurement>& expected, const std::vector<Mea
 TEST_F(ViwoBag, ALogComesBackToTheBit) {
   const auto log = write_log("log");
   ASSERT_EQ(run(path("log") + " " + path("a.bag")), 0) << output_;
-  EXPECT_EQ(output_, path("a.bag") + ": 230 messages (100 IMU, 100 wheels, 10 images, 20 poses)\n");
+  EXPECT_EQ(output_,
+            path("a.bag") + ": 235 messages (100 IMU, 100 wheels, 10 images, 20 poses, 5 fixes)\n");
   const auto played = play(*make_sensor(
       "{type: ros1_bag, path: " + path("a.bag") +
       ", imu_topic: /imu0, image_topics: [/cam0/image_raw, /cam1/image_raw], joint_topic: "
       "/joint_states, drive_joints: [drive_1, drive_2], steer_joints: [steer_1, steer_2], "
-      "pose_topic: /ground_truth}"));
+      "pose_topic: /ground_truth, gnss_topic: /fix}"));
   EXPECT_EQ(played.size(), log.size());
   expect_same<ImuSample>(log, played, [](const ImuSample& a, const ImuSample& b) {
     EXPECT_EQ(a.gyro_rad_per_s, b.gyro_rad_per_s);
@@ -111,6 +115,12 @@ TEST_F(ViwoBag, ALogComesBackToTheBit) {
   expect_same<PoseSample>(log, played, [](const PoseSample& a, const PoseSample& b) {
     EXPECT_EQ(a.p_BinW_m, b.p_BinW_m);
     EXPECT_EQ(a.q_BtoW_xyzw, b.q_BtoW_xyzw);
+  });
+  expect_same<GnssSample>(log, played, [](const GnssSample& a, const GnssSample& b) {
+    EXPECT_EQ(a.latitude_deg, b.latitude_deg);
+    EXPECT_EQ(a.longitude_deg, b.longitude_deg);
+    EXPECT_EQ(a.altitude_m, b.altitude_m);
+    EXPECT_EQ(a.covariance_ENU_m2, b.covariance_ENU_m2);
   });
   expect_same<ImageSample>(log, played, [](const ImageSample& a, const ImageSample& b) {
     Image x, y;

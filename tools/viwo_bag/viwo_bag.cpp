@@ -36,6 +36,7 @@ constexpr const char* kHelp =
     "                                                 their positions and velocities\n"
     "  cam0, cam1, ..               /camN/image_raw   sensor_msgs/Image, mono8\n"
     "  poses0                       /poses0           geometry_msgs/PoseStamped\n"
+    "  gnss0                        /fix              sensor_msgs/NavSatFix\n"
     "  state_groundtruth_estimate0  /ground_truth     geometry_msgs/PoseStamped\n"
     "What the folder does not have is left out. Stamps of recording are those of the headers.\n";
 
@@ -49,6 +50,7 @@ struct Log {
   std::vector<ImuSample> imu;
   std::vector<EncoderSample> wheels;
   std::vector<PoseSample> poses;
+  std::vector<GnssSample> fixes;
   std::vector<PoseSample> truth;
   std::vector<ImageOnDisk> images;
 };
@@ -92,6 +94,10 @@ Log read_log(const fs::path& folder) {
   if (has("poses0")) {
     log.poses = samples_of(log::read_asl_poses(folder / "poses0", limits), folder / "poses0");
   }
+  if (has("gnss0")) {
+    log.fixes = samples_of(log::read_asl_gnss(folder / "gnss0", limits.max_rejected_fraction),
+                           folder / "gnss0");
+  }
   const fs::path truth = folder / "state_groundtruth_estimate0";
   if (fs::exists(truth, ignored)) log.truth = samples_of(log::read_asl_poses(truth, limits), truth);
   for (std::size_t camera = 0; camera <= log::kMaxCamera; ++camera) {
@@ -99,17 +105,17 @@ Log read_log(const fs::path& folder) {
     if (has(name)) read_images(folder / name, camera, log.images);
   }
   if (log.imu.empty() && log.wheels.empty() && log.poses.empty() && log.truth.empty() &&
-      log.images.empty()) {
+      log.images.empty() && log.fixes.empty()) {
     throw InputError(folder.string() +
                      "  is no log folder: it has none of imu0, wheels0, cam0, poses0, "
-                     "state_groundtruth_estimate0");
+                     "gnss0, state_groundtruth_estimate0");
   }
   return log;
 }
 
 /// A message that is to be written: the `index`-th of its kind.
 struct Entry {
-  enum Kind : std::uint8_t { kImu, kWheels, kPose, kTruth, kImage };
+  enum Kind : std::uint8_t { kImu, kWheels, kPose, kTruth, kImage, kFix };
   std::int64_t t_ns = 0;
   Kind kind = kImu;
   std::size_t index = 0;
@@ -126,6 +132,7 @@ std::vector<Entry> schedule(const Log& log) {
   add(log.poses, Entry::kPose);
   add(log.truth, Entry::kTruth);
   add(log.images, Entry::kImage);
+  add(log.fixes, Entry::kFix);
   std::stable_sort(entries.begin(), entries.end(),
                    [](const Entry& a, const Entry& b) { return a.t_ns < b.t_ns; });
   return entries;
@@ -158,6 +165,13 @@ void write_image(const ImageOnDisk& image, const bag::Stamps& stamps, bag::Ros1W
                    std::move(pixels.pixels)});
 }
 
+void write_fix(const GnssSample& fix, const bag::Stamps& stamps, bag::Ros1Writer& out) {
+  constexpr int kUnknown = 0, kKnown = 3;
+  out.write_fix("/fix", stamps,
+                {0, fix.latitude_deg, fix.longitude_deg, fix.altitude_m, fix.covariance_ENU_m2,
+                 fix.has_covariance() ? kKnown : kUnknown});
+}
+
 void write(const Log& log, const Entry& entry, bag::Ros1Writer& out) {
   const bag::Stamps stamps{entry.t_ns, entry.t_ns};
   switch (entry.kind) {
@@ -177,6 +191,8 @@ void write(const Log& log, const Entry& entry, bag::Ros1Writer& out) {
     }
     case Entry::kImage:
       return write_image(log.images[entry.index], stamps, out);
+    case Entry::kFix:
+      return write_fix(log.fixes[entry.index], stamps, out);
   }
 }
 
@@ -222,7 +238,7 @@ void convert(const fs::path& folder, const fs::path& file) {
   write_bag(log, entries, file);
   std::cout << file.string() << ": " << entries.size() << " messages (" << log.imu.size()
             << " IMU, " << log.wheels.size() << " wheels, " << log.images.size() << " images, "
-            << log.poses.size() + log.truth.size() << " poses)\n";
+            << log.poses.size() + log.truth.size() << " poses, " << log.fixes.size() << " fixes)\n";
 }
 
 }  // namespace

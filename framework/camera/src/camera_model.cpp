@@ -7,39 +7,52 @@
 namespace viwo {
 namespace {
 
-/// Distorted point of the plane z = 1, as a function of p_C, with derivatives by p_C and by the
-/// four distortion coefficients.
+using CoefficientsJacobian = Eigen::Matrix<double, 2, 4>;
+
+/// Distorted point of the plane z = 1, as a function of p_C.
 struct Distorted {
   Eigen::Vector2d xy;
-  Eigen::Matrix<double, 2, 3> J_point;
-  Eigen::Matrix<double, 2, 4> J_coefficients;
+  Eigen::Matrix<double, 2, 3> J_point;  ///< by p_C
 };
 
-bool distort_radtan(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out) {
-  if (!(p_C.z() > 1e-9)) return false;
+/// Distorted point for one of the plane z = 1, with the derivative by it; false where the model
+/// folds back.
+bool distort_radtan(const CameraView& camera, double x, double y, Eigen::Vector2d& xy,
+                    Eigen::Matrix2d& J) {
   const double k1 = camera.intrinsics[4], k2 = camera.intrinsics[5];
   const double p1 = camera.intrinsics[6], p2 = camera.intrinsics[7];
-  const double inverse_z = 1. / p_C.z();
-  const double x = p_C.x() * inverse_z, y = p_C.y() * inverse_z;
   const double r2 = x * x + y * y;
   const double radial = 1. + r2 * (k1 + r2 * k2);
   const double radial_slope = 2. * (k1 + 2. * k2 * r2);  // d radial / d x = radial_slope * x
-  if (!(radial + r2 * radial_slope > 0.)) return false;  // folds back
-  out.xy << x * radial + 2. * p1 * x * y + p2 * (r2 + 2. * x * x),
+  if (!(radial + r2 * radial_slope > 0.)) return false;
+  xy << x * radial + 2. * p1 * x * y + p2 * (r2 + 2. * x * x),
       y * radial + p1 * (r2 + 2. * y * y) + 2. * p2 * x * y;
-  Eigen::Matrix2d J;
   J << radial + x * x * radial_slope + 2. * p1 * y + 6. * p2 * x,
       x * y * radial_slope + 2. * p1 * x + 2. * p2 * y,
       x * y * radial_slope + 2. * p1 * x + 2. * p2 * y,
       radial + y * y * radial_slope + 6. * p1 * y + 2. * p2 * x;
-  out.J_point.leftCols<2>() = J * inverse_z;
-  out.J_point.col(2) = -inverse_z * (J.col(0) * x + J.col(1) * y);
-  out.J_coefficients << x * r2, x * r2 * r2, 2. * x * y, r2 + 2. * x * x,  //
-      y * r2, y * r2 * r2, r2 + 2. * y * y, 2. * x * y;
   return true;
 }
 
-bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out) {
+bool distort_radtan(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out,
+                    CoefficientsJacobian* J_coefficients) {
+  if (!(p_C.z() > 1e-9)) return false;
+  const double inverse_z = 1. / p_C.z();
+  const double x = p_C.x() * inverse_z, y = p_C.y() * inverse_z;
+  Eigen::Matrix2d J;
+  if (!distort_radtan(camera, x, y, out.xy, J)) return false;
+  out.J_point.leftCols<2>() = J * inverse_z;
+  out.J_point.col(2) = -inverse_z * (J.col(0) * x + J.col(1) * y);
+  if (J_coefficients != nullptr) {
+    const double r2 = x * x + y * y;
+    *J_coefficients << x * r2, x * r2 * r2, 2. * x * y, r2 + 2. * x * x,  //
+        y * r2, y * r2 * r2, r2 + 2. * y * y, 2. * x * y;
+  }
+  return true;
+}
+
+bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out,
+                         CoefficientsJacobian* J_coefficients) {
   const double k1 = camera.intrinsics[4], k2 = camera.intrinsics[5];
   const double k3 = camera.intrinsics[6], k4 = camera.intrinsics[7];
   const Eigen::Vector2d a = p_C.head<2>();
@@ -50,7 +63,7 @@ bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, D
     if (!(z > 0.)) return false;
     out.xy = a / z;
     out.J_point << 1. / z, 0., -a.x() / (z * z), 0., 1. / z, -a.y() / (z * z);
-    out.J_coefficients.setZero();
+    if (J_coefficients != nullptr) J_coefficients->setZero();
     return true;
   }
   const double r = std::sqrt(a2);
@@ -67,17 +80,28 @@ bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, D
   out.J_point.leftCols<2>() =
       (d / r) * Eigen::Matrix2d::Identity() + (radial - d / r) * direction * direction.transpose();
   out.J_point.col(2) = -slope * r / n2 * direction;
-  double power = theta;
-  for (int i = 0; i < 4; ++i) {
-    power *= t2;
-    out.J_coefficients.col(i) = power * direction;
+  if (J_coefficients != nullptr) {
+    double power = theta;
+    for (int i = 0; i < 4; ++i) {
+      power *= t2;
+      J_coefficients->col(i) = power * direction;
+    }
   }
   return true;
 }
 
-bool distort(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out) {
-  return camera.distortion == CameraDistortion::kRadtan ? distort_radtan(camera, p_C, out)
-                                                        : distort_equidistant(camera, p_C, out);
+bool distort(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out,
+             CoefficientsJacobian* J_coefficients = nullptr) {
+  return camera.distortion == CameraDistortion::kRadtan
+             ? distort_radtan(camera, p_C, out, J_coefficients)
+             : distort_equidistant(camera, p_C, out, J_coefficients);
+}
+
+/// A step of Newton's method this small leaves an error of about its square.
+constexpr double kStepTolerance = 1e-13;
+
+Eigen::Vector3d direction_of(const Eigen::Vector2d& point) {
+  return Eigen::Vector3d(point.x(), point.y(), 1.).normalized();
 }
 
 Eigen::Vector2d to_pixels(const CameraView& camera, const Eigen::Vector2d& xy) {
@@ -96,14 +120,17 @@ bool project(const CameraView& camera, const Eigen::Vector3d& p_C, Eigen::Vector
 bool project(const CameraView& camera, const Eigen::Vector3d& p_C, Eigen::Vector2d& uv,
              PixelJacobian& J_point, IntrinsicsJacobian* J_intrinsics) {
   Distorted distorted;
-  if (!distort(camera, p_C, distorted)) return false;
+  CoefficientsJacobian J_coefficients;
+  if (!distort(camera, p_C, distorted, J_intrinsics != nullptr ? &J_coefficients : nullptr)) {
+    return false;
+  }
   uv = to_pixels(camera, distorted.xy);
   const Eigen::Vector2d focal = camera.intrinsics.head<2>();
   J_point = focal.asDiagonal() * distorted.J_point;
   if (J_intrinsics != nullptr) {
     J_intrinsics->leftCols<2>() = distorted.xy.asDiagonal();
     J_intrinsics->middleCols<2>(2).setIdentity();
-    J_intrinsics->rightCols<4>() = focal.asDiagonal() * distorted.J_coefficients;
+    J_intrinsics->rightCols<4>() = focal.asDiagonal() * J_coefficients;
   }
   return true;
 }
@@ -132,21 +159,20 @@ std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::
     return Eigen::Vector3d(s * target.x(), s * target.y(), std::cos(theta));
   }
   // Newton's method on the distortion, from the distorted point.
-  Eigen::Vector3d p_C(target.x(), target.y(), 1.);
-  Distorted distorted;
+  Eigen::Vector2d point = target, distorted;
+  Eigen::Matrix2d J;
   for (int i = 0; i < 30; ++i) {
-    if (!distort_radtan(camera, p_C, distorted)) return std::nullopt;
-    const Eigen::Matrix2d J = distorted.J_point.leftCols<2>();
-    const Eigen::Vector2d residual = distorted.xy - target;
+    if (!distort_radtan(camera, point.x(), point.y(), distorted, J)) return std::nullopt;
+    const Eigen::Vector2d residual = distorted - target;
     const double determinant = J.determinant();
     if (!(std::abs(determinant) > 1e-12)) return std::nullopt;
     Eigen::Matrix2d inverse;
     inverse << J(1, 1), -J(0, 1), -J(1, 0), J(0, 0);
     const Eigen::Vector2d step = inverse * residual / determinant;
-    p_C.head<2>() -= step;
-    if (step.squaredNorm() < 1e-26) return p_C.normalized();
+    point -= step;
+    if (step.squaredNorm() < kStepTolerance * kStepTolerance) return direction_of(point);
   }
-  return distorted.xy.isApprox(target, 1e-9) ? std::optional(p_C.normalized()) : std::nullopt;
+  return distorted.isApprox(target, 1e-9) ? std::optional(direction_of(point)) : std::nullopt;
 }
 
 }  // namespace viwo

@@ -35,9 +35,9 @@ Conformance check_plugin(const std::filesystem::path& file, const Options& optio
                                          : kind == "update"   ? update_checks(subject)
                                                               : std::vector<NamedCheck>();
   for (const auto& [name, check] : checks) {
-    const bool needed = name == (kind == "update"       ? "start"
-                                 : kind == "kinematics" ? "repeatable"
-                                                        : "");
+    const bool needed = kind == "update"       ? name == "declarations" || name == "start"
+                        : kind == "kinematics" ? name == "repeatable"
+                                               : false;
     if (run(name, check) || !needed) continue;
     out.checks.back().failures.emplace_back(
         "the checks behind this one need it, and were left out");
@@ -47,7 +47,11 @@ Conformance check_plugin(const std::filesystem::path& file, const Options& optio
 }
 
 std::string to_text(const CheckResult& result, bool verbose) {
-  std::string text = (result.passed() ? "ok      " : "FAILED  ") + result.name + "\n";
+  const char* const answer = !result.passed()          ? "FAILED  "
+                             : !result.skipped.empty() ? "skipped "
+                                                       : "ok      ";
+  std::string text = answer + result.name + "\n";
+  if (!result.skipped.empty()) text += "          " + result.skipped + "\n";
   for (const std::string& failure : result.failures) text += "          " + failure + "\n";
   for (const std::string& warning : result.warnings) text += "          warning: " + warning + "\n";
   if (!verbose) return text;

@@ -9,8 +9,6 @@ void add_all(const Values& values, Digest& out) {
 }
 
 void add(const EncoderSample& s, Digest& out) {
-  out.add(s.begin_ns);
-  out.add(s.end_ns);
   for (int i = 0; i < s.n_drive; ++i) out.add(s.drive_rad_per_s[static_cast<std::size_t>(i)]);
   for (int i = 0; i < s.n_steer; ++i) out.add(s.steer_rad[static_cast<std::size_t>(i)]);
 }
@@ -23,7 +21,6 @@ void add(const ImuSample& s, Digest& out) {
   add_all(s.accel_m_per_s2, out);
 }
 void add(const FeatureSample& s, Digest& out) {
-  out.add(s.camera);
   for (const FeaturePoint& point : s.points) {
     out.add(point.id);
     out.add(point.u_px);
@@ -43,20 +40,37 @@ void add(const CalibrationSample& s, Digest& out) {
 }
 
 void add(const ImageSample& s, Digest& out) {
-  out.add(s.camera);
   Image image;
   s.source->read(image);
   out.add(image.width_px);
   for (const std::uint8_t pixel : image.pixels) out.add(static_cast<int>(pixel));
 }
 
+template <class Sample>
+bool add_if(const Measurement& measurement, Digest& out) {
+  const auto* sample = measurement.get_if<Sample>();
+  if (sample != nullptr) add(*sample, out);
+  return sample != nullptr;
+}
+
+template <class... Samples>
+void add_one_of(const Measurement& measurement, Digest& out) {
+  (add_if<Samples>(measurement, out) || ...);
+}
+
 }  // namespace
 
 std::uint64_t digest_of(const Measurement& measurement) {
   Digest digest;
-  digest.add(static_cast<std::int64_t>(measurement.index()));
-  digest.add(stamp_ns(measurement));
-  std::visit([&digest](const auto& sample) { add(sample, digest); }, measurement);
+  const SampleType& type = measurement.view().type();
+  const SampleExtent extent = measurement.view().extent();
+  for (const char* c = type.name; *c != '\0'; ++c) digest.add(static_cast<int>(*c));
+  digest.add(extent.t_ns);
+  digest.add(extent.begin_ns);
+  digest.add(extent.end_ns);
+  digest.add(type.channel(measurement.view().data()));
+  add_one_of<EncoderSample, PoseSample, ImuSample, FeatureSample, StateSample, CalibrationSample,
+             ImageSample>(measurement, digest);
   return digest.value();
 }
 

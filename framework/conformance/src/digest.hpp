@@ -39,6 +39,7 @@ class Digest {
   std::uint64_t hash_ = 14695981039346656037u;
 };
 
+/// All values of viwo's own kinds; of others what every kind has: name, time, channel.
 std::uint64_t digest_of(const Measurement& measurement);
 std::uint64_t digest_of(const FactorSink& sink);
 

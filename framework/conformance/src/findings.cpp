@@ -15,6 +15,7 @@ namespace {
 constexpr char kFailure = 'F';
 constexpr char kNote = 'N';
 constexpr char kWarning = 'W';
+constexpr char kSkipped = 'S';
 
 /// What the child has to say, each text with its kind in front and a zero behind.
 std::string packed(const Findings& findings) {
@@ -22,16 +23,27 @@ std::string packed(const Findings& findings) {
   for (const std::string& text : findings.failures()) bytes += kFailure + text + '\0';
   for (const std::string& text : findings.notes()) bytes += kNote + text + '\0';
   for (const std::string& text : findings.warnings()) bytes += kWarning + text + '\0';
+  if (!findings.skipped().empty()) bytes += kSkipped + findings.skipped() + '\0';
   return bytes;
 }
 
 void unpack(const std::string& bytes, CheckResult& result) {
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t end = std::min(bytes.find('\0', at), bytes.size());
-    auto& to = bytes[at] == kFailure   ? result.failures
-               : bytes[at] == kWarning ? result.warnings
-                                       : result.notes;
-    to.push_back(bytes.substr(at + 1, end - at - 1));
+    const std::string text = bytes.substr(at + 1, end - at - 1);
+    switch (bytes[at]) {
+      case kFailure:
+        result.failures.push_back(text);
+        break;
+      case kWarning:
+        result.warnings.push_back(text);
+        break;
+      case kSkipped:
+        result.skipped = text;
+        break;
+      default:
+        result.notes.push_back(text);
+    }
     at = end + 1;
   }
 }

@@ -17,9 +17,12 @@ class Findings {
   void note(const std::string& text) { add(notes_, text); }
   /// Like note(), but shown without being asked for.
   void warn(const std::string& text) { add(warnings_, text); }
+  /// The check cannot be made, and why.
+  void skip(const std::string& why) { skipped_ = why; }
   const std::vector<std::string>& failures() const { return failures_; }
   const std::vector<std::string>& notes() const { return notes_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
+  const std::string& skipped() const { return skipped_; }
 
  private:
   static void add(std::vector<std::string>& to, const std::string& text) {
@@ -31,6 +34,7 @@ class Findings {
   std::vector<std::string> failures_;
   std::vector<std::string> notes_;
   std::vector<std::string> warnings_;
+  std::string skipped_;
 };
 
 using Check = std::function<void(Findings&)>;

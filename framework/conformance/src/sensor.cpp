@@ -3,7 +3,10 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include <unistd.h>
 
@@ -35,10 +38,6 @@ std::string fault(const EncoderSample& s) {
   if (s.n_drive < 0 || s.n_drive > kMaxDrives || s.n_steer < 0 || s.n_steer > kMaxSteers) {
     return "has " + std::to_string(s.n_drive) + " drive and " + std::to_string(s.n_steer) +
            " steering channels";
-  }
-  if (s.begin_ns > s.t_ns || s.t_ns > s.end_ns) {
-    return "is for the time from " + std::to_string(s.begin_ns) + " to " +
-           std::to_string(s.end_ns) + " ns, which does not hold its stamp";
   }
   return finite(s.drive_rad_per_s) && finite(s.steer_rad) ? "" : "has values that are not finite";
 }
@@ -87,35 +86,98 @@ std::string fault(const ImageSample& s) {
   return image.pixels == again.pixels ? "" : "has other pixels when read again";
 }
 
-constexpr const char* kKinds[] = {"encoder sample", "pose",           "IMU sample", "image",
-                                  "true state",     "true parameter", "picture"};
-static_assert(std::size(kKinds) == std::variant_size_v<Measurement>);
+template <class Sample>
+bool set_fault(const Measurement& measurement, std::string& out) {
+  const auto* sample = measurement.get_if<Sample>();
+  if (sample != nullptr) out = fault(*sample);
+  return sample != nullptr;
+}
+
+/// Of viwo's own kinds all that can be wrong, of others what they say themselves.
+std::string fault(const Measurement& measurement) {
+  const SampleExtent extent = measurement.view().extent();
+  if (extent.begin_ns > extent.t_ns || extent.t_ns > extent.end_ns) {
+    return "is for the time from " + std::to_string(extent.begin_ns) + " to " +
+           std::to_string(extent.end_ns) + " ns, which does not hold its stamp";
+  }
+  std::string text;
+  if (set_fault<EncoderSample>(measurement, text) || set_fault<PoseSample>(measurement, text) ||
+      set_fault<ImuSample>(measurement, text) || set_fault<FeatureSample>(measurement, text) ||
+      set_fault<StateSample>(measurement, text) ||
+      set_fault<CalibrationSample>(measurement, text) ||
+      set_fault<ImageSample>(measurement, text)) {
+    return text;
+  }
+  const SampleView view = measurement.view();
+  const char* const said = view.type().fault(view.data());
+  return said != nullptr ? "has a " + std::string(said) : "";
+}
+
+/// What is wrong with a measurement where it stands among the others; "" if nothing.
+class Sequence {
+ public:
+  explicit Sequence(SampleTypes yields) : yields_(std::move(yields)) {}
+
+  std::string fault(const Measurement& measurement) {
+    if (measurement.empty()) return "is empty";
+    const SampleType& type = measurement.view().type();
+    if (std::none_of(yields_.begin(), yields_.end(),
+                     [&type](const SampleType* one) { return *one == type; })) {
+      return "is of a kind that yields() does not name - it names all that next() may give";
+    }
+    const SampleExtent extent = measurement.view().extent();
+    if (last_ns_ && extent.t_ns < *last_ns_) {
+      return "comes after one at " + std::to_string(*last_ns_) +
+             " ns - next() gives measurements in time order";
+    }
+    last_ns_ = extent.t_ns;
+    std::string wrong = conformance::fault(measurement);
+    if (!wrong.empty() || extent.begin_ns == extent.end_ns) return wrong;
+    std::int64_t& end_ns = cell_end_ns_.try_emplace(type.name, extent.begin_ns).first->second;
+    if (extent.begin_ns < end_ns) {
+      return "begins " + std::to_string(end_ns - extent.begin_ns) +
+             " ns before the last one ends - cells must not overlap";
+    }
+    end_ns = extent.end_ns;
+    return "";
+  }
+
+ private:
+  SampleTypes yields_;
+  std::optional<std::int64_t> last_ns_;
+  std::map<std::string, std::int64_t> cell_end_ns_;  ///< by kind
+};
+
+/// "measurement 12 (imu) at 60000000 ns "
+std::string name_of(const Measurement& measurement, std::int64_t count) {
+  std::string text = "measurement " + std::to_string(count) + " ";
+  if (measurement.empty()) return text;
+  return text + "(" + measurement.view().type().name + ") at " +
+         std::to_string(measurement.t_ns()) + " ns ";
+}
+
+void check_rejections(const Sensor& sensor, Findings& findings) {
+  std::vector<RejectionCount> rejections;
+  sensor.rejections(rejections);
+  for (const RejectionCount& rejection : rejections) {
+    if (rejection.reason.empty() || rejection.count <= 0) {
+      findings.fail("rejections() gives an entry without reason or count");
+    }
+    findings.note("rejected: " + std::to_string(rejection.count) + " x " + rejection.reason);
+  }
+}
 
 void check_measurements(const Subject& subject, Findings& findings) {
   const auto sensor = subject.make<Sensor>().object;
+  const SampleTypes yields = sensor->yields();
+  if (yields.empty()) return findings.fail("yields() names no kind of samples");
+  Sequence sequence(yields);
   Measurement measurement;
-  std::int64_t count = 0, last_ns = 0, last_cell_ns = 0;
-  bool any_cell = false;
+  std::int64_t count = 0;
   Status status = Status::kOk;
   while (count < kMost && (status = sensor->next(measurement)) == Status::kOk) {
-    const std::int64_t t_ns = stamp_ns(measurement);
-    const std::string which = std::string(kKinds[measurement.index()]) + " " +
-                              std::to_string(count) + " at " + std::to_string(t_ns) + " ns ";
-    if (count > 0 && t_ns < last_ns) {
-      return findings.fail(which + "comes after one at " + std::to_string(last_ns) +
-                           " ns - next() gives measurements in time order");
-    }
-    const std::string wrong = std::visit([](const auto& s) { return fault(s); }, measurement);
-    if (!wrong.empty()) return findings.fail(which + wrong);
-    if (const auto* cell = std::get_if<EncoderSample>(&measurement)) {
-      if (any_cell && cell->begin_ns < last_cell_ns) {
-        return findings.fail(which + "begins " + std::to_string(last_cell_ns - cell->begin_ns) +
-                             " ns before the last one ends - cells must not overlap");
-      }
-      last_cell_ns = cell->end_ns;
-      any_cell = true;
-    }
-    last_ns = t_ns;
+    const std::string wrong = sequence.fault(measurement);
+    if (!wrong.empty()) return findings.fail(name_of(measurement, count) + wrong);
     ++count;
   }
   findings.note(std::to_string(count) + " measurements");
@@ -127,14 +189,7 @@ void check_measurements(const Subject& subject, Findings& findings) {
       return findings.fail("next() goes on after kEnd - once at the end it stays there");
     }
   }
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  for (const RejectionCount& rejection : rejections) {
-    if (rejection.reason.empty() || rejection.count <= 0) {
-      findings.fail("rejections() gives an entry without reason or count");
-    }
-    findings.note("rejected: " + std::to_string(rejection.count) + " x " + rejection.reason);
-  }
+  check_rejections(*sensor, findings);
 }
 
 std::vector<std::uint64_t> stream_of(Sensor& sensor) {

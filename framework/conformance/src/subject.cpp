@@ -157,9 +157,9 @@ void Subject::choose_section(const Options& options) {
 }
 
 template <>
-Loaded<KinematicModel> Subject::make(const Node& section, std::uint64_t /*seed*/) const {
+Loaded<KinematicModel> Subject::make(const Node& section, std::uint64_t seed) const {
   config::Errors errors;
-  auto loaded = registry_->make_kinematics(section, "kinematics", errors);
+  auto loaded = registry_->make_kinematics(section, "kinematics", seed, errors);
   errors.throw_if_any();
   return loaded;
 }
@@ -192,9 +192,9 @@ Loaded<Sensor> Subject::make(const Node& section, std::uint64_t seed) const {
 }
 
 template <>
-Loaded<Update> Subject::make(const Node& section, std::uint64_t /*seed*/) const {
+Loaded<Update> Subject::make(const Node& section, std::uint64_t seed) const {
   config::Errors errors;
-  auto loaded = registry_->make_update(section, "update", errors);
+  auto loaded = registry_->make_update(section, "update", seed, errors);
   errors.throw_if_any();
   return loaded;
 }

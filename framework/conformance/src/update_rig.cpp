@@ -1,6 +1,10 @@
 #include "update_rig.hpp"
 
+#include <array>
 #include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
 
 #include "viwo/api/auto_kinematics.hpp"
 #include "viwo/filter/estimator.hpp"
@@ -14,6 +18,7 @@ namespace {
 
 constexpr std::int64_t kStart = 1'000'000'000;
 constexpr double kPoseRateHz = 20.;
+constexpr int kPosesPerFix = 4;
 
 /// Two driven wheels on each side and the lateral no-slip row: two rows more than a twist needs.
 class FourDrives final : public AutoKinematics<FourDrives> {
@@ -70,16 +75,27 @@ CameraView camera() {
   return view;
 }
 
-WheelsPrior wheels() {
+CameraPrior camera_prior(Calibration calibration) {
+  CameraPrior prior;
+  prior.camera = camera();
+  if (calibration == Calibration::kHeld) return prior;
+  prior.sigma_extrinsics << 0.005, 0.005, 0.005, 0.01, 0.01, 0.01;
+  prior.sigma_intrinsics << 1., 1., 1., 1., 0.01, 0.01, 0.001, 0.001;
+  prior.sigma_clock_s = 0.002;
+  return prior;
+}
+
+WheelsPrior wheels_prior(Calibration calibration) {
   WheelsPrior prior;
   const ModelDescription description = base_description();
   prior.wheels.model = &base();
   prior.wheels.R_ItoO = mounting().R_ItoO;
   prior.wheels.p_IinO = mounting().p_IinO;
   prior.wheels.x_WI = sim::nominal_intrinsics(description);
+  prior.sigma_intrinsics.setZero(prior.wheels.x_WI.size());
+  if (calibration == Calibration::kHeld) return prior;
   prior.sigma_extrinsics.setConstant(0.01);
   prior.sigma_time_offset_s = 0.005;
-  prior.sigma_intrinsics.resize(prior.wheels.x_WI.size());
   for (std::size_t i = 0; i < description.intrinsics.size(); ++i) {
     prior.sigma_intrinsics[static_cast<Eigen::Index>(i)] = description.intrinsics[i].prior_sigma;
   }
@@ -108,28 +124,107 @@ PoseSample pose_at(const sim::BodyTrajectory& trajectory, double t_s) {
   return pose;
 }
 
-}  // namespace
+/// Where a pose is when W is east, north, up at a place of the ellipsoid.
+GnssSample fix_at(const PoseSample& pose) {
+  constexpr double kLatitude = 0.8, kLongitude = 0.28, kAltitude_m = 120.;
+  constexpr double kAxis_m = 6378137., kEccentricity2 = 6.69437999014e-3;
+  constexpr double kDegrees = 180. / std::numbers::pi;
+  const double sine = std::sin(kLatitude);
+  const double w2 = 1. - kEccentricity2 * sine * sine;
+  const double across_m = kAxis_m / std::sqrt(w2);
+  const double along_m = across_m * (1. - kEccentricity2) / w2;
+  GnssSample fix;
+  fix.t_ns = pose.t_ns;
+  fix.latitude_deg = kDegrees * (kLatitude + pose.p_BinW_m[1] / (along_m + kAltitude_m));
+  fix.longitude_deg =
+      kDegrees * (kLongitude + pose.p_BinW_m[0] / ((across_m + kAltitude_m) * std::cos(kLatitude)));
+  fix.altitude_m = kAltitude_m + pose.p_BinW_m[2];
+  fix.covariance_ENU_m2 = {1e-4, 0., 0., 0., 1e-4, 0., 0., 0., 4e-4};
+  return fix;
+}
 
-Drive simulate_drive(const char* motion, double duration_s) {
-  const sim::BodyTrajectory trajectory = sim::BodyTrajectory::drive(
-      sim::PlanarMotion(motion, {}), sim::Ground(), -1., duration_s + 1.);
+/// Something to see.
+class Stripes final : public ImageSource {
+ public:
+  void read(Image& out) const override {
+    out.width_px = camera().width_px;
+    out.height_px = camera().height_px;
+    out.pixels.resize(static_cast<std::size_t>(out.width_px) *
+                      static_cast<std::size_t>(out.height_px));
+    for (std::size_t i = 0; i < out.pixels.size(); ++i) {
+      out.pixels[i] = static_cast<std::uint8_t>(i % 97);
+    }
+  }
+};
+
+class Neighbour final : public Update {
+ public:
+  void declare(Declarations& host) override {
+    const CameraBlocks blocks = declare_camera(host, 0);
+    declare_wheels(host);
+    BlockSpec own{.name = "neighbour.bias"};
+    host.block(own.add("neighbour.bias", "", 0., 1.));
+    room_ = host.room({.name = "neighbour.points", .blocks = 2, .entries = 3});
+    host.stream({.type = &sample_type<FeatureSample>(),
+                 .ends_epochs = true,
+                 .optional = true,
+                 .clocks = {{blocks.clock_constant_s, blocks.clock}}});
+  }
+  void update(const FilterView& filter, const EpochData& /*data*/, FactorSink& sink) override {
+    if (has_point_) return;
+    const auto point = sink.add_block(room_, std::array{1., 2., 3.});
+    if (!point) return;
+    has_point_ = true;
+    InformationFactor& factor = sink.add_information();
+    factor.columns.add(filter.block(*point).column(), 3);
+    factor.Lambda.topLeftCorner<3, 3>().setIdentity();
+    factor.eta.head<3>().setZero();
+  }
+
+ private:
+  RoomId room_;
+  bool has_point_ = false;
+};
+
+/// Adds what the rig measures, with images at the stamps of the tracks.
+void add_rig(const sim::BodyTrajectory& trajectory, double duration_s, std::uint64_t seed,
+             Drive& drive) {
   sim::RigSimulation rig;
   rig.mounting = mounting();
   rig.cameras = {camera()};
   rig.imu.duration_s = rig.features.duration_s = duration_s;
   rig.imu.start_ns = rig.features.start_ns = kStart;
   rig.features.features = 40;
-  constexpr std::uint64_t kSeed = 5;
-  Drive drive;
+  const auto stripes = std::make_shared<Stripes>();
   bool has_start = false;
-  for (Measurement& m : sim::simulate_rig(trajectory, rig, kSeed)) {
-    if (const auto* state = std::get_if<StateSample>(&m)) {
-      if (!has_start) drive.start = *state;
+  for (Measurement& m : sim::simulate_rig(trajectory, rig, seed)) {
+    if (const auto* state = m.get_if<StateSample>(); state != nullptr && !has_start) {
+      drive.start = *state;
       has_start = true;
-      continue;
+    }
+    if (m.get_if<FeatureSample>() != nullptr) {
+      drive.measurements.emplace_back(ImageSample{m.t_ns(), 0, stripes});
     }
     drive.measurements.push_back(std::move(m));
   }
+}
+
+void feed(const Measurement& measurement, Estimator& estimator) {
+  if (const auto* imu = measurement.get_if<ImuSample>()) estimator.add(*imu);
+  const auto streams = estimator.streams();
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    if (*streams[i].spec().type == measurement.view().type()) estimator.add(i, measurement.view());
+  }
+}
+
+}  // namespace
+
+Drive simulate_drive(const char* motion, double duration_s) {
+  const sim::BodyTrajectory trajectory = sim::BodyTrajectory::drive(
+      sim::PlanarMotion(motion, {}), sim::Ground(), -1., duration_s + 1.);
+  constexpr std::uint64_t kSeed = 5;
+  Drive drive;
+  add_rig(trajectory, duration_s, kSeed, drive);
   sim::EncoderSimulation encoders;
   encoders.duration_s = duration_s;
   encoders.start_ns = kStart;
@@ -140,44 +235,52 @@ Drive simulate_drive(const char* motion, double duration_s) {
     drive.measurements.emplace_back(sample);
   }
   for (int k = 0; k < static_cast<int>(duration_s * kPoseRateHz); ++k) {
-    drive.measurements.emplace_back(pose_at(trajectory, k / kPoseRateHz));
+    const PoseSample pose = pose_at(trajectory, k / kPoseRateHz);
+    drive.measurements.emplace_back(pose);
+    if (k % kPosesPerFix == 0) drive.measurements.emplace_back(fix_at(pose));
+  }
+  for (const CalibrationSample& truth : sim::mounting_truth(mounting(), kStart)) {
+    drive.measurements.emplace_back(truth);
   }
   sim::sort_by_time(drive.measurements);
   return drive;
 }
 
-std::int64_t run_update(const std::shared_ptr<Update>& update, const Drive& drive) {
+std::shared_ptr<Rig> robot_rig(Calibration calibration) {
+  return std::make_shared<Rig>(std::vector{camera_prior(calibration)}, wheels_prior(calibration));
+}
+
+std::shared_ptr<Update> make_neighbour() { return std::make_shared<Neighbour>(); }
+
+void run_updates(std::span<const std::shared_ptr<Update>> updates, const std::string& name,
+                 const Drive& drive, Calibration calibration) {
   EstimatorOptions options;
   options.monitor.enabled = false;
   options.growing_window = false;
-  options.max_update_failures = std::numeric_limits<int>::max();
-  CameraPrior camera_prior;
-  camera_prior.camera = camera();
-  UpdateEntry entry;
-  entry.name = "plugin";
-  entry.update = update;
-  if (update->kind() == UpdateKind::kWheels) entry.wheels = 0;
-  if (update->kind() == UpdateKind::kPoses) entry.poses = 0;
-  Estimator estimator(options, {camera_prior}, {wheels()}, {entry});
-  estimator.start(prior_at(drive.start));
+  options.runner.max_update_failures = std::numeric_limits<int>::max();
+  std::vector<std::unique_ptr<Estimator>> estimators;
+  for (const auto& update : updates) {
+    const UpdateEntry neighbour{kNeighbour, make_neighbour(), robot_rig(calibration), ""};
+    const UpdateEntry entry{name, update, robot_rig(calibration), ""};
+    estimators.push_back(std::make_unique<Estimator>(options, std::vector{neighbour, entry}));
+    estimators.back()->start(prior_at(drive.start));
+  }
   const auto step = [&] {
-    while (estimator.step()) {
+    for (bool any = true; any;) {
+      any = false;
+      for (const auto& estimator : estimators) any = estimator->step() || any;
     }
   };
   for (const Measurement& measurement : drive.measurements) {
-    if (const auto* imu = std::get_if<ImuSample>(&measurement)) estimator.add(*imu);
-    if (const auto* image = std::get_if<FeatureSample>(&measurement)) estimator.add(*image);
-    if (const auto* cell = std::get_if<EncoderSample>(&measurement)) estimator.add(*cell, 0);
-    const auto* pose = std::get_if<PoseSample>(&measurement);
-    if (pose != nullptr && entry.poses >= 0) estimator.add(*pose, 0);
+    for (const auto& estimator : estimators) feed(measurement, *estimator);
     step();
   }
-  estimator.finish();
+  for (const auto& estimator : estimators) estimator->finish();
   step();
-  if (!estimator.failure().empty()) {
-    throw std::runtime_error("the filter diverges with its factors: " + estimator.failure());
+  for (const auto& estimator : estimators) {
+    if (estimator->failure().empty()) continue;
+    throw std::runtime_error("the filter diverges with its factors: " + estimator->failure());
   }
-  return estimator.epochs();
 }
 
 }  // namespace viwo::conformance

@@ -23,19 +23,13 @@ constexpr double kDegPerRad = 180. / std::numbers::pi;
 /// step.
 constexpr double kLengthTolerance = 1e-9;
 
-/// Shortest text that reads back to the same number: "10", "2.5".
-std::string text(double value) {
-  std::array<char, 32> buffer{};
-  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
-  return {buffer.data(), end};
-}
-
 void check(const Options& options) {
   if (options.segment_stride < 1) throw InputError("segment_stride must be at least 1");
   if (!(options.max_reference_gap_s > 0.)) throw InputError("max_reference_gap_s must be positive");
   for (const double length_m : options.segment_lengths_m) {
     if (!(length_m > 0.) || !std::isfinite(length_m)) {
-      throw InputError("segment length " + text(length_m) + " m must be positive and finite");
+      throw InputError("segment length " + length_text(length_m) +
+                       " m must be positive and finite");
     }
   }
 }
@@ -145,10 +139,16 @@ Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate, const
   return result;
 }
 
+std::string length_text(double length_m) {
+  std::array<char, 32> buffer{};
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), length_m).ptr;
+  return {buffer.data(), end};
+}
+
 nlohmann::json to_json(const Accuracy& accuracy) {
   nlohmann::json rpe = nlohmann::json::object();
   for (const SegmentErrors& errors : accuracy.rpe) {
-    nlohmann::json& entry = rpe[text(errors.length_m)];
+    nlohmann::json& entry = rpe[length_text(errors.length_m)];
     if (errors.count == 0) continue;
     entry = {{"m", number_or_null(errors.mean_m)},
              {"deg", number_or_null(errors.mean_deg)},

@@ -54,9 +54,9 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
   const auto margin_ns =
       static_cast<std::int64_t>(std::llround(4e9 * options.clock_offset_sigma_s)) + 2'000'000;
   const std::int64_t begin_ns =
-      std::max(data.samples.front().begin_ns + offset_ns + margin_ns, data.reference.front().t_ns);
+      std::max(data.wheels().front().begin_ns + offset_ns + margin_ns, data.reference.front().t_ns);
   const std::int64_t end_ns =
-      std::min(data.samples.back().end_ns + offset_ns - margin_ns, data.reference.back().t_ns);
+      std::min(data.wheels().back().end_ns + offset_ns - margin_ns, data.reference.back().t_ns);
   const double duration_s = seconds_between(begin_ns, end_ns);
   if (!(duration_s > 0.)) throw InputError(where + ": wheels and reference have no time in common");
   const int count = options.segment_s > 0.
@@ -84,7 +84,7 @@ void RecordingProblem::integrate(const CalibrationPoint& point,
   const auto shift_ns = static_cast<std::int64_t>(std::llround(point.clock_offset_s * 1e9));
   guarded(recording_.setup.kinematics.info, "preintegration", [&] {
     for (std::size_t k = 0; k < segments.size(); ++k) {
-      preintegrator_.integrate(recording_.data.samples, stamps_ns_[k] - shift_ns,
+      preintegrator_.integrate(recording_.data.wheels(), stamps_ns_[k] - shift_ns,
                                stamps_ns_[k + 1] - shift_ns, segments[k]);
     }
   });

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "channels.hpp"
 #include "inputs.hpp"
-#include "sources.hpp"
 #include "viwo/experiment/run.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/se2.hpp"
@@ -17,128 +17,68 @@ StampedPose planar_pose(std::int64_t t_ns, const std::array<double, 3>& p,
   return {t_ns, {p[0], p[1], 0.}, Eigen::Quaterniond(about_z)};
 }
 
-/// A model's complaint about the channels of a sensor, at the position of the model or the sensors.
-void require_channels(const WheelModel& model, const config::Mark& mark,
-                      const EncoderSample& sample, const std::string& sensor) {
-  try {
-    model.require_channels(sample, "sensors." + sensor);
-  } catch (const InputError& error) {
-    config::fail(mark, error.what());
+void require_channels(const RunSetup& setup, const Recorded& recorded) {
+  for (const Recorded::Track& track : recorded.tracks()) {
+    const auto samples = recorded.of<EncoderSample>(track.sensor);
+    if (!samples.empty()) require_channels(setup, track.sensor, samples.front());
   }
 }
 
-/// The same for the first sample of a sensor that gives those of a further wheel set.
-void require_channels_of_set(const RunSetup& setup, const EncoderSample& sample,
-                             const std::string& sensor) {
-  for (const WheelSet& wheels : setup.filter->wheels) {
-    if (wheels.sensor != sensor) continue;
-    require_channels(*wheels.model, setup.sensors_mark, sample, sensor);
-  }
-}
-
-/// What every update measures with has been given. What a stream gives is still to be seen.
-void require_what_the_updates_need(const RunSetup& setup, const RunData& data) {
-  const FilterSetup& filter = *setup.filter;
-  for (const FilterSetup::Entry& update : filter.updates) {
-    const auto require = [&](const std::string& sensor, bool is_given, const char* what) {
-      const bool is_stream = std::any_of(data.streams.begin(), data.streams.end(),
-                                         [&](const auto& s) { return s.name == sensor; });
-      if (is_given || is_stream) return;
-      const std::string who =
-          sensor.empty() ? "no sensor of this run gave " : "sensor '" + sensor + "' gave no ";
-      config::fail(update.mark, who + what + ", which update " + update.name + " needs");
-    };
-    if (update.wheels >= 0) {
-      const std::string& sensor = filter.wheels[static_cast<std::size_t>(update.wheels)].sensor;
-      require(sensor, !encoder_samples(data, sensor).empty(), kEncoderSamples);
-    }
-    if (update.poses >= 0) {
-      const std::string& sensor = filter.pose_sensors[static_cast<std::size_t>(update.poses)];
-      require(sensor, !pose_samples(data, sensor).empty(), "poses");
-    }
-  }
-}
-
+/// What was promised has been given. What a stream gives is still to be seen.
 void require_what_the_filter_needs(const RunSetup& setup, const RunData& data) {
-  if (data.imu.empty()) config::fail(setup.sensors_mark, "no sensor of this run gave IMU samples");
-  if (setup.filter->start.mode == StartMode::kReference && data.states.empty()) {
-    config::fail(setup.sensors_mark,
-                 "no sensor of this run gave reference states, which estimator.start: reference "
-                 "needs - choose start: standstill or moving");
+  const auto fail = [&](const std::string& text) { config::fail(setup.sensors_mark, text); };
+  if (data.imu().empty()) fail("no sensor of this run gave IMU samples");
+  if (setup.filter->start.mode == StartMode::kReference && data.states().empty()) {
+    fail(
+        "no sensor of this run gave reference states, which estimator.start: reference needs - "
+        "choose start: standstill or moving");
   }
-  require_what_the_updates_need(setup, data);
+  for (const Route& route : setup.routes.all()) {
+    if (route.consumer != Consumer::kStream) continue;
+    const SharedStream& stream = setup.filter->streams[route.stream];
+    const bool is_stream = std::any_of(data.streams.begin(), data.streams.end(),
+                                       [&](const auto& s) { return s.name == route.sensor; });
+    // Without images or tracks a filter goes on: there may be darkness from the first second.
+    if (is_stream || stream.spec.optional || stream.spec.ends_epochs) continue;
+    if (data.recorded.find(route.sensor, *route.type) != nullptr) continue;
+    fail("sensor '" + route.sensor + "' gave no " + route.type->name + ", which " + stream.takers +
+         " needs");
+  }
 }
 
 /// Sorts what the sensors of a run give into the data of the run.
 class Collector {
  public:
   Collector(const RunSetup& setup, RunData& data) : setup_(setup), data_(data) {
-    if (!setup.filter || setup.filter->wheels.empty()) return;
-    const auto& sets = setup.filter->wheels;
-    wheels_sensor_ = sets.front().sensor;
-    some_set_is_unnamed_ =
-        std::any_of(sets.begin(), sets.end(), [](const auto& set) { return set.sensor.empty(); });
+    data.wheels_name = setup.routes.sensor_of(Consumer::kWheels);
   }
 
   void add(const std::string& sensor, const Measurement& measurement) {
-    std::visit([&](const auto& sample) { add(sensor, sample); }, measurement);
+    const SampleView sample = measurement.view();
+    bool is_wanted = false;
+    setup_.routes.dispatch(sensor, sample.type(), [&](const Route& route) {
+      if (route.consumer == Consumer::kReferencePoses) {
+        add_reference(*sample.get_if<PoseSample>());
+      } else if (route.consumer == Consumer::kTrueCalibration) {
+        const auto& truth = *sample.get_if<CalibrationSample>();
+        data_.calibration[truth.name] = truth.value;
+      } else {
+        is_wanted = true;
+      }
+    });
+    if (is_wanted) data_.recorded.add(sensor, sample);
   }
 
  private:
-  void claim(std::string& owner, const std::string& sensor, const char* what) const {
-    experiment::claim(owner, sensor, what, setup_.sensors_mark);
-  }
-
-  void add(const std::string& sensor, const EncoderSample& sample) {
-    if (some_set_is_unnamed_) claim(encoders_name_, sensor, kEncoderSamples);
-    if (!wheels_sensor_.empty() && sensor != wheels_sensor_) {
-      auto& samples = data_.other_wheels[sensor];
-      if (samples.empty()) require_channels_of_set(setup_, sample, sensor);
-      samples.push_back(sample);
-      return;
-    }
-    claim(data_.wheels_name, sensor, kEncoderSamples);
-    if (data_.samples.empty() && setup_.model) {
-      require_channels(*setup_.model, setup_.kinematics_mark, sample, sensor);
-    }
-    data_.samples.push_back(sample);
-  }
-  void add(const std::string& sensor, const PoseSample& pose) {
-    const auto& measured = setup_.measured_poses;
-    if (std::find(measured.begin(), measured.end(), sensor) != measured.end()) {
-      data_.poses[sensor].push_back(pose);
-      return;
-    }
-    claim(reference_name_, sensor, kReferencePoses);
+  void add_reference(const PoseSample& pose) {
     const Eigen::Quaterniond q_BtoW = to_quaternion(pose.q_BtoW_xyzw).normalized();
     data_.reference.push_back(setup_.filter
                                   ? StampedPose{pose.t_ns, to_vector(pose.p_BinW_m), q_BtoW}
                                   : planar_pose(pose.t_ns, pose.p_BinW_m, q_BtoW));
   }
-  void add(const std::string& sensor, const ImuSample& imu) {
-    claim(imu_name_, sensor, kImuSamples);
-    data_.imu.push_back(imu);
-  }
-  void add(const std::string& sensor, const FeatureSample& image) {
-    claim(data_.tracks_name, sensor, kTracks);
-    data_.images.push_back(image);
-  }
-  void add(const std::string& sensor, const StateSample& state) {
-    claim(reference_name_, sensor, "reference states");
-    data_.states.push_back(state);
-  }
-  void add(const std::string& /*sensor*/, const CalibrationSample& truth) {
-    data_.calibration[truth.name] = truth.value;
-  }
-  void add(const std::string& sensor, const ImageSample& image) {
-    claim(pixels_name_, sensor, "the pixels of images");
-    data_.pixels.push_back(image);
-  }
 
   const RunSetup& setup_;
   RunData& data_;
-  std::string wheels_sensor_, encoders_name_, reference_name_, imu_name_, pixels_name_;
-  bool some_set_is_unnamed_ = false;  ///< then only one sensor gives encoder samples
 };
 
 /// The live sensors of a run and those that work on them, unread.
@@ -204,18 +144,17 @@ RunData collect(RunSetup& setup, LiveSensors live) {
       }
     });
   }
-  // Of a sensor that also knows the states, poses are measurements, here without an update.
-  if (!data.states.empty()) data.reference.clear();
+  require_channels(setup, data.recorded);
   if (setup.filter) {
     require_what_the_filter_needs(setup, data);
     return data;
   }
-  if (data.samples.empty()) {
+  if (data.wheels().empty()) {
     config::fail(setup.sensors_mark, "no sensor of this run gave encoder samples");
   }
   // States are those of the IMU: then it is the reference body.
-  if (!data.states.empty() && setup.O_in_I) setup.extrinsics = *setup.O_in_I;
-  for (const StateSample& state : data.states) {
+  if (!data.states().empty() && setup.O_in_I) setup.extrinsics = *setup.O_in_I;
+  for (const StateSample& state : data.states()) {
     data.reference.push_back(
         planar_pose(state.t_ns, state.p_IinG_m, to_quaternion(state.q_ItoG_xyzw)));
   }

@@ -108,15 +108,6 @@ std::string text_of(const RunSetup& run) {
   return text + config::to_yaml(run.resolved);
 }
 
-void add_units(const RunSetup& run, std::map<std::string, std::string>& units) {
-  if (!run.filter) return;
-  const auto all = calibration_units(run);
-  auto unit = all.begin();
-  for (const WheelSet& wheels : run.filter->wheels) {
-    for (const std::string& name : calibration_names(wheels)) units[name] = *unit++;
-  }
-}
-
 /// Thrown out of a run that the user does not wait for any more.
 struct Stopped {};
 
@@ -139,7 +130,8 @@ class Runner {
         RunSetup check = read_run(configuration(v, r), plugins_);
         if (v == 0 || r == 0) collect(check);
         configurations_.push_back(text_of(check));
-        add_units(check, result_.units);
+        const std::vector<double>& lengths_m = check.evaluation.segment_lengths_m;
+        result_.segment_lengths_m.insert(lengths_m.begin(), lengths_m.end());
         for (int s = 0; s < setup_.seeds; ++s) {
           const auto seed = setup_.seeds > 1 ? static_cast<std::uint64_t>(s) + 1 : check.seed;
           result_.runs.push_back({v, r, seed, {}});
@@ -320,6 +312,11 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
     throw Interrupted("interrupted after " + std::to_string(runner.finished()) + " of " +
                       std::to_string(result.runs.size()) + " runs" +
                       (folder.empty() ? "" : "; continue with --resume"));
+  }
+  for (const ExperimentRun& run : result.runs) {
+    for (const CalibrationTrack& track : run.result.calibration) {
+      result.units[track.name] = track.unit;
+    }
   }
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;

@@ -14,7 +14,7 @@ using nlohmann::json;
 
 json metrics_json(const ExperimentResult& result, std::size_t variant, const Group& group) {
   json metrics = json::object();
-  for (const Metric& metric : all_metrics()) {
+  for (const Metric& metric : all_metrics(result)) {
     const auto values = values_of(result, variant, metric, group);
     metrics[metric.key] = {{"n", values.size()},
                            {"mean", number_or_null(eval::mean(values))},
@@ -36,7 +36,7 @@ json paired_json(const ExperimentResult& result, const Group& group) {
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
     if (v == result.setup.baseline) continue;
     json& entry = variants[result.setup.variants[v].name] = json::object();
-    for (const Metric& metric : all_metrics()) {
+    for (const Metric& metric : all_metrics(result)) {
       const eval::PairedDifference d = paired(result, v, metric, group);
       entry[metric.key] = {{"pairs", d.pairs},
                            {"mean", number_or_null(d.mean)},
@@ -50,18 +50,18 @@ json paired_json(const ExperimentResult& result, const Group& group) {
           {"variants", variants}};
 }
 
-/// Mean relative pose errors over 10 and 25 m.
+/// Mean relative pose errors by length.
 json rpe_json(const ExperimentResult& result, std::size_t variant) {
   json all = json::object();
-  for (const auto& length : {10., 25.}) {
+  for (const double length_m : result.segment_lengths_m) {
     std::vector<double> m, deg;
     for (const ExperimentRun& run : result.runs) {
-      if (run.variant != variant || !std::isfinite(rpe(run.result, length, false))) continue;
-      m.push_back(rpe(run.result, length, false));
-      deg.push_back(rpe(run.result, length, true));
+      if (run.variant != variant || !std::isfinite(rpe(run.result, length_m, false))) continue;
+      m.push_back(rpe(run.result, length_m, false));
+      deg.push_back(rpe(run.result, length_m, true));
     }
-    all[significant(length, 3)] = {{"m", number_or_null(eval::mean(m))},
-                                   {"deg", number_or_null(eval::mean(deg))}};
+    all[eval::length_text(length_m)] = {{"m", number_or_null(eval::mean(m))},
+                                        {"deg", number_or_null(eval::mean(deg))}};
   }
   return all;
 }
@@ -135,10 +135,11 @@ std::string csv_field(const std::string& text) {
 }
 
 std::string runs_csv(const ExperimentResult& result) {
+  const std::vector<Metric> metrics = all_metrics(result);
   std::ostringstream csv;
   csv.precision(12);
   csv << "variant,recording,seed,status,duration_s,wall_s,samples,rank_deficient,gated";
-  for (const Metric& metric : all_metrics()) csv << ',' << metric.key;
+  for (const Metric& metric : metrics) csv << ',' << metric.key;
   csv << ",cause\n";
   for (const ExperimentRun& run : result.runs) {
     csv << result.setup.variants[run.variant].name << ','
@@ -146,7 +147,7 @@ std::string runs_csv(const ExperimentResult& result) {
         << name(run.result.status) << ',' << run.result.duration_s << ',' << run.result.wall_s
         << ',' << run.result.total.samples << ',' << run.result.total.rank_deficient << ','
         << run.result.total.gated;
-    for (const Metric& metric : all_metrics()) {
+    for (const Metric& metric : metrics) {
       csv << ',';
       if (const double value = metric.of(run.result); std::isfinite(value)) csv << value;
     }

@@ -137,7 +137,7 @@ Table paired_table_by(const ExperimentResult& result, const std::string& label,
   const std::size_t baseline = result.setup.baseline;
   Table table;
   table.caption =
-      metric.heading + (": difference to " + result.setup.variants[baseline].name + " by " + label);
+      metric.heading + ": difference to " + result.setup.variants[baseline].name + " by " + label;
   table.columns = {{label}};
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
     if (v != baseline) table.columns.push_back({result.setup.variants[v].name});
@@ -328,7 +328,7 @@ Document report_of(const ExperimentResult& result) {
     }
     if (result.setup.variants.size() > 1) {
       for (const Metric& metric : metrics_of(result)) {
-        if (metric.key == std::string_view("ate_m")) {
+        if (metric.key == "ate_m") {
           section.blocks.emplace_back(paired_table_by(result, label, metric));
         }
       }

@@ -8,7 +8,7 @@
 namespace viwo::experiment {
 namespace {
 
-const Metric kMetrics[] = {
+const Metric kBeforeRpe[] = {
     {"end_m", "end [mm]", 1e3,
      [](const RunResult& r) { return r.accuracy ? r.accuracy->end_m : kNan; }},
     {"end_yaw_abs_rad", "end yaw [mrad]", 1e3,
@@ -19,10 +19,9 @@ const Metric kMetrics[] = {
      [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_m : kNan; }},
     {"ate_deg", "ATE [deg]", 1.,
      [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_deg : kNan; }},
-    {"rpe_10_m", "RPE 10 m [mm]", 1e3, [](const RunResult& r) { return rpe(r, 10., false); }},
-    {"rpe_10_deg", "RPE 10 m [deg]", 1., [](const RunResult& r) { return rpe(r, 10., true); }},
-    {"rpe_25_m", "RPE 25 m [mm]", 1e3, [](const RunResult& r) { return rpe(r, 25., false); }},
-    {"rpe_25_deg", "RPE 25 m [deg]", 1., [](const RunResult& r) { return rpe(r, 25., true); }},
+};
+
+const Metric kAfterRpe[] = {
     {"nees_planar", "NEES (3)", 1., [](const RunResult& r) { return r.nees_planar; }, 3.},
     {"nees_pose", "NEES (6)", 1., [](const RunResult& r) { return r.nees.pose; }, 6.},
     {"nees_position", "NEES pos (3)", 1., [](const RunResult& r) { return r.nees.position; }, 3.},
@@ -32,19 +31,30 @@ const Metric kMetrics[] = {
      [](const RunResult& r) { return r.updates.empty() ? kNan : r.total_ms.mean_ms; }},
 };
 
+void add_rpe(double length_m, std::vector<Metric>& metrics) {
+  const std::string length = eval::length_text(length_m);
+  metrics.push_back({"rpe_" + length + "_m", "RPE " + length + " m [mm]", 1e3,
+                     [length_m](const RunResult& r) { return rpe(r, length_m, false); }});
+  metrics.push_back({"rpe_" + length + "_deg", "RPE " + length + " m [deg]", 1.,
+                     [length_m](const RunResult& r) { return rpe(r, length_m, true); }});
+}
+
 }  // namespace
 
-std::span<const Metric> all_metrics() { return kMetrics; }
+std::vector<Metric> all_metrics(const ExperimentResult& result) {
+  std::vector<Metric> metrics(std::begin(kBeforeRpe), std::end(kBeforeRpe));
+  for (const double length_m : result.segment_lengths_m) add_rpe(length_m, metrics);
+  metrics.insert(metrics.end(), std::begin(kAfterRpe), std::end(kAfterRpe));
+  return metrics;
+}
 
 std::vector<Metric> metrics_of(const ExperimentResult& result) {
-  std::vector<Metric> metrics;
-  for (const Metric& metric : kMetrics) {
-    if (std::any_of(result.runs.begin(), result.runs.end(), [&](const ExperimentRun& run) {
-          return std::isfinite(metric.of(run.result));
-        })) {
-      metrics.push_back(metric);
-    }
-  }
+  std::vector<Metric> metrics = all_metrics(result);
+  std::erase_if(metrics, [&](const Metric& metric) {
+    return std::none_of(result.runs.begin(), result.runs.end(), [&](const ExperimentRun& run) {
+      return std::isfinite(metric.of(run.result));
+    });
+  });
   return metrics;
 }
 

@@ -3,7 +3,6 @@
 
 #include <functional>
 #include <limits>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -17,14 +16,16 @@ inline constexpr double kConfidence = 0.95;  ///< of the intervals of paired dif
 
 /// A number of a run that tables show; NaN where a run has none.
 struct Metric {
-  const char* key;      ///< in summary.json and runs.csv, in SI units
-  const char* heading;  ///< of a table
+  std::string key;      ///< in summary.json and runs.csv, in SI units
+  std::string heading;  ///< of a table
   double table_scale;   ///< from SI to the unit of the table
-  double (*of)(const RunResult&);
+  std::function<double(const RunResult&)> of;
   double target = 0.;  ///< best value; 0: the lower the better
 };
 
-std::span<const Metric> all_metrics();
+/// In the order of the columns; relative pose errors over every length that a run is configured
+/// with.
+std::vector<Metric> all_metrics(const ExperimentResult& result);
 
 /// Those that at least one run has.
 std::vector<Metric> metrics_of(const ExperimentResult& result);

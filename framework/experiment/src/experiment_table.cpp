@@ -22,15 +22,16 @@ void add_means(const ExperimentResult& result, const Group& group, std::ostream&
   for (const Variant& variant : result.setup.variants) width = std::max(width, variant.name.size());
   width = std::max(width, group.value.size());
   const auto metrics = metrics_of(result);
+  const auto column = [](const Metric& m) { return std::max<std::size_t>(14, m.heading.size()); };
   out << "\n" << padded(group.value, width) << right("not ok", 6);
-  for (const Metric& metric : metrics) out << right(metric.heading, 14);
+  for (const Metric& metric : metrics) out << right(metric.heading, column(metric));
   out << "\n";
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
     out << padded(result.setup.variants[v].name, width)
         << right(std::to_string(counts_of(result, v, group).not_ok()), 6);
     for (const Metric& metric : metrics) {
       const double mean = eval::mean(values_of(result, v, metric, group));
-      out << right(compact(metric.table_scale * mean, 4), 14);
+      out << right(compact(metric.table_scale * mean, 4), column(metric));
     }
     out << "\n";
   }
@@ -40,17 +41,20 @@ void add_means(const ExperimentResult& result, const Group& group, std::ostream&
 void add_paired(const ExperimentResult& result, const Group& all, std::ostream& out) {
   const ExperimentSetup& setup = result.setup;
   if (setup.variants.size() < 2) return;
+  const auto metrics = metrics_of(result);
+  std::size_t first = 16;
+  for (const Metric& metric : metrics) first = std::max(first, metric.heading.size());
   out << "\ndifference to " << setup.variants[setup.baseline].name
       << " over pairs of runs, 95 % interval (* without zero)\n"
-      << padded("", 16);
+      << padded("", first);
   std::vector<std::size_t> widths;
   for (const Variant& variant : setup.variants) {
     widths.push_back(std::max<std::size_t>(22, variant.name.size()));
     if (widths.size() - 1 != setup.baseline) out << right(variant.name, widths.back());
   }
   out << "\n";
-  for (const Metric& metric : metrics_of(result)) {
-    out << padded(metric.heading, 16);
+  for (const Metric& metric : metrics) {
+    out << padded(metric.heading, first);
     for (std::size_t v = 0; v < setup.variants.size(); ++v) {
       if (v == setup.baseline) continue;
       const eval::PairedDifference d = paired(result, v, metric, all);

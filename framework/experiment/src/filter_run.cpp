@@ -7,15 +7,15 @@
 #include <Eigen/Dense>
 
 #include "feed.hpp"
-#include "held_gauge.hpp"
 #include "monitor_record.hpp"
+#include "true_calibration.hpp"
 #include "viwo/eval/consistency.hpp"
 #include "viwo/experiment/run.hpp"
-#include "viwo/filter/moving_start.hpp"
-#include "viwo/filter/standstill_start.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/random.hpp"
+#include "viwo/start/moving_start.hpp"
+#include "viwo/start/standstill_start.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -80,8 +80,19 @@ void start_moving(Estimator& estimator, const FilterSetup& setup) {
   options.sigma_velocity_m_per_s = setup.start.sigma_velocity_m_per_s;
   options.model = setup.wheels.front().model;
   options.wheels = setup.wheels.front().prior;
-  estimator.start([options](auto imu, auto encoders) {
-    return start_from_motion(imu, encoders.front(), options);
+  estimator.start([options, wheels = estimator.extra(0)](const StartData& data) {
+    return start_from_motion(data.imu, data.samples<EncoderSample>(wheels), options);
+  });
+}
+
+void start_standing(Estimator& estimator, const FilterSetup& setup) {
+  std::vector<StreamId> wheels;
+  for (std::size_t i = 0; i < setup.wheels.size(); ++i) wheels.push_back(estimator.extra(i));
+  const auto options = start_options<StandstillOptions>(setup);
+  estimator.start([options, wheels](const StartData& data) {
+    std::vector<std::span<const EncoderSample>> encoders;
+    for (const StreamId id : wheels) encoders.push_back(data.samples<EncoderSample>(id));
+    return start_from_standstill(data.imu, encoders, options);
   });
 }
 
@@ -89,17 +100,15 @@ void start(Estimator& estimator, const RunSetup& run, const RunData& data) {
   const FilterSetup& setup = *run.filter;
   switch (setup.start.mode) {
     case StartMode::kReference:
-      if (data.states.empty()) {
+      if (data.states().empty()) {
         throw InputError(
             "estimator.start: reference needs a sensor that gives reference states; without one "
             "choose start: standstill or moving");
       }
-      estimator.start(start_from_reference(setup, data.states.front(), run.seed));
+      estimator.start(start_from_reference(setup, data.states().front(), run.seed));
       return;
     case StartMode::kStandstill:
-      estimator.start([options = start_options<StandstillOptions>(setup)](auto imu, auto encoders) {
-        return start_from_standstill(imu, encoders, options);
-      });
+      start_standing(estimator, setup);
       return;
     case StartMode::kMoving:
       start_moving(estimator, setup);
@@ -110,14 +119,17 @@ void start(Estimator& estimator, const RunSetup& run, const RunData& data) {
 /// Collects what a run reports while it goes on.
 class Recorder {
  public:
-  Recorder(const RunSetup& setup, const RunData& data, RunResult& result)
-      : setup_(*setup.filter), data_(data), result_(result) {
-    for (const StateSample& state : data.states) truth_.push_back(pose_of(state));
-    for (const WheelSet& wheels : setup_.wheels) {
-      for (const std::string& name : calibration_names(wheels)) {
-        result_.calibration.push_back({name, {}, {}});
+  Recorder(const RunSetup& setup, const RunData& data, const Filter& filter, RunResult& result)
+      : setup_(*setup.filter),
+        calibration_(true_calibration(*setup.filter, data.calibration)),
+        result_(result) {
+    for (const StateSample& state : data.states()) truth_.push_back(pose_of(state));
+    for (const BlockSpec& block : filter.blocks().specs()) {
+      for (const BlockEntry& entry : block.entries) {
+        CalibrationTrack& track = result_.calibration.emplace_back();
+        track.name = entry.name;
+        track.unit = entry.unit;
       }
-      truths_.push_back(true_calibration(wheels));
     }
   }
 
@@ -159,26 +171,6 @@ class Recorder {
   }
 
  private:
-  /// The true calibration in the gauge that the estimate holds; nothing if not all of it is known.
-  std::optional<WheelsView> true_calibration(const WheelSet& wheels) const {
-    const auto names = calibration_names(wheels);
-    std::vector<double> values;
-    for (const std::string& name : names) {
-      const auto found = data_.calibration.find(name);
-      if (found == data_.calibration.end()) return std::nullopt;
-      values.push_back(found->second);
-    }
-    WheelsView truth = wheels.prior.wheels;
-    truth.R_ItoO = exp_so3({values[0], values[1], values[2]});
-    truth.p_IinO = {values[3], values[4], values[5]};
-    truth.t_OtoI_s = values[6];
-    for (Eigen::Index i = 0; i < truth.x_WI.size(); ++i) {
-      truth.x_WI[i] = values[static_cast<std::size_t>(7 + i)];
-    }
-    move_to_held_gauge(*wheels.model, wheels.prior.wheels.x_WI, truth);
-    return truth;
-  }
-
   /// (F-11).
   void add_error(const Filter& filter, double t_s) {
     // Only then is G that of the reference: else the two poses are not in one frame.
@@ -186,7 +178,7 @@ class Recorder {
     const auto truth = interpolate(truth_, filter.t_ns(), 0.2);
     if (!truth) return;
     const ImuView& imu = filter.imu();
-    Vector6d error;
+    Eigen::Matrix<double, 6, 1> error;
     error.head<3>() =
         -log_so3(truth->q_BtoW.toRotationMatrix().transpose() * imu.R_GtoI.transpose());
     error.tail<3>() = truth->p_BinW - imu.p_IinG;
@@ -227,57 +219,23 @@ class Recorder {
 
   void add_calibration(const Filter& filter) {
     auto track = result_.calibration.begin();
-    for (std::size_t k = 0; k < setup_.wheels.size(); ++k) {
-      auto next = track;
-      for (const CalibrationValue& estimate : calibration_of(filter, k)) {
-        next->estimate.push_back(estimate.value);
-        next->sigma.push_back(estimate.sigma);
-        ++next;
-      }
-      if (truths_[k]) compare(filter.wheels()[k], *truths_[k], track);
-      track = next;
-    }
-  }
-
-  /// Truth and present error of a wheel set's parameters, from `track` on.
-  static void compare(const WheelsView& wheels, const WheelsView& truth,
-                      std::vector<CalibrationTrack>::iterator track) {
-    const auto add = [&track](double true_value, double error) {
-      track->truth = true_value;
-      track->final_error = error;
+    for (const BlockEstimate& estimate : calibration_of(filter)) {
+      track->estimate.push_back(estimate.value);
+      track->sigma.push_back(estimate.sigma);
       ++track;
-    };
-    const Vector3d truly = log_so3(truth.R_ItoO);
-    const Vector3d turn_error = log_so3(truth.R_ItoO * wheels.R_ItoO.transpose());
-    for (int i = 0; i < 3; ++i) add(truly[i], turn_error[i]);
-    for (int i = 0; i < 3; ++i) add(truth.p_IinO[i], wheels.p_IinO[i] - truth.p_IinO[i]);
-    add(truth.t_OtoI_s, wheels.t_OtoI_s - truth.t_OtoI_s);
-    for (int i = 0; i < wheels.x_WI.size(); ++i) add(truth.x_WI[i], wheels.x_WI[i] - truth.x_WI[i]);
+    }
+    compare_calibration(calibration_, filter, result_.calibration);
   }
 
   const FilterSetup& setup_;
-  const RunData& data_;
+  std::map<std::string, double> calibration_;  ///< true values
   RunResult& result_;
   Trajectory truth_;
-  std::vector<std::optional<WheelsView>> truths_;
   std::int64_t begin_ns_ = 0;
   std::vector<std::vector<double>> stage_ms_;
   double sum_pose_ = 0., sum_position_ = 0., sum_orientation_ = 0.;
   int n_nees_ = 0;
 };
-
-Estimator make_estimator(const FilterSetup& setup, bool live) {
-  EstimatorOptions options = setup.options;
-  // What a tracker finds in the images of two cameras at one instant comes one after the other.
-  if (live) options.max_image_wait_s = 0.05;
-  std::vector<WheelsPrior> wheels;
-  for (const WheelSet& set : setup.wheels) wheels.push_back(set.prior);
-  std::vector<UpdateEntry> updates;
-  for (const auto& entry : setup.updates) {
-    updates.push_back({entry.name, entry.update.object, entry.wheels, entry.poses});
-  }
-  return {options, setup.cameras, wheels, updates};
-}
 
 /// Feed::next(); once there are results, a sensor that breaks is the cause of a run that failed.
 bool next(Feed& feed, Estimator& estimator, std::string& cause) {
@@ -360,9 +318,10 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks&
   Estimator estimator = make_estimator(*setup.filter, live);
   start(estimator, setup, data);
   if (hooks.on_start) estimator.observe(hooks.on_start(estimator));
-  Recorder recorder(setup, data, result);
+  Recorder recorder(setup, data, estimator.filter(), result);
   const auto feed = live ? feed_live(setup, data, hooks) : feed_recorded(setup, data);
-  const double log_s = live ? 0. : seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);
+  const auto imu = data.imu();
+  const double log_s = live ? 0. : seconds_between(imu.front().t_ns, imu.back().t_ns);
   double wall_s = 0.;
   const auto all_begin = std::chrono::steady_clock::now();
   bool more = true;
@@ -378,7 +337,7 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks&
       feed->on_epoch(estimator);
       if (hooks.on_epoch) hooks.on_epoch(result);
       if (hooks.progress && log_s > 0.) {
-        hooks.progress(seconds_between(data.imu.front().t_ns, estimator.filter().t_ns()) / log_s);
+        hooks.progress(seconds_between(imu.front().t_ns, estimator.filter().t_ns()) / log_s);
       }
     }
   }

@@ -5,6 +5,7 @@
 
 #include "filter_params.hpp"
 #include "section.hpp"
+#include "update_setup.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/log/kalibr.hpp"
@@ -45,10 +46,10 @@ void read_estimator(const ParamSet& p, FilterSetup& setup) {
   setup.options.filter.first_estimates = p.flag("first_estimates");
   setup.options.filter.gravity_m_per_s2 = p.number("gravity_m_per_s2");
   setup.options.growing_window = p.flag("growing_window");
-  setup.options.max_epoch_s = p.number("max_epoch_s");
-  setup.options.max_wait_s = p.number("max_wait_s");
+  setup.options.schedule.max_epoch_s = p.number("max_epoch_s");
+  setup.options.schedule.max_wait_s = p.number("max_wait_s");
   setup.options.max_imu_gap_s = p.number("max_imu_gap_s");
-  setup.options.max_update_failures = static_cast<int>(p.integer("max_update_failures"));
+  setup.options.runner.max_update_failures = static_cast<int>(p.integer("max_update_failures"));
   setup.options.monitor.enabled = p.flag("monitor");
   setup.options.monitor.window_s = p.number("monitor_window_s");
   setup.options.monitor.min_information = p.number("monitor_min_information");
@@ -106,7 +107,50 @@ void read_imu(ParamSet p, const Node& section, FilterSetup& setup, Node& resolve
   setup.options.filter.imu_noise = noise;
 }
 
-void read_cameras(const ParamSet& p, const Node& section, FilterSetup& setup, Errors& errors) {
+/// Draws how wrong calibration starts: the same whether it is then calibrated or not.
+class WrongStart {
+ public:
+  WrongStart(double scale, std::uint64_t seed, std::uint64_t index)
+      : scale_(scale), random_(seed, sim::Stream::kCalibrationError, index) {}
+  double draw(double sigma) { return scale_ * sigma * random_.gaussian(); }
+  /// Each axis.
+  Vector3d draw(const Vector3d& sigma) {
+    Vector3d errors;
+    for (int i = 0; i < 3; ++i) errors[i] = draw(sigma[i]);
+    return errors;
+  }
+  bool is_wrong() const { return scale_ > 0.; }
+
+ private:
+  double scale_;
+  sim::RandomStream random_;
+};
+
+/// Draws of cameras follow those of any number of wheel sets.
+constexpr std::uint64_t kFirstCameraDraw = 1000;
+
+/// Moves a camera off by draws from its prior; what it was is remembered in `drawn_from`.
+void make_wrong(CameraPrior& prior, std::size_t index, WrongStart& wrong,
+                std::map<std::string, double>& drawn_from) {
+  if (!wrong.is_wrong()) return;
+  const std::string name = "cam" + std::to_string(index) + ".";
+  CameraView& camera = prior.camera;
+  const Vector3d theta = log_so3(camera.R_ItoC);
+  constexpr const char* kAxes[] = {"x", "y", "z"};
+  constexpr const char* kIntrinsics[] = {"fx", "fy", "cx", "cy", "d1", "d2", "d3", "d4"};
+  for (int i = 0; i < 3; ++i) {
+    drawn_from[name + "theta_ItoC_" + kAxes[i]] = theta[i];
+    drawn_from[name + "p_IinC_" + kAxes[i]] = camera.p_IinC[i];
+  }
+  for (int i = 0; i < 8; ++i) drawn_from[name + kIntrinsics[i]] = camera.intrinsics[i];
+  drawn_from[name + "t_CtoI"] = camera.t_CtoI_s;
+  camera.R_ItoC = exp_so3(wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()))) * camera.R_ItoC;
+  camera.p_IinC += wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
+  for (int i = 0; i < 8; ++i) camera.intrinsics[i] += wrong.draw(prior.sigma_intrinsics[i]);
+}
+
+void read_cameras(const ParamSet& p, const Node& section, double error_scale, std::uint64_t seed,
+                  FilterSetup& setup, Errors& errors) {
   auto cameras = from_kalibr(p, section, "cameras", log::read_kalibr_cameras, errors);
   if (!cameras) return;
   const auto use = static_cast<std::size_t>(p.integer("use"));
@@ -117,13 +161,27 @@ void read_cameras(const ParamSet& p, const Node& section, FilterSetup& setup, Er
     return;
   }
   if (use > 0) cameras->resize(use);
+  const bool calibrates = p.flag("calibrate");
+  if (!calibrates) error_scale = 0.;
+  WrongStart clock(error_scale, seed, kFirstCameraDraw);
+  const double later_s = clock.draw(p.number("sigma_t_CtoI_s"));
   for (const CameraView& camera : *cameras) {
+    const std::size_t index = setup.cameras.size();
     CameraPrior prior;
     prior.camera = camera;
+    prior.shares_clock = p.flag("synchronised");
     prior.sigma_extrinsics.head<3>().setConstant(p.number("sigma_orientation_rad"));
     prior.sigma_extrinsics.tail<3>().setConstant(p.number("sigma_position_m"));
     prior.sigma_intrinsics.head<4>().setConstant(p.number("sigma_focal_px"));
     prior.sigma_intrinsics.tail<4>().setConstant(p.number("sigma_distortion"));
+    prior.sigma_clock_s = p.number("sigma_t_CtoI_s");
+    WrongStart wrong(error_scale, seed, kFirstCameraDraw + 1 + index);
+    make_wrong(prior, index, wrong, setup.drawn_from);
+    const double own_s = wrong.draw(prior.sigma_clock_s);
+    if (wrong.is_wrong()) prior.camera.t_CtoI_s += prior.shares_clock ? later_s : own_s;
+    if (!calibrates || !p.flag("calibrate_extrinsics")) prior.sigma_extrinsics.setZero();
+    if (!calibrates || !p.flag("calibrate_intrinsics")) prior.sigma_intrinsics.setZero();
+    if (!calibrates || !p.flag("calibrate_time_offset")) prior.sigma_clock_s = 0.;
     setup.cameras.push_back(prior);
   }
 }
@@ -136,9 +194,8 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double er
   const auto sigma_p = three(p, "sigma_p_IinO_m", section, errors);
   const auto sigma_R = three(p, "sigma_R_ItoO_rad", section, errors);
   if (!p_IinO || !rpy || !sigma_p || !sigma_R) return;
-  set.sensor = p.text("sensor");
   WheelsPrior& prior = set.prior;
-  prior.name = set.name;
+  prior.sensor = p.text("sensor");
   prior.wheels.model = &set.model->model();
   prior.wheels.R_ItoO = sim::rotation_from_euler(rpy->z(), rpy->y(), rpy->x());
   prior.wheels.p_IinO = *p_IinO;
@@ -152,21 +209,19 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double er
     }
   }
 
-  // A start that is wrong is wrong in the same way whether it is then calibrated or not.
-  sim::RandomStream random(seed, sim::Stream::kCalibrationError, setup.wheels.size());
-  const auto draw = [&](double sigma) { return error_scale * sigma * random.gaussian(); };
-  Vector3d turn, shift;
-  for (int i = 0; i < 3; ++i) turn[i] = draw(prior.sigma_extrinsics[i]);
-  for (int i = 0; i < 3; ++i) shift[i] = draw(prior.sigma_extrinsics[3 + i]);
-  const double later = draw(prior.sigma_time_offset_s);
-  if (error_scale > 0.) {
+  WrongStart wrong(error_scale, seed, setup.wheels.size());
+  const Vector3d turn = wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()));
+  const Vector3d shift = wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
+  const double later = wrong.draw(prior.sigma_time_offset_s);
+  if (wrong.is_wrong()) {
     prior.wheels.R_ItoO = exp_so3(turn) * prior.wheels.R_ItoO;
     prior.wheels.p_IinO += shift;
     prior.wheels.t_OtoI_s += later;
     for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
-      prior.wheels.x_WI[i] += draw(prior.sigma_intrinsics[i]);
+      prior.wheels.x_WI[i] += wrong.draw(prior.sigma_intrinsics[i]);
     }
   }
+  prior.intrinsics_walk = p.number("intrinsics_walk_per_sqrt_s");
   if (!p.flag("calibrate_extrinsics")) prior.sigma_extrinsics.setZero();
   if (!p.flag("calibrate_time_offset")) prior.sigma_time_offset_s = 0.;
   if (!p.flag("calibrate_intrinsics")) prior.sigma_intrinsics.setZero();
@@ -174,8 +229,8 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double er
 }
 
 /// Further wheel sets: NAME: {kinematics: {...}, wheels: {...}}.
-void read_wheel_sets(const Node& run, double error_scale, std::uint64_t seed,
-                     PluginRegistry& plugins, FilterSetup& setup, Node& resolved, Errors& errors) {
+void read_wheel_sets(const Node& run, double error_scale, const ReadContext& context,
+                     FilterSetup& setup, Node& resolved, Errors& errors) {
   const Node* sets = run.find("wheel_sets");
   if (sets == nullptr) return;
   if (!sets->is_map()) {
@@ -196,38 +251,27 @@ void read_wheel_sets(const Node& run, double error_scale, std::uint64_t seed,
                    path + ": unknown key '" + part.key + "' - known: kinematics, wheels");
       }
     }
-    const auto model = plugins.make_kinematics(*kinematics, path + ".kinematics", errors);
+    const std::string model_path = path + ".kinematics";
+    const auto model = context.plugins.make_kinematics(
+        *kinematics, model_path, instance_seed(context.seed, "kinematics", model_path), errors);
     const Node section = section_or_empty(entry.value, "wheels");
     Node resolved_wheels;
     const auto params =
         read_section(section, path + ".wheels", kWheelsParams, resolved_wheels, errors);
     if (!model.object || !params) continue;
     WheelSet set;
-    set.name = entry.key;
+    set.prior.name = entry.key;
     set.model = guarded(model.info, "describe",
                         [&] { return std::make_shared<const WheelModel>(model.object); });
     set.prior.wheels.x_WI = set.model->nominal();
     set.prior.sigma_intrinsics = set.model->prior_sigma();
-    read_wheels(*params, section, std::move(set), error_scale, seed, setup, errors);
+    read_wheels(*params, section, std::move(set), error_scale, context.seed, setup, errors);
     Node resolved_set = Node::empty_map();
     resolved_set.set("kinematics", model.resolved);
     resolved_set.set("wheels", resolved_wheels);
     resolved_sets.set(entry.key, resolved_set);
   }
   resolved.set("wheel_sets", resolved_sets);
-}
-
-/// Whether the estimator can work with an update as it is configured: tried with instances of their
-/// own, because an update is started once.
-void try_update(const FilterSetup& setup, const std::shared_ptr<Update>& update, int wheels,
-                const config::Mark& mark, const std::string& path, Errors& errors) {
-  std::vector<WheelsPrior> priors;
-  for (const WheelSet& set : setup.wheels) priors.push_back(set.prior);
-  try {
-    const Estimator estimator(setup.options, setup.cameras, priors, {{path, update, wheels}});
-  } catch (const InputError& error) {
-    errors.add(mark, path + ": " + error.what());
-  }
 }
 
 /// A wheel set whose sensor does not exist would get no samples and never say so.
@@ -237,109 +281,14 @@ void check_wheel_sensors(const Node& run, const FilterSetup& setup, Errors& erro
   std::vector<std::string> names;
   for (const auto& entry : sensors->entries()) names.push_back(entry.key);
   for (const WheelSet& set : setup.wheels) {
-    if (set.sensor.empty() || sensors->find(set.sensor) != nullptr) continue;
+    const std::string &name = set.prior.name, &sensor = set.prior.sensor;
+    if (sensor.empty() || sensors->find(sensor) != nullptr) continue;
     const Node* at = &run;
-    if (!set.name.empty()) at = at->find("wheel_sets")->find(set.name);
+    if (!name.empty()) at = at->find("wheel_sets")->find(name);
     errors.add(at->find("wheels")->find("sensor")->mark(),
-               (set.name.empty() ? "" : "wheel_sets." + set.name + ".") +
-                   "wheels.sensor: no sensor '" + set.sensor + "'" +
-                   config::did_you_mean(set.sensor, names));
+               (name.empty() ? "" : "wheel_sets." + name + ".") + "wheels.sensor: no sensor '" +
+                   sensor + "'" + config::did_you_mean(sensor, names));
   }
-}
-
-/// Index of the sensor that an update of kind kPoses names, also one that is turned off; -1 for
-/// other updates.
-int read_pose_sensor(const Node& run, const Node& section, const std::string& path, bool wants_one,
-                     FilterSetup& setup, Errors& errors) {
-  const Node* sensor = section.find("sensor");
-  if (!wants_one) {
-    if (sensor != nullptr) {
-      errors.add(sensor->mark(), path + ".sensor: only updates that measure with poses have one");
-    }
-    return -1;
-  }
-  const Node* sensors = run.find("sensors");
-  std::vector<std::string> names;
-  if (sensors != nullptr && sensors->is_map()) {
-    for (const auto& entry : sensors->entries()) names.push_back(entry.key);
-  }
-  if (sensor == nullptr || !sensor->is_scalar()) {
-    errors.add(section.mark(), path + " needs the sensor that gives its poses (sensor: NAME)");
-    return -1;
-  }
-  const std::string& name = sensor->scalar();
-  if (std::find(names.begin(), names.end(), name) == names.end()) {
-    errors.add(sensor->mark(),
-               path + ".sensor: no sensor '" + name + "'" + config::did_you_mean(name, names));
-    return -1;
-  }
-  auto& known = setup.pose_sensors;
-  const auto found = std::find(known.begin(), known.end(), name);
-  const auto index = static_cast<int>(found - known.begin());
-  if (found == known.end()) known.push_back(name);
-  return index;
-}
-
-void read_updates(const Node& run, PluginRegistry& plugins, FilterSetup& setup, Node& resolved,
-                  Errors& errors) {
-  const Node* updates = run.find("updates");
-  if (updates == nullptr) return;
-  if (!updates->is_map()) {
-    errors.add(updates->mark(), "'updates' is a section NAME: {its parameters}");
-    return;
-  }
-  Node resolved_updates = Node::empty_map(updates->mark());
-  for (const auto& entry : updates->entries()) {
-    const std::string path = "updates." + entry.key;
-    Node section = entry.value.is_null() ? Node::empty_map(entry.value.mark()) : entry.value;
-    if (!section.is_map()) {
-      errors.add(section.mark(), path + " must be a section of parameters ({} for none)");
-      continue;
-    }
-    bool enabled = true;
-    if (const Node* flag = section.find("enabled")) {
-      if (!flag->is_scalar() || (flag->scalar() != "true" && flag->scalar() != "false")) {
-        errors.add(flag->mark(), path + ".enabled must be true or false");
-      } else {
-        enabled = flag->scalar() == "true";
-      }
-    }
-    // The name says which update it is unless it says so itself.
-    if (section.find("type") == nullptr)
-      section.set("type", Node::scalar_of(entry.key, entry.key_mark));
-    constexpr std::string_view kHostKeys[] = {"enabled", "sensor"};
-    // One instance per wheel set; the first also tells which kind it is.
-    auto loaded = plugins.make_update(section, path, errors, kHostKeys);
-    if (!loaded.object) continue;
-    Node resolved_update = loaded.resolved;
-    resolved_update.set("enabled", Node::scalar_of(enabled ? "true" : "false"));
-    const UpdateKind kind = loaded.object->kind();
-    const int poses =
-        read_pose_sensor(run, section, path, kind == UpdateKind::kPoses, setup, errors);
-    if (const Node* sensor = section.find("sensor")) resolved_update.set("sensor", *sensor);
-    resolved_updates.set(entry.key, resolved_update, entry.key_mark);
-    if (!enabled) continue;
-    const int wheels = kind == UpdateKind::kWheels ? 0 : -1;
-    if (errors.empty() && (wheels < 0 || !setup.wheels.empty())) {
-      const auto trial = plugins.make_update(section, path, errors, kHostKeys);
-      try_update(setup, trial.object, wheels, entry.key_mark, path, errors);
-    }
-    if (kind != UpdateKind::kWheels) {
-      setup.updates.push_back({entry.key, std::move(loaded), -1, poses, entry.key_mark});
-      continue;
-    }
-    if (run.find("kinematics") == nullptr && run.find("wheel_sets") == nullptr) {
-      errors.add(entry.key_mark, path + " needs wheels: the run has no section 'kinematics'");
-      continue;
-    }
-    for (std::size_t i = 0; i < setup.wheels.size(); ++i) {
-      const std::string name =
-          setup.wheels[i].name.empty() ? entry.key : setup.wheels[i].name + "." + entry.key;
-      if (i > 0) loaded = plugins.make_update(section, path, errors, kHostKeys);
-      setup.updates.push_back({name, loaded, static_cast<int>(i), -1, entry.key_mark});
-    }
-  }
-  resolved.set("updates", resolved_updates);
 }
 
 }  // namespace
@@ -362,8 +311,8 @@ bool wants_filter(const Node& run) {
 }
 
 FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>& model,
-                        const Intrinsics& x_WI, const Intrinsics& sigma, std::uint64_t seed,
-                        PluginRegistry& plugins, Node& resolved, Errors& errors) {
+                        const Intrinsics& x_WI, const Intrinsics& sigma, const ReadContext& context,
+                        Node& resolved, Errors& errors) {
   FilterSetup setup;
   const auto read = [&](const char* key, std::span<const ParamSpec> specs) {
     Node section = Node::empty_map();
@@ -378,14 +327,15 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
       errors.add(run.find("estimator")->mark(),
                  "estimator.hold_unexcited needs estimator.monitor: true");
     }
-    error_scale = params->number("calibration_error_scale");
+    error_scale = context.exact ? 0. : params->number("calibration_error_scale");
+    if (context.exact) setup.start.state_error_scale = 0.;
   }
   if (const auto params = read("imu", kImuParams)) {
     read_imu(*params, section_or_empty(run, "imu"), setup, resolved, errors);
   }
   if (run.find("cameras") != nullptr) {
     if (const auto params = read("cameras", kCamerasParams)) {
-      read_cameras(*params, *run.find("cameras"), setup, errors);
+      read_cameras(*params, *run.find("cameras"), error_scale, context.seed, setup, errors);
     }
   }
   if (model != nullptr) {
@@ -394,13 +344,13 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
       set.model = model;
       set.prior.wheels.x_WI = x_WI;
       set.prior.sigma_intrinsics = sigma;
-      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error_scale, seed,
-                  setup, errors);
+      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error_scale,
+                  context.seed, setup, errors);
     }
   }
-  read_wheel_sets(run, error_scale, seed, plugins, setup, resolved, errors);
+  read_wheel_sets(run, error_scale, context, setup, resolved, errors);
   check_wheel_sensors(run, setup, errors);
-  read_updates(run, plugins, setup, resolved, errors);
+  read_updates(run, context, setup, resolved, errors);
   return setup;
 }
 

@@ -1,6 +1,7 @@
 // Sensors that give measurements as they happen. Each has a thread, and so has each sensor that
 // works on what another one gives; all of them put what they give into one queue, from which the
 // estimator takes it in the order of arrival.
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -10,13 +11,14 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "channels.hpp"
 #include "feed.hpp"
-#include "sources.hpp"
 #include "viwo/math/arrays.hpp"
 
 namespace viwo::experiment {
@@ -37,6 +39,7 @@ double milliseconds_since(Clock::time_point begin) {
 /// What a live sensor gives, as the input of another one: next() waits for it.
 class LiveInput final : public Sensor {
  public:
+  SampleTypes yields() const override { return sample_types<ImageSample>(); }
   void push(const ImageSample& image) {
     {
       const std::scoped_lock lock(mutex_);
@@ -91,7 +94,7 @@ class LiveInput final : public Sensor {
 class LiveFeed final : public Feed {
  public:
   LiveFeed(const RunSetup& setup, const RunData& data, const RunHooks& hooks)
-      : setup_(setup), data_(data), hooks_(hooks), encoders_names_(setup.filter->wheels.size()) {
+      : setup_(setup), data_(data), hooks_(hooks) {
     for (const SensorStream& stream : data.streams) {
       workers_.push_back({&stream, std::make_unique<LiveInput>(), {}});
       LiveInput& input = *workers_.back().input;
@@ -124,21 +127,17 @@ class LiveFeed final : public Feed {
       arrivals_.pop_front();
     }
     if (interrupted()) stop_sensors();
-    std::visit([&](const auto& sample) { add(*arrival.sensor, sample, estimator); },
-               arrival.measurement);
+    give(*arrival.sensor, arrival.measurement.view(), estimator);
     return true;
   }
 
   void on_epoch(const Estimator& estimator) override {
     const Filter& filter = estimator.filter();
     EstimateSample sample = sample_of(filter);
-    for (std::size_t k = 0; k < setup_.filter->wheels.size(); ++k) {
-      const auto names = calibration_names(setup_.filter->wheels[k]);
-      sample.calibration_names.insert(sample.calibration_names.end(), names.begin(), names.end());
-      for (const CalibrationValue& estimate : calibration_of(filter, k)) {
-        sample.calibration.push_back(estimate.value);
-        sample.calibration_sigma.push_back(estimate.sigma);
-      }
+    sample.calibration_names = calibration_names(filter);
+    for (const BlockEstimate& estimate : calibration_of(filter)) {
+      sample.calibration.push_back(estimate.value);
+      sample.calibration_sigma.push_back(estimate.sigma);
     }
     sample.latency_s = latency_s(filter.t_ns());
     if (sample.latency_s > 0.) latency_ms_.push_back(1e3 * sample.latency_s);
@@ -150,7 +149,7 @@ class LiveFeed final : public Feed {
   void finish(RunResult& result) override {
     stop();
     result.reference = std::move(reference_);
-    if (imu_name_.empty() && result.cause.empty()) {
+    if (!has_imu_ && result.cause.empty()) {
       result.cause = "nothing has come: no IMU sample arrived";
     }
     for (const Worker& worker : workers_) {
@@ -184,7 +183,7 @@ class LiveFeed final : public Feed {
 
   void listen(const SensorStream& stream) {
     run_thread(stream, [&](const Measurement& measurement) {
-      const auto* image = std::get_if<ImageSample>(&measurement);
+      const auto* image = measurement.get_if<ImageSample>();
       if (image == nullptr) return true;
       {
         const std::scoped_lock lock(mutex_);
@@ -195,7 +194,7 @@ class LiveFeed final : public Feed {
         if (worker.stream->input_name == stream.name) worker.input->push(*image);
       }
       if (hooks_.on_live_image) hooks_.on_live_image(*image);
-      return false;
+      return is_taken(stream.name, sample_type<ImageSample>());
     });
     for (const Worker& worker : workers_) {
       if (worker.stream->input_name == stream.name) worker.input->end();
@@ -245,6 +244,14 @@ class LiveFeed final : public Feed {
     changed_.notify_all();
   }
 
+  /// Whether an update takes this kind from this sensor.
+  bool is_taken(const std::string& sensor, const SampleType& type) const {
+    const auto routes = setup_.routes.all();
+    return std::any_of(routes.begin(), routes.end(), [&](const Route& route) {
+      return route.consumer == Consumer::kStream && route.sensor == sensor && *route.type == type;
+    });
+  }
+
   bool interrupted() const { return hooks_.interrupted && hooks_.interrupted(); }
 
   void stop_sensors() {
@@ -260,48 +267,32 @@ class LiveFeed final : public Feed {
     threads_.clear();
   }
 
-  void claim(std::string& owner, const std::string& sensor, const char* what) const {
-    experiment::claim(owner, sensor, what, setup_.sensors_mark);
+  void give(const std::string& sensor, SampleView sample, Estimator& estimator) {
+    const auto* wheels = sample.get_if<EncoderSample>();
+    if (wheels != nullptr && checked_.insert(sensor).second) {
+      require_channels(setup_, sensor, *wheels);
+    }
+    setup_.routes.dispatch(sensor, sample.type(), [&](const Route& route) {
+      switch (route.consumer) {
+        case Consumer::kImu:
+          has_imu_ = true;
+          estimator.add(*sample.get_if<ImuSample>());
+          break;
+        case Consumer::kStream:
+          estimator.add(route.stream, sample);
+          break;
+        case Consumer::kReferencePoses:
+          add_reference(*sample.get_if<PoseSample>());
+          break;
+        default:
+          break;
+      }
+    });
   }
 
-  void add(const std::string& sensor, const ImuSample& imu, Estimator& estimator) {
-    claim(imu_name_, sensor, kImuSamples);
-    estimator.add(imu);
-  }
-  void add(const std::string& sensor, const FeatureSample& image, Estimator& estimator) {
-    claim(tracks_name_, sensor, kTracks);
-    estimator.add(image);
-  }
-  void add(const std::string& sensor, const EncoderSample& sample, Estimator& estimator) {
-    const auto& sets = setup_.filter->wheels;
-    for (std::size_t k = 0; k < sets.size(); ++k) {
-      if (sets[k].sensor != sensor && !sets[k].sensor.empty()) continue;
-      if (encoders_names_[k].empty()) require_channels(sets[k], sample, sensor);
-      claim(encoders_names_[k], sensor, kEncoderSamples);
-      estimator.add(sample, static_cast<int>(k));
-    }
-  }
-  void add(const std::string& sensor, const PoseSample& pose, Estimator& estimator) {
-    const auto& measured = setup_.filter->pose_sensors;
-    for (std::size_t k = 0; k < measured.size(); ++k) {
-      if (measured[k] != sensor) continue;
-      if (is_measured(*setup_.filter, k)) estimator.add(pose, static_cast<int>(k));
-      return;
-    }
-    claim(reference_name_, sensor, kReferencePoses);
+  void add_reference(const PoseSample& pose) {
     reference_.push_back(
         {pose.t_ns, to_vector(pose.p_BinW_m), to_quaternion(pose.q_BtoW_xyzw).normalized()});
-  }
-  template <class Other>
-  void add(const std::string& /*sensor*/, const Other& /*sample*/, Estimator& /*estimator*/) {}
-
-  void require_channels(const WheelSet& wheels, const EncoderSample& sample,
-                        const std::string& sensor) const {
-    try {
-      wheels.model->require_channels(sample, "sensors." + sensor);
-    } catch (const InputError& error) {
-      config::fail(setup_.sensors_mark, error.what());
-    }
   }
 
   static EstimateSample sample_of(const Filter& filter) {
@@ -338,8 +329,8 @@ class LiveFeed final : public Feed {
   const RunData& data_;
   const RunHooks& hooks_;
   std::vector<Worker> workers_;
-  std::string imu_name_, tracks_name_, reference_name_;
-  std::vector<std::string> encoders_names_;  ///< of each wheel set
+  bool has_imu_ = false;
+  std::set<std::string> checked_;  ///< sensors whose encoder channels have been looked at
   Trajectory reference_;
   std::vector<double> latency_ms_;
 

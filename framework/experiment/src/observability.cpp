@@ -20,38 +20,18 @@ using Eigen::MatrixXd;
 /// Directions closer to the null space than this are in it.
 constexpr double kHiddenAngle = 1e-4;
 
-/// Sets `key` of `section` if it has such a key.
-void set_if_there(Node& section, const char* key, const char* value) {
-  if (section.find(key) != nullptr) section.set(key, Node::scalar_of(value));
-}
-
-/// Without noise and without wrong starts, as far as the run's plugins have parameters for that.
-Node without_noise(const RunSetup& run, std::vector<std::string>& notes) {
-  Node quiet = run.resolved;
-  if (Node* sensors = quiet.find("sensors")) {
-    for (auto& sensor : sensors->entries()) {
-      if (sensor.value.find("noise") == nullptr) {
-        const std::string note =
-            "sensor '" + sensor.key +
-            "' has no parameter 'noise': what its noise seems to tell counts as observed";
-        if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
-      }
-      set_if_there(sensor.value, "noise", "false");
-      set_if_there(sensor.value, "true_intrinsics_scale", "0");
+/// What of a run's sensors is not free of noise when that is asked for.
+void note_noise(const RunSetup& run, std::vector<std::string>& notes) {
+  for (const SensorEntry& entry : run.sensors) {
+    const Loaded<Sensor>& sensor = entry.sensor;
+    if (guarded(sensor.info, "can_be_exact", [&] { return sensor.object->can_be_exact(); })) {
+      continue;
     }
+    const std::string note =
+        "sensor '" + entry.name +
+        "' cannot be made exact: what its noise seems to tell counts as observed";
+    if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
   }
-  // Updates linearise at the estimate, which is the truth: no steps of their own from there.
-  if (Node* updates = quiet.find("updates")) {
-    for (auto& update : updates->entries()) {
-      set_if_there(update.value, "max_iterations", "1");
-      set_if_there(update.value, "second_order_noise", "false");
-    }
-  }
-  if (Node* estimator = quiet.find("estimator")) {
-    set_if_there(*estimator, "start_error_scale", "0");
-    set_if_there(*estimator, "calibration_error_scale", "0");
-  }
-  return quiet;
 }
 
 std::vector<std::string> imu_names() {
@@ -62,31 +42,40 @@ std::vector<std::string> imu_names() {
   return names;
 }
 
-/// Names of the state's columns. Calibration of cameras is numbered.
-std::vector<std::string> state_names(const ObservabilityMatrix& state, const Filter& filter,
-                                     const FilterSetup& setup) {
+/// Names of the state's columns.
+std::vector<std::string> state_names(const ObservabilityMatrix& state, const Filter& filter) {
   std::vector<std::string> names = imu_names();
-  for (std::size_t i = 0; i < state.calibration_columns().size(); ++i) {
-    names.push_back("camera_calibration_" + std::to_string(i));
+  names.resize(static_cast<std::size_t>(state.size()));
+  for (std::size_t b = 0; b < filter.blocks().specs().size(); ++b) {
+    const int column = filter.blocks().views()[b].column();
+    const auto& entries = filter.blocks().specs()[b].entries;
+    for (std::size_t i = 0; column >= 0 && i < entries.size(); ++i) {
+      const int own = state.state_column(column + static_cast<int>(i));
+      if (own >= 0) names[static_cast<std::size_t>(own)] = entries[i].name;
+    }
   }
-  for (std::size_t k = 0; k < setup.wheels.size(); ++k) {
-    const WheelsView& wheels = filter.wheels()[k];
-    const auto calibration = calibration_names(setup.wheels[k]);
-    const auto name = [&](int first, int count, std::size_t at) {
-      for (int i = 0; first >= 0 && i < count; ++i) {
-        const int own = state.state_column(first + i);
-        if (own >= 0)
-          names[static_cast<std::size_t>(own)] = calibration[at + static_cast<std::size_t>(i)];
-      }
-    };
-    name(wheels.extrinsics_column, 6, 0);
-    name(wheels.time_offset_column, 1, 6);
-    name(wheels.intrinsics_column, static_cast<int>(wheels.x_WI.size()), 7);
-  }
-  if (state.feature_column() >= 0) {
-    for (const char* axis : {"x", "y", "z"}) names.push_back(std::string("p_FinG_") + axis);
+  for (int i = 0; state.feature_column() >= 0 && i < 3; ++i) {
+    names[static_cast<std::size_t>(state.feature_column() + i)] = std::string("p_FinG_") + "xyz"[i];
   }
   return names;
+}
+
+/// The wheel sets of a run as the filter began, those that it knows of.
+std::vector<WheelsView> wheels_of(const FilterSetup& setup, const Filter& filter) {
+  std::vector<WheelsView> all;
+  for (const WheelSet& set : setup.wheels) {
+    WheelsView& wheels = all.emplace_back(set.prior.wheels);
+    const auto blocks = wheels_blocks(set.prior);
+    int* const columns[] = {&wheels.extrinsics_column, &wheels.time_offset_column,
+                            &wheels.intrinsics_column};
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      for (std::size_t b = 0; b < filter.blocks().specs().size(); ++b) {
+        if (filter.blocks().specs()[b].name != blocks[i].name) continue;
+        *columns[i] = filter.blocks().views()[b].column();
+      }
+    }
+  }
+  return all;
 }
 
 /// One run of the frozen estimator, watched.
@@ -106,9 +95,10 @@ Eigen::VectorXd calibration_sigma(const ObservabilityMatrix& state) {
                                      static_cast<Eigen::Index>(state.calibration_columns().size()));
 }
 
-Watched watch(const Node& run, PluginRegistry& plugins) {
+Watched watch(const Node& run, PluginRegistry& plugins, std::vector<std::string>& notes) {
   Watched out;
-  out.setup = read_run(run, plugins);
+  out.setup = read_run(run, plugins, {}, true);
+  note_noise(out.setup, notes);
   if (!out.setup.filter) {
     throw InputError(out.setup.name +
                      ": observability is that of the filter: the run needs a section 'updates'");
@@ -117,16 +107,16 @@ Watched watch(const Node& run, PluginRegistry& plugins) {
   if (filter.start.mode != StartMode::kReference) {
     throw InputError(out.setup.name + ": observability needs estimator.start: reference");
   }
-  filter.options.frozen = true;
+  filter.options.runner.frozen = true;
   out.data = collect(out.setup);
   FeatureOptions feature;
-  feature.enabled =
-      (!out.data.images.empty() || !out.data.streams.empty()) && !filter.cameras.empty();
+  feature.enabled = (!out.data.recorded.of<FeatureSample>().empty() || !out.data.streams.empty()) &&
+                    !filter.cameras.empty();
   RunHooks hooks;
   hooks.on_start = [&](const Estimator& estimator) {
     out.state.emplace(estimator.filter(), feature);
-    out.names = state_names(*out.state, estimator.filter(), filter);
-    out.wheels.assign(estimator.filter().wheels().begin(), estimator.filter().wheels().end());
+    out.names = state_names(*out.state, estimator.filter());
+    out.wheels = wheels_of(filter, estimator.filter());
     out.track.emplace(out.state->calibration_columns(), calibration_sigma(*out.state), &*out.state);
     return &*out.track;
   };
@@ -144,8 +134,9 @@ void explain(const Watched& run, const MatrixXd& null, Observability& out) {
   const ObservabilityMatrix& state = *run.state;
   MatrixXd known(state.size(), 0);
   out.unexplained = out.unobservable;
-  if (run.data.samples.empty()) return;
-  const EncoderSample& sample = run.data.samples[run.data.samples.size() / 2];
+  const auto samples = run.data.wheels();
+  if (samples.empty()) return;
+  const EncoderSample& sample = samples[samples.size() / 2];
   for (std::size_t k = 0; k < run.wheels.size(); ++k) {
     const WheelSet& wheels = run.setup.filter->wheels[k];
     for (const NamedDirections& set :
@@ -155,7 +146,7 @@ void explain(const Watched& run, const MatrixXd& null, Observability& out) {
           orthonormal(state.prior_sigma().cwiseInverse().asDiagonal() * set.basis);
       const MatrixXd hidden = intersection(basis, null, kHiddenAngle);
       ExplainedDirections explained;
-      explained.name = (wheels.name.empty() ? "" : wheels.name + ": ") + set.name;
+      explained.name = (wheels.prior.name.empty() ? "" : wheels.prior.name + ": ") + set.name;
       explained.when = set.when;
       explained.dimension = static_cast<int>(basis.cols());
       explained.hidden = static_cast<int>(hidden.cols());
@@ -276,15 +267,15 @@ ObservabilityReport analyse(const ExperimentSetup& setup, PluginRegistry& plugin
       result.variant = v;
       RunSetup configured =
           read_run(configuration_of(setup, setup.variants[v], setup.recordings[m]), plugins);
-      Node run = without_noise(configured, report.notes);
+      Node run = configured.resolved;
       MatrixXd null;
-      const Watched held = watch(run, plugins);
+      const Watched held = watch(run, plugins, report.notes);
       result.held = analysis_of(held, tolerance, &null);
       result.parameters = parameters_of(held, null);
       follow_hidden(held, null, configured, result);
       // Each wheel set has a gauge of its own; that of the first is looked at.
-      if (Node* wheels = run.find("wheels")) set_if_there(*wheels, "hold_gauge", "false");
-      const Watched free = watch(run, plugins);
+      if (Node* wheels = run.find("wheels")) wheels->set("hold_gauge", Node::scalar_of("false"));
+      const Watched free = watch(run, plugins, report.notes);
       result.free = analysis_of(free, tolerance, &null);
       explain(free, null, result.free);
       look_at_wheels_alone(free, tolerance, result);

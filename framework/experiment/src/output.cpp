@@ -49,16 +49,6 @@ std::string with_unit(const std::string& heading, const std::string& unit) {
   return unit.empty() ? heading : heading + " [" + unit + "]";
 }
 
-std::vector<std::string> calibration_units(const RunSetup& setup) {
-  std::vector<std::string> units;
-  if (!setup.filter) return units;
-  for (const WheelSet& wheels : setup.filter->wheels) {
-    for (const char* unit : {"rad", "rad", "rad", "m", "m", "m", "s"}) units.emplace_back(unit);
-    for (const auto& spec : wheels.model->description().intrinsics) units.push_back(spec.unit);
-  }
-  return units;
-}
-
 namespace {
 
 /// Every k-th index so that at most `max_points` remain, and the last.

@@ -15,8 +15,8 @@ namespace {
 
 /// Images of a live run that are kept until the filter has come to them.
 constexpr std::size_t kMaxArrived = 100;
-/// Stamps of tracks are those of their image plus the offset of its clock; those of a pair are both
-/// of the first camera, whose image may be earlier or later by some milliseconds.
+/// Stamps of the tracks of a pair may both be those of the first camera, whose image may be earlier
+/// or later by some milliseconds.
 constexpr double kMaxStampOff_s = 0.02;
 constexpr std::size_t kMaxCurves = 8;
 constexpr std::size_t kMaxPoints = 400;
@@ -37,9 +37,9 @@ void every(std::size_t size, const F& take) {
 }
 
 Trajectory reference_of(const RunData& data) {
-  if (data.states.empty()) return data.reference;
+  if (data.states().empty()) return data.reference;
   Trajectory reference;
-  for (const StateSample& state : data.states) {
+  for (const StateSample& state : data.states()) {
     reference.push_back(
         {state.t_ns, to_vector(state.p_IinG_m), to_quaternion(state.q_ItoG_xyzw).normalized()});
   }
@@ -125,15 +125,14 @@ RunPictures::RunPictures(const RunSetup& setup, const RunData& data, PictureSink
     : setup_(setup),
       sinks_(std::move(sinks)),
       reference_(reference_of(data)),
-      units_(calibration_units(setup)),
       live_(!data.live.empty()) {
   if (setup.filter) cameras_.resize(setup.filter->cameras.size());
-  for (const ImageSample& image : data.pixels) {
+  for (const ImageSample& image : data.pixels()) {
     const auto index = static_cast<std::size_t>(image.camera);
     if (index < cameras_.size()) cameras_[index].images.push_back(image);
   }
-  if (!data.imu.empty()) {
-    duration_s_ = seconds_between(data.imu.front().t_ns, data.imu.back().t_ns);
+  if (const auto imu = data.imu(); !imu.empty()) {
+    duration_s_ = seconds_between(imu.front().t_ns, imu.back().t_ns);
   }
   next_snapshot_s_ = live_ ? kFirstLiveSnapshot_s : kSnapshotsAt.front() * duration_s_;
 }
@@ -150,7 +149,16 @@ void RunPictures::watch(RunHooks& hooks) {
 
 void RunPictures::on_epoch(const Filter& filter, const EpochData& data) {
   sigma_position_m_ = std::sqrt(filter.covariance().diagonal().segment<3>(kPositionColumn).sum());
-  for (const FeatureSample& image : data.features) {
+  for (const SampleSpan& stream : data.streams) {
+    if (stream.type != nullptr && *stream.type == sample_type<FeatureSample>()) {
+      see({static_cast<const FeatureSample*>(stream.data), stream.size});
+      return;  // others take the same
+    }
+  }
+}
+
+void RunPictures::see(std::span<const FeatureSample> images) {
+  for (const FeatureSample& image : images) {
     const auto index = static_cast<std::size_t>(image.camera);
     if (index >= cameras_.size()) continue;
     cameras_[index].t_ns = image.t_ns;
@@ -218,8 +226,7 @@ std::string RunPictures::finish(RunResult& result) {
 std::shared_ptr<const ImageSource> RunPictures::source_of(std::size_t index) {
   const Camera& camera = cameras_[index];
   if (!camera.t_ns) return nullptr;
-  const double offset_s = setup_.filter->cameras[index].camera.t_CtoI_s;
-  const auto t_ns = *camera.t_ns - static_cast<std::int64_t>(std::llround(1e9 * offset_s));
+  const std::int64_t t_ns = *camera.t_ns;
   double least_s = kMaxStampOff_s;
   std::shared_ptr<const ImageSource> nearest;
   const auto consider = [&](const ImageSample& image) {
@@ -288,8 +295,7 @@ std::vector<view::Path> RunPictures::paths_of(const RunResult& result) const {
 std::vector<view::Curve> RunPictures::curves_of(const RunResult& result) const {
   std::vector<view::Curve> curves;
   for (const std::size_t i : chosen(result.calibration)) {
-    curves.push_back(
-        curve_of(result.calibration[i], i < units_.size() ? units_[i] : "", result.epoch_t_s));
+    curves.push_back(curve_of(result.calibration[i], result.calibration[i].unit, result.epoch_t_s));
   }
   return curves;
 }

@@ -1,11 +1,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <memory>
 #include <vector>
 
 #include "feed.hpp"
-#include "sources.hpp"
 #include "stream.hpp"
 
 namespace viwo::experiment {
@@ -13,50 +12,40 @@ namespace {
 
 class RecordedFeed final : public Feed {
  public:
-  RecordedFeed(const RunSetup& setup, const RunData& data)
-      : setup_(setup), data_(data), tracks_name_(data.tracks_name) {
-    for (const WheelSet& wheels : setup.filter->wheels) {
-      wheels_.push_back(&encoder_samples(data, wheels.sensor));
+  RecordedFeed(const RunSetup& setup, const RunData& data) : setup_(setup), data_(data) {
+    for (const Recorded::Track& track : data.recorded.tracks()) {
+      Head head{&track, {}, 0, kFirst};
+      setup.routes.dispatch(track.sensor, track.samples->type(), [&](const Route& route) {
+        if (route.consumer != Consumer::kImu && route.consumer != Consumer::kStream) return;
+        head.routes.push_back(route);
+        head.rank = std::max(head.rank, rank_of(route));
+      });
+      if (!head.routes.empty()) heads_.push_back(std::move(head));
     }
-    next_wheel_.resize(wheels_.size(), 0);
-    poses_.resize(setup.filter->pose_sensors.size(), nullptr);
-    for (std::size_t k = 0; k < poses_.size(); ++k) {
-      if (!is_measured(*setup.filter, k)) continue;
-      poses_[k] = &pose_samples(data, setup.filter->pose_sensors[k]);
-    }
-    next_pose_.resize(poses_.size(), 0);
+    std::stable_sort(heads_.begin(), heads_.end(),
+                     [](const Head& a, const Head& b) { return a.rank < b.rank; });
     for (const SensorStream& stream : data.streams) {
       streams_.push_back(std::make_unique<Prefetch>(stream));
     }
   }
 
   bool next(Estimator& estimator) override {
-    const std::int64_t first = first_stamp();
+    Head* first = nullptr;
+    for (Head& head : heads_) {
+      if (head.is_at_end()) continue;
+      if (first == nullptr || head.t_ns() < first->t_ns()) first = &head;
+    }
     for (const auto& stream : streams_) {
       const Measurement* head = stream->head();
+      if (head == nullptr || !is_first(*stream)) continue;
       // Behind what was recorded at the same stamp.
-      if (head != nullptr && stamp_ns(*head) < first && is_first(*stream)) {
-        add_streamed(*stream, estimator);
-        return true;
-      }
-    }
-    if (first == kNone) return false;
-    // Before the IMU of the same stamp: nothing waits for poses.
-    for (std::size_t k = 0; k < poses_.size(); ++k) {
-      if (poses_[k] == nullptr || stamp(*poses_[k], next_pose_[k]) != first) continue;
-      estimator.add((*poses_[k])[next_pose_[k]++], static_cast<int>(k));
+      if (first != nullptr && first->t_ns() <= stamp_ns(*head)) continue;
+      give_streamed(*stream, estimator);
       return true;
     }
-    if (stamp(data_.imu, next_imu_) == first) {
-      estimator.add(data_.imu[next_imu_++]);
-      return true;
-    }
-    for (std::size_t k = 0; k < wheels_.size(); ++k) {
-      if (stamp(*wheels_[k], next_wheel_[k]) != first) continue;
-      estimator.add((*wheels_[k])[next_wheel_[k]++], static_cast<int>(k));
-      return true;
-    }
-    estimator.add(data_.images[next_image_++]);
+    if (first == nullptr) return false;
+    const SampleView sample = first->track->samples->view(first->next++);
+    for (const Route& route : first->routes) give(route, sample, estimator);
     return true;
   }
 
@@ -73,23 +62,29 @@ class RecordedFeed final : public Feed {
   }
 
  private:
-  static constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::max();
+  /// Of what has one stamp: what nothing waits for, then the IMU, what epochs wait for, and what
+  /// ends them.
+  enum Rank { kFirst, kImu, kAwaited, kEndsEpochs };
 
-  template <class Sample>
-  static std::int64_t stamp(const std::vector<Sample>& samples, std::size_t i) {
-    return i < samples.size() ? samples[i].t_ns : kNone;
+  /// What a sensor gave of one kind, and how far it has been given on.
+  struct Head {
+    const Recorded::Track* track;
+    std::vector<Route> routes;
+    std::size_t next;
+    Rank rank;
+    bool is_at_end() const { return next == track->samples->size(); }
+    std::int64_t t_ns() const { return track->samples->extent(next).t_ns; }
+  };
+
+  Rank rank_of(const Route& route) const {
+    if (route.consumer == Consumer::kImu) return kImu;
+    const StreamSpec& spec = setup_.filter->streams[route.stream].spec;
+    return spec.ends_epochs ? kEndsEpochs : spec.awaited ? kAwaited : kFirst;
   }
 
-  /// Of everything that was recorded.
-  std::int64_t first_stamp() const {
-    std::int64_t first = std::min(stamp(data_.imu, next_imu_), stamp(data_.images, next_image_));
-    for (std::size_t k = 0; k < wheels_.size(); ++k) {
-      first = std::min(first, stamp(*wheels_[k], next_wheel_[k]));
-    }
-    for (std::size_t k = 0; k < poses_.size(); ++k) {
-      if (poses_[k] != nullptr) first = std::min(first, stamp(*poses_[k], next_pose_[k]));
-    }
-    return first;
+  static void give(const Route& route, SampleView sample, Estimator& estimator) {
+    if (route.consumer == Consumer::kImu) estimator.add(*sample.get_if<ImuSample>());
+    if (route.consumer == Consumer::kStream) estimator.add(route.stream, sample);
   }
 
   /// Whether no other stream has an earlier stamp.
@@ -101,27 +96,16 @@ class RecordedFeed final : public Feed {
     });
   }
 
-  void add_streamed(Prefetch& stream, Estimator& estimator) {
-    const auto* image = std::get_if<FeatureSample>(stream.head());
-    if (image == nullptr) {
-      throw InputError("sensor '" + stream.name() +
-                       "', which takes an input, gives something else than tracks of features - "
-                       "only those are used while the filter runs");
-    }
-    claim(tracks_name_, stream.name(), kTracks, setup_.sensors_mark);
-    estimator.add(*image);
+  void give_streamed(Prefetch& stream, Estimator& estimator) {
+    const SampleView sample = stream.head()->view();
+    setup_.routes.dispatch(stream.name(), sample.type(),
+                           [&](const Route& route) { give(route, sample, estimator); });
     stream.pop();
   }
 
   const RunSetup& setup_;
   const RunData& data_;
-  std::string tracks_name_;
-  std::vector<const std::vector<EncoderSample>*> wheels_;
-  std::vector<std::size_t> next_wheel_;
-  std::vector<const std::vector<PoseSample>*> poses_;  // null: nobody uses them
-  std::vector<std::size_t> next_pose_;
-  std::size_t next_imu_ = 0;
-  std::size_t next_image_ = 0;
+  std::vector<Head> heads_;  // by rank
   std::vector<std::unique_ptr<Prefetch>> streams_;
 };
 

@@ -35,8 +35,8 @@ StampedPose stamped(std::int64_t t_ns, const Eigen::Vector3d& pose) {
 /// that wheels (and reference) cover.
 std::vector<std::int64_t> epoch_stamps(const RunSetup& setup, const RunData& data,
                                        std::int64_t offset_ns) {
-  std::int64_t begin_ns = data.samples.front().begin_ns;
-  std::int64_t end_ns = data.samples.back().end_ns;
+  std::int64_t begin_ns = data.wheels().front().begin_ns;
+  std::int64_t end_ns = data.wheels().back().end_ns;
   if (!data.reference.empty()) {
     begin_ns = std::max(begin_ns, data.reference.front().t_ns - offset_ns);
     end_ns = std::min(end_ns, data.reference.back().t_ns - offset_ns);
@@ -121,6 +121,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   const Eigen::Vector3d B_start = start ? planar(*start) : Eigen::Vector3d::Zero();
   const Eigen::Vector3d O_start = compose(B_start, O_in_B);
 
+  const auto wheels = data.wheels();
   Preintegrator preintegrator(setup.model, setup.preintegration);
   preintegrator.set_intrinsics(setup.x_WI);
   PreintegratedPose interval;
@@ -131,7 +132,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   for (std::size_t k = 1; k < stamps.size() && result.status == RunStatus::kOk; ++k) {
     const auto epoch_begin = std::chrono::steady_clock::now();
     try {
-      preintegrator.integrate(data.samples, stamps[k - 1], stamps[k], interval);
+      preintegrator.integrate(wheels, stamps[k - 1], stamps[k], interval);
     } catch (const PluginFailure& failure) {
       result.status = RunStatus::kFailed;
       result.cause = std::string(failure.what()) + " (epoch " + std::to_string(k) + ")";
@@ -168,7 +169,9 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   result.epoch_t_s = {0., result.duration_s};
   for (int i = 0; i < setup.model->n_intrinsics(); ++i) {
     CalibrationTrack track;
-    track.name = setup.model->description().intrinsics[static_cast<std::size_t>(i)].name;
+    const IntrinsicSpec& spec = setup.model->description().intrinsics[static_cast<std::size_t>(i)];
+    track.name = spec.name;
+    track.unit = spec.unit;
     track.estimate.assign(2, setup.x_WI[i]);
     track.sigma.assign(2, setup.sigma[i]);
     if (const auto truth = data.calibration.find(track.name); truth != data.calibration.end()) {

@@ -181,7 +181,7 @@ Document report_of(const RunSetup& setup, const RunResult& result) {
   add_trajectory_section(result, document);
   add_picture_section(result, document);
   add_error_section(result, document);
-  add_calibration_section(setup, result, document);
+  add_calibration_section(result, document);
   add_excitation_section(result, document);
   add_measurements_section(result, document);
   add_time_section(result, document);

@@ -17,8 +17,7 @@ void add_picture_section(const RunResult& result, report::Document& document);
 void add_error_section(const RunResult& result, report::Document& document);
 
 /// Every estimated parameter of the wheels over time, and where it ended.
-void add_calibration_section(const RunSetup& setup, const RunResult& result,
-                             report::Document& document);
+void add_calibration_section(const RunResult& result, report::Document& document);
 
 /// What the monitor found about the motion.
 void add_excitation_section(const RunResult& result, report::Document& document);

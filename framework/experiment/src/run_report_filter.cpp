@@ -179,7 +179,7 @@ std::optional<std::pair<double, double>> settled_range(const Series& series, dou
 
 Plot calibration_plot(const RunResult& result, const CalibrationTrack& track,
                       const std::string& si_unit) {
-  const DisplayUnit unit = unit_of(track, si_unit);
+  const DisplayUnit unit = unit_of(track, track.unit);
   Plot plot = half_plot(track.name, "time [s]", with_unit(track.name, unit.name));
   const std::size_t n = std::min(result.epoch_t_s.size(), track.estimate.size());
   const std::span<const double> t_s(result.epoch_t_s.data(), n);
@@ -251,30 +251,27 @@ void add_error_section(const RunResult& result, Document& document) {
   document.sections.push_back(std::move(section));
 }
 
-void add_calibration_section(const RunSetup& setup, const RunResult& result, Document& document) {
+void add_calibration_section(const RunResult& result, Document& document) {
   if (result.epoch_t_s.empty()) return;
-  const auto units = calibration_units(setup);
   Table table;
   table.caption = "Estimated parameters, their truth and what was believed at the end";
   table.columns = {{"parameter"}, {"unit"},  {"initial"}, {"prior sigma"},    {"final"},
                    {"sigma"},     {"truth"}, {"|error|"}, {"|error| / sigma"}};
   std::vector<Block> plots;
   std::string held;
-  for (std::size_t i = 0; i < result.calibration.size(); ++i) {
-    const CalibrationTrack& track = result.calibration[i];
-    const std::string si_unit = i < units.size() ? units[i] : "";
+  for (const CalibrationTrack& track : result.calibration) {
     if (!is_estimated(track)) {
       held += (held.empty() ? "" : ", ") + track.name;
       continue;
     }
-    const DisplayUnit unit = unit_of(track, si_unit);
+    const DisplayUnit unit = unit_of(track, track.unit);
     const double sigma = track.sigma.back();
     table.rows.push_back({track.name, unit.name, unit.scale * track.estimate.front(),
                           unit.scale * track.sigma.front(), unit.scale * track.estimate.back(),
                           unit.scale * sigma, unit.scale * track.truth,
                           std::abs(unit.scale * track.final_error),
                           std::abs(track.final_error) / sigma});
-    plots.emplace_back(calibration_plot(result, track, si_unit));
+    plots.emplace_back(calibration_plot(result, track, track.unit));
   }
   if (plots.empty()) return;
   Section section{"Calibration", {std::move(table)}};

@@ -134,7 +134,7 @@ void place_behind_inputs(std::vector<SensorEntry> unplaced, const Node& sensors,
   }
 }
 
-void read_sensors(const Node& run, PluginRegistry& plugins, RunSetup& setup,
+void read_sensors(const Node& run, const ReadContext& context, RunSetup& setup,
                   config::Errors& errors) {
   const Node* sensors = run.find("sensors");
   if (sensors == nullptr || !sensors->is_map() || sensors->entries().empty()) {
@@ -150,7 +150,8 @@ void read_sensors(const Node& run, PluginRegistry& plugins, RunSetup& setup,
   for (const auto& entry : sensors->entries()) {
     // Sensors of one run have seeds of their own; the same sensor keeps its own in every variant.
     const std::uint64_t seed = setup.seed * 1000 + index++;
-    auto loaded = plugins.make_sensor(entry.value, "sensors." + entry.key, seed, errors, kHostKeys);
+    auto loaded = context.plugins.make_sensor(entry.value, "sensors." + entry.key, seed, errors,
+                                              kHostKeys, context.exact);
     Node section = loaded.resolved;
     std::string input = read_input(entry, *sensors, loaded, errors);
     if (!input.empty()) section.set("input", Node::scalar_of(input));
@@ -172,7 +173,8 @@ void read_kinematics(const Node& run, PluginRegistry& plugins, RunSetup& setup,
   }
   setup.kinematics_mark = section->mark();
   constexpr std::string_view kHostKeys[] = {"calibration"};
-  setup.kinematics = plugins.make_kinematics(*section, "kinematics", errors, kHostKeys);
+  const std::uint64_t seed = instance_seed(setup.seed, "kinematics", "kinematics");
+  setup.kinematics = plugins.make_kinematics(*section, "kinematics", seed, errors, kHostKeys);
   if (!setup.kinematics.object) return;
   setup.model = guarded(setup.kinematics.info, "describe", [&] {
     return std::make_shared<const WheelModel>(setup.kinematics.object);
@@ -228,6 +230,32 @@ void read_options(const Node& run, RunSetup& setup, config::Errors& errors) {
   setup.resolved.set("evaluation", config::write_params(kEvaluationParams, e));
 }
 
+/// The sensor that the section `wheels` of a run names; "" for none.
+std::string wheels_sensor(const Node& run) {
+  const Node* wheels = run.find("wheels");
+  const Node* sensor = wheels != nullptr && wheels->is_map() ? wheels->find("sensor") : nullptr;
+  return sensor != nullptr && sensor->is_scalar() ? sensor->scalar() : "";
+}
+
+/// Who gets what; all sections have been read.
+Routes read_routes(const Node& run, const RunSetup& setup, std::vector<std::string> measuring,
+                   config::Errors& errors) {
+  std::vector<SensorYield> sensors;
+  for (const SensorEntry& entry : setup.sensors) {
+    SensorYield& sensor = sensors.emplace_back();
+    sensor.name = entry.name;
+    sensor.types =
+        guarded(entry.sensor.info, "yields", [&] { return entry.sensor.object->yields(); });
+  }
+  Wanted wanted;
+  if (setup.filter) wanted.streams = setup.filter->streams;
+  wanted.filter = setup.filter.has_value();
+  wanted.wheels = setup.model != nullptr;
+  wanted.wheels_sensor = wheels_sensor(run);
+  wanted.measuring = std::move(measuring);
+  return Routes::resolve(sensors, wanted, setup.sensors_mark, errors);
+}
+
 /// Pose of O in I, seen from above, as a wheel set's mount says.
 PlanarExtrinsics planar_mount(const WheelsView& wheels) {
   const Eigen::Matrix3d R_OtoI = wheels.R_ItoO.transpose();
@@ -237,7 +265,8 @@ PlanarExtrinsics planar_mount(const WheelsView& wheels) {
 
 }  // namespace
 
-RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed) {
+RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed,
+                  bool exact) {
   RunSetup setup;
   config::Errors errors;
   constexpr std::string_view kSections[] = {"sensors", "kinematics", "odometry",    "evaluation",
@@ -255,15 +284,18 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
   }
   read_kinematics(run, plugins, setup, errors);
   read_options(run, setup, errors);
+  const ReadContext context{plugins, setup.seed, exact};
+  std::vector<std::string> measuring;
   if (has_filter_sections(run)) {
     // Read also when the wheels run alone: what is wrong in it is wrong.
-    FilterSetup filter = read_filter(run, setup.model, setup.x_WI, setup.sigma, setup.seed, plugins,
-                                     setup.resolved, errors);
+    FilterSetup filter =
+        read_filter(run, setup.model, setup.x_WI, setup.sigma, context, setup.resolved, errors);
     if (!filter.wheels.empty()) setup.O_in_I = planar_mount(filter.wheels.front().prior.wheels);
-    setup.measured_poses = filter.pose_sensors;
+    measuring = filter.measuring;
     if (wants_filter(run)) setup.filter = std::move(filter);
   }
-  read_sensors(run, plugins, setup, errors);
+  read_sensors(run, context, setup, errors);
+  if (errors.empty()) setup.routes = read_routes(run, setup, std::move(measuring), errors);
   errors.throw_if_any();
   setup.warnings = compare_cameras(setup);
   return setup;

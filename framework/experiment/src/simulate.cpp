@@ -29,17 +29,18 @@ SimulateResult write_log(RunSetup& setup, const std::filesystem::path& folder) {
   SimulateResult result;
   log::AslWriter writer(folder);
   // Beside true states, poses are measurements, and have a table of their own.
-  const bool has_states = std::any_of(measurements.begin(), measurements.end(), [](const auto& m) {
-    return std::holds_alternative<StateSample>(m);
-  });
+  const bool has_states =
+      std::any_of(measurements.begin(), measurements.end(),
+                  [](const Measurement& m) { return m.get_if<StateSample>() != nullptr; });
   for (const Measurement& measurement : measurements) {
-    const auto* pose = std::get_if<PoseSample>(&measurement);
+    const auto* pose = measurement.get_if<PoseSample>();
+    bool is_written = true;
     if (has_states && pose != nullptr) {
       writer.write_measured(*pose);
     } else {
-      writer.write(measurement);
+      is_written = writer.write(measurement);
     }
-    ++result.counts[measurement.index()];
+    ++(is_written ? result.counts : result.left_out)[measurement.view().type().name];
   }
   writer.close();
   return result;
@@ -47,30 +48,37 @@ SimulateResult write_log(RunSetup& setup, const std::filesystem::path& folder) {
 
 std::string describe(const SimulateResult& result) {
   struct Kind {
-    std::size_t index;
+    const SampleType& type;
     const char* one;
     const char* many;
   };
-  // `index` is that of the kind in Measurement.
-  static_assert(std::variant_size_v<Measurement> == 7);
-  const bool measured = result.counts[4] > 0;  // poses beside true states
-  const Kind kinds[] = {{2, "IMU sample", "IMU samples"},
-                        {3, "tracked image", "tracked images"},
-                        {6, "image", "images"},
-                        {0, "encoder sample", "encoder samples"},
-                        {1, measured ? "measured pose" : "reference pose",
+  const auto count_of = [](const auto& counts, const SampleType& type) {
+    const auto found = counts.find(type.name);
+    return found != counts.end() ? found->second : 0;
+  };
+  // Poses beside true states are measured.
+  const bool measured = count_of(result.counts, sample_type<StateSample>()) > 0;
+  const Kind kinds[] = {{sample_type<ImuSample>(), "IMU sample", "IMU samples"},
+                        {sample_type<FeatureSample>(), "tracked image", "tracked images"},
+                        {sample_type<ImageSample>(), "image", "images"},
+                        {sample_type<EncoderSample>(), "encoder sample", "encoder samples"},
+                        {sample_type<PoseSample>(), measured ? "measured pose" : "reference pose",
                          measured ? "measured poses" : "reference poses"},
-                        {4, "reference state", "reference states"},
-                        {5, "true parameter", "true parameters"}};
+                        {sample_type<GnssSample>(), "GNSS fix", "GNSS fixes"},
+                        {sample_type<StateSample>(), "reference state", "reference states"},
+                        {sample_type<CalibrationSample>(), "true parameter", "true parameters"}};
   std::vector<std::string> parts;
   for (const Kind& kind : kinds) {
-    const std::int64_t n = result.counts[kind.index];
+    const std::int64_t n = count_of(result.counts, kind.type);
     if (n > 0) parts.push_back(std::to_string(n) + " " + (n == 1 ? kind.one : kind.many));
   }
   std::string text;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (i > 0) text += i + 1 < parts.size() ? ", " : " and ";
     text += parts[i];
+  }
+  for (const auto& [kind, n] : result.left_out) {
+    text += "; not written, as there is no table for them: " + std::to_string(n) + " " + kind;
   }
   return text;
 }

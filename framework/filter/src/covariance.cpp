@@ -1,5 +1,7 @@
 #include "viwo/filter/covariance.hpp"
 
+#include <algorithm>
+
 #include <Eigen/Cholesky>
 
 #include "viwo/math/chi2.hpp"
@@ -18,7 +20,7 @@ void mirror_lower(Eigen::MatrixXd& M) { M.triangularView<Eigen::StrictlyUpper>()
 
 }  // namespace
 
-Covariance::Covariance(int size)
+Covariance::Covariance(int size, int max_new)
     : P_(Eigen::MatrixXd::Zero(size, size)),
       PHt_(size, kMaxFactorRows),
       in_factor_(static_cast<std::size_t>(size)),
@@ -28,11 +30,18 @@ Covariance::Covariance(int size)
       Z_(size, size),
       G_(size, size),
       W_(size, size),
-      y_(size) {
+      y_(size),
+      N_(max_new, max_new),
+      G_new_(max_new, size),
+      P_new_(size, std::max(max_new, kMaxRoomEntries)),
+      eta_new_(max_new) {
   order_.reserve(static_cast<std::size_t>(size));
   factor_index_.reserve(static_cast<std::size_t>(size));
   gates_.reserve(64);
   runs_.reserve(static_cast<std::size_t>(size));
+  for (std::vector<int>* list : {&new_, &known_, &new_index_, &known_index_}) {
+    list->reserve(static_cast<std::size_t>(size));
+  }
 }
 
 void Covariance::set_block(int first, const Eigen::MatrixXd& block) {
@@ -62,6 +71,14 @@ void Covariance::propagate(const ImuTransition& transition) {
 void Covariance::clone_pose(int column) {
   P_.middleCols<kPoseSize>(column) = P_.middleCols<kPoseSize>(kThetaColumn);
   P_.middleRows<kPoseSize>(column) = P_.middleRows<kPoseSize>(kThetaColumn);
+}
+
+void Covariance::decay(int column, double kept, double variance) {
+  if (kept != 1.) {
+    P_.row(column) *= kept;
+    P_.col(column) *= kept;
+  }
+  P_(column, column) += variance;
 }
 
 double Covariance::gate(int rows, double probability) {
@@ -132,8 +149,11 @@ void Covariance::collect_columns(const FactorColumns& columns) {
     start += block.count;
   }
   const auto m = order_.size();
+  // Nothing comes of columns without variance: what is held, and room that is not used.
   for (int column = 0; column < size(); ++column) {
-    if (!in_factor_[static_cast<std::size_t>(column)]) order_.push_back(column);
+    if (!in_factor_[static_cast<std::size_t>(column)] && P_(column, column) > 0.) {
+      order_.push_back(column);
+    }
   }
   // Neighbours that are neighbours in the state, too; a run is of the factor or of the others.
   runs_.clear();
@@ -149,7 +169,7 @@ FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd&
   dx.setZero();
   collect_columns(factor.columns);
   const Index m = static_cast<Index>(factor_index_.size());
-  const Index n = size();
+  const Index n = static_cast<Index>(order_.size());
   if (m == 0) return FactorResult::kRejected;
   const auto at = [](const std::vector<int>& list, Index i) {
     return list[static_cast<std::size_t>(i)];

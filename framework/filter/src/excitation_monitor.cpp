@@ -29,77 +29,69 @@ std::size_t bins_of(const MonitorOptions& options) {
   return static_cast<std::size_t>(std::max(bins, 1.));
 }
 
-int first_column(const WheelsView& wheels) {
-  if (wheels.extrinsics_column >= 0) return wheels.extrinsics_column;
-  if (wheels.time_offset_column >= 0) return wheels.time_offset_column;
-  return wheels.intrinsics_column;
+int first_column(const StateBlocks& blocks, const BlockGroup& group) {
+  for (const BlockId id : group.blocks) {
+    if (blocks.view(id).column() >= 0) return blocks.view(id).column();
+  }
+  return blocks.first_watched();
 }
 
 /// Prior sigmas of the blocks that have columns, as they stand in the state.
-Eigen::VectorXd sigmas(const WheelsPrior& prior) {
-  Eigen::VectorXd all(kPoseSize + 1 + prior.sigma_intrinsics.size());
-  Index n = 0;
-  const auto add = [&](int column, const auto& block) {
-    if (column < 0) return;
-    all.segment(n, block.size()) = block;
-    n += block.size();
-  };
-  add(prior.wheels.extrinsics_column, prior.sigma_extrinsics);
-  add(prior.wheels.time_offset_column, Eigen::VectorXd::Constant(1, prior.sigma_time_offset_s));
-  add(prior.wheels.intrinsics_column, prior.sigma_intrinsics);
-  return all.head(n);
+Eigen::VectorXd sigmas(const StateBlocks& blocks, const BlockGroup& group) {
+  std::vector<double> all;
+  for (const BlockId id : group.blocks) {
+    if (blocks.view(id).column() < 0) continue;
+    for (const BlockEntry& entry : blocks.specs()[static_cast<std::size_t>(id.index)].entries) {
+      all.push_back(entry.sigma);
+    }
+  }
+  return Eigen::VectorXd::Map(all.data(), static_cast<Index>(all.size()));
 }
 
 }  // namespace
 
-ExcitationMonitor::ExcitationMonitor(const MonitorOptions& options, const WheelsPrior& prior)
+ExcitationMonitor::ExcitationMonitor(const MonitorOptions& options, const StateBlocks& blocks,
+                                     const BlockGroup& group)
     : options_(options),
-      information_(first_column(prior.wheels), sigmas(prior), bins_of(options)),
+      information_(first_column(blocks, group), sigmas(blocks, group), bins_of(options)),
       motion_(bins_of(options)),
+      mount_(group.mount),
       n_bins_(bins_of(options)) {
-  const WheelsView& wheels = prior.wheels;
-  ModelDescription description;
-  if (wheels.model != nullptr) wheels.model->describe(description);
-  while (static_cast<Index>(description.intrinsics.size()) < wheels.x_WI.size()) {
-    IntrinsicSpec& unnamed = description.intrinsics.emplace_back();
-    unnamed.name = "intrinsic_" + std::to_string(description.intrinsics.size());
+  if (mount_.index < 0) {
+    throw std::invalid_argument("the group '" + group.name + "' has no block that is a pose");
   }
-  const auto names = calibration_names(prior.name, description.intrinsics);
-  const auto place = [](int begin, int column, int size, int at) {
-    return begin >= 0 && column >= begin && column < begin + size ? column - begin + at : -1;
-  };
-  for (const int column : information_.columns()) {
-    int i = place(wheels.extrinsics_column, column, kPoseSize, 0);
-    if (i < 0) i = place(wheels.time_offset_column, column, 1, kPoseSize);
-    if (i < 0) i = column - wheels.intrinsics_column + kPoseSize + 1;
-    names_.push_back(names[static_cast<std::size_t>(i)]);
-    const bool tilt = i == 0 || i == 1 || i == kPoseSize - 1;  // about x and y, and along z
-    needs_.push_back(tilt ? Need::kTilt : i == kPoseSize ? Need::kClock : Need::kPlanar);
+  for (const BlockId id : group.blocks) {
+    if (blocks.view(id).column() < 0) continue;
+    for (const BlockEntry& entry : blocks.specs()[static_cast<std::size_t>(id.index)].entries) {
+      if (!(entry.sigma > 0.)) continue;
+      names_.push_back(entry.name);
+      needs_.push_back(entry.needs);
+    }
   }
   sigma_ratio_.reserve(names_.size());
 }
 
-void ExcitationMonitor::add_motion(const Filter& filter, const WheelsView& wheels,
-                                   std::span<const ImuSample> imu) {
+void ExcitationMonitor::add_motion(const Filter& filter, std::span<const ImuSample> imu) {
+  const BlockView& mount = filter.blocks().view(mount_);
+  const auto R_ItoO = mount.rotation();
   // The rate is a mean over the epoch: single readings shake.
   Vector3d w_IinI = Vector3d::Zero();
   for (const ImuSample& sample : imu) w_IinI += to_vector(sample.gyro_rad_per_s);
   w_IinI = w_IinI / static_cast<double>(imu.size()) - filter.imu().gyro_bias;
-  const Vector3d w_OinO = wheels.R_ItoO * w_IinI;
-  const Vector3d v_IinO = wheels.R_ItoO * (filter.imu().R_GtoI * filter.imu().v_IinG);
+  const Vector3d w_OinO = R_ItoO * w_IinI;
+  const Vector3d v_IinO = R_ItoO * (filter.imu().R_GtoI * filter.imu().v_IinG);
   const double span_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
   const double noise = filter.options().imu_noise.gyro_rad_per_s_sqrt_hz;
   const double sigma_w = span_s > 0. ? noise / std::sqrt(span_s) : 0.;
-  motion_.add(v_IinO - w_OinO.cross(wheels.p_IinO), w_OinO, sigma_w);
+  motion_.add(v_IinO - w_OinO.cross(Vector3d(mount.numbers())), w_OinO, sigma_w);
 }
 
-bool ExcitationMonitor::epoch(const Filter& filter, const WheelsView& wheels,
-                              std::span<const ImuSample> imu) {
+bool ExcitationMonitor::epoch(const Filter& filter, std::span<const ImuSample> imu) {
   measured_ = false;
   has_news_ = false;
   if (imu.empty()) return false;
   if (!bin_begin_ns_) bin_begin_ns_ = imu.front().t_ns;
-  add_motion(filter, wheels, imu);
+  add_motion(filter, imu);
   if (seconds_between(*bin_begin_ns_, filter.t_ns()) < options_.period_s - kSlackS) return false;
   bin_begin_ns_ = filter.t_ns();
   evaluate();
@@ -116,11 +108,11 @@ double ExcitationMonitor::unexcited_part(Index parameter) const {
 
 void ExcitationMonitor::evaluate() {
   const auto motion = motion_.classify();
-  // Wheels that stand, and tilts that are noise, are counted as motion by the Jacobians (F-21).
+  // A standstill, and tilts that are noise, are counted as motion by the Jacobians (F-21).
   const bool still = motion[static_cast<std::size_t>(Degeneracy::kStandstill)];
   InformationWindow::Vector believed(information_.sigma().size());
   for (std::size_t i = 0; i < needs_.size(); ++i) {
-    const double part = needs_[i] == Need::kTilt ? motion_.tilt_signal() : 1.;
+    const double part = needs_[i] == Excitation::kTilt ? motion_.tilt_signal() : 1.;
     believed[static_cast<Index>(i)] = still ? 0. : part;
   }
   information_.decompose(believed);
@@ -167,10 +159,10 @@ void ExcitationMonitor::warn(std::int64_t t_ns, Degeneracy kind) {
   for (std::size_t i = 0; i < names_.size(); ++i) {
     const bool concerned =
         kind == Degeneracy::kStandstill ||
-        (kind == Degeneracy::kSteadyVelocity && needs_[i] == Need::kClock) ||
-        (kind == Degeneracy::kFlatGround && needs_[i] == Need::kTilt) ||
+        (kind == Degeneracy::kSteadyVelocity && needs_[i] == Excitation::kClock) ||
+        (kind == Degeneracy::kFlatGround && needs_[i] == Excitation::kTilt) ||
         ((kind == Degeneracy::kNoYawRate || kind == Degeneracy::kConstantSteering) &&
-         needs_[i] == Need::kPlanar);
+         needs_[i] == Excitation::kPlanar);
     if (concerned && unexcited_part(static_cast<Index>(i)) > kNamedPart) {
       warning.parameters.push_back(names_[i]);
     }

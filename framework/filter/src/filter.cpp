@@ -1,20 +1,39 @@
 #include "viwo/filter/filter.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
+#include <utility>
 
+#include "viwo/api/status.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
 namespace {
 
-int count_unless_held(const Eigen::VectorXd& sigma) {
-  if (!sigma.allFinite() || (sigma.array() < 0.).any()) {
-    throw std::invalid_argument("a prior sigma is negative or not finite");
+int clone_columns(const FilterOptions& options) {
+  if (options.clones < 2 || options.clones > 100) {
+    throw std::invalid_argument("the number of clones must be within 2 .. 100");
   }
-  return sigma.isZero(0.) ? 0 : static_cast<int>(sigma.size());
+  return kPoseSize * (options.clones + 1);
+}
+
+StateBlocks checked(std::vector<BlockSpec> blocks, std::vector<RoomSpec> rooms, int first_column) {
+  for (const BlockSpec& block : blocks) {
+    const std::string fault = fault_of(block);
+    if (!fault.empty()) throw InputError("block '" + block.name + "': " + fault);
+  }
+  for (const RoomSpec& room : rooms) {
+    const std::string fault = fault_of(room);
+    if (!fault.empty()) throw InputError("room '" + room.name + "': " + fault);
+  }
+  return {std::move(blocks), std::move(rooms), first_column};
+}
+
+int room_columns(const StateBlocks& blocks) {
+  int columns = 0;
+  for (const RoomSpec& room : blocks.rooms()) columns += room.blocks * room.entries;
+  return columns;
 }
 
 /// R <- Exp(-dtheta) R; exactly R for no correction.
@@ -24,55 +43,18 @@ void turn(Eigen::Matrix3d& R, const Eigen::Vector3d& dtheta) {
 
 }  // namespace
 
-int Filter::state_size(const FilterOptions& options, std::span<const CameraPrior> cameras,
-                       std::span<const WheelsPrior> wheels) {
-  if (options.clones < 2 || options.clones > 100) {
-    throw std::invalid_argument("the number of clones must be within 2 .. 100");
-  }
-  int size = kImuSize + kPoseSize * (options.clones + 1);
-  for (const CameraPrior& prior : cameras) {
-    size += count_unless_held(prior.sigma_extrinsics) + count_unless_held(prior.sigma_intrinsics);
-  }
-  for (const WheelsPrior& prior : wheels) {
-    if (prior.sigma_intrinsics.size() != prior.wheels.x_WI.size()) {
-      throw std::invalid_argument("each intrinsic of a wheel set needs a prior sigma");
-    }
-    size += count_unless_held(prior.sigma_extrinsics) + (prior.sigma_time_offset_s > 0. ? 1 : 0) +
-            count_unless_held(prior.sigma_intrinsics);
-  }
-  return size;
-}
-
-int Filter::place(const Eigen::VectorXd& sigma, int& next) {
-  const int count = count_unless_held(sigma);
-  if (count == 0) return -1;
-  const int column = next;
-  covariance_.set_block(column, sigma.cwiseAbs2().asDiagonal());
-  next += count;
-  return column;
-}
-
-Filter::Filter(const FilterOptions& options, std::vector<CameraPrior> cameras,
-               std::vector<WheelsPrior> wheels)
+Filter::Filter(const FilterOptions& options, std::vector<BlockSpec> blocks,
+               std::vector<RoomSpec> rooms)
     : options_(options),
       slots_(static_cast<std::size_t>(std::max(options.clones, 0)) + 1, false),
-      covariance_(state_size(options, cameras, wheels)),
+      blocks_(checked(std::move(blocks), std::move(rooms), kImuSize + clone_columns(options))),
+      covariance_(blocks_.first_column() + blocks_.columns(), room_columns(blocks_)),
+      held_(blocks_.first_watched(),
+            blocks_.first_column() + blocks_.columns() - blocks_.first_watched()),
       dx_(Eigen::VectorXd::Zero(covariance_.size())) {
   clones_.reserve(slots_.size());
-  int next = kImuSize + kPoseSize * (options.clones + 1);
-  for (CameraPrior& prior : cameras) {
-    prior.camera.extrinsics_column = place(prior.sigma_extrinsics, next);
-    prior.camera.intrinsics_column = place(prior.sigma_intrinsics, next);
-    cameras_.push_back(prior.camera);
-  }
-  held_ = HeldDirections(next, size() - next);  // the wheels come last
-  for (WheelsPrior& prior : wheels) {
-    prior.wheels.extrinsics_column = place(prior.sigma_extrinsics, next);
-    prior.wheels.time_offset_column =
-        place(Eigen::VectorXd::Constant(1, prior.sigma_time_offset_s), next);
-    prior.wheels.intrinsics_column = place(prior.sigma_intrinsics, next);
-    wheels_.push_back(prior.wheels);
-  }
+  new_columns_.reserve(static_cast<std::size_t>(room_columns(blocks_)));
+  blocks_.set_prior(covariance_);
 }
 
 void Filter::initialize(const ImuPrior& prior) {
@@ -96,6 +78,7 @@ ImuTransition Filter::propagate(std::span<const ImuSample> samples) {
   const ImuTransition transition =
       viwo::propagate(samples, options_.imu_noise, options_.gravity_m_per_s2, imu_);
   covariance_.propagate(transition);
+  blocks_.propagate(seconds_between(samples.front().t_ns, samples.back().t_ns), covariance_);
   t_ns_ = samples.back().t_ns;
   return transition;
 }
@@ -143,6 +126,39 @@ FactorResult Filter::apply(const InformationFactor& factor) {
   return result;
 }
 
+FactorResult Filter::apply(InformationFactor& factor, std::span<const AddedBlock> added) {
+  if (added.empty()) return apply(std::as_const(factor));
+  new_columns_.clear();
+  for (const AddedBlock& block : added) {
+    const BlockView& view = blocks_.view(block.id);
+    for (int i = 0; i < view.size(); ++i) new_columns_.push_back(view.column() + i);
+  }
+  dx_.setZero();
+  if (!covariance_.split(new_columns_, factor)) return FactorResult::kRejected;
+  if (covariance_.ties_known_columns()) {
+    held_.before(covariance_.matrix());
+    const FactorResult result = covariance_.apply(factor, dx_);
+    if (result == FactorResult::kFailed) covariance_failed_ = true;
+    if (result != FactorResult::kApplied) return result;
+    covariance_.hold(held_, dx_);
+  }
+  covariance_.initialise(dx_);
+  for (const AddedBlock& block : added) blocks_.add(block);
+  correct();
+  return FactorResult::kApplied;
+}
+
+void Filter::drop(BlockId id) {
+  const BlockView& view = blocks_.view(id);
+  covariance_.clear_block(view.column(), view.size());
+  blocks_.drop(id);
+}
+
+void Filter::rewrite(const BlockRewrite& block) {
+  covariance_.rewrite(blocks_.view(block.id).column(), block.columns, block.J);
+  blocks_.rewrite(block);
+}
+
 void Filter::correct() {
   turn(imu_.R_GtoI, dx_.segment<3>(kThetaColumn));
   imu_.p_IinG += dx_.segment<3>(kPositionColumn);
@@ -157,49 +173,14 @@ void Filter::correct() {
       clone.p_IinG_fej = clone.p_IinG;
     }
   }
-  for (CameraView& camera : cameras_) {
-    if (camera.extrinsics_column >= 0) {
-      turn(camera.R_ItoC, dx_.segment<3>(camera.extrinsics_column));
-      camera.p_IinC += dx_.segment<3>(camera.extrinsics_column + 3);
-    }
-    if (camera.intrinsics_column >= 0)
-      camera.intrinsics += dx_.segment<8>(camera.intrinsics_column);
-  }
-  for (WheelsView& wheels : wheels_) {
-    if (wheels.extrinsics_column >= 0) {
-      turn(wheels.R_ItoO, dx_.segment<3>(wheels.extrinsics_column));
-      wheels.p_IinO += dx_.segment<3>(wheels.extrinsics_column + 3);
-    }
-    if (wheels.time_offset_column >= 0) wheels.t_OtoI_s += dx_[wheels.time_offset_column];
-    if (wheels.intrinsics_column >= 0) {
-      wheels.x_WI += dx_.segment(wheels.intrinsics_column, wheels.x_WI.size());
-    }
-  }
+  blocks_.correct(dx_, options_.first_estimates);
 }
 
-std::string Filter::failure() const {
-  if (covariance_failed_) return "the covariance of the clones is not positive definite any more";
-  const auto& P = covariance_.matrix();
-  const bool finite = imu_.R_GtoI.allFinite() && imu_.p_IinG.allFinite() &&
-                      imu_.v_IinG.allFinite() && imu_.gyro_bias.allFinite() &&
-                      imu_.accel_bias.allFinite() && P.diagonal().allFinite();
-  if (!finite) return "the estimate or its covariance is not finite any more";
-  if ((P.diagonal().array() < 0.).any()) return "a variance is negative";
-  for (const WheelsView& wheels : wheels_) {
-    if (!wheels.x_WI.allFinite() || !wheels.R_ItoO.allFinite() || !wheels.p_IinO.allFinite() ||
-        !std::isfinite(wheels.t_OtoI_s)) {
-      return "the calibration of the wheels is not finite any more";
-    }
-  }
-  return "";
-}
-
-FilterView Filter::view(int wheels) const {
+FilterView Filter::view() const {
   FilterView view;
   view.imu = imu_;
   view.clones = clones_;
-  view.cameras = cameras_;
-  if (wheels >= 0) view.wheels = &wheels_[static_cast<std::size_t>(wheels)];
+  view.blocks = blocks_.views();
   view.imu_noise = options_.imu_noise;
   view.gravity_m_per_s2 = options_.gravity_m_per_s2;
   view.oldest_leaves = window_full();

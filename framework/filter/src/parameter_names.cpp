@@ -1,4 +1,4 @@
-// Names of the calibration parameters, and lists of them for people to read.
+// Lists of parameters for people to read.
 #include <algorithm>
 #include <cctype>
 
@@ -25,18 +25,6 @@ Numbered split(std::string_view name) {
 }
 
 }  // namespace
-
-std::vector<std::string> calibration_names(const std::string& name,
-                                           std::span<const IntrinsicSpec> intrinsics) {
-  const std::string prefix = name.empty() ? "" : name + ".";
-  std::vector<std::string> names;
-  for (const char* entry : {"theta_ItoO_x", "theta_ItoO_y", "theta_ItoO_z", "p_IinO_x", "p_IinO_y",
-                            "p_IinO_z", "t_OtoI"}) {
-    names.push_back(prefix + entry);
-  }
-  for (const IntrinsicSpec& spec : intrinsics) names.push_back(prefix + spec.name);
-  return names;
-}
 
 std::string compressed(std::span<const std::string> names) {
   std::string text;

@@ -1,9 +1,11 @@
-// A small filter with one camera and one wheel set, and random covariances for it.
+// A small filter with some blocks, of which one group is watched, and random covariances for it.
 #pragma once
 
 #include <cstdint>
 #include <limits>
 #include <random>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -29,30 +31,64 @@ class Random {
   std::normal_distribution<double> normal_;
 };
 
-inline CameraPrior camera_prior() {
-  CameraPrior prior;
-  prior.camera.width_px = 640;
-  prior.camera.height_px = 480;
-  prior.camera.intrinsics << 400., 401., 320., 240., 0.1, -0.05, 1e-3, 2e-3;
-  prior.camera.R_ItoC = exp_so3({0.3, -0.2, 1.1});
-  prior.camera.p_IinC << 0.1, -0.2, 0.05;
-  prior.sigma_extrinsics << 0.01, 0.02, 0.03, 0.1, 0.2, 0.3;
-  prior.sigma_intrinsics << 1., 2., 3., 4., 0.01, 0.02, 0.03, 0.04;
-  return prior;
+/// A pose: entries PREFIXtheta_x .. z, PREFIXp_x .. z.
+inline BlockSpec pose_block(const std::string& name, const std::string& prefix,
+                            const Eigen::Vector3d& turn, const Eigen::Vector3d& p,
+                            const Eigen::VectorXd& sigma, const std::string& group = "") {
+  BlockSpec block{.name = name, .group = group};
+  block.add_rotation({prefix + "theta_x", prefix + "theta_y", prefix + "theta_z"}, exp_so3(turn),
+                     sigma.head<3>());
+  block.add(prefix + "p_x", "m", p.x(), sigma[3]);
+  block.add(prefix + "p_y", "m", p.y(), sigma[4]);
+  block.add(prefix + "p_z", "m", p.z(), sigma[5]);
+  return block;
 }
 
-/// Three intrinsics, the second one held. The filter never calls the model.
-inline WheelsPrior wheels_prior() {
-  WheelsPrior prior;
-  prior.wheels.R_ItoO = exp_so3({-0.1, 0.4, 0.7});
-  prior.wheels.p_IinO << 0.05, 0.02, 0.15;
-  prior.wheels.t_OtoI_s = 0.004;
-  prior.wheels.x_WI = Eigen::Vector3d(0.05, 0.06, 0.3);
-  prior.sigma_extrinsics << 0.011, 0.012, 0.013, 0.04, 0.05, 0.06;
-  prior.sigma_time_offset_s = 0.01;
-  prior.sigma_intrinsics = Eigen::Vector3d(0.001, 0., 0.02);
-  return prior;
+/// Numbers: entries STEM1, STEM2, ...
+inline BlockSpec numbers_block(const std::string& name, const std::string& stem,
+                               const std::vector<double>& values, const std::vector<double>& sigma,
+                               const std::string& group = "") {
+  BlockSpec block{.name = name, .group = group};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    block.add(stem + std::to_string(i + 1), "m", values[i], sigma[i]);
+  }
+  return block;
 }
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+inline const Vector6 kArmSigma = (Vector6() << 0.01, 0.02, 0.03, 0.1, 0.2, 0.3).finished();
+inline const std::vector<double> kArmNumbersSigma{1., 2., 3., 4., 0.01, 0.02, 0.03, 0.04};
+inline const Vector6 kBaseSigma = (Vector6() << 0.011, 0.012, 0.013, 0.04, 0.05, 0.06).finished();
+inline constexpr double kClockSigma = 0.01;
+/// The second one is held.
+inline const std::vector<double> kBaseNumbersSigma{0.001, 0., 0.02};
+
+inline BlockSpec arm_mount() {
+  return pose_block("arm.mount", "arm.", {0.3, -0.2, 1.1}, {0.1, -0.2, 0.05}, kArmSigma);
+}
+inline BlockSpec arm_numbers() {
+  return numbers_block("arm.numbers", "arm.n_", {400., 401., 320., 240., 0.1, -0.05, 1e-3, 2e-3},
+                       kArmNumbersSigma);
+}
+inline BlockSpec base_mount() {
+  BlockSpec block =
+      pose_block("base.mount", "", {-0.1, 0.4, 0.7}, {0.05, 0.02, 0.15}, kBaseSigma, "base");
+  for (const std::size_t i : {0u, 1u, 5u}) block.entries[i].needs = Excitation::kTilt;
+  return block;
+}
+inline BlockSpec base_clock(double late_s = 0.004) {
+  BlockSpec block{.name = "base.clock", .group = "base"};
+  block.add("late", "s", late_s, kClockSigma, Excitation::kClock);
+  return block;
+}
+inline BlockSpec base_numbers() {
+  return numbers_block("base.numbers", "n_", {0.05, 0.06, 0.3}, kBaseNumbersSigma, "base");
+}
+inline std::vector<BlockSpec> fixture_blocks() {
+  return {arm_mount(), arm_numbers(), base_mount(), base_clock(), base_numbers()};
+}
+inline constexpr BlockId kArmMountId{0}, kArmNumbersId{1}, kBaseMountId{2}, kBaseClockId{3},
+    kBaseNumbersId{4};
 
 inline ImuPrior imu_prior(Random& random, std::int64_t t_ns = 1'000'000'000) {
   ImuPrior prior;
@@ -104,16 +140,18 @@ inline const FilterOptions kOptions = [] {
   options.clones = 3;
   return options;
 }();
+// Columns of the filter with fixture_blocks().
 inline constexpr int kClones = kImuSize;
-inline constexpr int kCameraExtrinsics = kClones + 4 * kPoseSize;
-inline constexpr int kCameraIntrinsics = kCameraExtrinsics + 6;
-inline constexpr int kWheelsExtrinsics = kCameraIntrinsics + 8;
-inline constexpr int kTimeOffset = kWheelsExtrinsics + 6;
-inline constexpr int kIntrinsics = kTimeOffset + 1;
-inline constexpr int kSize = kIntrinsics + 3;
+inline constexpr int kArmMount = kClones + 4 * kPoseSize;
+inline constexpr int kArmNumbers = kArmMount + 6;
+inline constexpr int kBaseMount = kArmNumbers + 8;
+inline constexpr int kBaseClock = kBaseMount + 6;
+inline constexpr int kBaseNumbers = kBaseClock + 1;
+inline constexpr int kSize = kBaseNumbers + 3;
 
-inline Filter make_filter(const FilterOptions& options = kOptions) {
-  return {options, {camera_prior()}, {wheels_prior()}};
+inline Filter make_filter(const FilterOptions& options = kOptions,
+                          std::vector<RoomSpec> rooms = {}) {
+  return Filter(options, fixture_blocks(), std::move(rooms));
 }
 
 /// Propagates by one period with random readings and clones.
@@ -126,8 +164,9 @@ inline void step(Filter& filter, Random& random) {
 }
 
 /// A filter that has been started and has `clones` clones.
-inline Filter running_filter(Random& random, int clones, const FilterOptions& options = kOptions) {
-  Filter filter = make_filter(options);
+inline Filter running_filter(Random& random, int clones, const FilterOptions& options = kOptions,
+                             std::vector<RoomSpec> rooms = {}) {
+  Filter filter = make_filter(options, std::move(rooms));
   filter.initialize(imu_prior(random));
   for (int i = 0; i < clones; ++i) step(filter, random);
   return filter;
@@ -138,7 +177,7 @@ inline ResidualFactor random_factor(Random& random) {
   ResidualFactor factor;
   factor.columns.add(0, kImuSize);
   factor.columns.add(kClones, 2 * kPoseSize);
-  factor.columns.add(kCameraExtrinsics, kSize - kCameraExtrinsics);
+  factor.columns.add(kArmMount, kSize - kArmMount);
   factor.set_rows(5);
   factor.H = random.matrix(5, factor.columns.size());
   factor.residual = 0.05 * random.matrix(5, 1);

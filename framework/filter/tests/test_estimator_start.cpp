@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
-#include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -13,51 +12,49 @@
 namespace viwo {
 namespace {
 
-using testing::camera_prior;
+using testing::Bench;
+using testing::cell_at;
+using testing::CellSample;
 using testing::Counts;
-using testing::encoder_at;
-using testing::FakeUpdate;
-using testing::image_at;
+using testing::FixSample;
 using testing::imu_at;
 using testing::kMs;
 using testing::kStart;
 using testing::level_prior;
-using testing::Rig;
+using testing::tick_at;
 
-PoseSample pose_at(std::int64_t t_ns) {
-  PoseSample pose;
-  pose.t_ns = t_ns;
-  return pose;
-}
+FixSample fix_at(std::int64_t t_ns) { return {t_ns, 1.}; }
 
-/// An estimator with wheels and poses that asks for a start, and what it showed when it asked.
+/// An estimator of cells and fixes that asks for a start, and what it showed when it asked.
 struct Waiting {
-  std::shared_ptr<FakeUpdate> update = std::make_shared<FakeUpdate>();
   std::vector<std::int64_t> asked_ms;  ///< the last IMU sample; -1: none
-  std::int64_t imu_span_ms = 0;        ///< of the last attempt
-  std::int64_t encoders_begin_ms = 0;
-  std::size_t most_encoders = 0;
+  std::size_t n_imu = 0;               ///< of the last attempt
+  std::int64_t imu_span_ms = 0;
+  std::int64_t cells_begin_ms = 0;
+  std::size_t most_imu = 0, most_cells = 0;
   std::int64_t start_at_ms = std::numeric_limits<std::int64_t>::max();
-  Estimator estimator;
+  Bench bench;
 
-  explicit Waiting(double t_OtoI_s = 0.)
-      : estimator({}, {camera_prior()}, Rig::wheels(true, t_OtoI_s), {{"fake", update, 0, 0}}) {
-    estimator.start([this](auto imu, auto encoders) -> StartAttempt {
+  explicit Waiting(double late_s = 0.) : bench({.cells = true, .fixes = true, .late_s = late_s}) {
+    bench.estimator.start([this](const StartData& data) -> StartAttempt {
+      const auto imu = data.imu;
+      // In the order in which the update has declared them.
+      const auto cells = data.samples<CellSample>(StreamId{0});
       asked_ms.push_back(imu.empty() ? -1 : (imu.back().t_ns - kStart) / kMs);
       if (!imu.empty()) imu_span_ms = (imu.back().t_ns - imu.front().t_ns) / kMs;
-      most_encoders = std::max(most_encoders, encoders[0].size());
-      if (!encoders[0].empty()) {
-        encoders_begin_ms = (encoders[0].front().begin_ns - kStart) / kMs;
-      }
-      if (asked_ms.back() < start_at_ms) return no_start("not yet");
+      n_imu = imu.size();
+      most_imu = std::max(most_imu, imu.size());
+      most_cells = std::max(most_cells, cells.size());
+      if (!cells.empty()) cells_begin_ms = (cells.front().begin_ns - kStart) / kMs;
+      if (asked_ms.back() < start_at_ms) return no_start(n_imu < 6 ? "far too early" : "not yet");
       return {level_prior(imu.back().t_ns), {}};
     });
   }
+  Waiting(const Waiting&) = delete;
+
   Counts rejected() const {
-    Counts counts;
-    for (const RejectionCount& r : estimator.rejections()) counts[r.reason] += r.count;
-    counts.erase("fake: a reason of its own");
-    counts.erase("gap of the IMU bridged");
+    Counts counts = bench.rejected();
+    counts.erase("imu: gap bridged");
     return counts;
   }
 };
@@ -65,115 +62,179 @@ struct Waiting {
 TEST(EstimatorStart, IsTriedEvery50MsAndOnceMoreAtTheEnd) {
   Waiting waiting;
   for (std::int64_t t = 0; t <= 120; t += 10) {
-    waiting.estimator.add(imu_at(kStart + t * kMs));
-    waiting.estimator.add(encoder_at(kStart + t * kMs), 0);
-    EXPECT_FALSE(waiting.estimator.step());
-    EXPECT_FALSE(waiting.estimator.step());
+    waiting.bench.estimator.add(imu_at(kStart + t * kMs));
+    waiting.bench.add(cell_at(kStart + t * kMs));
+    EXPECT_FALSE(waiting.bench.estimator.step());
+    EXPECT_FALSE(waiting.bench.estimator.step());
   }
   EXPECT_EQ(waiting.asked_ms, (std::vector<std::int64_t>{0, 50, 100}));
-  waiting.estimator.finish();
-  EXPECT_FALSE(waiting.estimator.step());
-  EXPECT_FALSE(waiting.estimator.step());
+  waiting.bench.estimator.finish();
+  EXPECT_FALSE(waiting.bench.estimator.step());
+  EXPECT_FALSE(waiting.bench.estimator.step());
   EXPECT_EQ(waiting.asked_ms, (std::vector<std::int64_t>{0, 50, 100, 120}));
-  ASSERT_EQ(waiting.estimator.start_obstacles().size(), 1u);
-  EXPECT_EQ(waiting.estimator.start_obstacles()[0].count, 4);
+  const auto obstacles = waiting.bench.estimator.start_obstacles();
+  ASSERT_EQ(obstacles.size(), 2u);
+  EXPECT_EQ(obstacles[0].text, "far too early");
+  EXPECT_EQ(obstacles[0].count, 1);
+  EXPECT_EQ(obstacles[1].text, "not yet");
+  EXPECT_EQ(obstacles[1].count, 3);
 }
 
 TEST(EstimatorStart, IsTriedAtTheEndWithoutAnyImuSoThatItSaysWhatIsMissing) {
   Waiting waiting;
-  waiting.estimator.add(image_at(kStart));
-  EXPECT_FALSE(waiting.estimator.step());
+  waiting.bench.tick(0);
+  EXPECT_FALSE(waiting.bench.estimator.step());
   EXPECT_TRUE(waiting.asked_ms.empty());
-  waiting.estimator.finish();
-  EXPECT_FALSE(waiting.estimator.step());
+  waiting.bench.estimator.finish();
+  EXPECT_FALSE(waiting.bench.estimator.step());
   EXPECT_EQ(waiting.asked_ms, (std::vector<std::int64_t>{-1}));
 }
 
+TEST(EstimatorStart, FromThereOnMakesEpochs) {
+  Bench bench;
+  int asked = 0;
+  bench.estimator.start([&](const StartData& data) -> StartAttempt {
+    ++asked;
+    if (data.imu.size() < 21) return no_start("too short");
+    return {level_prior(data.imu.back().t_ns), {}};
+  });
+  for (std::int64_t t = 0; t <= 400; t += 10) {
+    bench.estimator.add(imu_at(kStart + t * kMs));
+    if (t % 50 == 0) bench.tick(t);
+    bench.estimator.step();
+  }
+  EXPECT_EQ(asked, 5);
+  ASSERT_EQ(bench.update->seen.size(), 3u);  // 250, 300, 350: nothing is later than the last tick
+  EXPECT_EQ(bench.update->seen[0].begin_ns, kStart + 200 * kMs);
+  EXPECT_EQ(bench.update->seen[0].end_ns, kStart + 250 * kMs);
+  EXPECT_EQ(bench.rejected(), (Counts{{"ticks: before the start", 5}}));
+}
+
+TEST(EstimatorStart, ForgetsWhatNoStartLooksAtWhileItWaitsForOne) {
+  Waiting waiting;
+  for (std::int64_t t = 0; t <= 600'000; t += 100) {
+    waiting.bench.estimator.add(imu_at(kStart + t * kMs));
+    if (t % 1000 == 0) waiting.bench.tick(t);
+    EXPECT_FALSE(waiting.bench.estimator.step());
+    if (t > 200'000) {
+      EXPECT_GE(waiting.imu_span_ms, 59'900);
+    }
+  }
+  EXPECT_LE(waiting.most_imu, 1202U);
+  EXPECT_GT(waiting.rejected().at("ticks: before the start"), 400);
+}
+
 TEST(EstimatorStart, IsNotSpoiltByAStampInTheFuture) {
-  // GIVEN an image and a pose of an hour later; then the IMU for a second
+  // GIVEN a tick and a fix of an hour later; then the IMU for a second
   const std::int64_t ahead = kStart + 3600'000 * kMs;
   Waiting waiting;
   waiting.start_at_ms = 1000;
-  waiting.estimator.add(image_at(ahead));
-  waiting.estimator.add(pose_at(ahead), 0);
+  waiting.bench.add(tick_at(ahead));
+  waiting.bench.add(fix_at(ahead));
   for (std::int64_t t = 0; t <= 1300; t += 10) {
-    waiting.estimator.add(imu_at(kStart + t * kMs));
-    waiting.estimator.add(encoder_at(kStart + t * kMs), 0);
-    waiting.estimator.step();
+    waiting.bench.estimator.add(imu_at(kStart + t * kMs));
+    waiting.bench.add(cell_at(kStart + t * kMs));
+    waiting.bench.estimator.step();
     // THEN the start sees all of it
-    if (!waiting.estimator.filter().initialized()) {
+    if (!waiting.bench.estimator.filter().initialized()) {
       EXPECT_GE(waiting.imu_span_ms, t - 50);
     }
   }
   EXPECT_EQ(waiting.asked_ms.back(), 1000);
-  EXPECT_TRUE(waiting.estimator.filter().initialized());
-  EXPECT_FALSE(waiting.update->seen.empty());
+  EXPECT_TRUE(waiting.bench.estimator.filter().initialized());
+  EXPECT_FALSE(waiting.bench.update->seen.empty());
 }
 
-TEST(EstimatorStart, IsGivenAMinuteOfEncodersInTheirOwnClock) {
-  for (const double t_OtoI_s : {-1000., 1000.}) {
-    Waiting waiting(t_OtoI_s);
-    const auto in_wheel_clock = [&](std::int64_t t) {
-      return kStart + t * kMs - static_cast<std::int64_t>(t_OtoI_s * 1e9);
+TEST(EstimatorStart, IsGivenAMinuteOfCellsInTheirOwnClock) {
+  for (const double late_s : {-1000., 1000.}) {
+    Waiting waiting(late_s);
+    const auto in_its_clock = [&](std::int64_t t) {
+      return kStart + t * kMs - static_cast<std::int64_t>(late_s * 1e9);
     };
     for (std::int64_t t = 0; t <= 300'000; t += 100) {
-      waiting.estimator.add(imu_at(kStart + t * kMs));
-      waiting.estimator.add(encoder_at(in_wheel_clock(t)), 0);
-      waiting.estimator.step();
-      const std::int64_t oldest =
-          waiting.encoders_begin_ms + static_cast<std::int64_t>(t_OtoI_s * 1e3);
+      waiting.bench.estimator.add(imu_at(kStart + t * kMs));
+      waiting.bench.add(cell_at(in_its_clock(t)));
+      waiting.bench.estimator.step();
+      const std::int64_t oldest = waiting.cells_begin_ms + static_cast<std::int64_t>(late_s * 1e3);
       if (t >= 60'000) {
         ASSERT_LE(oldest, t - 59'000);
       }
     }
-    EXPECT_LE(waiting.most_encoders, 1202u);
+    EXPECT_LE(waiting.most_cells, 1202u);
   }
 }
 
-TEST(EstimatorStart, ForgetsEncodersThatHaveStopped) {
+TEST(EstimatorStart, ForgetsCellsThatHaveStopped) {
   Waiting waiting;
   for (std::int64_t t = 0; t <= 300'000; t += 100) {
-    waiting.estimator.add(imu_at(kStart + t * kMs));
-    if (t <= 1000) waiting.estimator.add(encoder_at(kStart + t * kMs), 0);
-    waiting.most_encoders = 0;
-    waiting.estimator.step();
+    waiting.bench.estimator.add(imu_at(kStart + t * kMs));
+    if (t <= 1000) waiting.bench.add(cell_at(kStart + t * kMs));
+    waiting.most_cells = 0;
+    waiting.bench.estimator.step();
   }
-  EXPECT_EQ(waiting.most_encoders, 0u);
+  EXPECT_EQ(waiting.most_cells, 0u);
 }
 
 TEST(EstimatorStart, DoesNotKeepWhatComesWithoutAnImu) {
   Waiting waiting;
   for (std::int64_t t = 0; t <= 600'000; t += 100) {
-    waiting.estimator.add(image_at(kStart + t * kMs, 0));
-    waiting.estimator.add(image_at(kStart + t * kMs, 1));
-    waiting.estimator.add(pose_at(kStart + t * kMs), 0);
-    waiting.estimator.add(encoder_at(kStart + t * kMs), 0);
-    waiting.estimator.step();
+    waiting.bench.tick(t, 0);
+    waiting.bench.tick(t, 1);
+    waiting.bench.add(fix_at(kStart + t * kMs));
+    waiting.bench.add(cell_at(kStart + t * kMs));
+    waiting.bench.estimator.step();
   }
-  waiting.estimator.finish();
-  waiting.estimator.step();
-  // At most two minutes are kept; each image counts, also of the same instant.
-  EXPECT_LE(waiting.most_encoders, 1202u);
+  waiting.bench.estimator.finish();
+  waiting.bench.estimator.step();
+  // At most two minutes are kept; each tick counts, also of the same instant.
+  EXPECT_LE(waiting.most_cells, 1202u);
   const Counts rejected = waiting.rejected();
-  EXPECT_GE(rejected.at("pose before the start"), 4800);
-  EXPECT_EQ(rejected.at("image before the start"), 2 * rejected.at("pose before the start"));
+  EXPECT_GE(rejected.at("fixes: before the start"), 4800);
+  EXPECT_EQ(rejected.at("ticks: before the start"), 2 * rejected.at("fixes: before the start"));
 }
 
-TEST(EstimatorStart, CountsThePosesBeforeItAndGivesTheOthers) {
+TEST(EstimatorStart, CountsTheFixesBeforeItAndGivesTheOthers) {
   Waiting waiting;
   waiting.start_at_ms = 100;
   for (std::int64_t t = 0; t <= 400; t += 10) {
-    waiting.estimator.add(imu_at(kStart + t * kMs));
-    waiting.estimator.add(encoder_at(kStart + t * kMs), 0);
-    if (t == 150) waiting.estimator.add(pose_at(kStart + 95 * kMs), 0);  // it came late
-    if (t < 60 || t > 150) waiting.estimator.add(pose_at(kStart + t * kMs), 0);
-    if (t == 60) waiting.estimator.add(pose_at(kStart + 65 * kMs), 0);
-    waiting.estimator.step();
+    waiting.bench.estimator.add(imu_at(kStart + t * kMs));
+    waiting.bench.add(cell_at(kStart + t * kMs));
+    if (t == 150) waiting.bench.add(fix_at(kStart + 95 * kMs));  // it came late
+    if (t < 60 || t > 150) waiting.bench.add(fix_at(kStart + t * kMs));
+    if (t == 60) waiting.bench.add(fix_at(kStart + 65 * kMs));
+    waiting.bench.estimator.step();
   }
-  EXPECT_EQ(waiting.rejected(), (Counts{{"pose before the start", 8}}));
-  ASSERT_EQ(waiting.update->seen.size(), 1u);
-  ASSERT_EQ(waiting.update->seen[0].poses.size(), 20u);
-  EXPECT_EQ(waiting.update->seen[0].poses.front().t_ns, kStart + 160 * kMs);
+  EXPECT_EQ(waiting.rejected(), (Counts{{"fixes: before the start", 8}}));
+  const auto& seen = waiting.bench.update->seen;
+  ASSERT_EQ(seen.size(), 1u);
+  ASSERT_EQ(seen[0].fixes.size(), 20u);
+  EXPECT_EQ(seen[0].fixes.front().t_ns, kStart + 160 * kMs);
+}
+
+TEST(EstimatorStart, CanLookAtAStreamThatNoUpdateTakes) {
+  // GIVEN an update without cells, and a start that wants them
+  const auto update = std::make_shared<testing::FakeUpdate>();
+  StreamSpec cells = testing::cells_spec({});
+  cells.awaited = false;
+  Estimator estimator({}, {{"fake", update, nullptr, ""}}, {{cells, "start"}});
+  ASSERT_EQ(estimator.streams().size(), 2u);
+  EXPECT_EQ(estimator.streams()[1].takers(), "start");
+  std::size_t shown = 0;
+  estimator.start([&](const StartData& data) -> StartAttempt {
+    shown = data.samples<CellSample>(StreamId{1}).size();
+    if (data.imu.back().t_ns < kStart + 100 * kMs) return no_start("not yet");
+    return {level_prior(data.imu.back().t_ns), {}};
+  });
+  for (std::int64_t t = 0; t <= 5000; t += 10) {
+    estimator.add(imu_at(kStart + t * kMs));
+    estimator.add(1, cell_at(kStart + t * kMs));
+    while (estimator.step()) {
+    }
+  }
+  // THEN it is shown them, and nobody is in their way later.
+  EXPECT_EQ(shown, 11u);
+  EXPECT_EQ(update->seen.size(), 19u);
+  EXPECT_EQ(testing::counts_of(estimator), Counts{});
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "filter_fixture.hpp"
 #include "viwo/filter/filter.hpp"
+#include "viwo/filter/health.hpp"
 
 namespace viwo {
 namespace {
@@ -46,7 +47,7 @@ TEST(Filter, DroppingTheOldestCloneFreesItsSlotAndLeavesAllOthersAlone) {
   Random random(2);
   Filter filter = running_filter(random, 4);
   EXPECT_TRUE(filter.window_full());
-  EXPECT_TRUE(filter.view(-1).oldest_leaves);
+  EXPECT_TRUE(filter.view().oldest_leaves);
   EXPECT_THROW(filter.clone(imu_sample(filter.t_ns(), random)), std::logic_error);
   std::vector<int> slots;
   for (int k = 0; k < 9; ++k) {
@@ -57,7 +58,7 @@ TEST(Filter, DroppingTheOldestCloneFreesItsSlotAndLeavesAllOthersAlone) {
     filter.drop_oldest_clone();
     EXPECT_EQ(filter.covariance(), expected);
     EXPECT_FALSE(filter.window_full());
-    EXPECT_FALSE(filter.view(-1).oldest_leaves);
+    EXPECT_FALSE(filter.view().oldest_leaves);
     ASSERT_EQ(filter.clones().size(), 3u);
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(filter.clones()[i].t_ns, clones[i + 1].t_ns);
@@ -173,30 +174,44 @@ TEST(Filter, CorrectsEveryBlockThroughItsBoxplus) {
     EXPECT_TRUE(near(filter.clones()[i].R_GtoI, turned(clones[i].R_GtoI, dx, column)));
     EXPECT_TRUE(near(filter.clones()[i].p_IinG, clones[i].p_IinG + dx.segment<3>(column + 3)));
   }
-  const CameraView camera = camera_prior().camera;
-  const CameraView& is = filter.cameras()[0];
-  EXPECT_TRUE(near(is.R_ItoC, turned(camera.R_ItoC, dx, kCameraExtrinsics)));
-  EXPECT_TRUE(near(is.p_IinC, camera.p_IinC + dx.segment<3>(kCameraExtrinsics + 3)));
-  EXPECT_TRUE(near(is.intrinsics, camera.intrinsics + dx.segment<8>(kCameraIntrinsics)));
-  const WheelsView wheels = wheels_prior().wheels;
-  const WheelsView& now = filter.wheels()[0];
-  EXPECT_TRUE(near(now.R_ItoO, turned(wheels.R_ItoO, dx, kWheelsExtrinsics)));
-  EXPECT_TRUE(near(now.p_IinO, wheels.p_IinO + dx.segment<3>(kWheelsExtrinsics + 3)));
-  EXPECT_NEAR(now.t_OtoI_s, wheels.t_OtoI_s + dx[kTimeOffset], kTolerance);
-  EXPECT_TRUE(near(now.x_WI, wheels.x_WI + dx.segment<3>(kIntrinsics)));
+  const auto& blocks = filter.blocks();
+  const auto numbers_of = [](const BlockSpec& spec) {
+    const Eigen::Index first = 9 * spec.rotations;
+    return VectorXd(VectorXd::Map(spec.value.data() + first,
+                                  static_cast<Eigen::Index>(spec.value.size()) - first));
+  };
+  const auto rotation_of = [](const BlockSpec& spec) {
+    return Matrix3d(Matrix3d::Map(spec.value.data()));
+  };
+  EXPECT_TRUE(
+      near(blocks.view(kArmMountId).rotation(), turned(rotation_of(arm_mount()), dx, kArmMount)));
+  EXPECT_TRUE(near(blocks.view(kArmMountId).numbers(),
+                   numbers_of(arm_mount()) + dx.segment<3>(kArmMount + 3)));
+  EXPECT_TRUE(near(blocks.view(kArmNumbersId).numbers(),
+                   numbers_of(arm_numbers()) + dx.segment<8>(kArmNumbers)));
+  EXPECT_TRUE(near(blocks.view(kBaseMountId).rotation(),
+                   turned(rotation_of(base_mount()), dx, kBaseMount)));
+  EXPECT_TRUE(near(blocks.view(kBaseMountId).numbers(),
+                   numbers_of(base_mount()) + dx.segment<3>(kBaseMount + 3)));
+  EXPECT_TRUE(near(blocks.view(kBaseClockId).numbers(),
+                   numbers_of(base_clock()) + dx.segment<1>(kBaseClock)));
+  EXPECT_TRUE(near(blocks.view(kBaseNumbersId).numbers(),
+                   numbers_of(base_numbers()) + dx.segment<3>(kBaseNumbers)));
+  EXPECT_EQ(blocks.view(kArmMountId).first_rotation(), rotation_of(arm_mount()));
+  EXPECT_EQ(blocks.view(kBaseNumbersId).first_numbers(), numbers_of(base_numbers()));
   // Every block has moved by more than the tolerance, so that a wrong sign is seen.
   for (int column = 0; column < kImuSize; ++column) EXPECT_GT(std::abs(dx[column]), 1e-10);
-  EXPECT_GT(dx.segment<6>(kCameraExtrinsics).cwiseAbs().minCoeff(), 1e-10);
-  EXPECT_GT(dx.segment<6>(kWheelsExtrinsics).cwiseAbs().minCoeff(), 1e-10);
+  EXPECT_GT(dx.segment<6>(kArmMount).cwiseAbs().minCoeff(), 1e-10);
+  EXPECT_GT(dx.segment<6>(kBaseMount).cwiseAbs().minCoeff(), 1e-10);
 }
 
 TEST(Filter, ObservedRotationErrorTurnsTheEstimateOntoTheTruth) {
   Random random(7);
   Filter filter = running_filter(random, 1);
   const Vector3d error(0.02, -0.01, 0.03);
-  const Matrix3d truth = exp_so3(-error) * filter.wheels()[0].R_ItoO;
-  filter.apply(observation(kWheelsExtrinsics, error, 1e-9));
-  EXPECT_LT((filter.wheels()[0].R_ItoO - truth).norm(), 1e-12);
+  const Matrix3d truth = exp_so3(-error) * filter.blocks().view(kBaseMountId).rotation();
+  filter.apply(observation(kBaseMount, error, 1e-9));
+  EXPECT_LT((filter.blocks().view(kBaseMountId).rotation() - truth).norm(), 1e-12);
   const Matrix3d true_R_GtoI = exp_so3(-error) * filter.imu().R_GtoI;
   filter.apply(observation(kThetaColumn, error, 1e-9));
   EXPECT_LT((filter.imu().R_GtoI - true_R_GtoI).norm(), 1e-10);
@@ -204,20 +219,19 @@ TEST(Filter, ObservedRotationErrorTurnsTheEstimateOntoTheTruth) {
 
 TEST(Filter, HeldValuesStayTheSameBits) {
   Random random(8);
-  CameraPrior camera = camera_prior();
-  camera.sigma_intrinsics.setZero();
-  WheelsPrior wheels = wheels_prior();
-  wheels.sigma_extrinsics.tail<1>().setZero();
-  Filter filter(kOptions, {camera}, {wheels});
+  std::vector<BlockSpec> blocks = fixture_blocks();
+  for (BlockEntry& entry : blocks[1].entries) entry.sigma = 0.;  // all of arm.numbers
+  blocks[2].entries[5].sigma = 0.;                               // p_z of base.mount
+  Filter filter(kOptions, blocks);
   filter.initialize(imu_prior(random));
-  const int intrinsics = filter.wheels()[0].intrinsics_column;
-  const int held_position = filter.wheels()[0].extrinsics_column + 5;
+  const int mount = filter.blocks().view(kBaseMountId).column();
+  const int numbers = filter.blocks().view(kBaseNumbersId).column();
   for (int k = 0; k < 12; ++k) {
     if (filter.window_full()) filter.drop_oldest_clone();
     step(filter, random);
     ResidualFactor factor;
     factor.columns.add(0, kImuSize);
-    factor.columns.add(filter.wheels()[0].extrinsics_column, filter.size() - held_position + 5);
+    factor.columns.add(mount, filter.size() - mount);
     factor.set_rows(4);
     factor.H = random.matrix(4, factor.columns.size());
     factor.residual = 0.05 * random.matrix(4, 1);
@@ -231,17 +245,18 @@ TEST(Filter, HeldValuesStayTheSameBits) {
     information.eta = random.matrix(n, 1);
     ASSERT_EQ(filter.apply(information), FactorResult::kApplied);
   }
-  EXPECT_EQ(filter.wheels()[0].x_WI[1], wheels.wheels.x_WI[1]);
-  EXPECT_EQ(filter.wheels()[0].p_IinO[2], wheels.wheels.p_IinO[2]);
-  EXPECT_EQ(filter.cameras()[0].intrinsics, camera.camera.intrinsics);
-  for (const int column : {intrinsics + 1, held_position}) {
+  const auto now = [&](BlockId id) { return filter.blocks().view(id).numbers(); };
+  EXPECT_EQ(now(kBaseNumbersId)[1], 0.06);
+  EXPECT_EQ(now(kBaseMountId)[2], 0.15);
+  EXPECT_EQ(VectorXd(now(kArmNumbersId)), VectorXd(VectorXd::Map(blocks[1].value.data(), 8)));
+  for (const int column : {numbers + 1, mount + 5}) {
     EXPECT_EQ(filter.covariance().col(column), VectorXd::Zero(filter.size()));
     EXPECT_EQ(filter.covariance().row(column).transpose(), VectorXd::Zero(filter.size()));
   }
-  EXPECT_NE(filter.wheels()[0].x_WI[0], wheels.wheels.x_WI[0]);
-  EXPECT_NE(filter.wheels()[0].x_WI[2], wheels.wheels.x_WI[2]);
-  EXPECT_NE(filter.wheels()[0].p_IinO[1], wheels.wheels.p_IinO[1]);
-  EXPECT_EQ(filter.failure(), "");
+  EXPECT_NE(now(kBaseNumbersId)[0], 0.05);
+  EXPECT_NE(now(kBaseNumbersId)[2], 0.3);
+  EXPECT_NE(now(kBaseMountId)[1], 0.02);
+  EXPECT_EQ(failure_of(filter), "");
 }
 
 }  // namespace

@@ -1,98 +1,103 @@
-// Layout of the error state, what the filter refuses, and when it cannot go on.
+// Layout of the error state, and what the filter refuses.
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
 #include "filter_fixture.hpp"
+#include "viwo/api/status.hpp"
 #include "viwo/filter/filter.hpp"
 
 namespace viwo {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using namespace testing;
 
-std::string refusal(const FilterOptions& options, const CameraPrior& camera,
-                    const WheelsPrior& wheels) {
+std::string filter_refusal(const FilterOptions& options, const std::vector<BlockSpec>& blocks,
+                           const std::vector<RoomSpec>& rooms = {}) {
   try {
-    Filter filter(options, {camera}, {wheels});
+    const Filter filter(options, blocks, rooms);
+  } catch (const InputError& error) {
+    return error.what();
   } catch (const std::invalid_argument& error) {
     return error.what();
   }
   return "(accepted)";
 }
 
-TEST(Filter, LaysOutInertialStateClonesCamerasAndWheels) {
+TEST(Filter, LaysOutInertialStateClonesAndBlocks) {
   const Filter filter = make_filter();
   EXPECT_EQ(filter.size(), kSize);
-  EXPECT_EQ(filter.cameras()[0].extrinsics_column, kCameraExtrinsics);
-  EXPECT_EQ(filter.cameras()[0].intrinsics_column, kCameraIntrinsics);
-  EXPECT_EQ(filter.wheels()[0].extrinsics_column, kWheelsExtrinsics);
-  EXPECT_EQ(filter.wheels()[0].time_offset_column, kTimeOffset);
-  EXPECT_EQ(filter.wheels()[0].intrinsics_column, kIntrinsics);
+  const StateBlocks& blocks = filter.blocks();
+  EXPECT_EQ(blocks.view(kArmMountId).column(), kArmMount);
+  EXPECT_EQ(blocks.view(kArmNumbersId).column(), kArmNumbers);
+  EXPECT_EQ(blocks.view(kBaseMountId).column(), kBaseMount);
+  EXPECT_EQ(blocks.view(kBaseClockId).column(), kBaseClock);
+  EXPECT_EQ(blocks.view(kBaseNumbersId).column(), kBaseNumbers);
   VectorXd sigma = VectorXd::Zero(kSize);
-  sigma.segment<6>(kCameraExtrinsics) = camera_prior().sigma_extrinsics;
-  sigma.segment<8>(kCameraIntrinsics) = camera_prior().sigma_intrinsics;
-  sigma.segment<6>(kWheelsExtrinsics) = wheels_prior().sigma_extrinsics;
-  sigma[kTimeOffset] = wheels_prior().sigma_time_offset_s;
-  sigma.segment<3>(kIntrinsics) = wheels_prior().sigma_intrinsics;
+  sigma.segment<6>(kArmMount) = kArmSigma;
+  sigma.segment<8>(kArmNumbers) = VectorXd::Map(kArmNumbersSigma.data(), 8);
+  sigma.segment<6>(kBaseMount) = kBaseSigma;
+  sigma[kBaseClock] = kClockSigma;
+  sigma.segment<3>(kBaseNumbers) = VectorXd::Map(kBaseNumbersSigma.data(), 3);
   const MatrixXd expected = sigma.cwiseAbs2().asDiagonal();
   EXPECT_EQ(filter.covariance(), expected);
+  EXPECT_EQ(filter.held().first(), kBaseMount) << "what is watched stands at the end";
+  EXPECT_EQ(filter.held().count(), kSize - kBaseMount);
   EXPECT_FALSE(filter.initialized());
-  EXPECT_EQ(filter.view(-1).wheels, nullptr);
-  EXPECT_EQ(filter.view(0).wheels, &filter.wheels()[0]);
-  EXPECT_EQ(filter.view(0).P(), filter.covariance());
+}
+
+TEST(Filter, ShowsUpdatesItsStateAndNothingElse) {
+  Random random(10);
+  const Filter filter = running_filter(random, 2);
+  const FilterView view = filter.view();
+  EXPECT_EQ(view.P(), filter.covariance());
+  EXPECT_EQ(view.size, kSize);
+  EXPECT_EQ(view.clones.data(), filter.clones().data());
+  ASSERT_EQ(view.blocks.size(), 5u);
+  EXPECT_EQ(view.block(kBaseNumbersId).numbers()[2], 0.3);
+  EXPECT_EQ(view.block(kBaseMountId).column(), kBaseMount);
+  EXPECT_EQ(view.gravity_m_per_s2, filter.options().gravity_m_per_s2);
 }
 
 TEST(Filter, GivesNoColumnsToWhatIsHeld) {
-  CameraPrior camera = camera_prior();
-  camera.sigma_extrinsics.setZero();
-  WheelsPrior wheels = wheels_prior();
-  wheels.sigma_time_offset_s = 0.;
-  wheels.sigma_extrinsics.setZero();
-  const Filter filter(kOptions, {camera}, {wheels});
+  std::vector<BlockSpec> blocks = fixture_blocks();
+  for (const std::size_t held : {0u, 2u, 3u}) {
+    for (BlockEntry& entry : blocks[held].entries) entry.sigma = 0.;
+  }
+  const Filter filter(kOptions, blocks);
   EXPECT_EQ(filter.size(), kSize - 13);
-  EXPECT_EQ(filter.cameras()[0].extrinsics_column, -1);
-  EXPECT_EQ(filter.cameras()[0].intrinsics_column, kCameraExtrinsics);
-  EXPECT_EQ(filter.wheels()[0].extrinsics_column, -1);
-  EXPECT_EQ(filter.wheels()[0].time_offset_column, -1);
-  EXPECT_EQ(filter.wheels()[0].intrinsics_column, kCameraExtrinsics + 8);
+  EXPECT_EQ(filter.blocks().view(kArmMountId).column(), -1);
+  EXPECT_EQ(filter.blocks().view(kArmNumbersId).column(), kArmMount);
+  EXPECT_EQ(filter.blocks().view(kBaseMountId).column(), -1);
+  EXPECT_EQ(filter.blocks().view(kBaseClockId).column(), -1);
+  EXPECT_EQ(filter.blocks().view(kBaseNumbersId).column(), kArmMount + 8);
 }
 
-TEST(Filter, RefusesPriorsAndSizesThatMakeNoSense) {
-  EXPECT_EQ(refusal(kOptions, camera_prior(), wheels_prior()), "(accepted)");
-  const std::string bad_sigma = "a prior sigma is negative or not finite";
+TEST(Filter, RefusesBlocksRoomsAndSizesThatMakeNoSense) {
+  EXPECT_EQ(filter_refusal(kOptions, fixture_blocks()), "(accepted)");
   for (const double value : {-1e-9, kNaN, std::numeric_limits<double>::infinity()}) {
-    CameraPrior camera = camera_prior();
-    camera.sigma_extrinsics[5] = value;
-    EXPECT_EQ(refusal(kOptions, camera, wheels_prior()), bad_sigma);
-    camera = camera_prior();
-    camera.sigma_intrinsics[7] = value;
-    EXPECT_EQ(refusal(kOptions, camera, wheels_prior()), bad_sigma);
-    WheelsPrior wheels = wheels_prior();
-    wheels.sigma_extrinsics[0] = value;
-    EXPECT_EQ(refusal(kOptions, camera_prior(), wheels), bad_sigma);
-    wheels = wheels_prior();
-    wheels.sigma_time_offset_s = value;
-    EXPECT_EQ(refusal(kOptions, camera_prior(), wheels), bad_sigma);
-    wheels = wheels_prior();
-    wheels.sigma_intrinsics[1] = value;
-    EXPECT_EQ(refusal(kOptions, camera_prior(), wheels), bad_sigma);
+    std::vector<BlockSpec> blocks = fixture_blocks();
+    blocks[0].entries[5].sigma = value;
+    EXPECT_EQ(filter_refusal(kOptions, blocks),
+              "block 'arm.mount': a sigma of 'arm.p_z' is negative or not finite");
+    blocks = fixture_blocks();
+    blocks[4].entries[1].process_sigma = value;
+    EXPECT_EQ(filter_refusal(kOptions, blocks),
+              "block 'base.numbers': a sigma of 'n_2' is negative or not finite");
   }
-  WheelsPrior wheels = wheels_prior();
-  wheels.sigma_intrinsics.conservativeResize(2);
-  EXPECT_EQ(refusal(kOptions, camera_prior(), wheels),
-            "each intrinsic of a wheel set needs a prior sigma");
+  EXPECT_EQ(filter_refusal(kOptions, {}, {{"points", 3, 10}}),
+            "room 'points': its blocks have 10 entries, not 1 to 9");
   for (const int clones : {-1, 0, 1, 101}) {
     FilterOptions options;
     options.clones = clones;
-    EXPECT_EQ(refusal(options, camera_prior(), wheels_prior()),
+    EXPECT_EQ(filter_refusal(options, fixture_blocks()),
               "the number of clones must be within 2 .. 100");
   }
 }
@@ -112,54 +117,6 @@ TEST(Filter, FactorThatIsNotFiniteIsRejectedAndChangesNothing) {
   }
   EXPECT_EQ(filter.covariance(), P);
   EXPECT_EQ(filter.imu().p_IinG, p);
-}
-
-TEST(Filter, SaysWhyItCannotGoOn) {
-  const std::string not_finite = "the estimate or its covariance is not finite any more";
-  {
-    ImuPrior prior = testing::level_prior(0);
-    Filter filter = make_filter();
-    filter.initialize(prior);
-    EXPECT_EQ(filter.failure(), "");
-    prior.state.accel_bias[1] = kNaN;
-    filter.initialize(prior);
-    EXPECT_EQ(filter.failure(), not_finite);
-    prior = testing::level_prior(0);
-    prior.P(4, 4) = kNaN;
-    filter.initialize(prior);
-    EXPECT_EQ(filter.failure(), not_finite);
-    prior.P(4, 4) = -1e-3;
-    filter.initialize(prior);
-    EXPECT_EQ(filter.failure(), "a variance is negative");
-  }
-  {
-    ImuPrior prior = testing::level_prior(0, 1.);
-    prior.P(0, 1) = prior.P(1, 0) = 2.;
-    Filter filter = make_filter();
-    filter.initialize(prior);
-    EXPECT_EQ(filter.failure(), "");  // not yet seen
-    InformationFactor factor;
-    factor.columns.add(0, 3);
-    factor.Lambda = Matrix3d::Identity();
-    factor.eta = Vector3d::Zero();
-    EXPECT_EQ(filter.apply(factor), FactorResult::kFailed);
-    EXPECT_EQ(filter.failure(), "the covariance of the clones is not positive definite any more");
-  }
-}
-
-TEST(Filter, CalibrationOfTheWheelsThatOverflowsEndsTheRun) {
-  for (const int column : {kWheelsExtrinsics + 3, kTimeOffset, kIntrinsics}) {
-    WheelsPrior wheels = wheels_prior();
-    wheels.sigma_extrinsics.tail<3>().setConstant(1e10);
-    wheels.sigma_time_offset_s = 1e10;
-    wheels.sigma_intrinsics[0] = 1e10;
-    Filter filter(kOptions, {camera_prior()}, {wheels});
-    filter.initialize(testing::level_prior(0));
-    ResidualFactor factor = observation(column, VectorXd::Constant(1, 1e305), 1.);
-    factor.H(0, 0) = 1e-5;  // a gain of 1e5
-    ASSERT_EQ(filter.apply(factor), FactorResult::kApplied);
-    EXPECT_EQ(filter.failure(), "the calibration of the wheels is not finite any more") << column;
-  }
 }
 
 }  // namespace

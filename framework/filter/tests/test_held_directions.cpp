@@ -9,6 +9,7 @@
 
 #include "filter_fixture.hpp"
 #include "viwo/filter/covariance.hpp"
+#include "viwo/filter/health.hpp"
 
 namespace viwo {
 namespace {
@@ -180,25 +181,26 @@ TEST(HeldDirections, RefusesColumnsThatAreNotTheirs) {
   EXPECT_EQ(held.size(), 0);
 }
 
-TEST(Filter, HeldDirectionsOfTheWheelsNeverMoveWhateverIsObserved) {
+TEST(Filter, HeldDirectionsOfABlockNeverMoveWhateverIsObserved) {
   Random random(14);
   Filter filter = testing::running_filter(random, 3);
-  // The first radius and the time offset, mixed.
-  const std::array columns{testing::kTimeOffset, testing::kIntrinsics};
+  // The first of the numbers and the clock, mixed.
+  const std::array columns{testing::kBaseClock, testing::kBaseNumbers};
   const Eigen::Vector2d sigma(0.01, 0.001), unit(0.6, 0.8);
   filter.held().add(columns, unit, sigma);
-  const auto along = [&](const Filter& f) {
-    const WheelsView& wheels = f.wheels()[0];
-    return unit[0] * wheels.t_OtoI_s / sigma[0] + unit[1] * wheels.x_WI[0] / sigma[1];
+  const auto number = [&](BlockId id) { return filter.blocks().view(id).numbers()[0]; };
+  const auto along = [&] {
+    return unit[0] * number(testing::kBaseClockId) / sigma[0] +
+           unit[1] * number(testing::kBaseNumbersId) / sigma[1];
   };
-  const double before = along(filter);
-  const double time_before = filter.wheels()[0].t_OtoI_s;
+  const double before = along();
+  const double clock_before = number(testing::kBaseClockId);
   for (int i = 0; i < 5; ++i) {
     ASSERT_EQ(filter.apply(testing::random_factor(random)), FactorResult::kApplied);
   }
-  EXPECT_NEAR(along(filter), before, 1e-12);
-  EXPECT_GT(std::abs(filter.wheels()[0].t_OtoI_s - time_before), 1e-7);  // across, it moves
-  EXPECT_EQ(filter.failure(), "");
+  EXPECT_NEAR(along(), before, 1e-12);
+  EXPECT_GT(std::abs(number(testing::kBaseClockId) - clock_before), 1e-7);  // across, it moves
+  EXPECT_EQ(failure_of(filter), "");
 }
 
 }  // namespace

@@ -130,6 +130,30 @@ ImuRecording read_asl_imu(const std::filesystem::path& path, const LogLimits& li
   return collector.finish(table.reader());
 }
 
+GnssRecording read_asl_gnss(const std::filesystem::path& path, double max_rejected_fraction) {
+  TableReader table(table_file(path));
+  const std::size_t stamp = stamp_column(table);
+  const std::size_t latitude = table.column("latitude", "deg");
+  const std::size_t longitude = table.column("longitude", "deg");
+  const std::size_t altitude = table.column("altitude", "m");
+  std::array<std::size_t, 9> covariance{};
+  for (std::size_t i = 0; i < covariance.size(); ++i) {
+    const std::string entry{"ENU"[i / 3], "ENU"[i % 3]};
+    covariance[i] = table.column("cov_" + entry, "m^2");
+  }
+  GnssCollector collector({std::numeric_limits<double>::infinity(), max_rejected_fraction});
+  while (table.next()) {
+    GnssSample fix;
+    fix.t_ns = table.stamp_ns(stamp);
+    fix.latitude_deg = table.number(latitude);
+    fix.longitude_deg = table.number(longitude);
+    fix.altitude_m = table.number(altitude);
+    read_numbers(table, covariance, fix.covariance_ENU_m2);
+    collector.add(fix, table.reader());
+  }
+  return collector.finish(table.reader());
+}
+
 int camera_index(const TableReader& table, std::size_t column) {
   const std::int64_t camera = table.integer(column);
   if (camera < 0 || camera > kMaxCamera) {

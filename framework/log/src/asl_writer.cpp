@@ -20,10 +20,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Index into kFolders.
-enum Table : std::size_t { kWheels, kImu, kFeatures, kTruth, kCalibration, kPoses, kTables };
+enum Table : std::size_t { kWheels, kImu, kFeatures, kTruth, kCalibration, kPoses, kGnss, kTables };
 constexpr std::array<const char*, kTables> kFolders = {
     "wheels0", "imu0", "features0", "state_groundtruth_estimate0", "calibration_groundtruth0",
-    "poses0"};
+    "poses0",  "gnss0"};
 
 constexpr const char* kData = "data.csv";
 constexpr const char* kImages = "data";
@@ -39,6 +39,10 @@ constexpr const char* kTruthHeader =
 constexpr const char* kPosesHeader =
     "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
     "q_RS_z []\n";
+
+constexpr const char* kGnssHeader =
+    "timestamp_ns,latitude [deg],longitude [deg],altitude [m],cov_EE [m^2],cov_EN [m^2],"
+    "cov_EU [m^2],cov_NE [m^2],cov_NN [m^2],cov_NU [m^2],cov_UE [m^2],cov_UN [m^2],cov_UU [m^2]\n";
 
 /// Velocity and biases of a pose: a reader of states must not take them for zero.
 constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
@@ -124,12 +128,26 @@ struct AslWriter::Tables {
   void write_measured(const PoseSample& pose);
   void write(const ImuSample& imu);
   void write(const FeatureSample& image);
+  void write(const GnssSample& fix);
   void write(const StateSample& state);
   void write(const CalibrationSample& parameter);
   void write(const ImageSample& image);
+  /// False when the measurement is of none of the kinds.
+  template <class... Samples>
+  bool write_one_of(const Measurement& measurement) {
+    return (write_if<Samples>(measurement) || ...);
+  }
 
   std::vector<std::optional<TextWriter>> image_tables;  ///< by camera
   Image pixels;
+
+ private:
+  template <class Sample>
+  bool write_if(const Measurement& measurement) {
+    const auto* sample = measurement.get_if<Sample>();
+    if (sample != nullptr) write(*sample);
+    return sample != nullptr;
+  }
 };
 
 TextWriter& AslWriter::Tables::open(Table table, std::string_view header) {
@@ -203,6 +221,13 @@ void AslWriter::Tables::write(const StateSample& state) {
   out << "\n";
 }
 
+void AslWriter::Tables::write(const GnssSample& fix) {
+  TextWriter& out = open(kGnss, kGnssHeader);
+  out << fix.t_ns << "," << fix.latitude_deg << "," << fix.longitude_deg << "," << fix.altitude_m;
+  append(out, fix.covariance_ENU_m2);
+  out << "\n";
+}
+
 void AslWriter::Tables::write(const ImuSample& imu) {
   TextWriter& out = open(kImu, kImuHeader);
   out << imu.t_ns;
@@ -262,8 +287,9 @@ AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>(
 
 AslWriter::~AslWriter() = default;
 
-void AslWriter::write(const Measurement& measurement) {
-  std::visit([this](const auto& sample) { tables_->write(sample); }, measurement);
+bool AslWriter::write(const Measurement& measurement) {
+  return tables_->write_one_of<ImuSample, EncoderSample, FeatureSample, ImageSample, PoseSample,
+                               GnssSample, StateSample, CalibrationSample>(measurement);
 }
 
 void AslWriter::write_measured(const PoseSample& pose) { tables_->write_measured(pose); }

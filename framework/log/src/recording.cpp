@@ -11,13 +11,6 @@
 namespace viwo::log {
 namespace {
 
-bool is_finite(double value) { return std::isfinite(value); }
-
-template <std::size_t N>
-bool all_finite(const std::array<double, N>& values) {
-  return std::all_of(values.begin(), values.end(), is_finite);
-}
-
 /// nullptr when the quaternion can be used; it is of unit norm then.
 const char* why_not_unit(std::array<double, 4>& xyzw) {
   Eigen::Quaterniond q(Eigen::Map<const Eigen::Vector4d>(xyzw.data()));
@@ -34,6 +27,8 @@ const char* why_rejected(StateSample& state) {
   }
   return why_not_unit(state.q_ItoG_xyzw);
 }
+
+const char* why_rejected(const GnssSample& fix) { return fix.fault(); }
 
 EncoderSample rate_sample(const EncoderReading& reading) {
   EncoderSample sample;
@@ -106,6 +101,7 @@ Recording<Sample> SampleCollector<Sample>::finish(const TextReader& at) {
 
 template class SampleCollector<PoseSample>;
 template class SampleCollector<ImuSample>;
+template class SampleCollector<GnssSample>;
 template class SampleCollector<StateSample>;
 
 std::size_t FeatureCollector::find(std::int64_t t_ns, int camera) const {
@@ -129,7 +125,8 @@ std::size_t FeatureCollector::find_or_make(std::int64_t t_ns, int camera) {
 
 void FeatureCollector::add(std::int64_t t_ns, int camera, const FeaturePoint& point,
                            const TextReader& at) {
-  if (!is_finite(point.u_px) || !is_finite(point.v_px)) return filter_.reject(kNotFinite, at);
+  if (!std::isfinite(point.u_px) || !std::isfinite(point.v_px))
+    return filter_.reject(kNotFinite, at);
   const std::size_t known = find(t_ns, camera);
   if (known < images_.size() && ids_[known - first_].contains(point.id)) {
     return filter_.reject(kIdTwice, at);

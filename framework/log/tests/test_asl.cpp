@@ -7,6 +7,19 @@
 #include "viwo/log/asl.hpp"
 
 namespace viwo::log {
+
+/// As a plugin of somebody else has it.
+struct RangeSample {
+  std::int64_t t_ns = 0;
+  double range_m = 0.;
+};
+
+}  // namespace viwo::log
+
+VIWO_SAMPLE(viwo::log::RangeSample, "range", 1, &viwo::log::RangeSample::t_ns,
+            &viwo::log::RangeSample::range_m);
+
+namespace viwo::log {
 namespace {
 
 using ::testing::ElementsAre;
@@ -139,19 +152,19 @@ std::vector<Measurement> some_measurements() {
 TEST_F(AslTest, AWrittenLogReadsBackToTheSameBits) {
   const auto written = some_measurements();
   AslWriter writer(folder_ / "log");
-  for (const Measurement& measurement : written) writer.write(measurement);
+  for (const Measurement& measurement : written) EXPECT_TRUE(writer.write(measurement));
   writer.close();
   const auto wheels = read_asl_encoders(folder_ / "log" / "wheels0", {}).samples;
   const auto poses = read_asl_poses(folder_ / "log" / "state_groundtruth_estimate0", {}).samples;
   ASSERT_EQ(wheels.size(), 100U);
   ASSERT_EQ(poses.size(), 100U);
   for (std::size_t i = 0; i < 100; ++i) {
-    const auto& sample = std::get<EncoderSample>(written[2 * i]);
+    const auto& sample = *written[2 * i].get_if<EncoderSample>();
     EXPECT_EQ(wheels[i].t_ns, sample.t_ns);
     EXPECT_EQ(wheels[i].n_steer, 3);
     EXPECT_EQ(wheels[i].drive_rad_per_s, sample.drive_rad_per_s);
     EXPECT_EQ(wheels[i].steer_rad, sample.steer_rad);
-    const auto& pose = std::get<PoseSample>(written[2 * i + 1]);
+    const auto& pose = *written[2 * i + 1].get_if<PoseSample>();
     EXPECT_EQ(poses[i].t_ns, pose.t_ns);
     EXPECT_EQ(poses[i].p_BinW_m, pose.p_BinW_m);
     EXPECT_EQ(poses[i].q_BtoW_xyzw, pose.q_BtoW_xyzw);
@@ -165,11 +178,11 @@ TEST_F(AslTest, WritesTheDocumentedColumns) {
   sample.n_drive = 2;
   sample.n_steer = 1;
   sample.drive_rad_per_s = {0.1, -2.};
-  writer.write(sample);
+  EXPECT_TRUE(writer.write(sample));
   PoseSample pose;
   pose.t_ns = 8;
   pose.p_BinW_m = {1., 2., 0.5};
-  writer.write(pose);
+  EXPECT_TRUE(writer.write(pose));
   writer.close();
   EXPECT_EQ(content(folder_ / "log/wheels0/data.csv"),
             "timestamp_ns,drive_1 [rad/s],drive_2 [rad/s],steer_1 [rad]\n7,0.1,-2,0\n");
@@ -181,12 +194,19 @@ TEST_F(AslTest, WritesTheDocumentedColumns) {
             "8,1,2,0.5,1,0,0,0,nan,nan,nan,nan,nan,nan,nan,nan,nan\n");
 }
 
+TEST_F(AslTest, SaysThatAForeignKindOfSamplesHasNoTable) {
+  AslWriter writer(folder_ / "log");
+  EXPECT_FALSE(writer.write(RangeSample{7, 1.5}));
+  writer.close();
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "log"));
+}
+
 TEST_F(AslTest, ReplacesAnEarlierLogCompletely) {
   for (const Measurement& first : some_measurements()) {
     AslWriter writer(folder_ / "log");
-    writer.write(first);
+    EXPECT_TRUE(writer.write(first));
     writer.close();
-    if (std::holds_alternative<PoseSample>(first)) break;
+    if (first.get_if<PoseSample>() != nullptr) break;
   }
   EXPECT_FALSE(std::filesystem::exists(folder_ / "log" / "wheels0"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "log" / "state_groundtruth_estimate0"));

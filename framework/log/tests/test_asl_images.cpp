@@ -51,7 +51,7 @@ TEST_F(AslImagesTest, WhatTheWriterWroteIsReadBackToTheBit) {
       images.push_back(image);
       written.push_back({1'403'636'579'763'555'584 + k * 50'000'000 + cam * 7, cam,
                          std::make_shared<ImageInMemory>(image)});
-      writer.write(written.back());
+      EXPECT_TRUE(writer.write(written.back()));
     }
   }
   writer.close();

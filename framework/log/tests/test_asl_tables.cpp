@@ -27,7 +27,7 @@ class AslTables : public InFolder {
 
   void write_log(const std::vector<Measurement>& measurements) const {
     AslWriter writer(folder_ / "log");
-    for (const Measurement& measurement : measurements) writer.write(measurement);
+    for (const Measurement& measurement : measurements) EXPECT_TRUE(writer.write(measurement));
     writer.close();
   }
 
@@ -58,10 +58,35 @@ TEST_F(AslTables, ImuSamplesReadBackToTheSameBits) {
   EXPECT_TRUE(read.rejections.empty());
   ASSERT_EQ(read.samples.size(), written.size());
   for (std::size_t k = 0; k < written.size(); ++k) {
-    const auto& expected = std::get<ImuSample>(written[k]);
+    const auto& expected = *written[k].get_if<ImuSample>();
     EXPECT_EQ(read.samples[k].t_ns, expected.t_ns);
     EXPECT_EQ(read.samples[k].gyro_rad_per_s, expected.gyro_rad_per_s);
     EXPECT_EQ(read.samples[k].accel_m_per_s2, expected.accel_m_per_s2);
+  }
+}
+
+TEST_F(AslTables, FixesReadBackToTheSameBitsAndTheirSpacingsAreNoGaps) {
+  std::vector<Measurement> written;
+  for (std::int64_t k = 0; k < 100; ++k) {
+    GnssSample fix;
+    fix.t_ns = kStart + k * 400'000'003;
+    fix.latitude_deg = std::remainder(any(), 90.);
+    fix.longitude_deg = any();
+    fix.altitude_m = any();
+    fill(fix.covariance_ENU_m2);
+    written.emplace_back(fix);
+  }
+  write_log(written);
+  const GnssRecording read = read_asl_gnss(folder_ / "log/gnss0", 0.1);
+  EXPECT_TRUE(read.rejections.empty());
+  ASSERT_EQ(read.samples.size(), written.size());
+  for (std::size_t k = 0; k < written.size(); ++k) {
+    const auto& expected = *written[k].get_if<GnssSample>();
+    EXPECT_EQ(read.samples[k].t_ns, expected.t_ns);
+    EXPECT_EQ(read.samples[k].latitude_deg, expected.latitude_deg);
+    EXPECT_EQ(read.samples[k].longitude_deg, expected.longitude_deg);
+    EXPECT_EQ(read.samples[k].altitude_m, expected.altitude_m);
+    EXPECT_EQ(read.samples[k].covariance_ENU_m2, expected.covariance_ENU_m2);
   }
 }
 
@@ -87,7 +112,7 @@ TEST_F(AslTables, StatesReadBackToTheSameBits) {
   ASSERT_EQ(read.size(), written.size());
   ASSERT_EQ(poses.size(), written.size());
   for (std::size_t k = 0; k < written.size(); ++k) {
-    const auto& expected = std::get<StateSample>(written[k]);
+    const auto& expected = *written[k].get_if<StateSample>();
     EXPECT_EQ(read[k].t_ns, expected.t_ns);
     EXPECT_EQ(read[k].q_ItoG_xyzw, expected.q_ItoG_xyzw);
     EXPECT_EQ(read[k].p_IinG_m, expected.p_IinG_m);
@@ -133,7 +158,7 @@ TEST_F(AslTables, ImagesReadBackToTheSameBitsAlsoWithoutPoints) {
   ASSERT_EQ(read.samples.size(), written.size());
   int empty = 0;
   for (std::size_t k = 0; k < written.size(); ++k) {
-    const auto& expected = std::get<FeatureSample>(written[k]);
+    const auto& expected = *written[k].get_if<FeatureSample>();
     EXPECT_EQ(read.samples[k].t_ns, expected.t_ns);
     EXPECT_EQ(read.samples[k].camera, expected.camera);
     ASSERT_EQ(read.samples[k].points.size(), expected.points.size());
@@ -158,7 +183,7 @@ TEST_F(AslTables, CalibrationReadsBackToTheSameBits) {
   EXPECT_TRUE(read.rejections.empty());
   ASSERT_EQ(read.samples.size(), written.size());
   for (std::size_t k = 0; k < written.size(); ++k) {
-    const auto& expected = std::get<CalibrationSample>(written[k]);
+    const auto& expected = *written[k].get_if<CalibrationSample>();
     EXPECT_EQ(read.samples[k].t_ns, expected.t_ns);
     EXPECT_EQ(read.samples[k].name, expected.name);
     EXPECT_EQ(read.samples[k].value, expected.value);

@@ -40,6 +40,13 @@ ObservabilityMatrix::ObservabilityMatrix(const Filter& filter, const FeatureOpti
   for (std::size_t k = 0; k < calibration_.size(); ++k) {
     prior_sigma_[kImuSize + static_cast<int>(k)] = std::sqrt(P(calibration_[k], calibration_[k]));
   }
+  is_in_room_.resize(column_of_.size(), false);
+  const auto blocks = filter.blocks().views();
+  for (const BlockView& block : blocks.subspan(filter.blocks().specs().size())) {
+    for (int i = 0; i < block.size(); ++i) {
+      is_in_room_[static_cast<std::size_t>(block.column() + i)] = true;
+    }
+  }
   p_FinG_ = filter.imu().p_IinG + filter.imu().R_GtoI.transpose() * feature_.p_FinI_m;
   rows_.setZero(size() + kBufferedRows, size());
   n_rows_ = 0;
@@ -95,16 +102,14 @@ void ObservabilityMatrix::on_factor(const Filter& /*filter*/, const UpdateEntry&
   const Eigen::MatrixXd R = factor.R;
   const Eigen::LLT<Eigen::MatrixXd> llt(R);
   if (llt.info() != Eigen::Success || !factor.H.allFinite()) return;
-  set_carry(factor.columns);
-  const Eigen::MatrixXd rows = factor.H * carry_;
-  add_rows(llt.matrixL().solve(rows));
+  const Eigen::MatrixXd H = factor.H;
+  add_factor(factor.columns, llt.matrixL().solve(H));
 }
 
 void ObservabilityMatrix::on_factor(const Filter& /*filter*/, const UpdateEntry& /*update*/,
                                     const InformationFactor& factor) {
   const int n = factor.columns.size();
   if (n == 0) return;
-  set_carry(factor.columns);
   // (OB-3). Square roots are taken in units in which the columns are comparable.
   Eigen::VectorXd unit = Eigen::VectorXd::Ones(n);
   for (int i = 0; i < n; ++i) {
@@ -120,9 +125,25 @@ void ObservabilityMatrix::on_factor(const Filter& /*filter*/, const UpdateEntry&
   }
   if (dropped == n) return;
   const int kept = n - dropped;
-  add_rows(eigen.eigenvalues().tail(kept).cwiseSqrt().asDiagonal() *
-           eigen.eigenvectors().rightCols(kept).transpose() * unit.cwiseInverse().asDiagonal() *
-           carry_);
+  add_factor(factor.columns, eigen.eigenvalues().tail(kept).cwiseSqrt().asDiagonal() *
+                                 eigen.eigenvectors().rightCols(kept).transpose() *
+                                 unit.cwiseInverse().asDiagonal());
+}
+
+void ObservabilityMatrix::add_factor(const FactorColumns& columns, const Eigen::MatrixXd& rows) {
+  set_carry(columns);
+  std::vector<int> unknown;
+  int k = 0;
+  for (const ColumnRange& block : columns.blocks()) {
+    for (int i = 0; i < block.count; ++i, ++k) {
+      if (is_in_room_[static_cast<std::size_t>(block.first + i)]) unknown.push_back(k);
+    }
+  }
+  if (unknown.empty()) return add_rows(rows * carry_);
+  // What comes and goes is not in the analysed state: the rows that its values do not enter.
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(rows(Eigen::all, unknown));
+  const Eigen::MatrixXd turned = qr.householderQ().adjoint() * (rows * carry_);
+  add_rows(turned.bottomRows(rows.rows() - qr.rank()));
 }
 
 void ObservabilityMatrix::add_rows(const Eigen::MatrixXd& rows) {

@@ -1,6 +1,7 @@
 // Jacobians carried back to the start, against what they are there.
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -25,16 +26,19 @@ ImuPrior start_prior() {
 }
 
 /// A filter whose camera extrinsics are six calibration columns.
-Filter make_filter() {
+Filter make_filter(const std::vector<RoomSpec>& rooms = {}) {
   FilterOptions options;
   options.clones = 3;
-  CameraPrior camera;
-  camera.sigma_extrinsics.setConstant(0.02);
-  camera.sigma_extrinsics[4] = 0.;  // held
-  Filter filter(options, {camera}, {});
+  BlockSpec camera;
+  camera.name = "cam0.extrinsics";
+  camera.add_rotation({"a", "b", "c"}, Eigen::Matrix3d::Identity(), Vector3d::Constant(0.02));
+  camera.add("x", "m", 0., 0.02).add("y", "m", 0., 0.).add("z", "m", 0., 0.02);  // y is held
+  Filter filter(options, {camera}, rooms);
   filter.initialize(start_prior());
   return filter;
 }
+
+int camera_column(const Filter& filter) { return filter.blocks().views()[0].column(); }
 
 /// One more epoch of a quiet tumble; returns the transition.
 ImuMatrix advance(Filter& filter) {
@@ -59,7 +63,7 @@ TEST(ObservabilityMatrix, LeavesHeldColumnsOut) {
   const Filter filter = make_filter();
   const ObservabilityMatrix matrix(filter, {});
   EXPECT_EQ(matrix.size(), 15 + 5 + 3);
-  const int first = filter.cameras()[0].extrinsics_column;
+  const int first = camera_column(filter);
   EXPECT_EQ(matrix.state_column(first), 15);
   EXPECT_EQ(matrix.state_column(first + 4), -1);
   EXPECT_EQ(matrix.state_column(first + 5), 19);
@@ -80,7 +84,7 @@ TEST(ObservabilityMatrix, CarriesAFactorBackToTheStart) {
   factor.columns.add(filter.clones()[0].column, 6);
   factor.columns.add(filter.clones()[1].column, 6);
   factor.columns.add(kVelocityColumn, 3);
-  factor.columns.add(filter.cameras()[0].extrinsics_column, 6);
+  factor.columns.add(camera_column(filter), 6);
   factor.set_rows(3);
   std::mt19937_64 rng(1);
   std::normal_distribution<double> gaussian;
@@ -113,6 +117,46 @@ TEST(ObservabilityMatrix, CarriesAFactorBackToTheStart) {
   normal.eta = VectorXd::Zero(21);
   by_information.on_factor(again, {}, normal);
   EXPECT_LT((gram(by_information) - information).norm(), 1e-9 * information.norm());
+}
+
+TEST(ObservabilityMatrix, DoesNotTakeLandmarksAsKnown) {
+  // GIVEN a factor of a pose and of a landmark that stands in the state
+  Filter filter = make_filter({{.name = "landmarks", .blocks = 2, .entries = 3}});
+  ObservabilityMatrix matrix(filter, {.enabled = false});
+  const ImuMatrix Phi = advance(filter);
+  matrix.on_clone(filter, Phi);
+  ResidualFactor factor;
+  factor.columns.add(filter.clones()[0].column, 6);
+  factor.columns.add(filter.blocks().views().back().column(), 3);
+  factor.set_rows(5);
+  std::mt19937_64 rng(2);
+  std::normal_distribution<double> gaussian;
+  factor.H = MatrixXd::NullaryExpr(5, 9, [&] { return gaussian(rng); });
+  factor.R.setIdentity();
+  matrix.on_factor(filter, {}, factor);
+  // THEN what remains is what it tells when nothing is known of the landmark
+  const MatrixXd H = factor.H.leftCols(6) * Phi.topRows<6>(), L = factor.H.rightCols(3);
+  const MatrixXd without =
+      MatrixXd::Identity(5, 5) - L * (L.transpose() * L).inverse() * L.transpose();
+  const MatrixXd expected = H.transpose() * without * H;
+  const MatrixXd found = gram(matrix).topLeftCorner(15, 15);
+  EXPECT_LT((found - expected).norm(), 1e-9 * expected.norm());
+
+  // The same as normal equations; and one bearing of it says nothing of the pose.
+  ObservabilityMatrix by_information(filter, {.enabled = false});
+  by_information.on_clone(filter, Phi);
+  InformationFactor normal;
+  normal.columns = factor.columns;
+  normal.Lambda = factor.H.transpose() * factor.H;
+  normal.eta = VectorXd::Zero(9);
+  by_information.on_factor(filter, {}, normal);
+  EXPECT_LT((gram(by_information) - gram(matrix)).norm(), 1e-9 * expected.norm());
+  ObservabilityMatrix of_bearing(filter, {.enabled = false});
+  of_bearing.on_clone(filter, Phi);
+  const MatrixXd bearing = factor.H.topRows(2);
+  normal.Lambda = bearing.transpose() * bearing;
+  of_bearing.on_factor(filter, {}, normal);
+  EXPECT_LT(gram(of_bearing).norm(), 1e-9);
 }
 
 /// Bearing of the feature in the frame of the last clone, when the start was off by `dx`.

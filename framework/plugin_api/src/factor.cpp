@@ -1,5 +1,8 @@
+#include <algorithm>
 #include <stdexcept>
+#include <string>
 
+#include "viwo/api/status.hpp"
 #include "viwo/api/update.hpp"
 
 namespace viwo {
@@ -26,6 +29,7 @@ FactorSink::FactorSink(int max_residual_factors, int max_state_size)
     : residuals_(static_cast<std::size_t>(max_residual_factors)) {
   information_.Lambda.setZero(max_state_size, max_state_size);
   information_.eta.setZero(max_state_size);
+  added_.reserve(static_cast<std::size_t>(max_state_size));  // a block has an entry at least
 }
 
 ResidualFactor& FactorSink::add_residual() {
@@ -42,9 +46,30 @@ InformationFactor& FactorSink::add_information() {
   return information_;
 }
 
+std::optional<BlockId> FactorSink::add_block(RoomId room, std::span<const double> value) {
+  const auto index = static_cast<std::size_t>(room.index);
+  if (room.index < 0 || index >= rooms_.size() || rooms_[index].free == nullptr) {
+    throw ContractError("adds a block to a room that it has not declared");
+  }
+  FreeBlocks& blocks = rooms_[index];
+  if (static_cast<int>(value.size()) != blocks.entries) {
+    throw ContractError("adds a block of " + std::to_string(value.size()) +
+                        " numbers to a room for blocks of " + std::to_string(blocks.entries));
+  }
+  if (blocks.taken == blocks.free->size()) return std::nullopt;
+  AddedBlock added;
+  // From behind, where the host takes them away.
+  added.id = (*blocks.free)[blocks.free->size() - ++blocks.taken];
+  std::copy(value.begin(), value.end(), added.value.begin());
+  added_.push_back(added);
+  return added.id;
+}
+
 void FactorSink::clear() {
   n_residuals_ = 0;
   has_information_ = false;
+  added_.clear();
+  for (FreeBlocks& room : rooms_) room.taken = 0;
   applied_ = rejected_ = 0;
 }
 

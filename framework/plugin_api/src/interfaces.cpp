@@ -13,6 +13,9 @@ ParamError::ParamError(std::string key, const std::string& text)
     : InputError(text), key_(std::move(key)) {}
 ParamError::~ParamError() = default;
 
+ContractError::ContractError(const std::string& text) : std::logic_error(text) {}
+ContractError::~ContractError() = default;
+
 KinematicModel::~KinematicModel() = default;
 
 Status KinematicModel::inverse(const Twist& /*xi*/, const Intrinsics& /*x_WI*/,
@@ -25,6 +28,8 @@ Status KinematicModel::move_frame(const Eigen::Vector3d& /*g*/, Intrinsics& /*x_
 }
 
 Sensor::~Sensor() = default;
+
+bool Sensor::can_be_exact() const { return false; }
 
 void Sensor::rejections(std::vector<RejectionCount>& /*out*/) const {}
 
@@ -40,7 +45,15 @@ void Sensor::estimate(const EstimateSample& /*estimate*/) {}
 
 ImageSource::~ImageSource() = default;
 
+Declarations::~Declarations() = default;
+
+BlockEdits::~BlockEdits() = default;
+
 Update::~Update() = default;
+
+void Update::start(const UpdateSetup& /*setup*/) {}
+
+void Update::settle(const FilterView& /*filter*/, BlockEdits& /*edits*/) {}
 
 void Update::rejections(std::vector<RejectionCount>& /*out*/) const {}
 

@@ -3,6 +3,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "checked_update.hpp"
 #include "guarded_model.hpp"
 #include "library.hpp"
 #include "viwo/api/plugin.hpp"
@@ -68,6 +69,14 @@ const Node* find_type(const Node& section, const std::string& path, const std::s
   return type;
 }
 
+/// SplitMix64's output function: neighbouring values give unrelated ones.
+std::uint64_t mixed(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15ULL;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
+  return x ^ (x >> 31);
+}
+
 /// Runs the plugin's constructor; false with an entry in `errors` if the user has to mend
 /// something.
 bool construct(Instance& instance, const Node& section, const std::string& path, Errors& errors) {
@@ -91,12 +100,39 @@ bool construct(Instance& instance, const Node& section, const std::string& path,
                       text.empty() ? "create() gave neither an object nor a reason" : text);
 }
 
+/// False with an entry in `errors` when a sensor gives samples that others know otherwise.
+bool kinds_fit(const Sensor& sensor, const PluginInfo& info, SampleKinds& kinds,
+               const Node& section, const std::string& path, Errors& errors) {
+  const SampleTypes yields = guarded(info, "yields", [&] { return sensor.yields(); });
+  for (const SampleType* type : yields) {
+    if (type == nullptr) throw PluginFailure(info, "yields", "gave a null pointer");
+    try {
+      kinds.require(*type, info);
+    } catch (const InputError& error) {
+      errors.add(section.mark(), path + ": " + error.what());
+      return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
+
+std::uint64_t instance_seed(std::uint64_t run_seed, std::string_view kind, std::string_view path) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  const auto add = [&hash](char c) {
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+  };
+  for (const char c : kind) add(c);
+  add('\0');  // ("ab", "c") is not ("a", "bc")
+  for (const char c : path) add(c);
+  return mixed(mixed(run_seed) + hash);
+}
 
 template <class Interface>
 Loaded<Interface> PluginRegistry::make(const Node& section, const std::string& path,
                                        std::uint64_t seed,
-                                       std::span<const std::string_view> other_keys,
+                                       std::span<const std::string_view> other_keys, bool exact,
                                        Errors& errors) {
   constexpr const char* kind = detail::PluginKind<Interface>::kName;
   std::string known;
@@ -116,7 +152,8 @@ Loaded<Interface> PluginRegistry::make(const Node& section, const std::string& p
   std::vector<Loaded<KinematicModel>> models;
   config::ReadContext context;
   context.make_kinematics = [&](const Node& node, const std::string& node_path, Errors& all) {
-    models.push_back(make_kinematics(node, node_path, all));
+    models.push_back(
+        make_kinematics(node, node_path, instance_seed(seed, "kinematics", node_path), all));
     return static_cast<const KinematicModel*>(models.back().object.get());
   };
   std::vector<std::string_view> keys(other_keys.begin(), other_keys.end());
@@ -127,9 +164,13 @@ Loaded<Interface> PluginRegistry::make(const Node& section, const std::string& p
   if (errors.size() != errors_before) return {};
 
   instance->log = log_;
-  instance->services = {instance.get(), &Instance::log_text, seed};
+  instance->services = {instance.get(), &Instance::log_text, seed, exact};
   for (const auto& model : models) instance->models.push_back(model.object);
   if (!construct(*instance, section, path, errors)) return {};
+  if constexpr (std::is_same_v<Interface, Sensor>) {
+    const auto& sensor = *static_cast<const Sensor*>(instance->object);
+    if (!kinds_fit(sensor, info, *sample_kinds_, section, path, errors)) return {};
+  }
 
   Node resolved = Node::empty_map();
   resolved.set("type", Node::scalar_of(info.name));
@@ -145,25 +186,30 @@ Loaded<Interface> PluginRegistry::make(const Node& section, const std::string& p
   if constexpr (std::is_same_v<Interface, KinematicModel>) {
     object = std::make_shared<GuardedModel>(std::move(object), info);
   }
+  if constexpr (std::is_same_v<Interface, Update>) {
+    object = std::make_shared<CheckedUpdate>(std::move(object), info, sample_kinds_);
+  }
   return {std::move(object), info, instance->params, std::move(resolved)};
 }
 
 Loaded<KinematicModel> PluginRegistry::make_kinematics(
-    const Node& section, const std::string& path, Errors& errors,
+    const Node& section, const std::string& path, std::uint64_t seed, Errors& errors,
     std::span<const std::string_view> other_keys) {
-  return make<KinematicModel>(section, path, 0, other_keys, errors);
+  return make<KinematicModel>(section, path, seed, other_keys, false, errors);
 }
 
 Loaded<Sensor> PluginRegistry::make_sensor(const Node& section, const std::string& path,
                                            std::uint64_t seed, Errors& errors,
-                                           std::span<const std::string_view> other_keys) {
-  return make<Sensor>(section, path, seed, other_keys, errors);
+                                           std::span<const std::string_view> other_keys,
+                                           bool exact) {
+  return make<Sensor>(section, path, seed, other_keys, exact, errors);
 }
 
 Loaded<Update> PluginRegistry::make_update(const Node& section, const std::string& path,
-                                           Errors& errors,
-                                           std::span<const std::string_view> other_keys) {
-  return make<Update>(section, path, 0, other_keys, errors);
+                                           std::uint64_t seed, Errors& errors,
+                                           std::span<const std::string_view> other_keys,
+                                           bool exact) {
+  return make<Update>(section, path, seed, other_keys, exact, errors);
 }
 
 }  // namespace viwo

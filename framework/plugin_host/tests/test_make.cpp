@@ -1,5 +1,6 @@
 // Objects from configuration: values, errors with positions, failures, lifetimes.
 #include <array>
+#include <set>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -24,7 +25,7 @@ Node section(const std::string& yaml) {
 std::string errors_of(const std::string& yaml) {
   PluginRegistry registry({kBadPlugins});
   Errors errors;
-  const auto loaded = registry.make_kinematics(section(yaml), "kinematics", errors);
+  const auto loaded = registry.make_kinematics(section(yaml), "kinematics", 1, errors);
   EXPECT_EQ(loaded.object == nullptr, !errors.empty());
   return errors.text();
 }
@@ -33,7 +34,7 @@ TEST(Make, AKinematicModelThatComputes) {
   PluginRegistry registry({kBadPlugins});
   Errors errors;
   const auto loaded =
-      registry.make_kinematics(section("{type: moody, radius_m: 0.25}"), "k", errors);
+      registry.make_kinematics(section("{type: moody, radius_m: 0.25}"), "k", 1, errors);
   ASSERT_EQ(errors.text(), "");
   EXPECT_EQ(loaded.info.name, "moody");
   EXPECT_EQ(loaded.params.number("radius_m"), 0.25);
@@ -81,11 +82,45 @@ TEST(Make, ASensorKeepsItsModelsAndServices) {
   }
   Measurement measurement;
   ASSERT_EQ(loaded.object->next(measurement), Status::kOk);
-  EXPECT_EQ(std::get<EncoderSample>(measurement).drive_rad_per_s[0], 0.1 * 20.);
+  EXPECT_EQ(measurement.get_if<EncoderSample>()->drive_rad_per_s[0], 0.1 * 20.);
   EXPECT_EQ(loaded.object->next(measurement), Status::kOk);
   EXPECT_EQ(loaded.object->next(measurement), Status::kEnd);
   loaded = {};
   EXPECT_EQ(messages, (std::vector<std::string>{"ticks warns: file /f", "ticks: goodbye r"}));
+}
+
+TEST(Make, GivesEveryPluginItsSeedAndModelsNestedInItTheirOwn) {
+  std::vector<std::string> seeds;
+  PluginRegistry registry({kBadPlugins},
+                          [&](const PluginInfo& info, LogLevel level, std::string_view text) {
+                            if (level == LogLevel::kWarning || info.name == "ticks") return;
+                            seeds.push_back(info.name + " " + std::string(text));
+                          });
+  Errors errors;
+  registry.make_kinematics(section("{type: moody, mood: seed}"), "kinematics", 7, errors);
+  registry.make_update(section("{type: failing, what: seed}"), "updates.u", 8, errors);
+  registry.make_sensor(section("{type: ticks, kinematics: {type: moody, mood: seed}}"), "sensors.w",
+                       9, errors);
+  ASSERT_EQ(errors.text(), "");
+  const auto nested = std::to_string(instance_seed(9, "kinematics", "sensors.w.kinematics"));
+  EXPECT_EQ(seeds, (std::vector<std::string>{"moody 7", "failing 8", "moody " + nested}));
+}
+
+TEST(InstanceSeed, IsTheSameOnEveryMachine) {
+  EXPECT_EQ(instance_seed(1, "update", "updates.wheel_odometry"), 0x5aa0d58584b98730u);
+  EXPECT_EQ(instance_seed(0, "kinematics", "kinematics"), 0xbd7b5c5ef318ab62u);
+}
+
+TEST(InstanceSeed, IsAnotherOneForEveryRunKindAndPath) {
+  std::set<std::uint64_t> seeds;
+  for (std::uint64_t run = 0; run < 100; ++run) {
+    for (const char* kind : {"kinematics", "update", "updates"}) {
+      for (const char* path : {"", "a", "b", "a.b", "s.a"}) {
+        seeds.insert(instance_seed(run, kind, path));
+      }
+    }
+  }
+  EXPECT_EQ(seeds.size(), 100u * 3 * 5);
 }
 
 TEST(Make, TwoSensorsDoNotSeeEachOther) {
@@ -97,7 +132,7 @@ TEST(Make, TwoSensorsDoNotSeeEachOther) {
   EXPECT_EQ(a.object->next(measurement), Status::kOk);
   EXPECT_EQ(a.object->next(measurement), Status::kEnd);
   EXPECT_EQ(b.object->next(measurement), Status::kOk);
-  EXPECT_EQ(std::get<EncoderSample>(measurement).drive_rad_per_s[0], 0.2);
+  EXPECT_EQ(measurement.get_if<EncoderSample>()->drive_rad_per_s[0], 0.2);
 }
 
 TEST(Make, RegistryServesManyThreads) {
@@ -151,7 +186,7 @@ TEST(Make, LeavesTheCallersKeysAlone) {
   Errors errors;
   const std::array<std::string_view, 1> keys = {"host_key"};
   const auto loaded =
-      registry.make_kinematics(section("{type: moody, host_key: 1}"), "k", errors, keys);
+      registry.make_kinematics(section("{type: moody, host_key: 1}"), "k", 1, errors, keys);
   EXPECT_EQ(errors.text(), "");
   EXPECT_EQ(loaded.resolved.find("host_key"), nullptr);
 }
@@ -207,7 +242,7 @@ class Guarded : public ::testing::Test {
     PluginRegistry registry({kBadPlugins});
     Errors errors;
     const auto loaded =
-        registry.make_kinematics(section("{type: moody, mood: " + mood + "}"), "k", errors);
+        registry.make_kinematics(section("{type: moody, mood: " + mood + "}"), "k", 1, errors);
     RowSystem out;
     try {
       const Status status = guarded(loaded.info, "rows", [&] {
@@ -250,7 +285,7 @@ TEST(Make, WhatAModelThrowsNamesItWhoeverCalls) {
   PluginRegistry registry({kBadPlugins});
   Errors errors;
   const auto loaded =
-      registry.make_kinematics(section("{type: moody, mood: rows_int}"), "k", errors);
+      registry.make_kinematics(section("{type: moody, mood: rows_int}"), "k", 1, errors);
   RowSystem out;
   try {
     loaded.object->rows({}, Intrinsics::Constant(1, 0.1), false, out);

@@ -116,7 +116,7 @@ TEST_F(Registry, SearchesCommandLineThenEnvironmentThenInstallation) {
   EXPECT_EQ(folders[1], "/env/a");
   EXPECT_EQ(folders[2], "/env/b");
   EXPECT_EQ(folders[3],
-            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v2");
+            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v3");
   EXPECT_EQ(error_of([] { PluginRegistry::default_search_path({"/no/such"}); }),
             "--plugin-path /no/such: no such folder");
 }
@@ -152,8 +152,13 @@ TEST_F(Registry, ListsEveryLibraryWithItsReason) {
     {"libviwo_kinematics_undefined.so", "cannot be loaded: "},
     {"libviwo_kinematics_unregistered.so", "registers no plugi"},
     {"libviwo_kinematics_wrong_api.so", "is for version 7 o"},
+    {"libviwo_sensor_own_encoders.so", "ok own_encoders"},
+    {"libviwo_sensor_range.so", "ok range"},
     {"libviwo_sensor_ticks.so", "ok ticks"},
-    {"libviwo_update_failing.so", "ok failing"}
+    {"libviwo_update_failing.so", "ok failing"},
+    {"libviwo_update_range.so", "ok range"},
+    {"libviwo_update_range_2.so", "ok range_2"},
+    {"libviwo_update_range_order.so", "ok range_order"}
   };
   EXPECT_EQ(reasons, expected);
 }
@@ -219,9 +224,9 @@ TEST_F(Registry, RefusesALibraryWithoutARecord) {
 }
 
 TEST_F(Registry, RefusesAnotherApiInTheRecord) {
-  EXPECT_EQ(reason(doctored("{api=2;", "{api=0;")),
+  EXPECT_EQ(reason(doctored("{api=3;", "{api=0;")),
             "is built differently from this host\n"
-            "  api: host 2, plugin 0\n"
+            "  api: host 3, plugin 0\n"
             "  -> it is for another version of the plugin API: rebuild it against this viwo");
 }
 
@@ -338,7 +343,7 @@ TEST_F(Registry, RefusesAShortDescriptor) {
 
 TEST_F(Registry, RefusesAnotherApiInTheDescriptor) {
   EXPECT_EQ(reason(bad("wrong_api")),
-            "is for version 7 of the plugin API, this host has version 2 - rebuild it against this "
+            "is for version 7 of the plugin API, this host has version 3 - rebuild it against this "
             "viwo");
 }
 

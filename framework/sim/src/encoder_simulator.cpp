@@ -172,6 +172,13 @@ class Base {
 
 }  // namespace
 
+void EncoderSimulation::make_exact() {
+  noise = false;
+  slip = {};
+  outlier_probability = 0.;
+  drive_resolution_rad_per_s = 0.;
+}
+
 std::int64_t sample_time_ns(std::int64_t k, double rate_hz) {
   return std::llround(static_cast<double>(k) * 1e9 / rate_hz);
 }

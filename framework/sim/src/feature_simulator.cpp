@@ -9,6 +9,7 @@
 #include "viwo/camera/camera_model.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/random.hpp"
+#include "viwo/sim/true_cameras.hpp"
 
 namespace viwo::sim {
 namespace {
@@ -223,7 +224,7 @@ SimulatedFeatures simulate_features(const BodyTrajectory& trajectory, const Moun
   for (const std::int64_t t_ns : image_times_ns(options)) {
     std::vector<FeatureSample> images(cameras.size());
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      images[c].t_ns = options.start_ns + t_ns;
+      images[c].t_ns = camera_stamp_ns(cameras[c], options.start_ns + t_ns);
       images[c].camera = static_cast<int>(c);
     }
     const BodyMotion imu = trajectory.imu(static_cast<double>(t_ns) * 1e-9, mounting);

@@ -2,21 +2,12 @@
 
 #include <cmath>
 
+#include "viwo/math/mix.hpp"
+
 namespace viwo::sim {
-namespace {
-
-/// SplitMix64's output function: neighbouring seeds give unrelated values.
-std::uint64_t mix(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
-  return x ^ (x >> 31);
-}
-
-}  // namespace
 
 RandomStream::RandomStream(std::uint64_t seed, Stream purpose, std::uint64_t index)
-    : engine_(mix(mix(seed) + static_cast<std::uint64_t>(purpose) + (index << 32U))) {}
+    : engine_(mix64(mix64(seed) + static_cast<std::uint64_t>(purpose) + (index << 32U))) {}
 
 double RandomStream::uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
 

@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "viwo/api/status.hpp"
-#include "viwo/log/kalibr.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/sim/true_cameras.hpp"
 
 namespace viwo::sim {
 namespace {
@@ -19,13 +19,14 @@ Eigen::Vector3d vector_from(const ParamSet& params, const std::string& key) {
   return {numbers[0], numbers[1], numbers[2]};
 }
 
-ImuSimulation imu_from(const ParamSet& params, double duration_s, std::int64_t start_ns) {
+ImuSimulation imu_from(const ParamSet& params, double duration_s, std::int64_t start_ns,
+                       bool exact) {
   ImuSimulation imu;
   imu.duration_s = duration_s;
   imu.start_ns = start_ns;
   imu.rate_hz = params.number("imu_rate_hz");
   imu.gravity_m_per_s2 = params.number("gravity_m_per_s2");
-  imu.noise = params.flag("noise");
+  imu.noise = params.flag("noise") && !exact;
   imu.densities = {params.number("sigma_gyro_rad_per_s_sqrt_hz"),
                    params.number("sigma_accel_m_per_s2_sqrt_hz"),
                    params.number("sigma_gyro_walk_rad_per_s2_sqrt_hz"),
@@ -37,7 +38,8 @@ ImuSimulation imu_from(const ParamSet& params, double duration_s, std::int64_t s
   return imu;
 }
 
-FeatureSimulation features_from(const ParamSet& params, double duration_s, std::int64_t start_ns) {
+FeatureSimulation features_from(const ParamSet& params, double duration_s, std::int64_t start_ns,
+                                bool exact) {
   FeatureSimulation features;
   features.duration_s = duration_s;
   features.start_ns = start_ns;
@@ -48,41 +50,45 @@ FeatureSimulation features_from(const ParamSet& params, double duration_s, std::
   features.landmark_max_m = params.number("landmark_max_m");
   features.max_view_angle_rad = params.number("max_view_angle_rad");
   features.sigma_px = params.number("sigma_px");
-  features.noise = params.flag("noise");
-  features.outlier_probability = params.number("feature_outlier_probability");
+  features.noise = params.flag("noise") && !exact;
+  features.outlier_probability = exact ? 0. : params.number("feature_outlier_probability");
   features.outlier_px = params.number("feature_outlier_px");
-  features.dropout_probability = params.number("feature_dropout_probability");
+  features.dropout_probability = exact ? 0. : params.number("feature_dropout_probability");
   if (features.landmark_max_m < features.landmark_min_m) {
     throw ParamError("landmark_max_m", "is less than landmark_min_m");
   }
   return features;
 }
 
-std::vector<CameraView> cameras_from(const ParamSet& params) {
+std::vector<CameraView> cameras_from(const ParamSet& params, const HostServices& services) {
   if (params.text("cameras").empty()) {
     throw ParamError("cameras", "a file is needed, or features: 0");
   }
-  std::vector<CameraView> cameras = log::read_kalibr_cameras(params.text("cameras"));
-  const auto n = static_cast<std::size_t>(params.integer("n_cameras"));
-  if (n > cameras.size()) {
-    throw ParamError("n_cameras", "there are only " + std::to_string(cameras.size()) + " in " +
-                                      params.text("cameras"));
-  }
-  cameras.resize(n);
-  return cameras;
+  return true_cameras(params, cameras_of_file(params), services);
 }
 
 }  // namespace
 
-RigSimulation rig_from(const ParamSet& params, double duration_s, std::int64_t start_ns) {
+RigSimulation rig_from(const ParamSet& params, double duration_s, std::int64_t start_ns,
+                       const HostServices& services) {
   RigSimulation rig;
   const Eigen::Vector3d rpy = vector_from(params, "rpy_ItoO_rad");
   rig.mounting = {rotation_from_euler(rpy[2], rpy[1], rpy[0]), vector_from(params, "p_IinO_m")};
   rig.with_imu = params.flag("imu");
-  rig.imu = imu_from(params, duration_s, start_ns);
-  rig.features = features_from(params, duration_s, start_ns);
-  if (rig.features.features > 0) rig.cameras = cameras_from(params);
+  rig.imu = imu_from(params, duration_s, start_ns, services.exact);
+  rig.features = features_from(params, duration_s, start_ns, services.exact);
+  if (rig.features.features > 0) rig.cameras = cameras_from(params, services);
   return rig;
+}
+
+SampleTypes rig_kinds(const ParamSet& params) {
+  SampleTypes out = sample_types<StateSample>();
+  if (params.flag("imu")) out.push_back(&sample_type<ImuSample>());
+  if (params.integer("features") > 0) {
+    out.push_back(&sample_type<FeatureSample>());
+    out.push_back(&sample_type<CalibrationSample>());
+  }
+  return out;
 }
 
 double rig_end_s(const RigSimulation& rig) {
@@ -94,6 +100,9 @@ std::vector<Measurement> simulate_rig(const BodyTrajectory& trajectory, const Ri
   const SimulatedImu imu = simulate_imu(trajectory, rig.mounting, rig.imu, seed);
   const std::int64_t start_ns = rig.imu.start_ns;
   std::vector<Measurement> out;
+  for (CalibrationSample& truth : camera_truth(rig.cameras, start_ns)) {
+    out.emplace_back(std::move(truth));
+  }
   const auto add_state = [&](std::int64_t t_ns) {
     out.emplace_back(true_state(trajectory, rig.mounting, imu, start_ns, t_ns));
   };
@@ -102,7 +111,7 @@ std::vector<Measurement> simulate_rig(const BodyTrajectory& trajectory, const Ri
     if (t_ns > 0) add_state(start_ns + t_ns);
   }
   if (rig.with_imu) out.insert(out.end(), imu.samples.begin(), imu.samples.end());
-  if (!rig.cameras.empty() && rig.features.features > 0) {
+  if (!rig.cameras.empty()) {
     SimulatedFeatures features =
         simulate_features(trajectory, rig.mounting, rig.cameras, rig.features, seed);
     for (FeatureSample& sample : features.samples) out.emplace_back(std::move(sample));

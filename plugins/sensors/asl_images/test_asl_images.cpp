@@ -17,8 +17,8 @@ class AslImages : public ::testing::Test {
     for (int i = 0; i < 20; ++i) {
       for (const int camera : {0, 1}) {
         const Image image{3, 2, std::vector<std::uint8_t>(6, grey(i, camera))};
-        writer.write(ImageSample{i * std::int64_t{100'000'000}, camera,
-                                 std::make_shared<ImageInMemory>(image)});
+        EXPECT_TRUE(writer.write(ImageSample{i * std::int64_t{100'000'000}, camera,
+                                             std::make_shared<ImageInMemory>(image)}));
       }
     }
     writer.close();

@@ -11,7 +11,8 @@
 namespace viwo::bag {
 
 inline constexpr std::array kPlayParams{
-    log::kStrideParam, log::kClockParam,
+    log::kStrideParam,
+    log::kClockParam,
     ParamSpec{.name = "start_s",
               .type = ParamType::kNumber,
               .unit = "s",
@@ -26,6 +27,12 @@ inline constexpr std::array kPlayParams{
               .min = 0.,
               .max = 1e9,
               .help = "how long a piece is read from there; 0: up to the end"},
+    ParamSpec{.name = "gnss_stride",
+              .type = ParamType::kInt,
+              .fallback = "1",
+              .min = 1.,
+              .max = 1e6,
+              .help = "every n-th fix is given; the others are left for a comparison"},
     log::kMaxRejectedFractionParam};
 
 /// All but where the bag is.
@@ -35,6 +42,7 @@ struct BagOptions : TopicOptions {
   log::LogLimits limits() const { return {max_gap_s, max_rejected_fraction}; }
 
   int stride = 1;  ///< of drive angles, see log::cells_from_angles()
+  int gnss_stride = 1;
   double max_rejected_fraction = 0.1;
   bool by_reception = false;
   double start_s = 0.;

@@ -98,6 +98,10 @@ Readers make_readers(const std::shared_ptr<const Bag>& bag, const BagOptions& op
     kind_of_topic(*bag, "odometry_topic", options.odometry_topic, {Kind::kOdometry});
     all.add(options.odometry_topic, false, make_pose_reader(options, Kind::kOdometry));
   }
+  if (!options.gnss_topic.empty()) {
+    kind_of_topic(*bag, "gnss_topic", options.gnss_topic, {Kind::kNavSatFix});
+    all.add(options.gnss_topic, false, make_fix_reader(options));
+  }
   return all;
 }
 

@@ -16,6 +16,7 @@ struct BagSamples {
   std::vector<PoseSample> poses;
   std::vector<ImuSample> imu;
   std::vector<EncoderSample> wheels;
+  std::vector<GnssSample> fixes;
   std::vector<ImageSample> images;  ///< whose sources keep the bag
   std::vector<RejectionCount> rejections;
 };

@@ -26,10 +26,12 @@ bool take(std::vector<Sample>& samples, std::size_t& next, std::int64_t t_ns, Me
 Status BagSensor::next(Measurement& out) {
   const std::int64_t t_ns =
       std::min({stamp_at(samples_.poses, next_pose_), stamp_at(samples_.imu, next_imu_),
-                stamp_at(samples_.wheels, next_wheel_), stamp_at(samples_.images, next_image_)});
+                stamp_at(samples_.wheels, next_wheel_), stamp_at(samples_.fixes, next_fix_),
+                stamp_at(samples_.images, next_image_)});
   if (t_ns == kNone) return Status::kEnd;
   if (!take(samples_.poses, next_pose_, t_ns, out) && !take(samples_.imu, next_imu_, t_ns, out) &&
-      !take(samples_.wheels, next_wheel_, t_ns, out)) {
+      !take(samples_.wheels, next_wheel_, t_ns, out) &&
+      !take(samples_.fixes, next_fix_, t_ns, out)) {
     take(samples_.images, next_image_, t_ns, out);
   }
   return Status::kOk;

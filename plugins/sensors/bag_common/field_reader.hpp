@@ -23,6 +23,7 @@ class FieldReader {
   /// std_msgs/Header: its stamp [ns].
   virtual std::int64_t header() = 0;
   virtual std::uint8_t u8() = 0;
+  virtual std::uint16_t u16() = 0;
   virtual std::uint32_t u32() = 0;
   virtual double f64() = 0;
   /// Views into the message.

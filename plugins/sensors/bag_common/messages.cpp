@@ -24,7 +24,8 @@ constexpr std::array kTypes{
     Type{Kind::kPose, "geometry_msgs/PoseStamped", "d3812c3cbc69362b77dc0b19b345f8f5"},
     Type{Kind::kPoseWithCovariance, "geometry_msgs/PoseWithCovarianceStamped",
          "953b798c0f514ff060a53a3498ce6246"},
-    Type{Kind::kOdometry, "nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7"}};
+    Type{Kind::kOdometry, "nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7"},
+    Type{Kind::kNavSatFix, "sensor_msgs/NavSatFix", "2d3a8cd499b9b4a0249fb98fd05cfa48"}};
 
 const Type& type_of(Kind kind) {
   return *std::find_if(kTypes.begin(), kTypes.end(),
@@ -142,6 +143,29 @@ PoseSample read_pose(Kind kind, FieldReader& in) {
   pose.p_BinW_m = read_vector(in);
   for (double& value : pose.q_BtoW_xyzw) value = in.f64();
   return pose;
+}
+
+std::optional<GnssSample> read_fix(FieldReader& in) {
+  // Of the message's definition.
+  constexpr std::int8_t kNoFix = -1;
+  constexpr std::uint8_t kUnknown = 0, kDiagonalKnown = 2;
+  GnssSample fix;
+  fix.t_ns = in.header();
+  const auto status = static_cast<std::int8_t>(in.u8());
+  in.u16();  // which satellites
+  fix.latitude_deg = in.f64();
+  fix.longitude_deg = in.f64();
+  fix.altitude_m = in.f64();
+  for (double& value : fix.covariance_ENU_m2) value = in.f64();
+  const std::uint8_t known = in.u8();
+  for (std::size_t i = 0; i < fix.covariance_ENU_m2.size(); ++i) {
+    const bool is_diagonal = i % 4 == 0;
+    if (known == kUnknown || (known == kDiagonalKnown && !is_diagonal)) {
+      fix.covariance_ENU_m2[i] = 0.;
+    }
+  }
+  if (status <= kNoFix) return std::nullopt;
+  return fix;
 }
 
 ImageHead read_image_head(FieldReader& in) {

@@ -20,7 +20,8 @@ enum class Kind : std::uint8_t {
   kJoints,
   kPose,
   kPoseWithCovariance,
-  kOdometry
+  kOdometry,
+  kNavSatFix
 };
 
 /// Of "sensor_msgs/Imu" (ROS 1) as of "sensor_msgs/msg/Imu" (ROS 2); nothing for a type that is not
@@ -56,6 +57,9 @@ ImuSample read_imu(FieldReader& in);
 Joints read_joints(FieldReader& in);
 /// PoseStamped, PoseWithCovarianceStamped or Odometry.
 PoseSample read_pose(Kind kind, FieldReader& in);
+/// sensor_msgs/NavSatFix. Nothing when it says that there is no fix. A covariance that is said to
+/// be unknown is zero, one of which the diagonal is known has no more.
+std::optional<GnssSample> read_fix(FieldReader& in);
 /// Leaves `in` at the pixels.
 ImageHead read_image_head(FieldReader& in);
 

@@ -27,6 +27,7 @@ class Ros1Fields final : public FieldReader {
     return seconds * 1'000'000'000 + nanoseconds;
   }
   std::uint8_t u8() override { return read<std::uint8_t>(); }
+  std::uint16_t u16() override { return read<std::uint16_t>(); }
   std::uint32_t u32() override { return read<std::uint32_t>(); }
   double f64() override { return read<double>(); }
   std::string_view text() override {

@@ -1,43 +1,44 @@
-// What the messages of one topic must satisfy, as the rows of the logs of
-// viwo/log/stamp_filter.hpp.
+// The order of stamps (viwo/log/stamp_order.hpp) of the messages of one topic.
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "bag.hpp"
-#include "viwo/api/sensor.hpp"
-#include "viwo/log/stamp_filter.hpp"
+#include "viwo/log/stamp_order.hpp"
 
 namespace viwo::bag {
 
 class TopicFilter {
  public:
   /// `topic` is for error messages.
-  TopicFilter(const log::LogLimits& limits, std::string topic);
+  TopicFilter(const log::LogLimits& limits, const std::string& topic)
+      : topic_(topic), order_(limits, topic + ": ") {}
 
   /// True for a stamp after all that were accepted before; others, and gaps, are counted.
-  bool accept(std::int64_t t_ns, const Message& at);
+  bool accept(std::int64_t t_ns, const Message& at) { return order_.accept(t_ns, Place{at}); }
   /// Counts a message that is dropped.
-  void reject(const std::string& reason, const Message& at);
+  void reject(std::string_view reason, const Message& at) { order_.reject(reason, Place{at}); }
+  /// The same for one that says itself that it has nothing to say.
+  void leave_out(std::string_view reason, const Message& at) {
+    order_.leave_out(reason, Place{at});
+  }
   /// At the end of the bag: InputError when nothing was accepted or too much was rejected.
   void finish(const std::string& bag) const;
 
-  const std::vector<RejectionCount>& counts() const { return counts_; }
+  const std::vector<RejectionCount>& counts() const { return order_.counts(); }
   const std::string& topic() const { return topic_; }
 
  private:
-  void count(const std::string& reason, const Message& at);
+  struct Place {
+    const Message& at;
+    std::string operator()() const;
+  };
 
-  log::LogLimits limits_;
   std::string topic_;
-  std::string gap_reason_;
-  std::optional<std::int64_t> last_ns_;
-  std::int64_t accepted_ = 0;
-  std::int64_t rejected_ = 0;
-  std::vector<RejectionCount> counts_;
+  log::StampOrder order_;
 };
 
 }  // namespace viwo::bag

@@ -28,10 +28,10 @@ void check(const TopicOptions& options, const std::string& key, const std::strin
   check_list("drive_joints", options.drive_joints, kMaxDrives);
   check_list("steer_joints", options.steer_joints, kMaxSteers);
   if (options.imu_topic.empty() && options.image_topics.empty() && options.joint_topic.empty() &&
-      options.pose_topic.empty() && options.odometry_topic.empty()) {
+      options.pose_topic.empty() && options.odometry_topic.empty() && options.gnss_topic.empty()) {
     throw ParamError(key, "nothing to " + verb +
                               ": give one of imu_topic, image_topics, joint_topic, "
-                              "pose_topic, odometry_topic");
+                              "pose_topic, odometry_topic, gnss_topic");
   }
   if (!options.joint_topic.empty() && options.drive_joints.empty()) {
     throw ParamError("joint_topic", "a joint_topic needs drive_joints, the names of the wheels");
@@ -50,6 +50,17 @@ void check(const TopicOptions& options, const std::string& key, const std::strin
 
 }  // namespace
 
+SampleTypes kinds_of(const TopicOptions& options) {
+  SampleTypes out;
+  const bool any_pose = !options.pose_topic.empty() || !options.odometry_topic.empty();
+  if (any_pose) out.push_back(&sample_type<PoseSample>());
+  if (!options.imu_topic.empty()) out.push_back(&sample_type<ImuSample>());
+  if (!options.joint_topic.empty()) out.push_back(&sample_type<EncoderSample>());
+  if (!options.gnss_topic.empty()) out.push_back(&sample_type<GnssSample>());
+  if (!options.image_topics.empty()) out.push_back(&sample_type<ImageSample>());
+  return out;
+}
+
 TopicOptions topic_options_from(const ParamSet& params, const std::string& key,
                                 const std::string& verb) {
   const auto list = [&params](const char* name) {
@@ -65,6 +76,7 @@ TopicOptions topic_options_from(const ParamSet& params, const std::string& key,
   options.drive_is_angle = params.text("drive_input") == "position";
   options.pose_topic = params.text("pose_topic");
   options.odometry_topic = params.text("odometry_topic");
+  options.gnss_topic = params.text("gnss_topic");
   options.max_gap_s = params.number("max_gap_s");
   check(options, key, verb);
   return options;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "viwo/api/params.hpp"
+#include "viwo/api/sample.hpp"
 #include "viwo/log/sensor_params.hpp"
 
 namespace viwo::bag {
@@ -44,6 +45,10 @@ inline constexpr std::array kTopicParams{
               .type = ParamType::kString,
               .fallback = "",
               .help = "nav_msgs/Odometry, whose poses are taken"},
+    ParamSpec{.name = "gnss_topic",
+              .type = ParamType::kString,
+              .fallback = "",
+              .help = "sensor_msgs/NavSatFix"},
     log::kMaxGapParam};
 
 struct TopicOptions {
@@ -55,8 +60,12 @@ struct TopicOptions {
   bool drive_is_angle = false;
   std::string pose_topic;
   std::string odometry_topic;
+  std::string gnss_topic;
   double max_gap_s = 0.2;
 };
+
+/// The kinds of samples that the topics give.
+SampleTypes kinds_of(const TopicOptions& options);
 
 /// ParamError for parameters that contradict each other; where no topic is wanted, for `key`:
 /// "nothing to <verb>".

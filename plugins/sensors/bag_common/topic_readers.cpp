@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <iterator>
+#include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -174,6 +176,40 @@ class JointReader final : public TopicReader {
   std::vector<log::EncoderReading> readings_;
 };
 
+class FixReader final : public TopicReader {
+ public:
+  /// Receivers are slow: their gaps are not counted.
+  explicit FixReader(const BagOptions& options)
+      : TopicReader(options, options.gnss_topic,
+                    {std::numeric_limits<double>::infinity(), options.max_rejected_fraction}),
+        stride_(options.gnss_stride) {}
+
+  void take(FieldReader& in, const Message& message) override {
+    std::optional<GnssSample> fix = read_fix(in);
+    if (!fix) {
+      any_without_ = true;
+      return filter_.leave_out("message without a fix", message);
+    }
+    fix->t_ns = stamp(fix->t_ns, message);
+    if (const char* const why = fix->fault()) return filter_.reject(why, message);
+    if (!filter_.accept(fix->t_ns, message)) return;
+    if (n_++ % stride_ == 0) samples_.push_back(*fix);
+  }
+
+ private:
+  void check(const std::string& bag) const override {
+    if (any_without_ && n_ == 0) {
+      throw InputError(bag + "  topic '" + filter_.topic() + "' has messages, and none has a fix");
+    }
+  }
+  void move_samples(BagSamples& out) override { out.fixes = std::move(samples_); }
+
+  std::int64_t stride_;
+  std::int64_t n_ = 0;
+  bool any_without_ = false;
+  std::vector<GnssSample> samples_;
+};
+
 }  // namespace
 
 void TopicReader::finish(const std::string& bag, BagSamples& out) {
@@ -193,6 +229,10 @@ std::unique_ptr<TopicReader> make_pose_reader(const BagOptions& options, Kind ki
 
 std::unique_ptr<TopicReader> make_joint_reader(const BagOptions& options) {
   return std::make_unique<JointReader>(options);
+}
+
+std::unique_ptr<TopicReader> make_fix_reader(const BagOptions& options) {
+  return std::make_unique<FixReader>(options);
 }
 
 std::unique_ptr<TopicReader> make_image_reader(const BagOptions& options, Kind kind, int camera,

@@ -15,7 +15,7 @@ namespace viwo::bag {
 class TopicReader {
  public:
   TopicReader(const BagOptions& options, const std::string& topic)
-      : filter_(options.limits(), topic), by_reception_(options.by_reception) {}
+      : TopicReader(options, topic, options.limits()) {}
   virtual ~TopicReader() = default;
 
   /// BrokenMessage when it is not what it says to be.
@@ -27,6 +27,8 @@ class TopicReader {
   void finish(const std::string& bag, BagSamples& out);
 
  protected:
+  TopicReader(const BagOptions& options, const std::string& topic, const log::LogLimits& limits)
+      : filter_(limits, topic), by_reception_(options.by_reception) {}
   virtual void move_samples(BagSamples& out) = 0;
   /// Before the number of messages is judged.
   virtual void check(const std::string& /*bag*/) const {}
@@ -43,6 +45,7 @@ class TopicReader {
 std::unique_ptr<TopicReader> make_imu_reader(const BagOptions& options);
 std::unique_ptr<TopicReader> make_pose_reader(const BagOptions& options, Kind kind);
 std::unique_ptr<TopicReader> make_joint_reader(const BagOptions& options);
+std::unique_ptr<TopicReader> make_fix_reader(const BagOptions& options);
 std::unique_ptr<TopicReader> make_image_reader(const BagOptions& options, Kind kind, int camera,
                                                const std::shared_ptr<const Bag>& bag);
 

@@ -13,10 +13,12 @@
 #include <Eigen/Geometry>
 
 #include "viwo/api/plugin.hpp"
-#include "viwo/log/kalibr.hpp"
+#include "viwo/log/sensor_params.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/sim/image_renderer.hpp"
+#include "viwo/sim/rig_simulator.hpp"
 #include "viwo/sim/textured_room.hpp"
+#include "viwo/sim/true_cameras.hpp"
 
 namespace viwo {
 namespace {
@@ -25,7 +27,7 @@ namespace {
 constexpr double kDarkGain = 0.01;
 
 // clang-format off
-constexpr std::array kParams{
+constexpr std::array kImageParams{
     ParamSpec{.name = "cameras", .type = ParamType::kPath,
               .help = "cameras on the IMU, a camera chain file of Kalibr"},
     ParamSpec{.name = "n_cameras", .type = ParamType::kInt, .fallback = "1", .min = 1., .max = 16.,
@@ -76,6 +78,8 @@ constexpr std::array kParams{
 };
 // clang-format on
 
+constexpr auto kParams = log::joined(kImageParams, sim::kTrueCameraParams);
+
 std::vector<double> list(const ParamSet& params, const char* key) {
   const auto numbers = params.numbers(key);
   return {numbers.begin(), numbers.end()};
@@ -103,9 +107,10 @@ struct Intervals {
 
 /// What a configuration says.
 struct Options {
-  explicit Options(const ParamSet& params);
+  Options(const ParamSet& params, const HostServices& services);
 
-  std::vector<CameraView> cameras;
+  std::vector<CameraView> cameras;       ///< as they truly are
+  std::vector<CameraView> file_cameras;  ///< as the file says
   bool skip_first;
   sim::RoomOptions room;                 ///< without size and centre
   std::vector<double> size_m, centre_m;  ///< along x and y, or nothing
@@ -114,24 +119,19 @@ struct Options {
   Intervals dark, dropped;
 };
 
-Options::Options(const ParamSet& params)
-    : cameras(log::read_kalibr_cameras(params.text("cameras"))),
+Options::Options(const ParamSet& params, const HostServices& services)
+    : file_cameras(sim::cameras_of_file(params)),
       skip_first(params.flag("skip_first")),
       size_m(pair_or_none(params, "room_size_m")),
       centre_m(pair_or_none(params, "room_centre_m")),
       margin_m(params.number("room_margin_m")),
-      sigma_grey(params.number("sigma_grey")),
+      sigma_grey(services.exact ? 0. : params.number("sigma_grey")),
       vignette(params.number("vignette")),
       exposure_swing(params.number("exposure_swing")),
       exposure_period_s(params.number("exposure_period_s")),
       dark{list(params, "dark_start_s"), params.number("dark_duration_s")},
       dropped{list(params, "drop_start_s"), params.number("drop_duration_s")} {
-  const auto n = static_cast<std::size_t>(params.integer("n_cameras"));
-  if (n > cameras.size()) {
-    throw ParamError("n_cameras", "there are only " + std::to_string(cameras.size()) + " in " +
-                                      params.text("cameras"));
-  }
-  cameras.resize(n);
+  cameras = sim::true_cameras(params, file_cameras, services);
   room.seed = static_cast<std::uint64_t>(params.integer("world_seed"));
   room.floor_m = params.number("floor_m");
   room.height_m = params.number("room_height_m");
@@ -174,8 +174,10 @@ class RenderedImage final : public ImageSource {
 class ImageSimulator final : public Sensor {
  public:
   ImageSimulator(const ParamSet& params, const HostServices& services)
-      : options_(params), seed_(services.seed) {}
+      : options_(params, services), seed_(services.seed) {}
 
+  SampleTypes yields() const override { return sample_types<ImageSample, CalibrationSample>(); }
+  bool can_be_exact() const override { return true; }
   bool takes_input() const override { return true; }
   void connect(Sensor& input) override { input_ = &input; }
 
@@ -192,25 +194,27 @@ class ImageSimulator final : public Sensor {
     std::vector<StateSample> states;
     Measurement measurement;
     while (input.next(measurement) == Status::kOk) {
-      if (const auto* state = std::get_if<StateSample>(&measurement)) states.push_back(*state);
+      if (const auto* state = measurement.get_if<StateSample>()) states.push_back(*state);
     }
     if (states.empty()) {
       throw InputError("the input gives no true states, which sensors simulator and asl_state do");
     }
     first_ns_ = states.front().t_ns;
+    for (CalibrationSample& truth : sim::camera_truth(options_.cameras, first_ns_)) {
+      samples_.emplace_back(std::move(truth));
+    }
     if (options_.skip_first) states.erase(states.begin());
     if (states.empty()) return;
     make_renderers(states);
     for (const StateSample& state : states) add_images(state);
-    // Clocks of cameras can differ.
-    std::stable_sort(samples_.begin(), samples_.end(),
-                     [](const ImageSample& a, const ImageSample& b) { return a.t_ns < b.t_ns; });
+    sim::sort_by_time(samples_);  // clocks of cameras can differ
   }
 
   void make_renderers(const std::vector<StateSample>& states) {
+    // Of the file's cameras, so that what is drawn for the true ones does not change the room.
     std::vector<Eigen::Vector3d> path;
     for (const StateSample& state : states) {
-      for (const CameraView& camera : options_.cameras) {
+      for (const CameraView& camera : options_.file_cameras) {
         path.push_back(camera_pose(state, camera).p_CinG);
       }
     }
@@ -247,10 +251,10 @@ class ImageSimulator final : public Sensor {
     for (std::size_t c = 0; c < renderers_.size(); ++c) {
       const CameraView& camera = options_.cameras[c];
       exposure.seed = noise_seed(c, state.t_ns);
-      const std::int64_t t_ns = state.t_ns - std::llround(camera.t_CtoI_s * 1e9);  // (IMG-10)
-      samples_.push_back({t_ns, static_cast<int>(c),
-                          std::make_shared<const RenderedImage>(
-                              renderers_[c], camera_pose(state, camera), exposure)});
+      const std::int64_t t_ns = sim::camera_stamp_ns(camera, state.t_ns);  // (IMG-10)
+      samples_.emplace_back(ImageSample{t_ns, static_cast<int>(c),
+                                        std::make_shared<const RenderedImage>(
+                                            renderers_[c], camera_pose(state, camera), exposure)});
     }
   }
 
@@ -269,7 +273,7 @@ class ImageSimulator final : public Sensor {
   Sensor* input_ = nullptr;  ///< until it has been read
   std::int64_t first_ns_ = 0;
   std::vector<std::shared_ptr<const sim::ImageRenderer>> renderers_;
-  std::vector<ImageSample> samples_;
+  std::vector<Measurement> samples_;
   std::size_t next_ = 0;
 };
 

@@ -8,6 +8,7 @@
 
 #include "support.hpp"
 #include "viwo/log/kalibr.hpp"
+#include "viwo/math/so3.hpp"
 #include "viwo/sim/image_renderer.hpp"
 
 namespace viwo {
@@ -26,6 +27,7 @@ std::string config(const std::string& rest, const std::string& cameras = kCamera
 class Given final : public Sensor {
  public:
   explicit Given(std::vector<Measurement> all) : all_(all.begin(), all.end()) {}
+  SampleTypes yields() const override { return sample_types<StateSample, ImuSample>(); }
   Status next(Measurement& out) override {
     if (all_.empty()) return Status::kEnd;
     out = all_.front();
@@ -53,16 +55,17 @@ std::vector<Measurement> states(int n) {
   return out;
 }
 
-std::vector<ImageSample> images(const std::string& yaml, std::vector<Measurement> input,
-                                std::uint64_t seed = 1) {
-  const auto sensor = make_sensor(yaml, seed);
+std::vector<Measurement> play_on(const std::shared_ptr<Sensor>& sensor,
+                                 std::vector<Measurement> input) {
   EXPECT_TRUE(sensor->takes_input());
   Given given(std::move(input));
   sensor->connect(given);
-  const auto all = play(*sensor);
-  const auto out = only<ImageSample>(all);
-  EXPECT_EQ(out.size(), all.size());
-  return out;
+  return play(*sensor);
+}
+
+std::vector<ImageSample> images(const std::string& yaml, std::vector<Measurement> input,
+                                std::uint64_t seed = 1) {
+  return only<ImageSample>(play_on(make_sensor(yaml, seed), std::move(input)));
 }
 
 std::string refusal(const std::string& yaml, const std::vector<Measurement>& input) {
@@ -84,6 +87,15 @@ double mean_of(const Image& image) {
   double sum = 0.;
   for (const std::uint8_t value : image.pixels) sum += static_cast<double>(value);
   return sum / static_cast<double>(image.pixels.size());
+}
+
+/// Pixels that differ by more than one grey level.
+int different_pixels(const Image& a, const Image& b) {
+  int out = a.pixels.size() == b.pixels.size() ? 0 : 1'000'000;
+  for (std::size_t k = 0; k < a.pixels.size() && out < 1'000'000; ++k) {
+    out += std::abs(static_cast<int>(a.pixels[k]) - b.pixels[k]) > 1 ? 1 : 0;
+  }
+  return out;
 }
 
 TEST(ImageSimulator, ImagesStandAtTheStampsOfTheSimulatorsCameras) {
@@ -147,12 +159,7 @@ TEST(ImageSimulator, CamerasAreWhereTheirChainPutsThemOnTheImu) {
     Image expected;
     renderer.render(poses[i], {}, expected);
     const Image image = pixels_of(rendered[i]);
-    ASSERT_EQ(image.pixels.size(), expected.pixels.size());
-    int different = 0;
-    for (std::size_t k = 0; k < image.pixels.size(); ++k) {
-      different += std::abs(static_cast<int>(image.pixels[k]) - expected.pixels[k]) > 1 ? 1 : 0;
-    }
-    EXPECT_LT(different, 100) << i;  // rounding of the poses, at edges
+    EXPECT_LT(different_pixels(image, expected), 100) << i;  // rounding of the poses, at edges
     EXPECT_GT(mean_of(image), 60.);
   }
 }
@@ -178,6 +185,79 @@ TEST(ImageSimulator, StampsAreInTheClocksOfTheCamerasAndStayInOrder) {
     EXPECT_EQ(of_camera[1][i].t_ns, t_ns - 12'500'000);
     // Both cameras are in one place, hence see the same at the same true time.
     EXPECT_EQ(pixels_of(of_camera[0][i]).pixels, pixels_of(of_camera[1][i]).pixels);
+  }
+}
+
+/// A Kalibr file of one radtan camera with the true values that a sensor told.
+std::string write_chain(const std::vector<CalibrationSample>& truth) {
+  std::map<std::string, double> value;
+  for (const CalibrationSample& sample : truth) value[sample.name] = sample.value;
+  const Eigen::Matrix3d R = exp_so3({value.at("cam0.theta_ItoC_x"), value.at("cam0.theta_ItoC_y"),
+                                     value.at("cam0.theta_ItoC_z")});
+  const std::string file = ::testing::TempDir() + "/viwo_image_simulator_truth.yaml";
+  std::ofstream out(file);
+  out.precision(17);
+  out << "cam0:\n  camera_model: pinhole\n  intrinsics: [" << value.at("cam0.fx") << ", "
+      << value.at("cam0.fy") << ", " << value.at("cam0.cx") << ", " << value.at("cam0.cy")
+      << "]\n  distortion_model: radtan\n  distortion_coeffs: [" << value.at("cam0.d1") << ", "
+      << value.at("cam0.d2") << ", " << value.at("cam0.d3") << ", " << value.at("cam0.d4")
+      << "]\n  resolution: [80, 60]\n  timeshift_cam_imu: " << value.at("cam0.t_CtoI")
+      << "\n  T_cam_imu: [";
+  for (int i = 0; i < 3; ++i) {
+    out << "[" << R(i, 0) << ", " << R(i, 1) << ", " << R(i, 2) << ", "
+        << value.at(std::string("cam0.p_IinC_") + "xyz"[i]) << "], ";
+  }
+  out << "[0, 0, 0, 1]]\n";
+  return file;
+}
+
+TEST(ImageSimulator, ImagesAreThoseOfTheTrueCameraWhichItTells) {
+  const std::string nominal = ::testing::TempDir() + "/viwo_image_simulator_nominal.yaml";
+  std::ofstream(nominal)
+      << "cam0:\n  camera_model: pinhole\n  intrinsics: [60, 61, 39.5, 29.5]\n"
+         "  distortion_model: radtan\n  distortion_coeffs: [0.01, 0, 0, 0]\n"
+         "  resolution: [80, 60]\n  timeshift_cam_imu: 0.002\n"
+         "  T_cam_imu: [[0, -1, 0, 0.1], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]\n";
+  // The room follows from the motion of the file's camera, which differs.
+  const std::string room = "sigma_grey: 0, boxes: 0, room_size_m: [8, 7], room_centre_m: [0, 0]";
+  const auto config_of = [&room](const std::string& file, const std::string& rest) {
+    return "{type: image_simulator, texture_size_px: 256, cameras: " + file + ", " + room + rest +
+           "}";
+  };
+  const auto all =
+      play_on(make_sensor(config_of(
+                  nominal,
+                  ", camera_clock_error_s: [0.0105], sigma_true_camera_orientation_rad: 0.02, "
+                  "sigma_true_camera_position_m: 0.05, sigma_true_camera_focal_px: 2, "
+                  "sigma_true_camera_distortion: 0.01")),
+              states(4));
+  const auto wrong = only<ImageSample>(all);
+  const auto truth = only<CalibrationSample>(all);
+  ASSERT_EQ(truth.size(), 15U);
+  EXPECT_EQ(truth[14].value, 0.0125);
+  EXPECT_EQ(truth[0].t_ns, 2'000'000'000);
+  const auto expected = images(config_of(write_chain(truth), ""), states(4));
+  const auto as_the_file_says = images(config_of(nominal, ""), states(4));
+  ASSERT_EQ(wrong.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(wrong[i].t_ns, expected[i].t_ns);
+    const Image image = pixels_of(wrong[i]);
+    EXPECT_LT(different_pixels(image, pixels_of(expected[i])), 10) << i;  // rounding, at edges
+    EXPECT_GT(different_pixels(image, pixels_of(as_the_file_says[i])), 2000) << i;
+  }
+}
+
+TEST(ImageSimulator, IsExactWhenThatIsAskedForWhateverItsParametersSay) {
+  const auto sensor = make_sensor(
+      config("sigma_grey: 5, camera_clock_error_s: [0.01], sigma_true_camera_focal_px: 5"), 1,
+      true);
+  EXPECT_TRUE(sensor->can_be_exact());
+  const auto exact = only<ImageSample>(play_on(sensor, states(3)));
+  const auto quiet = images(config("sigma_grey: 0"), states(3));
+  ASSERT_EQ(exact.size(), quiet.size());
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    EXPECT_EQ(exact[i].t_ns, quiet[i].t_ns);
+    EXPECT_EQ(pixels_of(exact[i]).pixels, pixels_of(quiet[i]).pixels);
   }
 }
 

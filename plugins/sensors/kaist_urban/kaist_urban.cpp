@@ -91,6 +91,8 @@ class KaistUrban final : public Sensor {
     cut(params.number("start_s"), params.number("duration_s"));
   }
 
+  SampleTypes yields() const override { return yields_; }
+
   Status next(Measurement& out) override {
     const auto first = earliest();
     if (!first) return Status::kEnd;
@@ -111,6 +113,7 @@ class KaistUrban final : public Sensor {
  private:
   template <std::size_t camera = 0, class Sample>
   void keep(log::Recording<Sample> recording) {
+    if (camera == 0) yields_.push_back(&sample_type<Sample>());
     if constexpr (std::is_same_v<Sample, ImageSample>) {
       images_[camera].samples = std::move(recording.samples);
     } else {
@@ -163,6 +166,7 @@ class KaistUrban final : public Sensor {
   std::tuple<Track<PoseSample>, Track<ImuSample>, Track<EncoderSample>> tracks_;
   std::array<Track<ImageSample>, 2> images_;
   std::vector<RejectionCount> rejections_;
+  SampleTypes yields_;
 };
 
 VIWO_REGISTER(Sensor, KaistUrban, "kaist_urban", "1.0.0",

@@ -173,6 +173,8 @@ TEST_F(KaistUrban, PlaysEverythingInTheOrderOfTime) {
   EXPECT_EQ(only<EncoderSample>(all).size(), 100U);
   EXPECT_EQ(only<ImageSample>(all).size(), 20U);
   EXPECT_EQ(all.size(), 322U);
+  EXPECT_THAT(kinds_of(*make_sensor(yaml())), ElementsAre("encoders", "images", "imu", "poses"));
+  EXPECT_THAT(kinds_of(*make_sensor(only_yaml("images"))), ElementsAre("images"));
   // Left before right at the same stamp; nothing was dropped.
   EXPECT_EQ(only<ImageSample>(all)[0].camera, 0);
   EXPECT_EQ(only<ImageSample>(all)[1].camera, 1);

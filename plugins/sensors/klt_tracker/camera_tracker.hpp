@@ -1,6 +1,7 @@
 // Points of one camera, followed from image to image.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "patch.hpp"
 #include "tracker_options.hpp"
 #include "viwo/api/filter_view.hpp"
+#include "viwo/math/mix.hpp"
 
 namespace viwo::klt {
 
@@ -27,6 +29,11 @@ struct Track {
   Eigen::Matrix2f A = Eigen::Matrix2f::Identity();  ///< deformation since then
   double inverse_distance_per_m = -1.;  ///< along the ray, from stereo; negative: not known
 };
+
+/// For the draws of one camera of a sensor with `seed`: of no other camera and no other seed.
+inline std::uint64_t camera_seed(std::uint64_t seed, std::size_t camera) {
+  return mix64(mix64(seed) + camera);
+}
 
 class CameraTracker {
  public:

@@ -15,21 +15,6 @@ std::string place(int camera, std::int64_t t_ns) {
   return text.data();
 }
 
-void Rejections::add(const std::string& reason, const std::string& where) {
-  const auto found = std::find_if(counts_.begin(), counts_.end(), [&](const RejectionCount& count) {
-    return count.reason == reason;
-  });
-  if (found == counts_.end()) {
-    counts_.push_back({reason, 1, where});
-  } else {
-    ++found->count;
-  }
-}
-
-void Rejections::append_to(std::vector<RejectionCount>& out) const {
-  out.insert(out.end(), counts_.begin(), counts_.end());
-}
-
 void ImageGroups::note_distance(const ImageSample& image) {
   for (int other = 0; other < n_cameras_; ++other) {
     const std::int64_t last_ns = last_ns_[static_cast<std::size_t>(other)];
@@ -47,13 +32,13 @@ std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& re
       ended_ = true;
       break;
     }
-    auto* image = std::get_if<ImageSample>(&measurement);
+    const auto* image = measurement.get_if<ImageSample>();
     if (status != Status::kOk || image == nullptr || image->camera < 0 ||
         image->camera >= n_cameras_) {
       ++others_;
       continue;
     }
-    const std::string where = place(image->camera, image->t_ns);
+    const auto where = [image] { return place(image->camera, image->t_ns); };
     if (image->source == nullptr) {
       rejections.add("image without pixels", where);
       continue;
@@ -68,7 +53,7 @@ std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& re
     last_ns = image->t_ns;
     newest_ns_ = std::max(newest_ns_.value_or(image->t_ns), image->t_ns);
     ++images_;
-    return std::move(*image);
+    return *image;
   }
   return std::nullopt;
 }
@@ -79,20 +64,18 @@ bool ImageGroups::next(Sensor& input, Rejections& rejections, ImageGroup& out) {
       ahead_ ? std::exchange(ahead_, std::nullopt) : next_image(input, rejections);
   if (!image) return false;
   const std::int64_t begin_ns = image->t_ns;
+  std::int64_t newest_ns = begin_ns;
   for (int count = 0; image; image = next_image(input, rejections)) {
-    auto& source = out.sources[static_cast<std::size_t>(image->camera)];
-    if (source != nullptr || std::abs(image->t_ns - begin_ns) > tolerance_ns_) {
+    auto& slot = out.images[static_cast<std::size_t>(image->camera)];
+    if (slot.source != nullptr || std::abs(image->t_ns - begin_ns) > tolerance_ns_) {
       ahead_ = std::move(image);
       break;
     }
-    source = std::move(image->source);
-    if (image->camera < out.first_camera) {
-      out.first_camera = image->camera;
-      out.t_ns = image->t_ns;
-    }
+    slot = {image->t_ns, std::move(image->source)};
+    newest_ns = std::max(newest_ns, slot.t_ns);
     if (++count == n_cameras_) break;
   }
-  group_ns_ = out.t_ns;
+  group_ns_ = newest_ns;
   return true;
 }
 

@@ -7,9 +7,9 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "viwo/api/measurement.hpp"
+#include "viwo/api/rejections.hpp"
 #include "viwo/api/sensor.hpp"
 
 namespace viwo::klt {
@@ -19,21 +19,12 @@ inline constexpr int kMaxCameras = 2;
 /// "camera 0 at 1.050000000 s".
 std::string place(int camera, std::int64_t t_ns);
 
-/// Counts what is dropped.
-class Rejections {
- public:
-  void add(const std::string& reason, const std::string& where);
-  void append_to(std::vector<RejectionCount>& out) const;
-
- private:
-  std::vector<RejectionCount> counts_;
-};
-
 struct ImageGroup {
-  /// Of the image of `first_camera`, in its clock.
-  std::int64_t t_ns = 0;
-  int first_camera = kMaxCameras;  ///< the lowest that has an image
-  std::array<std::shared_ptr<const ImageSource>, kMaxCameras> sources;  ///< null: no image
+  struct Slot {
+    std::int64_t t_ns = 0;                      ///< in the clock of the camera
+    std::shared_ptr<const ImageSource> source;  ///< null: no image
+  };
+  std::array<Slot, kMaxCameras> images;  ///< by camera
 };
 
 /// Reads a sensor and gathers its images, in time order. A group is complete when it has an image
@@ -64,7 +55,7 @@ class ImageGroups {
   std::optional<ImageSample> ahead_;  ///< the first image of the next group
   std::array<std::int64_t, kMaxCameras> last_ns_{};
   std::optional<std::int64_t> newest_ns_;
-  std::optional<std::int64_t> group_ns_;  ///< of the last group
+  std::optional<std::int64_t> group_ns_;  ///< newest of the last group
   std::optional<std::int64_t> nearest_ns_;
   std::int64_t images_ = 0;
   std::int64_t others_ = 0;

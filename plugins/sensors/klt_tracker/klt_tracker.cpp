@@ -87,7 +87,7 @@ KltTracker::KltTracker(const ParamSet& params, const HostServices& services)
     if (stereo && i == 1) {
       matchers_.emplace_back(cameras_[0], cameras_[1], options_, mask);
     } else {
-      trackers_.emplace_back(cameras_[i], options_, mask, services.seed + i);
+      trackers_.emplace_back(cameras_[i], options_, mask, camera_seed(services.seed, i));
     }
   }
   groups_.emplace(static_cast<int>(cameras_.size()), std::llround(max_camera_dt_s_ * 1e9));
@@ -123,7 +123,7 @@ void KltTracker::read(const ImageGroup& group) {
   cv::parallel_for_(cv::Range(0, static_cast<int>(eyes_.size())), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
       const auto camera = static_cast<std::size_t>(i);
-      read_one(group.sources[camera].get(), camera, eyes_[camera]);
+      read_one(group.images[camera].source.get(), camera, eyes_[camera]);
     }
   });
 }
@@ -132,14 +132,15 @@ void KltTracker::check(const ImageGroup& group) {
   for (std::size_t i = 0; i < eyes_.size(); ++i) {
     Eye& eye = eyes_[i];
     if (eye.failure) std::rethrow_exception(eye.failure);
-    const std::string where = place(static_cast<int>(i), group.t_ns);
+    const std::string where = place(static_cast<int>(i), group.images[i].t_ns);
     if (!eye.unreadable.empty()) {
-      rejections_.add("image that cannot be read", where + ": " + eye.unreadable);
+      rejections_.add("image that cannot be read", [&] { return where + ": " + eye.unreadable; });
     }
     check_size(i, where);
   }
   if (is_stereo() && !eyes_[0].is_read && eyes_[1].is_read) {
-    rejections_.add("right image without its left one", place(1, group.t_ns));
+    rejections_.add("right image without its left one",
+                    [&group] { return place(1, group.images[1].t_ns); });
     eyes_[1].is_read = false;
   }
 }
@@ -151,7 +152,8 @@ void KltTracker::check_size(std::size_t camera, const std::string& where) {
     eye.other_sizes = 0;
   }
   if (eye.other_size.empty()) return;
-  rejections_.add("image of another size than the camera's", where + ": " + eye.other_size);
+  rejections_.add("image of another size than the camera's",
+                  [&] { return where + ": " + eye.other_size; });
   if (++eye.other_sizes == 1) {
     const CameraView& view = cameras_[camera];
     eye.first_other_size = "the image of " + where + " has " + eye.other_size + ", but cam" +
@@ -192,7 +194,7 @@ void KltTracker::watch_stereo(const StereoCounts& counts, std::int64_t t_ns) {
     contradicting_pairs_ = 0;
     return;
   }
-  rejections_.add("stereo pair that contradicts the extrinsics", place(0, t_ns));
+  rejections_.add("stereo pair that contradicts the extrinsics", [t_ns] { return place(0, t_ns); });
   if (++contradicting_pairs_ < kContradictingPairs || told_contradiction_) return;
   told_contradiction_ = true;
   services_.log(LogLevel::kWarning,
@@ -206,9 +208,10 @@ void KltTracker::watch_stereo(const StereoCounts& counts, std::int64_t t_ns) {
 
 void KltTracker::watch_pairs(const ImageGroup& group) {
   if (!is_stereo() || pair_seen_) return;
-  pair_seen_ = group.sources[0] != nullptr && group.sources[1] != nullptr;
+  const bool left = group.images[0].source != nullptr, right = group.images[1].source != nullptr;
+  pair_seen_ = left && right;
   if (pair_seen_ || ++groups_without_pair_ != kGroupsWithoutPair) return;
-  std::string why = "only camera " + std::to_string(group.first_camera) + " gives images";
+  std::string why = std::string("only camera ") + (left ? "0" : "1") + " gives images";
   if (const auto nearest_ns = groups_->nearest_ns()) {
     std::array<char, 96> text{};
     std::snprintf(text.data(), text.size(),
@@ -219,10 +222,18 @@ void KltTracker::watch_pairs(const ImageGroup& group) {
   services_.log(LogLevel::kWarning, "no pair of images yet: " + why);
 }
 
-void KltTracker::match_right(std::int64_t t_ns, FeatureSample& sample) {
-  if (eyes_[0].now.blank || eyes_[1].now.blank) return;
-  watch_stereo(matchers_[0].match(eyes_[0].now, eyes_[1].now, trackers_[0].tracks(), sample.points),
-               t_ns);
+FeatureSample KltTracker::points_of(std::size_t camera, const ImageGroup& group) {
+  FeatureSample sample{group.images[camera].t_ns, static_cast<int>(camera), {}};
+  if (camera < trackers_.size()) {
+    for (const Track& track : trackers_[camera].tracks()) {
+      sample.points.push_back({track.id, track.uv.x, track.uv.y});
+    }
+  } else if (!eyes_[0].now.blank && !eyes_[1].now.blank) {
+    watch_stereo(
+        matchers_[0].match(eyes_[0].now, eyes_[1].now, trackers_[0].tracks(), sample.points),
+        group.images[0].t_ns);
+  }
+  return sample;
 }
 
 void KltTracker::process(const ImageGroup& group) {
@@ -230,30 +241,22 @@ void KltTracker::process(const ImageGroup& group) {
   read(group);
   check(group);
   if (trackers_.size() == 1) {
-    advance(0, group.t_ns);  // parallel inside
+    advance(0, group.images[0].t_ns);  // parallel inside
   } else {
     cv::parallel_for_(cv::Range(0, static_cast<int>(trackers_.size())),
                       [&](const cv::Range& range) {
                         for (int i = range.start; i < range.end; ++i) {
-                          advance(static_cast<std::size_t>(i), group.t_ns);
+                          const auto camera = static_cast<std::size_t>(i);
+                          advance(camera, group.images[camera].t_ns);
                         }
                       });
   }
   for (CameraTracker& tracker : trackers_) give_ids(tracker.tracks());
-  const double shift_s = cameras_[static_cast<std::size_t>(group.first_camera)].t_CtoI_s;
-  const std::int64_t t_imu_ns = group.t_ns + std::llround(1e9 * shift_s);
   for (std::size_t i = 0; i < eyes_.size(); ++i) {
-    if (!eyes_[i].is_read) continue;
-    FeatureSample sample{t_imu_ns, static_cast<int>(i), {}};
-    if (i < trackers_.size()) {
-      for (const Track& track : trackers_[i].tracks()) {
-        sample.points.push_back({track.id, track.uv.x, track.uv.y});
-      }
-    } else {
-      match_right(group.t_ns, sample);
-    }
-    ready_.push_back(std::move(sample));
+    if (eyes_[i].is_read) ready_.push_back(points_of(i, group));
   }
+  std::stable_sort(ready_.begin(), ready_.end(),
+                   [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
   for (Eye& eye : eyes_) {
     if (eye.is_read) std::swap(eye.now, eye.before);
   }

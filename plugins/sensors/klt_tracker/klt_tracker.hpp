@@ -24,6 +24,7 @@ class KltTracker final : public Sensor {
  public:
   KltTracker(const ParamSet& params, const HostServices& services);
 
+  SampleTypes yields() const override { return sample_types<FeatureSample>(); }
   bool takes_input() const override { return true; }
   void connect(Sensor& input) override { input_ = &input; }
   Status next(Measurement& out) override;
@@ -56,7 +57,8 @@ class KltTracker final : public Sensor {
   /// Follows and refills the points of one camera; ids are given later.
   void advance(std::size_t camera, std::int64_t t_ns);
   void give_ids(std::vector<Track>& tracks);
-  void match_right(std::int64_t t_ns, FeatureSample& sample);
+  /// The points of one camera; those of the right one of a pair are looked for now.
+  FeatureSample points_of(std::size_t camera, const ImageGroup& group);
   void watch_stereo(const StereoCounts& counts, std::int64_t t_ns);
   /// Warns when left and right images do not come together.
   void watch_pairs(const ImageGroup& group);

@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 
 TEST(KltTracker, TracksOverAnImageThatCannotBeRead) {
   std::vector<Measurement> input = drive(4, 1);
-  std::get<ImageSample>(input[2]).source = std::make_shared<BrokenImage>();
+  input[2] = ImageSample{stamp_of(2), 0, std::make_shared<BrokenImage>()};
   const Played played = track(input, section({}, 1));
   ASSERT_EQ(played.samples.size(), 3U);
   EXPECT_GT(common(played.samples[1], played.samples[2]), 170U);
@@ -48,30 +48,27 @@ TEST(KltTracker, CountsARightImageWithoutItsLeftOne) {
   EXPECT_GT(common(played.of(0)[0], played.of(0)[1]), 170U);
 }
 
-TEST(KltTracker, GivesAnImageAloneTheClockOfItsOwnCamera) {
+TEST(KltTracker, LeavesTheStampOfAnImageAloneInTheClockOfItsCamera) {
   std::vector<Measurement> input = drive(3, 2);
   input.erase(input.begin() + 2);  // left, second pair
   const Played played = track(input, section("stereo: false\n"));
   const auto right = played.of(1);
   ASSERT_EQ(right.size(), 3U);
-  EXPECT_EQ(right[0].t_ns, stamp_of(0) + kShiftNs);
-  EXPECT_EQ(right[1].t_ns, stamp_of(1) + 4'500'000);
-  EXPECT_EQ(right[2].t_ns, stamp_of(2) + kShiftNs);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(right[static_cast<std::size_t>(i)].t_ns, stamp_of(i));
   EXPECT_TRUE(played.rejections.empty());
 }
 
 TEST(KltTracker, StartsAnewAfterALongGapAndAfterDarkness) {
   // GIVEN images 0 to 2, then none for 0.6 s, then 8 to 10, of which 9 is dark
   std::vector<Measurement> input = drive(11, 1);
-  std::get<ImageSample>(input[9]) =
-      sample_of({424, 400, std::vector<std::uint8_t>(424 * 400, 2)}, 0, stamp_of(9));
+  input[9] = sample_of({424, 400, std::vector<std::uint8_t>(424 * 400, 2)}, 0, stamp_of(9));
   input.erase(input.begin() + 3, input.begin() + 8);
   const auto left = track(input, section({}, 1)).of(0);
   ASSERT_EQ(left.size(), 6U);
   EXPECT_GT(common(left[1], left[2]), 180U);
   // THEN there is a sample for the dark one, too, and no id comes back
   EXPECT_TRUE(left[4].points.empty());
-  EXPECT_EQ(left[4].t_ns, stamp_of(9) + kShiftNs);
+  EXPECT_EQ(left[4].t_ns, stamp_of(9));
   for (const auto& [from, to] : {std::pair{2U, 3U}, {2U, 5U}, {3U, 5U}}) {
     EXPECT_GT(left[to].points.size(), 190U);
     EXPECT_EQ(common(left[from], left[to]), 0U);
@@ -81,7 +78,7 @@ TEST(KltTracker, StartsAnewAfterALongGapAndAfterDarkness) {
 
 TEST(KltTracker, CountsImagesWhoseStampsGoBack) {
   std::vector<Measurement> input = drive(4, 1);
-  std::get<ImageSample>(input[2]).t_ns = stamp_of(0);
+  input[2] = sample_of(rig().render(2, 0), 0, stamp_of(0));
   const Played played = track(input, section({}, 1));
   EXPECT_EQ(played.samples.size(), 3U);
   const RejectionCount& count =
@@ -94,7 +91,7 @@ TEST(KltTracker, CountsImagesWhoseStampsGoBack) {
 std::vector<Measurement> drive_with_small_images(int n, int from, int to) {
   std::vector<Measurement> input = drive(n, 1);
   for (int i = from; i < to; ++i) {
-    std::get<ImageSample>(input[static_cast<std::size_t>(i)]) =
+    input[static_cast<std::size_t>(i)] =
         sample_of({320, 240, std::vector<std::uint8_t>(320 * 240, 99)}, 0, stamp_of(i));
   }
   return input;
@@ -155,8 +152,9 @@ TEST(KltTracker, WarnsOnceWhenTheCamerasAreSwapped) {
   for (const bool swapped : {false, true}) {
     std::vector<Measurement> input = drive(13, 2);
     for (Measurement& measurement : input) {
-      auto& image = std::get<ImageSample>(measurement);
+      ImageSample image = *measurement.get_if<ImageSample>();
       if (swapped) image.camera = 1 - image.camera;
+      measurement = image;
     }
     const Told told = told_of(input);
     if (!swapped) {
@@ -178,8 +176,9 @@ TEST(KltTracker, WarnsOnceWhenLeftAndRightDoNotComeTogether) {
   for (const std::int64_t offset_ns : {5'000'000, -5'000'000}) {
     std::vector<Measurement> input = drive(12, 2);
     for (Measurement& measurement : input) {
-      auto& image = std::get<ImageSample>(measurement);
+      ImageSample image = *measurement.get_if<ImageSample>();
       if (image.camera == 1) image.t_ns += offset_ns;
+      measurement = image;
     }
     EXPECT_THAT(told_of(input).warnings,
                 ::testing::ElementsAre("no pair of images yet: the nearest stamps differ by 5.0 "

@@ -35,6 +35,7 @@ class FakeInput final : public Sensor {
  public:
   explicit FakeInput(std::vector<Measurement> measurements)
       : measurements_(std::move(measurements)) {}
+  SampleTypes yields() const override { return sample_types<ImageSample, ImuSample>(); }
   Status next(Measurement& out) override {
     if (next_ == measurements_.size()) return Status::kEnd;
     out = measurements_[next_++];

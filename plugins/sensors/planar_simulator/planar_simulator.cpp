@@ -150,7 +150,7 @@ sim::EncoderSimulation simulation_from(const ParamSet& params) {
 }
 
 std::vector<EncoderSample> encoders(const ParamSet& params, const sim::PlanarMotion& motion,
-                                    std::uint64_t seed) {
+                                    const HostServices& services) {
   const KinematicModel& robot = params.kinematics("robot");
   ModelDescription description;
   robot.describe(description);
@@ -161,10 +161,11 @@ std::vector<EncoderSample> encoders(const ParamSet& params, const sim::PlanarMot
                                        std::to_string(description.n_drive) + " wheels");
   }
   options.slip.wheel = static_cast<int>(wheel) - 1;
-  const Intrinsics truth =
-      sim::perturbed_intrinsics(description, params.number("true_intrinsics_scale"), seed);
+  if (services.exact) options.make_exact();
+  const double scale = services.exact ? 0. : params.number("true_intrinsics_scale");
+  const Intrinsics truth = sim::perturbed_intrinsics(description, scale, services.seed);
   try {
-    return sim::simulate_encoders(robot, truth, motion, options, seed);
+    return sim::simulate_encoders(robot, truth, motion, options, services.seed);
   } catch (const InputError& error) {
     throw ParamError("motion", error.what());
   }
@@ -192,7 +193,7 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
                                                          params.number("ramp_s"),
                                                          {pivot[0], pivot[1]}});
   log::Recording<Measurement> out;
-  const auto from_wheels = encoders(params, motion, services.seed);
+  const auto from_wheels = encoders(params, motion, services);
   const auto from_reference = poses(params, motion);
   out.samples.assign(from_wheels.begin(), from_wheels.end());
   out.samples.insert(out.samples.end(), from_reference.begin(), from_reference.end());
@@ -205,7 +206,8 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
 class PlanarSimulator final : public log::RecordingSensor<Measurement> {
  public:
   PlanarSimulator(const ParamSet& params, const HostServices& services)
-      : RecordingSensor(simulate(params, services)) {}
+      : RecordingSensor(simulate(params, services), sample_types<EncoderSample, PoseSample>()) {}
+  bool can_be_exact() const override { return true; }
 };
 
 VIWO_REGISTER(Sensor, PlanarSimulator, "planar_simulator", "1.0.0",

@@ -12,6 +12,7 @@
 #include "viwo/log/sensor_params.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/rig_simulator.hpp"
+#include "viwo/sim/true_cameras.hpp"
 
 namespace viwo {
 namespace {
@@ -32,7 +33,7 @@ constexpr std::array kMotionParams{
 };
 // clang-format on
 
-constexpr auto kParams = log::joined(kMotionParams, sim::kRigParams);
+constexpr auto kParams = log::joined(kMotionParams, sim::kRigParams, sim::kTrueCameraParams);
 
 /// IMU samples must not lie behind the last pose.
 double duration_within(double recorded_s, double imu_rate_hz) {
@@ -64,8 +65,8 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
 
   log::Recording<Measurement> out;
   out.rejections = std::move(recorded.rejections);
-  out.samples =
-      sim::simulate_rig(trajectory, sim::rig_from(params, duration_s, start_ns), services.seed);
+  out.samples = sim::simulate_rig(trajectory, sim::rig_from(params, duration_s, start_ns, services),
+                                  services.seed);
   sim::sort_by_time(out.samples);
   return out;
 }
@@ -73,7 +74,8 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
 class RecordedMotionSimulator final : public log::RecordingSensor<Measurement> {
  public:
   RecordedMotionSimulator(const ParamSet& params, const HostServices& services)
-      : RecordingSensor(simulate(params, services)) {}
+      : RecordingSensor(simulate(params, services), sim::rig_kinds(params)) {}
+  bool can_be_exact() const override { return true; }
 };
 
 VIWO_REGISTER(Sensor, RecordedMotionSimulator, "recorded_motion_simulator", "1.0.0",

@@ -81,6 +81,30 @@ TEST(RecordedMotionSimulator, InSpaceItKeepsTiltAndHeightAndTheOffsetMovesItsSta
   EXPECT_NEAR(last.p_IinG_m[2], 0.1 * 0.2 * t, 1e-6);
 }
 
+TEST(RecordedMotionSimulator, IsExactWhenThatIsAskedForAndTellsTheTruthOfItsCameras) {
+  const auto file = write_circle(5.);
+  const std::string wrong =
+      "features: 20, camera_clock_error_s: [0.01], sigma_true_camera_focal_px: 5";
+  const auto sensor = make_sensor(config(file, wrong), 1, true);
+  EXPECT_TRUE(sensor->can_be_exact());
+  const auto exact = play(*sensor);
+  const auto quiet = play(*make_sensor(config(file, "features: 20, noise: false")));
+  ASSERT_EQ(exact.size(), quiet.size());
+  const auto a = only<FeatureSample>(exact), b = only<FeatureSample>(quiet);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    EXPECT_EQ(a[k].t_ns, b[k].t_ns);
+    EXPECT_EQ(a[k].points.back().u_px, b[k].points.back().u_px);
+  }
+  EXPECT_EQ(only<CalibrationSample>(exact).size(), 15U);
+  const auto truth = play_only<CalibrationSample>(config(file, wrong));
+  ASSERT_EQ(truth.size(), 15U);
+  EXPECT_EQ(truth[6].name, "cam0.fx");
+  EXPECT_NE(truth[6].value, only<CalibrationSample>(exact)[6].value);
+  EXPECT_EQ(truth[14].name, "cam0.t_CtoI");
+  EXPECT_EQ(truth[14].value, 0.01);
+}
+
 TEST(RecordedMotionSimulator, RefusesWhatItCannotRead) {
   EXPECT_NE(error_of(config("/nonexistent.csv", "features: 0")).find("/nonexistent.csv"),
             std::string::npos);

@@ -12,6 +12,7 @@
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/JointState.h>
+#include <sensor_msgs/NavSatFix.h>
 
 namespace viwo::bag {
 namespace {
@@ -146,6 +147,20 @@ void Ros1Writer::write_odometry(const std::string& topic, const Stamps& stamps,
   message.header.frame_id = "world";
   message.child_frame_id = "base_link";
   message.pose.pose = pose(p, q_xyzw);
+  write(topic, stamps, message);
+}
+
+void Ros1Writer::write_fix(const std::string& topic, const Stamps& stamps, const RawFix& fix) {
+  sensor_msgs::NavSatFix message;
+  message.header.frame_id = "gps";
+  message.status.status = static_cast<std::int8_t>(fix.status);
+  message.status.service = sensor_msgs::NavSatStatus::SERVICE_GPS;
+  message.latitude = fix.latitude_deg;
+  message.longitude = fix.longitude_deg;
+  message.altitude = fix.altitude_m;
+  std::copy(fix.covariance_m2.begin(), fix.covariance_m2.end(),
+            message.position_covariance.begin());
+  message.position_covariance_type = static_cast<std::uint8_t>(fix.covariance_type);
   write(topic, stamps, message);
 }
 

@@ -26,6 +26,16 @@ struct RawImage {
   std::vector<std::uint8_t> pixels;
 };
 
+/// Fields of a sensor_msgs/NavSatFix.
+struct RawFix {
+  int status = 0;  ///< -1: no fix
+  double latitude_deg = 0.;
+  double longitude_deg = 0.;
+  double altitude_m = 0.;
+  std::array<double, 9> covariance_m2{};
+  int covariance_type = 0;  ///< 0 unknown, 1 approximated, 2 diagonal known, 3 known
+};
+
 /// Everything that fails is a std::runtime_error "file  cannot be written: why".
 class Ros1Writer {
  public:
@@ -49,6 +59,7 @@ class Ros1Writer {
                                   const std::array<double, 4>& q_xyzw);
   void write_odometry(const std::string& topic, const Stamps& stamps,
                       const std::array<double, 3>& p, const std::array<double, 4>& q_xyzw);
+  void write_fix(const std::string& topic, const Stamps& stamps, const RawFix& fix);
   void write_image(const std::string& topic, const Stamps& stamps, const RawImage& image);
   void write_compressed_image(const std::string& topic, const Stamps& stamps,
                               const std::string& format, const std::vector<std::uint8_t>& bytes);

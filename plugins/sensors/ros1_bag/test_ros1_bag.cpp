@@ -50,6 +50,7 @@ void expect_drive(const std::vector<Measurement>& all) {
 TEST_F(Ros1Bag, GivesAllTopicsInTimeOrderToTheBit) {
   write_drive();
   const auto sensor = make_sensor(section(kAll));
+  EXPECT_THAT(kinds_of(*sensor), ElementsAre("encoders", "images", "imu", "poses"));
   expect_drive(play(*sensor));
   std::vector<RejectionCount> rejections;
   sensor->rejections(rejections);
@@ -64,9 +65,59 @@ TEST_F(Ros1Bag, ReadsCompressedBags) {
   }
 }
 
+/// Fixes of 400 ms, the third without one, the fifth of another covariance type each.
+void write_fixes(const std::string& file, int n, int without = 3) {
+  Ros1Writer out(file);
+  for (int k = 0; k < n; ++k) {
+    const std::int64_t t = kStart + 400 * k * kMs;
+    bag::RawFix fix{k == without ? -1 : 0, 42. + 0.001 * k, -71., 7.5, {}, k % 4};
+    fix.covariance_m2 = {0.81, 0.1, 0.2, 0.1, 0.64, 0.3, 0.2, 0.3, 3.24};
+    out.write_fix("/fix", {t, t + kMs}, fix);
+  }
+  out.close();
+}
+
+TEST_F(Ros1Bag, GivesFixesWithWhatIsKnownOfTheirCovariance) {
+  write_fixes(file(), 8);
+  const auto sensor = make_sensor(section("gnss_topic: /fix"));
+  EXPECT_THAT(kinds_of(*sensor), ElementsAre("gnss fixes"));
+  const auto fixes = only<GnssSample>(play(*sensor));
+  ASSERT_EQ(fixes.size(), 7U);
+  EXPECT_EQ(fixes[1].t_ns, kStart + 400 * kMs);
+  EXPECT_EQ(fixes[1].latitude_deg, 42.001);
+  EXPECT_EQ(fixes[1].longitude_deg, -71.);
+  EXPECT_EQ(fixes[1].altitude_m, 7.5);
+  const std::array<double, 9> all{0.81, 0.1, 0.2, 0.1, 0.64, 0.3, 0.2, 0.3, 3.24};
+  const std::array<double, 9> diagonal{0.81, 0., 0., 0., 0.64, 0., 0., 0., 3.24};
+  EXPECT_EQ(fixes[0].covariance_ENU_m2, (std::array<double, 9>{})) << "unknown";
+  EXPECT_EQ(fixes[1].covariance_ENU_m2, all) << "approximated";
+  EXPECT_EQ(fixes[2].covariance_ENU_m2, diagonal) << "of which the diagonal is known";
+  EXPECT_EQ(fixes[6].covariance_ENU_m2, all) << "known";
+  std::vector<RejectionCount> rejections;
+  sensor->rejections(rejections);
+  ASSERT_EQ(rejections.size(), 1U) << "spacings of 400 ms are no gaps";
+  EXPECT_EQ(rejections[0].reason, "/fix: message without a fix");
+  EXPECT_EQ(rejections[0].first, "a.bag: message 4");
+}
+
+TEST_F(Ros1Bag, GivesEveryNthFix) {
+  write_fixes(file(), 8, -1);
+  const auto fixes = play_only<GnssSample>(section("gnss_topic: /fix, gnss_stride: 3"));
+  ASSERT_EQ(fixes.size(), 3U);
+  EXPECT_EQ(fixes[2].t_ns, kStart + 2400 * kMs);
+}
+
+TEST_F(Ros1Bag, SaysThatNoMessageHasAFix) {
+  write_fixes(file(), 1, 0);
+  EXPECT_THAT(error_of(section("gnss_topic: /fix")),
+              HasSubstr(file() + "  topic '/fix' has messages, and none has a fix"));
+}
+
 TEST_F(Ros1Bag, ReadsOnlyWhatIsWanted) {
   write_drive();
-  const auto all = play(*make_sensor(section("imu_topic: /imu0")));
+  const auto sensor = make_sensor(section("imu_topic: /imu0"));
+  EXPECT_THAT(kinds_of(*sensor), ElementsAre("imu"));
+  const auto all = play(*sensor);
   EXPECT_EQ(all.size(), 40U);
   EXPECT_EQ(only<ImuSample>(all).size(), 40U);
 }

@@ -64,6 +64,7 @@ Intake::Intake(const bag::TopicOptions& options, const HostServices& services, L
   want(options.joint_topic, {Kind::kJoints});
   want(options.pose_topic, {Kind::kPose, Kind::kPoseWithCovariance});
   want(options.odometry_topic, {Kind::kOdometry});
+  want(options.gnss_topic, {Kind::kNavSatFix});
   for (std::size_t i = 0; i < options.image_topics.size(); ++i) {
     want(options.image_topics[i], {Kind::kImage, Kind::kCompressedImage}, static_cast<int>(i));
   }
@@ -102,6 +103,8 @@ void Intake::read(std::size_t topic, Kind kind,
     case Kind::kPoseWithCovariance:
     case Kind::kOdometry:
       return take_pose(topic, bag::read_pose(kind, in));
+    case Kind::kNavSatFix:
+      return take_fix(topic, bag::read_fix(in));
     case Kind::kImage: {
       const bag::ImageHead head = bag::read_image_head(in);
       if (!bag::is_known_encoding(head.encoding)) {
@@ -144,6 +147,12 @@ void Intake::take_pose(std::size_t topic, PoseSample pose) {
   if (accept(topic, pose.t_ns)) queue_.push(pose);
 }
 
+void Intake::take_fix(std::size_t topic, const std::optional<GnssSample>& fix) {
+  if (!fix) return reject(topic, "message without a fix", 0);
+  if (const char* const why = fix->fault()) return reject(topic, why, fix->t_ns);
+  if (accept(topic, fix->t_ns)) queue_.push(*fix);
+}
+
 void Intake::take_joints(std::size_t topic, const bag::Joints& joints) {
   log::EncoderReading reading;
   if (const auto missing = bag::joint_reading(joints, options_, reading)) {
@@ -163,6 +172,11 @@ void Intake::take_image(std::size_t topic, const ImageSample& image) {
   for (ImageSample& ready : ready_) queue_.push(std::move(ready));
 }
 
+/// Receivers of satellites give a fix in a second or so.
+bool Intake::is_slow(std::size_t topic) const {
+  return topics_[topic].kinds.front() == Kind::kNavSatFix;
+}
+
 bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
   State& state = states_[topic];
   if (t_ns == 0) {
@@ -173,9 +187,9 @@ bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
     reject(topic, log::kStampNotAfter, t_ns);
     return false;
   }
-  if (state.last_ns && seconds_between(*state.last_ns, t_ns) > options_.max_gap_s) {
-    count(topic, "gap longer than " + log::number_text(options_.max_gap_s) + " s", t_ns,
-          "it is counted");
+  if (state.last_ns && !is_slow(topic) &&
+      seconds_between(*state.last_ns, t_ns) > options_.max_gap_s) {
+    count(topic, log::gap_reason(options_.max_gap_s), t_ns, "it is counted");
   }
   state.last_ns = t_ns;
   state.last_use = Clock::now();
@@ -188,15 +202,9 @@ void Intake::reject(std::size_t topic, const std::string& reason, std::int64_t t
 }
 
 void Intake::count(std::size_t topic, const std::string& reason, std::int64_t t_ns,
-                   const std::string& consequence) {
+                   const char* consequence) {
   const std::string full = topics_[topic].name + ": " + reason;
-  const auto known = std::find_if(counts_.begin(), counts_.end(),
-                                  [&](const RejectionCount& c) { return c.reason == full; });
-  if (known != counts_.end()) {
-    ++known->count;
-    return;
-  }
-  counts_.push_back({full, 1, "stamp " + std::to_string(t_ns) + " ns"});
+  if (!counts_.add(full, t_ns)) return;
   services_.log(LogLevel::kWarning, "topic " + full + "; " + consequence);
 }
 
@@ -209,14 +217,15 @@ std::vector<std::string> Intake::silent_topics(std::chrono::milliseconds longer_
   const std::scoped_lock lock(mutex_);
   std::vector<std::string> silent;
   for (std::size_t i = 0; i < topics_.size(); ++i) {
-    if (Clock::now() - states_[i].last_use > longer_than) silent.push_back(topics_[i].name);
+    const auto limit = is_slow(i) ? 5 * longer_than : longer_than;
+    if (Clock::now() - states_[i].last_use > limit) silent.push_back(topics_[i].name);
   }
   return silent;
 }
 
 void Intake::rejections(std::vector<RejectionCount>& out) const {
   const std::scoped_lock lock(mutex_);
-  out.insert(out.end(), counts_.begin(), counts_.end());
+  counts_.append_to(out);
 }
 
 }  // namespace viwo::ros1

@@ -18,6 +18,7 @@
 #include "raw_message.hpp"
 #include "topic_options.hpp"
 #include "viwo/api/host_services.hpp"
+#include "viwo/api/rejections.hpp"
 
 namespace viwo::ros1 {
 
@@ -44,7 +45,7 @@ class Intake {
 
   /// When something came last that could be used; of all topics.
   std::optional<Clock::time_point> last_use() const;
-  /// Topics of which nothing could be used for longer than this.
+  /// Topics of which nothing could be used for longer than this, of fixes five times as long.
   std::vector<std::string> silent_topics(std::chrono::milliseconds longer_than) const;
   void rejections(std::vector<RejectionCount>& out) const;
 
@@ -57,12 +58,14 @@ class Intake {
   void read(std::size_t topic, bag::Kind kind, const boost::shared_ptr<const RawMessage>& message);
   void take_imu(std::size_t topic, const ImuSample& imu);
   void take_pose(std::size_t topic, PoseSample pose);
+  void take_fix(std::size_t topic, const std::optional<GnssSample>& fix);
   void take_joints(std::size_t topic, const bag::Joints& joints);
   void take_image(std::size_t topic, const ImageSample& image);
+  bool is_slow(std::size_t topic) const;
   bool accept(std::size_t topic, std::int64_t t_ns);
   void reject(std::size_t topic, const std::string& reason, std::int64_t t_ns);
   void count(std::size_t topic, const std::string& reason, std::int64_t t_ns,
-             const std::string& consequence);
+             const char* consequence);
 
   bag::TopicOptions options_;
   const HostServices& services_;
@@ -75,7 +78,7 @@ class Intake {
   ImageOrder image_order_;
   std::vector<ImageSample> ready_;
   std::optional<Clock::time_point> last_use_;
-  std::vector<RejectionCount> counts_;
+  Rejections counts_;
 };
 
 }  // namespace viwo::ros1

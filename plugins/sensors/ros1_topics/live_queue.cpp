@@ -1,9 +1,7 @@
 #include "live_queue.hpp"
 
 #include <algorithm>
-#include <string>
 #include <utility>
-#include <variant>
 
 namespace viwo::ros1 {
 
@@ -46,7 +44,7 @@ void LiveQueue::push(Measurement measurement) {
   {
     const std::scoped_lock lock(mutex_);
     if (ended_) return;
-    if (std::holds_alternative<ImageSample>(measurement)) {
+    if (measurement.get_if<ImageSample>() != nullptr) {
       if (n_images_ == max_images_) drop_oldest_images();
       ++n_images_;
     }
@@ -57,16 +55,17 @@ void LiveQueue::push(Measurement measurement) {
 
 void LiveQueue::drop_oldest_images() {
   const auto oldest = std::find_if(queue_.begin(), queue_.end(), [](const Measurement& m) {
-    return std::holds_alternative<ImageSample>(m);
+    return m.get_if<ImageSample>() != nullptr;
   });
   const std::int64_t oldest_ns = stamp_ns(*oldest);
   const auto kept = std::remove_if(oldest, queue_.end(), [oldest_ns](const Measurement& m) {
-    return std::holds_alternative<ImageSample>(m) && stamp_ns(m) <= oldest_ns + kSameInstantNs;
+    return m.get_if<ImageSample>() != nullptr && stamp_ns(m) <= oldest_ns + kSameInstantNs;
   });
-  const auto n = static_cast<std::size_t>(queue_.end() - kept);
-  if (dropped_ == 0) first_dropped_ns_ = oldest_ns;
-  dropped_ += static_cast<std::int64_t>(n);
-  n_images_ -= n;
+  const auto n = queue_.end() - kept;
+  rejections_.add(
+      "image dropped: images come faster than they are taken",
+      [oldest_ns] { return stamp_text(oldest_ns); }, n);
+  n_images_ -= static_cast<std::size_t>(n);
   queue_.erase(kept, queue_.end());
 }
 
@@ -76,7 +75,7 @@ LiveQueue::Taken LiveQueue::pop(Measurement& out, std::chrono::milliseconds wait
   if (queue_.empty()) return ended_ ? Taken::kEnded : Taken::kNothing;
   out = std::move(queue_.front());
   queue_.pop_front();
-  if (std::holds_alternative<ImageSample>(out)) --n_images_;
+  if (out.get_if<ImageSample>() != nullptr) --n_images_;
   return Taken::kMeasurement;
 }
 
@@ -95,9 +94,7 @@ bool LiveQueue::ended() const {
 
 void LiveQueue::rejections(std::vector<RejectionCount>& out) const {
   const std::scoped_lock lock(mutex_);
-  if (dropped_ == 0) return;
-  out.push_back({"image dropped: images come faster than they are taken", dropped_,
-                 "stamp " + std::to_string(first_dropped_ns_) + " ns"});
+  rejections_.append_to(out);
 }
 
 }  // namespace viwo::ros1

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "viwo/api/measurement.hpp"
+#include "viwo/api/rejections.hpp"
 #include "viwo/api/sensor.hpp"
 
 namespace viwo::ros1 {
@@ -72,8 +73,7 @@ class LiveQueue {
   std::deque<Measurement> queue_;
   std::size_t n_images_ = 0;
   bool ended_ = false;
-  std::int64_t dropped_ = 0;
-  std::int64_t first_dropped_ns_ = 0;
+  Rejections rejections_;
 };
 
 }  // namespace viwo::ros1

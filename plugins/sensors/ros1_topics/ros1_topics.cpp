@@ -169,6 +169,7 @@ class Ros1Topics final : public Sensor {
     callbacks_.clear();
   }
 
+  SampleTypes yields() const override { return bag::kinds_of(options_); }
   bool live() const override { return true; }
   void stop() override { queue_.end(); }
 

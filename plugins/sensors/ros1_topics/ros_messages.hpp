@@ -13,6 +13,7 @@
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/JointState.h>
+#include <sensor_msgs/NavSatFix.h>
 #include <tf2_msgs/TFMessage.h>
 
 namespace viwo::ros1 {
@@ -41,6 +42,7 @@ using Image = sensor_msgs::Image_<AnyAllocator>;
 using Imu = sensor_msgs::Imu_<AnyAllocator>;
 using JointState = sensor_msgs::JointState_<AnyAllocator>;
 using KeyValue = diagnostic_msgs::KeyValue_<AnyAllocator>;
+using NavSatFix = sensor_msgs::NavSatFix_<AnyAllocator>;
 using Odometry = nav_msgs::Odometry_<AnyAllocator>;
 using PoseStamped = geometry_msgs::PoseStamped_<AnyAllocator>;
 using PoseWithCovarianceStamped = geometry_msgs::PoseWithCovarianceStamped_<AnyAllocator>;

@@ -108,7 +108,7 @@ TEST_F(IntakeTest, TakesImuMessagesToTheNanosecond) {
   EXPECT_TRUE(intake.last_use());
   const auto all = taken();
   ASSERT_EQ(all.size(), 1U);
-  const auto& imu = std::get<ImuSample>(all[0]);
+  const auto& imu = *all[0].get_if<ImuSample>();
   EXPECT_EQ(imu.t_ns, kTime);
   EXPECT_EQ(imu.gyro_rad_per_s, (std::array{0.1, 0.2, 0.3}));
   EXPECT_EQ(imu.accel_m_per_s2, (std::array{1., 2., 9.8}));
@@ -171,7 +171,7 @@ TEST_F(IntakeTest, MakesCausalCellsOfRates) {
   take(intake, 0, joint_message(kTime + 10'000'000, 3., 4., -3.1));
   const auto all = taken();
   ASSERT_EQ(all.size(), 1U);
-  const auto& cell = std::get<EncoderSample>(all[0]);
+  const auto& cell = *all[0].get_if<EncoderSample>();
   EXPECT_EQ(cell.begin_ns, kTime);
   EXPECT_EQ(cell.end_ns, kTime + 10'000'000) << "no later than what has been read";
   EXPECT_EQ(cell.t_ns, kTime + 5'000'000);
@@ -192,11 +192,11 @@ TEST_F(IntakeTest, MakesCellsOfAnglesWhoseRatesAreExactInTheMean) {
   take(intake, 0, joint_message(kTime + 500'000'000, 4., 2.5, 0.3));
   const auto all = taken();
   ASSERT_EQ(all.size(), 2U);
-  const auto& cell = std::get<EncoderSample>(all[0]);
+  const auto& cell = *all[0].get_if<EncoderSample>();
   EXPECT_NEAR(cell.drive_rad_per_s[0], 20. / 0.1, 1e-9);
   EXPECT_NEAR(cell.drive_rad_per_s[1], 5. / 0.1, 1e-9);
   EXPECT_NEAR(cell.steer_rad[0], 0.2, 1e-15);
-  const auto& behind = std::get<EncoderSample>(all[1]);
+  const auto& behind = *all[1].get_if<EncoderSample>();
   EXPECT_EQ(behind.begin_ns, kTime + 400'000'000) << "no cell reaches over the gap";
   EXPECT_NEAR(behind.drive_rad_per_s[0], 10. / 0.1, 1e-9);
   EXPECT_THAT(rejections(intake), ElementsAre("/joint_states: gap longer than 0.2 s | 1 | stamp " +
@@ -242,7 +242,7 @@ TEST_F(IntakeTest, TakesPosesOfEitherMessage) {
   const auto all = taken();
   ASSERT_EQ(all.size(), 2U);
   for (const Measurement& measurement : all) {
-    const auto& sample = std::get<PoseSample>(measurement);
+    const auto& sample = *measurement.get_if<PoseSample>();
     EXPECT_EQ(sample.p_BinW_m, (std::array{1., 0., 3.}));
     EXPECT_EQ(sample.q_BtoW_xyzw, (std::array{0., 0., 0.6, 0.8}));
   }
@@ -275,7 +275,7 @@ TEST_F(IntakeTest, TakesImagesRawAndCompressedPixelForPixel) {
   const auto all = taken();
   ASSERT_EQ(all.size(), 2U);
   for (int camera = 0; camera < 2; ++camera) {
-    const auto& image = std::get<ImageSample>(all[static_cast<std::size_t>(camera)]);
+    const auto& image = *all[static_cast<std::size_t>(camera)].get_if<ImageSample>();
     EXPECT_EQ(image.camera, camera);
     EXPECT_EQ(image.t_ns, kTime);
     Image read;
@@ -308,7 +308,7 @@ TEST_F(IntakeTest, SaysWhichImagesAreNotRead) {
   ASSERT_EQ(all.size(), 1U);
   Image out;
   try {
-    std::get<ImageSample>(all[0]).source->read(out);
+    all[0].get_if<ImageSample>()->source->read(out);
     FAIL() << "no error";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("image on topic '/cam0' of 1000000000 ns: "));
@@ -365,6 +365,39 @@ TEST(MasterAddress, ComesFromTheEnvironmentWhereNoneIsGiven) {
   EXPECT_EQ(master_address("http://127.0.0.1:4712").port, 4712);
   unsetenv("ROS_MASTER_URI");
   EXPECT_EQ(master_address("").uri, "http://localhost:11311");
+}
+
+TEST_F(IntakeTest, TakesFixesAndCountsMessagesThatHaveNone) {
+  TopicOptions options;
+  options.gnss_topic = "/fix";
+  Intake intake = make(options);
+  msg::NavSatFix message;
+  message.header.stamp = time_of(kTime);
+  message.status.status = sensor_msgs::NavSatStatus::STATUS_NO_FIX;
+  message.latitude = 42.5;
+  message.longitude = -71.25;
+  message.altitude = 7.5;
+  message.position_covariance[0] = message.position_covariance[4] = 0.81;
+  message.position_covariance[8] = 3.24;
+  message.position_covariance_type = msg::NavSatFix::COVARIANCE_TYPE_APPROXIMATED;
+  take(intake, 0, message);
+  message.status.status = sensor_msgs::NavSatStatus::STATUS_SBAS_FIX;
+  take(intake, 0, message);
+  message.header.stamp = time_of(kTime + kSecond);  // no gap, though longer than max_gap_s
+  message.latitude = 142.5;
+  take(intake, 0, message);
+  message.latitude = 42.5;
+  take(intake, 0, message);
+  const auto all = taken();
+  ASSERT_EQ(all.size(), 2U);
+  const auto* const fix = all[0].get_if<GnssSample>();
+  ASSERT_NE(fix, nullptr);
+  EXPECT_EQ(fix->t_ns, kTime);
+  EXPECT_EQ(fix->latitude_deg, 42.5);
+  EXPECT_EQ(fix->covariance_ENU_m2[8], 3.24);
+  EXPECT_THAT(rejections(intake), ElementsAre("/fix: message without a fix | 1 | stamp 0 ns",
+                                              "/fix: latitude beyond 90 degrees | 1 | stamp " +
+                                                  std::to_string(kTime + kSecond) + " ns"));
 }
 
 }  // namespace

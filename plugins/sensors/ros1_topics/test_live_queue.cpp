@@ -109,7 +109,7 @@ TEST(LiveQueue, DropsTheOldestImagesWhenItIsFullAndNothingElse) {
   std::string images;
   Measurement out;
   while (queue.pop(out, 0ms) == Taken::kMeasurement) {
-    if (const auto* image = std::get_if<ImageSample>(&out)) {
+    if (const auto* image = out.get_if<ImageSample>()) {
       images += std::to_string(image->camera) + "@" + std::to_string(image->t_ns / kMs) + " ";
     } else {
       ++n_imu;

@@ -32,6 +32,7 @@ bag::TopicOptions options_from(const ParamSet& params) {
   check_topic("joint_topic", options.joint_topic, seen);
   check_topic("pose_topic", options.pose_topic, seen);
   check_topic("odometry_topic", options.odometry_topic, seen);
+  check_topic("gnss_topic", options.gnss_topic, seen);
   return options;
 }
 

@@ -220,6 +220,31 @@ TEST_F(Ros2Bag, GivesAllTopicsInTimeOrderToTheBit) {
   EXPECT_EQ(odometry[1].q_BtoW_xyzw, (std::array{0.6, 0., 0., 0.8}));
 }
 
+TEST_F(Ros2Bag, GivesFixes) {
+  {
+    Writer out(file());
+    out.topic(1, "/fix", "sensor_msgs/msg/NavSatFix");
+    const std::array<double, 9> covariance{0.81, 0.1, 0.2, 0.1, 0.64, 0.3, 0.2, 0.3, 3.24};
+    for (int k = 0; k < 3; ++k) {
+      Cdr2 fix;
+      // Frames of all lengths: what follows is aligned by them.
+      fix.header(kStart + k * kMs, std::string(static_cast<std::size_t>(k), 'g'))
+          << static_cast<std::int8_t>(k - 1) << std::uint16_t{3} << 42.5 << -71.25 << 7.5
+          << covariance << std::uint8_t{2};
+      out.message(1, k, fix.bytes());
+    }
+  }
+  const auto fixes = play_only<GnssSample>(section("gnss_topic: /fix"));
+  ASSERT_EQ(fixes.size(), 2U);  // the first says that it has none
+  for (const GnssSample& fix : fixes) {
+    EXPECT_EQ(fix.latitude_deg, 42.5);
+    EXPECT_EQ(fix.longitude_deg, -71.25);
+    EXPECT_EQ(fix.altitude_m, 7.5);
+    EXPECT_EQ(fix.covariance_ENU_m2,
+              (std::array<double, 9>{0.81, 0., 0., 0., 0.64, 0., 0., 0., 3.24}));
+  }
+}
+
 TEST_F(Ros2Bag, ReadsBothByteOrders) {
   {
     Writer out(file());

@@ -48,7 +48,7 @@ struct PoseSimulation {
   Eigen::Vector3d p_BinI = Eigen::Vector3d::Zero();
 };
 
-inline PoseSimulation pose_simulation_from(const ParamSet& params) {
+inline PoseSimulation pose_simulation_from(const ParamSet& params, bool exact) {
   const auto three = [&params](const char* key) {
     const auto values = params.numbers(key);
     if (values.size() != 3) throw ParamError(key, "needs three numbers");
@@ -58,10 +58,10 @@ inline PoseSimulation pose_simulation_from(const ParamSet& params) {
   out.duration_s = params.number("duration_s");
   out.start_ns = params.integer("start_ns");
   out.rate_hz = params.number("pose_rate_hz");
-  const double noise = params.flag("noise") ? 1. : 0.;
+  const double noise = params.flag("noise") && !exact ? 1. : 0.;
   out.sigma_position_m = noise * params.number("sigma_pose_position_m");
   out.sigma_orientation_rad = noise * params.number("sigma_pose_orientation_rad");
-  out.outlier_probability = params.number("pose_outlier_probability");
+  out.outlier_probability = exact ? 0. : params.number("pose_outlier_probability");
   out.outlier_m = params.number("pose_outlier_m");
   const Eigen::Vector3d rpy = three("pose_rpy_ItoB_rad");
   out.R_ItoB = sim::rotation_from_euler(rpy.z(), rpy.y(), rpy.x());

@@ -14,6 +14,7 @@
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/rig_simulator.hpp"
+#include "viwo/sim/true_cameras.hpp"
 
 namespace viwo {
 namespace {
@@ -81,7 +82,8 @@ constexpr std::array kBaseParams{
 };
 // clang-format on
 
-constexpr auto kParams = log::joined(kBaseParams, kPoseParams, sim::kRigParams);
+constexpr auto kParams =
+    log::joined(kBaseParams, kPoseParams, sim::kRigParams, sim::kTrueCameraParams);
 
 sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
                                                const ModelDescription& robot) {
@@ -123,18 +125,19 @@ sim::BodyTrajectory trajectory_from(const ParamSet& params, const sim::RigSimula
   return sim::BodyTrajectory::drive(motion, ground, -margin, sim::rig_end_s(rig) + margin);
 }
 
-std::vector<Measurement> calibration_truth(const ModelDescription& robot, const Intrinsics& x_WI,
-                                           const sim::Mounting& mounting, double t_OtoI_s,
-                                           std::int64_t t_ns) {
-  std::vector<Measurement> out;
+std::vector<CalibrationSample> calibration_truth(const ModelDescription& robot,
+                                                 const Intrinsics& x_WI,
+                                                 const sim::Mounting& mounting, double t_OtoI_s,
+                                                 std::int64_t t_ns) {
+  std::vector<CalibrationSample> out;
   for (Eigen::Index i = 0; i < x_WI.size(); ++i) {
     const std::string& name = robot.intrinsics[static_cast<std::size_t>(i)].name;
-    out.emplace_back(CalibrationSample{t_ns, name, x_WI[i]});
+    out.push_back({t_ns, name, x_WI[i]});
   }
   for (const CalibrationSample& sample : sim::mounting_truth(mounting, t_ns)) {
-    out.emplace_back(sample);
+    out.push_back(sample);
   }
-  out.emplace_back(CalibrationSample{t_ns, "t_OtoI", t_OtoI_s});
+  out.push_back({t_ns, "t_OtoI", t_OtoI_s});
   return out;
 }
 
@@ -143,28 +146,29 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
   ModelDescription description;
   robot.describe(description);
   const std::int64_t start_ns = params.integer("start_ns");
-  const sim::RigSimulation rig = sim::rig_from(params, params.number("duration_s"), start_ns);
-  const sim::EncoderSimulation wheels = encoder_simulation_from(params, description);
+  const sim::RigSimulation rig =
+      sim::rig_from(params, params.number("duration_s"), start_ns, services);
+  sim::EncoderSimulation wheels = encoder_simulation_from(params, description);
+  if (services.exact) wheels.make_exact();
   const sim::BodyTrajectory trajectory = trajectory_from(params, rig);
-  const Intrinsics x_WI =
-      sim::perturbed_intrinsics(description, params.number("true_intrinsics_scale"), services.seed);
+  const double scale = services.exact ? 0. : params.number("true_intrinsics_scale");
+  const Intrinsics x_WI = sim::perturbed_intrinsics(description, scale, services.seed);
 
   log::Recording<Measurement> out;
-  out.samples =
-      calibration_truth(description, x_WI, rig.mounting, params.number("t_OtoI_s"), start_ns);
   const std::string& wheel_set = params.text("wheel_set");
-  for (Measurement& sample : out.samples) {
-    auto& truth = std::get<CalibrationSample>(sample);
+  for (CalibrationSample truth :
+       calibration_truth(description, x_WI, rig.mounting, params.number("t_OtoI_s"), start_ns)) {
     if (!wheel_set.empty()) truth.name = wheel_set + "." + truth.name;
+    out.samples.emplace_back(std::move(truth));
   }
   auto from_rig = sim::simulate_rig(trajectory, rig, services.seed);
   if (!wheel_set.empty()) {
     std::erase_if(from_rig,
-                  [](const Measurement& m) { return std::holds_alternative<StateSample>(m); });
+                  [](const Measurement& m) { return m.get_if<StateSample>() != nullptr; });
   }
   std::move(from_rig.begin(), from_rig.end(), std::back_inserter(out.samples));
-  const auto poses =
-      simulate_poses(trajectory, rig.mounting, pose_simulation_from(params), services.seed);
+  const auto poses = simulate_poses(trajectory, rig.mounting,
+                                    pose_simulation_from(params, services.exact), services.seed);
   out.samples.insert(out.samples.end(), poses.begin(), poses.end());
   if (params.flag("wheels")) {
     try {
@@ -180,10 +184,21 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
   return out;
 }
 
+SampleTypes kinds_of(const ParamSet& params) {
+  SampleTypes out = sim::rig_kinds(params);
+  if (!params.text("wheel_set").empty()) std::erase(out, &sample_type<StateSample>());
+  const SampleType* const truth = &sample_type<CalibrationSample>();
+  if (std::find(out.begin(), out.end(), truth) == out.end()) out.push_back(truth);
+  if (params.number("pose_rate_hz") > 0.) out.push_back(&sample_type<PoseSample>());
+  if (params.flag("wheels")) out.push_back(&sample_type<EncoderSample>());
+  return out;
+}
+
 class Simulator final : public log::RecordingSensor<Measurement> {
  public:
   Simulator(const ParamSet& params, const HostServices& services)
-      : RecordingSensor(simulate(params, services)) {}
+      : RecordingSensor(simulate(params, services), kinds_of(params)) {}
+  bool can_be_exact() const override { return true; }
 };
 
 VIWO_REGISTER(Sensor, Simulator, "simulator", "1.0.0",

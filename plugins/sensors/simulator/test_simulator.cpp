@@ -1,44 +1,22 @@
 // The simulator as the host loads it: what it yields and in which order, its truth, its streams.
+#include "test_simulator.hpp"
+
 #include <cmath>
-#include <map>
+#include <set>
 
-#include <Eigen/Geometry>
-
-#include "support.hpp"
-#include "viwo/api/filter_view.hpp"
-#include "viwo/camera/camera_model.hpp"
-#include "viwo/log/kalibr.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 
 namespace viwo {
 namespace {
 
-constexpr const char* kSwerve =
-    "robot: {type: four_wis_wid, x_m: [0.1125, -0.1125, -0.1125, 0.1125], "
-    "y_m: [0.1125, 0.1125, -0.1125, -0.1125], radius_m: 0.0255}";
-constexpr const char* kDifferential =
-    "robot: {type: differential, radius_left_m: 0.1, radius_right_m: 0.1, baseline_m: 0.5}";
-const std::string kCameras =
-    std::string("cameras: ") + VIWO_TEST_SOURCE_DIR + "/configs/cameras/t265_like.yaml";
-
-std::string config(const std::string& rest, const std::string& robot = kSwerve) {
-  return "{type: simulator, " + robot + ", " + kCameras + ", " + rest + "}";
-}
-
-std::map<std::string, double> calibration_of(const std::vector<Measurement>& all) {
-  std::map<std::string, double> out;
-  for (const auto& sample : only<CalibrationSample>(all)) out[sample.name] = sample.value;
-  return out;
-}
-
 TEST(Simulator, SimulatesTheSixMotionsOnBothGrounds) {
   for (const std::string motion :
        {"icr_sweep", "straight", "lateral", "circle", "stationary", "figure_eight"}) {
     for (const std::string ground : {"flat", "uneven"}) {
-      const auto all = play(*make_sensor(
-          config("n_cameras: 2, features: 30, duration_s: 20, t_OtoI_s: 0.01, motion: " + motion +
-                 ", ground: " + ground)));
+      const auto all = play(*make_sensor(section_of(
+          "n_cameras: 2, features: 30, duration_s: 20, t_OtoI_s: 0.01, motion: " + motion +
+          ", ground: " + ground)));
       EXPECT_EQ(only<ImuSample>(all).size(), 4001U) << motion;
       EXPECT_EQ(only<EncoderSample>(all).size(), 2001U) << motion;
       const auto images = only<FeatureSample>(all);
@@ -51,21 +29,21 @@ TEST(Simulator, SimulatesTheSixMotionsOnBothGrounds) {
 
 TEST(Simulator, ABaseThatCannotMoveSidewaysDrivesOnUnevenGround) {
   const auto samples = play_only<EncoderSample>(
-      config("motion: figure_eight, ground: uneven, features: 0, noise: false", kDifferential));
+      section_of("motion: figure_eight, ground: uneven, features: 0, noise: false", kDifferential));
   EXPECT_EQ(samples.size(), 6001U);
 }
 
 TEST(Simulator, TrueValuesComeFirstAndAreThoseThatWereAskedFor) {
-  const auto all = play(*make_sensor(
-      config("duration_s: 1, features: 0, start_ns: 5, t_OtoI_s: 0.012, p_IinO_m: [0.1, 0.2, 0.3], "
-             "rpy_ItoO_rad: [0.1, -0.2, 0.3], true_intrinsics_scale: 1")));
+  const auto all = play(*make_sensor(section_of(
+      "duration_s: 1, features: 0, start_ns: 5, t_OtoI_s: 0.012, p_IinO_m: [0.1, 0.2, 0.3], "
+      "rpy_ItoO_rad: [0.1, -0.2, 0.3], true_intrinsics_scale: 1")));
   const auto truth = calibration_of(all);
   ASSERT_EQ(truth.size(), 16U + 7U);
   for (std::size_t k = 0; k < truth.size(); ++k) {
-    EXPECT_TRUE(std::holds_alternative<CalibrationSample>(all[k])) << k;
+    EXPECT_NE(all[k].get_if<CalibrationSample>(), nullptr) << k;
     EXPECT_EQ(stamp_ns(all[k]), 5);
   }
-  EXPECT_TRUE(std::holds_alternative<StateSample>(all[truth.size()]));
+  EXPECT_NE(all[truth.size()].get_if<StateSample>(), nullptr);
   EXPECT_EQ(truth.at("t_OtoI"), 0.012);
   EXPECT_EQ(truth.at("p_IinO_x"), 0.1);
   EXPECT_EQ(truth.at("p_IinO_z"), 0.3);
@@ -80,7 +58,7 @@ TEST(Simulator, TrueValuesComeFirstAndAreThoseThatWereAskedFor) {
 TEST(Simulator, StatesStandAtTheFirstImuStampAndAtTheImages) {
   for (const std::string phase : {"0", "0.0137"}) {
     const auto all = play(*make_sensor(
-        config("duration_s: 2, features: 20, start_ns: 1000000000, camera_phase_s: " + phase)));
+        section_of("duration_s: 2, features: 20, start_ns: 1000000000, camera_phase_s: " + phase)));
     const auto states = only<StateSample>(all);
     const auto images = only<FeatureSample>(all);
     const std::size_t extra = phase == "0" ? 0 : 1;
@@ -93,58 +71,12 @@ TEST(Simulator, StatesStandAtTheFirstImuStampAndAtTheImages) {
   }
 }
 
-TEST(Simulator, FeatureDirectionsAndTrueStatesAgreeOnStaticLandmarks) {
-  // Each landmark triangulated from the true poses, with the camera file read on its own.
-  const auto cameras = log::read_kalibr_cameras(std::string(VIWO_TEST_SOURCE_DIR) +
-                                                "/configs/cameras/t265_like.yaml");
-  ASSERT_EQ(cameras.size(), 2U);
-  const auto all = play(*make_sensor(
-      config("duration_s: 5, noise: false, n_cameras: 2, features: 40, ground: uneven, "
-             "camera_phase_s: 0.0137, rpy_ItoO_rad: [0.02, 0.05, -0.1]")));
-  std::map<std::int64_t, StateSample> states;
-  for (const auto& state : only<StateSample>(all)) states[state.t_ns] = state;
-  struct Rays {
-    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d b = Eigen::Vector3d::Zero();
-    double c = 0.;
-    int n = 0;
-  };
-  std::map<std::int64_t, Rays> rays_of;
-  for (const auto& image : only<FeatureSample>(all)) {
-    const StateSample& state = states.at(image.t_ns);
-    const CameraView& cam = cameras[static_cast<std::size_t>(image.camera)];
-    const Eigen::Quaterniond q_ItoG(state.q_ItoG_xyzw[3], state.q_ItoG_xyzw[0],
-                                    state.q_ItoG_xyzw[1], state.q_ItoG_xyzw[2]);
-    const Eigen::Vector3d p_CinI = -cam.R_ItoC.transpose() * cam.p_IinC;
-    const Eigen::Vector3d p_CinG = q_ItoG * p_CinI + Eigen::Vector3d(state.p_IinG_m.data());
-    for (const FeaturePoint& point : image.points) {
-      const auto ray = unproject(cam, {point.u_px, point.v_px});
-      ASSERT_TRUE(ray.has_value());
-      const Eigen::Vector3d d = q_ItoG * (cam.R_ItoC.transpose() * *ray);
-      const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
-      Rays& rays = rays_of[point.id];
-      rays.A += across;
-      rays.b += across * p_CinG;
-      rays.c += p_CinG.dot(across * p_CinG);
-      ++rays.n;
-    }
-  }
-  int checked = 0;
-  for (const auto& [id, rays] : rays_of) {
-    if (rays.n < 10) continue;
-    const Eigen::Vector3d p = rays.A.inverse() * rays.b;
-    EXPECT_LT(std::abs(rays.c - p.dot(rays.b)) / rays.n, 1e-12) << id;  // mean squared distance
-    ++checked;
-  }
-  EXPECT_GT(checked, 30);
-}
-
 TEST(Simulator, EncodersAreOfTheTrueStatesAtTheirTimeOffset) {
   // On a circle at constant speed every wheel turns at a constant rate, at any offset; on a ramp
   // the offset shows: readings are those of 0.2 s later.
   const std::string rest = "motion: straight, ramp_s: 4, noise: false, features: 0, duration_s: 5";
-  const auto now = play_only<EncoderSample>(config(rest));
-  const auto ahead = play_only<EncoderSample>(config(rest + ", t_OtoI_s: 0.2"));
+  const auto now = play_only<EncoderSample>(section_of(rest));
+  const auto ahead = play_only<EncoderSample>(section_of(rest + ", t_OtoI_s: 0.2"));
   for (std::size_t k = 0; k + 20 < now.size(); ++k) {
     EXPECT_NEAR(ahead[k].drive_rad_per_s[0], now[k + 20].drive_rad_per_s[0], 1e-6) << k;
   }
@@ -162,6 +94,10 @@ bool same(const FeatureSample& a, const FeatureSample& b) {
 bool same(const ImuSample& a, const ImuSample& b) {
   return a.t_ns == b.t_ns && a.gyro_rad_per_s == b.gyro_rad_per_s &&
          a.accel_m_per_s2 == b.accel_m_per_s2;
+}
+
+bool same(const PoseSample& a, const PoseSample& b) {
+  return a.t_ns == b.t_ns && a.p_BinW_m == b.p_BinW_m && a.q_BtoW_xyzw == b.q_BtoW_xyzw;
 }
 
 bool same(const EncoderSample& a, const EncoderSample& b) {
@@ -186,7 +122,7 @@ TEST(Simulator, SensorsThatAreTurnedOffLeaveTheOthersAsTheyWere) {
       "duration_s: 5, n_cameras: 2, features: 30, t_OtoI_s: 0.01, sigma_gyro_bias_rad_per_s: 0.01, "
       "true_intrinsics_scale: 1";
   const auto with = [&](const std::string& more, std::uint64_t seed = 1) {
-    return play(*make_sensor(config(rest + more), seed));
+    return play(*make_sensor(section_of(rest + more), seed));
   };
   const auto all = with("");
   const auto again = with("");
@@ -219,13 +155,49 @@ TEST(Simulator, SensorsThatAreTurnedOffLeaveTheOthersAsTheyWere) {
   EXPECT_EQ(only<StateSample>(all).size(), only<StateSample>(blind).size());
 }
 
+TEST(Simulator, IsExactWhenThatIsAskedForWhateverItsParametersSay) {
+  const std::string rest = "duration_s: 3, n_cameras: 2, features: 30, pose_rate_hz: 5, ";
+  const auto sensor = make_sensor(
+      section_of(rest +
+                 "true_intrinsics_scale: 1, sigma_gyro_bias_rad_per_s: 0.01, "
+                 "outlier_probability: 0.1, slip_start_s: [1], drive_resolution_rad_per_s: 0.1, "
+                 "pose_outlier_probability: 0.3, feature_outlier_probability: 0.1, "
+                 "feature_dropout_probability: 0.1" +
+                 kWrongCameras),
+      1, true);
+  EXPECT_TRUE(sensor->can_be_exact());
+  const auto exact = play(*sensor);
+  const auto quiet = play(*make_sensor(section_of(rest + "noise: false")));
+  EXPECT_EQ(calibration_of(exact), calibration_of(quiet));
+  EXPECT_TRUE(all_same<ImuSample>(exact, quiet));
+  EXPECT_TRUE(all_same<EncoderSample>(exact, quiet));
+  EXPECT_TRUE(all_same<FeatureSample>(exact, quiet));
+  EXPECT_TRUE(all_same<PoseSample>(exact, quiet));
+}
+
+TEST(Simulator, NamesTheKindsOfSamplesThatItIsConfiguredToYield) {
+  const auto kinds = [](const std::string& rest) {
+    return kinds_of(*make_sensor(section_of("duration_s: 1" + rest)));
+  };
+  using Kinds = std::set<std::string>;
+  EXPECT_EQ(kinds(""),
+            (Kinds{"true calibration", "reference states", "imu", "encoders", "tracks"}));
+  EXPECT_EQ(kinds(", features: 0, wheels: false, imu: false, pose_rate_hz: 1"),
+            (Kinds{"true calibration", "reference states", "poses"}));
+  EXPECT_EQ(kinds(", features: 0, imu: false, wheel_set: back"),
+            (Kinds{"true calibration", "encoders"}));
+}
+
 TEST(Simulator, SaysWhatItRefusesAndWhere) {
   const auto refusal = [](const std::string& rest, const std::string& robot = kSwerve) {
-    const std::string text = error_of(config(rest, robot));
+    const std::string text = error_of(section_of(rest, robot));
     return text.substr(std::min(text.find("sensor."), text.size()));
   };
   EXPECT_EQ(refusal("p_IinO_m: [1, 2]"), "sensor.p_IinO_m: needs 3 numbers, not 2");
   EXPECT_EQ(refusal("landmark_min_m: 8"), "sensor.landmark_max_m: is less than landmark_min_m");
+  EXPECT_EQ(refusal("n_cameras: 2, camera_clock_error_s: [0, 0, 0]"),
+            "sensor.camera_clock_error_s: needs one number, or one for each of the 2 cameras, not "
+            "3");
   EXPECT_EQ(refusal("slip_wheel: 5"), "sensor.slip_wheel: 5 is not one of the robot's 4 wheels");
   EXPECT_EQ(
       refusal("n_cameras: 3").substr(0, 44),
@@ -235,27 +207,6 @@ TEST(Simulator, SaysWhatItRefusesAndWhere) {
   EXPECT_NE(error_of("{type: simulator, " + std::string(kSwerve) + "}")
                 .find("cameras: a file is needed, or features: 0"),
             std::string::npos);
-}
-
-TEST(CameraFiles, LookForwardFromAnImuThatIsAlignedWithTheBase) {
-  for (const char* name : {"t265_like", "pinhole"}) {
-    for (const CameraView& cam : log::read_kalibr_cameras(std::string(VIWO_TEST_SOURCE_DIR) +
-                                                          "/configs/cameras/" + name + ".yaml")) {
-      const Eigen::Vector3d forward = cam.R_ItoC.transpose().col(2);
-      EXPECT_GT(forward.x(), 0.99) << name;
-      EXPECT_LE(forward.z(), 1e-12) << name;  // level, or down
-      const Eigen::Vector2d centre(0.5 * cam.width_px, 0.5 * cam.height_px);
-      const auto ray = unproject(cam, centre);
-      ASSERT_TRUE(ray.has_value());
-      EXPECT_GT(ray->z(), 0.99) << name;
-    }
-  }
-  const auto pair = log::read_kalibr_cameras(std::string(VIWO_TEST_SOURCE_DIR) +
-                                             "/configs/cameras/t265_like.yaml");
-  const auto place = [](const CameraView& cam) -> Eigen::Vector3d {
-    return -cam.R_ItoC.transpose() * cam.p_IinC;
-  };
-  EXPECT_NEAR((place(pair[0]) - place(pair[1]) - Eigen::Vector3d(0., 0.063, 0.)).norm(), 0., 1e-12);
 }
 
 }  // namespace

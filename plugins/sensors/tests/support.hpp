@@ -1,9 +1,11 @@
 // Sensors made from configuration text, as the host makes them.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,11 +21,12 @@ inline PluginRegistry& registry() {
   return the_registry;
 }
 
-/// Throws InputError with what the host would print.
-inline std::shared_ptr<Sensor> make_sensor(const std::string& yaml, std::uint64_t seed = 1) {
+/// Throws InputError with what the host would print. `exact`: HostServices::exact.
+inline std::shared_ptr<Sensor> make_sensor(const std::string& yaml, std::uint64_t seed = 1,
+                                           bool exact = false) {
   config::Errors errors;
   const auto loaded =
-      registry().make_sensor(config::parse(yaml, "test.yaml"), "sensor", seed, errors);
+      registry().make_sensor(config::parse(yaml, "test.yaml"), "sensor", seed, errors, {}, exact);
   errors.throw_if_any();
   return loaded.object;
 }
@@ -37,11 +40,20 @@ inline std::string error_of(const std::string& yaml) {
   return {};
 }
 
-/// Everything a sensor yields; it must be in time order.
+/// The names of the kinds of samples that a sensor says it yields.
+inline std::set<std::string> kinds_of(const Sensor& sensor) {
+  std::set<std::string> out;
+  for (const SampleType* type : sensor.yields()) EXPECT_TRUE(out.insert(type->name).second);
+  return out;
+}
+
+/// Everything a sensor yields; it must be in time order, and of the kinds that the sensor names.
 inline std::vector<Measurement> play(Sensor& sensor) {
+  const auto kinds = kinds_of(sensor);
   std::vector<Measurement> out;
   Measurement measurement;
   while (sensor.next(measurement) == Status::kOk) {
+    EXPECT_TRUE(kinds.contains(measurement.view().type().name));
     if (!out.empty()) {
       EXPECT_LE(stamp_ns(out.back()), stamp_ns(measurement));
     }
@@ -55,7 +67,7 @@ template <class Sample>
 std::vector<Sample> only(const std::vector<Measurement>& measurements) {
   std::vector<Sample> out;
   for (const Measurement& measurement : measurements) {
-    if (const auto* sample = std::get_if<Sample>(&measurement)) out.push_back(*sample);
+    if (const auto* sample = measurement.get_if<Sample>()) out.push_back(*sample);
   }
   return out;
 }

@@ -49,6 +49,22 @@ TEST(PlanarSimulator, DrawsTrueIntrinsicsFromTheSeedWhenAsked) {
   EXPECT_EQ(a, play_only<EncoderSample>(config(kRobot, drawn), 1).back().drive_rad_per_s[0]);
 }
 
+TEST(PlanarSimulator, IsExactWhenThatIsAskedForWhateverItsParametersSay) {
+  const auto sensor = make_sensor(config(kRobot,
+                                         "motion: circle, duration_s: 2, true_intrinsics_scale: 1, "
+                                         "outlier_probability: 0.3, slip_start_s: [1], "
+                                         "drive_resolution_rad_per_s: 0.1"),
+                                  1, true);
+  EXPECT_TRUE(sensor->can_be_exact());
+  const auto exact = only<EncoderSample>(play(*sensor));
+  const auto quiet =
+      play_only<EncoderSample>(config(kRobot, "motion: circle, duration_s: 2, noise: false"));
+  ASSERT_EQ(exact.size(), quiet.size());
+  for (std::size_t k = 0; k < exact.size(); ++k) {
+    EXPECT_EQ(exact[k].drive_rad_per_s, quiet[k].drive_rad_per_s) << k;
+  }
+}
+
 TEST(PlanarSimulator, ASwerveBaseGoesThroughEveryMotion) {
   for (const char* motion : {"icr_sweep", "straight", "lateral", "circle", "stationary",
                              "figure_eight", "crab_varying", "spin", "constant_steering"}) {
@@ -82,7 +98,7 @@ TEST(PlanarSimulator, AWrittenSimulationReadsBackToTheSameMeasurements) {
   const auto simulated = play(*make_sensor(config(
       kSwerve, "motion: icr_sweep, duration_s: 3, rate_hz: 70, start_ns: 1700000000000000001")));
   log::AslWriter writer(folder);
-  for (const Measurement& measurement : simulated) writer.write(measurement);
+  for (const Measurement& measurement : simulated) EXPECT_TRUE(writer.write(measurement));
   writer.close();
   const auto encoders =
       play_only<EncoderSample>("{type: asl_encoders, path: " + (folder / "wheels0").string() + "}");

@@ -53,9 +53,9 @@ class VioSensors : public ::testing::Test {
 std::vector<std::string> kinds(const std::vector<Measurement>& measurements) {
   std::vector<std::string> out;
   for (const Measurement& m : measurements) {
-    if (std::holds_alternative<StateSample>(m)) out.emplace_back("state");
-    if (std::holds_alternative<ImuSample>(m)) out.emplace_back("imu");
-    if (const auto* image = std::get_if<FeatureSample>(&m)) {
+    if (m.get_if<StateSample>() != nullptr) out.emplace_back("state");
+    if (m.get_if<ImuSample>() != nullptr) out.emplace_back("imu");
+    if (const auto* image = m.get_if<FeatureSample>()) {
       out.push_back("image " + std::to_string(image->camera));
     }
   }
@@ -126,16 +126,16 @@ TEST_F(VioSensors, VioCsvMergesInTimeOrderWithExactStamps) {
   EXPECT_EQ(stamp_ns(all[3]), 1'521'753'106'736'427'500);
   EXPECT_EQ(stamp_ns(all[4]), 1'521'753'106'740'000'000);
   EXPECT_EQ(stamp_ns(all[6]), 1'521'753'106'741'427'700);
-  const auto& state = std::get<StateSample>(all[0]);
+  const auto& state = *all[0].get_if<StateSample>();
   EXPECT_EQ(state.q_ItoG_xyzw, (std::array{0.6, 0., 0., 0.8}));
   EXPECT_EQ(state.p_IinG_m, (std::array{1., 2., 3.}));
   EXPECT_EQ(state.v_IinG_m_per_s, (std::array{4., 5., 6.}));
   EXPECT_EQ(state.gyro_bias_rad_per_s, (std::array{7., 8., 9.}));
   EXPECT_EQ(state.accel_bias_m_per_s2, (std::array{10., 11., 12.}));
-  const auto& imu = std::get<ImuSample>(all[6]);
+  const auto& imu = *all[6].get_if<ImuSample>();
   EXPECT_EQ(imu.gyro_rad_per_s, (std::array{1., 2., 3.}));
   EXPECT_EQ(imu.accel_m_per_s2, (std::array{4., 5., 7.}));
-  const auto& image = std::get<FeatureSample>(all[2]);
+  const auto& image = *all[2].get_if<FeatureSample>();
   ASSERT_EQ(image.points.size(), 2U);
   EXPECT_EQ(image.points[1].id, 8);
   EXPECT_EQ(image.points[1].u_px, 11.);
@@ -148,6 +148,8 @@ TEST_F(VioSensors, VioCsvReadsWhatIsSwitchedOn) {
               ElementsAre("imu", "imu"));
   EXPECT_THAT(kinds(play(*make_sensor(vio(", imu: false, truth: false")))),
               ElementsAre("image 1", "image 0", "image 0"));
+  EXPECT_THAT(kinds_of(*make_sensor(vio())), ElementsAre("imu", "reference states", "tracks"));
+  EXPECT_THAT(kinds_of(*make_sensor(vio(", imu: false, truth: false"))), ElementsAre("tracks"));
   std::filesystem::remove(folder_ / "imu.csv");
   std::filesystem::remove(folder_ / "features.csv");
   EXPECT_THAT(kinds(play(*make_sensor(vio(", imu: false, features: false")))),

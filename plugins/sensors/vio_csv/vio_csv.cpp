@@ -134,10 +134,12 @@ class VioCsv final : public Sensor {
     if (!params.flag("imu") && !params.flag("features") && !params.flag("truth")) {
       throw ParamError("folder", "nothing to read: imu, features and truth are all false");
     }
-    if (params.flag("truth")) states_.recording = read_states(folder, limits);
-    if (params.flag("imu")) imu_.recording = read_imu(folder, limits);
-    if (params.flag("features")) features_.recording = read_features(folder, limits);
+    if (params.flag("truth")) keep(states_, read_states(folder, limits));
+    if (params.flag("imu")) keep(imu_, read_imu(folder, limits));
+    if (params.flag("features")) keep(features_, read_features(folder, limits));
   }
+
+  SampleTypes yields() const override { return yields_; }
 
   Status next(Measurement& out) override {
     // The first of the earliest: states before inertial measurements before images.
@@ -157,6 +159,12 @@ class VioCsv final : public Sensor {
   }
 
  private:
+  template <class Sample>
+  void keep(Track<Sample>& track, log::Recording<Sample> recording) {
+    track.recording = std::move(recording);
+    yields_.push_back(&sample_type<Sample>());
+  }
+
   template <class A, class B>
   static bool precedes(const Track<A>& a, const Track<B>& b) {
     return a.has_next() && b.has_next() && a.next_ns() < b.next_ns();
@@ -172,6 +180,7 @@ class VioCsv final : public Sensor {
   Track<StateSample> states_;
   Track<ImuSample> imu_;
   Track<FeatureSample> features_;
+  SampleTypes yields_;
 };
 
 VIWO_REGISTER(Sensor, VioCsv, "vio_csv", "1.0.0",

@@ -62,20 +62,14 @@ class PlanarMotion final : public Update {
         sigma_height_m_per_sqrt_m_(params.number("sigma_height_m_per_sqrt_m")),
         gate_probability_(params.number("gate_probability")) {}
 
-  UpdateKind kind() const override { return UpdateKind::kWheels; }
-
-  void start(const UpdateSetup& setup) override {
-    if (setup.wheels == nullptr) {
-      throw InputError("planar_motion needs a wheel set: its frame O is what drives on the plane");
-    }
-  }
+  void declare(Declarations& host) override { blocks_ = declare_wheels(host); }
 
   void update(const FilterView& filter, const EpochData& /*data*/, FactorSink& sink) override {
     // Each pair of neighbours comes once: when the second of them is new.
-    if (filter.clones.size() < 2 || filter.wheels == nullptr) return;
+    if (filter.clones.size() < 2) return;
     const CloneView& first = filter.clones[filter.clones.size() - 2];
     const CloneView& last = filter.clones.back();
-    const WheelsView& wheels = *filter.wheels;
+    const WheelsView wheels = blocks_.view(filter);
     const Mount mount{wheels.R_ItoO, wheels.p_IinO};
     double path_m = 0.;
     const ImuPose at_first{first.R_GtoI, first.p_IinG};
@@ -104,6 +98,7 @@ class PlanarMotion final : public Update {
   }
 
  private:
+  WheelsBlocks blocks_;
   int rows_;
   double sigma_tilt_rad_, sigma_height_m_;
   double sigma_tilt_rad_per_sqrt_m_, sigma_height_m_per_sqrt_m_;

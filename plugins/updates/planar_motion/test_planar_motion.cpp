@@ -29,24 +29,21 @@ testing::SmallFilter driving(bool upright = false, double sigma = 1e-3) {
   if (upright) drive.R_GtoW = exp_so3({0., 0., 0.7});
   sim::PlanarMotion motion("icr_sweep", {.ramp_s = 0.});
   sim::PoseIntegrator pose(motion);
-  testing::SmallFilter filter;
+  testing::SmallFilter filter(testing::free_wheels(drive));
   for (int k = 0; k < 2; ++k) {
     const double t = 1. + 0.1 * k;
     filter.clones.push_back(
         drive.clone((1000 + 100 * k) * kMs, k, pose.advance_to(t), motion.twist(t)));
   }
-  filter.wheels.R_ItoO = drive.R_ItoO;
-  filter.wheels.p_IinO = drive.p_IinO;
-  filter.wheels.x_WI.resize(0);
   filter.layout();
   filter.P.setIdentity();
   filter.P *= sigma * sigma;
   return filter;
 }
 
-ResidualFactor factor(const testing::SmallFilter& filter, const std::string& more = "") {
+ResidualFactor factor(testing::SmallFilter filter, const std::string& more = "") {
   const auto update = testing::load_update("{type: planar_motion" + more + "}");
-  update->start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = &filter.wheels});
+  filter.start(*update);
   FactorSink sink(1, 60);
   update->update(filter.view(), {}, sink);
   EXPECT_EQ(sink.residuals().size(), 1u);
@@ -77,18 +74,18 @@ TEST(PlanarPair, HasTheDerivativesOfCentralDifferencesByThePosesAtRandomStates) 
 TEST(PlanarPair, HasTheDerivativesOfCentralDifferencesByTheMountOnThePlane) {
   for (const bool upright : {false, true}) {
     const testing::SmallFilter filter = driving(upright);
+    const WheelsView wheels = filter.wheels_view();
     const ImuPose first = pose_of(filter.clones[0]), last = pose_of(filter.clones[1]);
     // The height in G tells nothing about the mount where the plane is level.
     const int rows = upright ? 4 : 3;
     const auto predict = [&](const VectorXd& d) -> VectorXd {
-      return off_plane(
-                 first, last,
-                 {exp_so3(-d.head<3>()) * filter.wheels.R_ItoO, filter.wheels.p_IinO + d.tail<3>()})
+      return off_plane(first, last,
+                       {exp_so3(-d.head<3>()) * wheels.R_ItoO, wheels.p_IinO + d.tail<3>()})
           .head(rows);
     };
     const Eigen::MatrixXd numeric = testing::central_difference(predict, VectorXd::Zero(6));
     PairJacobian J;
-    mount_jacobian(first, last, {filter.wheels.R_ItoO, filter.wheels.p_IinO}, J);
+    mount_jacobian(first, last, {wheels.R_ItoO, wheels.p_IinO}, J);
     EXPECT_EQ(testing::jacobian_mismatch(J.topRightCorner(rows, 3), numeric.leftCols(3), {}), "");
     // It does tell about the tilt, and nothing about where O is.
     EXPECT_GT(numeric.leftCols(2).cwiseAbs().maxCoeff(), 0.01);
@@ -133,7 +130,7 @@ TEST(PlanarMotionUpdate, HasTheDerivativesOfItsResidualAndThoseOfPosesAtFirstEst
 
 TEST(PlanarMotionUpdate, LeavesTheLeverArmAsItWas) {
   testing::SmallFilter filter = driving(true);
-  const int mount = filter.wheels.extrinsics_column;
+  const int mount = filter.column(filter.wheels.extrinsics);
   filter.P.diagonal().segment<3>(mount).setConstant(0.01 * 0.01);
   filter.P.diagonal().segment<3>(mount + 3).setConstant(0.1 * 0.1);
   FactorSink sink(1, 60);
@@ -142,7 +139,7 @@ TEST(PlanarMotionUpdate, LeavesTheLeverArmAsItWas) {
   filter.apply(sink);
   for (int i = 0; i < 3; ++i) EXPECT_DOUBLE_EQ(filter.P(mount + 3 + i, mount + 3 + i), 0.01);
   EXPECT_LT(filter.P(mount, mount), 0.0099 * 0.01);
-  filter.wheels.extrinsics_column = -1;
+  filter.blocks[static_cast<std::size_t>(filter.wheels.extrinsics.index)].column = -1;
   EXPECT_EQ(factor(filter).columns.size(), 12);
 }
 
@@ -161,7 +158,7 @@ TEST(PlanarMotionUpdate, AddsNoiseThatGrowsWithThePath) {
 TEST(PlanarMotionUpdate, IsConsistentWithTheFloorItAssumesAndNotWithTheWrongSign) {
   std::mt19937_64 rng(8);
   const testing::SmallFilter truth = driving(true, 2e-3);
-  const int mount = truth.wheels.extrinsics_column;
+  const int mount = truth.column(truth.wheels.extrinsics);
   constexpr int kRuns = 50, kTested = 15;
   double right = 0., wrong = 0.;
   for (int run = 0; run < kRuns; ++run) {
@@ -188,7 +185,7 @@ TEST(PlanarMotionUpdate, IsConsistentWithTheFloorItAssumesAndNotWithTheWrongSign
         error.segment<3>(6 * i) = -log_so3(is.R_GtoI * estimate.R_GtoI.transpose());
         error.segment<3>(6 * i + 3) = is.p_IinG - estimate.p_IinG;
       }
-      error.tail<3>() = -log_so3(truth.wheels.R_ItoO * updated.wheels.R_ItoO.transpose());
+      error.tail<3>() = -log_so3(truth.wheels_view().R_ItoO * updated.R_ItoO().transpose());
       const Eigen::MatrixXd P = updated.P.block(kImuSize, kImuSize, kTested, kTested);
       ASSERT_EQ(mount, kImuSize + 12);
       const double nees = error.dot(P.ldlt().solve(error)) / kTested;
@@ -203,9 +200,9 @@ TEST(PlanarMotionUpdate, IsConsistentWithTheFloorItAssumesAndNotWithTheWrongSign
 
 TEST(PlanarMotionUpdate, DoesNotAllocate) {
   if (!testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
-  const testing::SmallFilter filter = driving();
+  testing::SmallFilter filter = driving();
   const auto update = testing::load_update("{type: planar_motion}");
-  update->start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = &filter.wheels});
+  filter.start(*update);
   FactorSink sink(1, 60);
   const FilterView view = filter.view();
   update->update(view, {}, sink);
@@ -218,13 +215,12 @@ TEST(PlanarMotionUpdate, DoesNotAllocate) {
 
 TEST(PlanarMotionUpdate, WantsAWheelSet) {
   const auto update = testing::load_update("{type: planar_motion}");
-  EXPECT_EQ(update->kind(), UpdateKind::kWheels);
+  testing::UpdateHost no_wheels;
   try {
-    update->start({});
+    update->declare(no_wheels);
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(),
-                 "planar_motion needs a wheel set: its frame O is what drives on the plane");
+    EXPECT_STREQ(error.what(), "needs wheels: there is no section 'kinematics'");
   }
 }
 

@@ -131,17 +131,18 @@ class PoseReference final : public Update {
     lever_.p_BinI = three(params, "p_BinI_m");
   }
 
-  UpdateKind kind() const override { return UpdateKind::kPoses; }
-
-  void start(const UpdateSetup& /*setup*/) override {}
+  void declare(Declarations& host) override {
+    fixes_ = host.stream({.type = &sample_type<PoseSample>()});
+  }
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
-    const std::size_t n = data.poses.size();
+    const auto fixes = data.samples<PoseSample>(fixes_);
+    const std::size_t n = fixes.size();
     const std::size_t used = std::min(n, max_per_epoch_);
     too_many_.add(static_cast<std::int64_t>(n - used), data.end_ns);
     for (std::size_t i = 0; i < used; ++i) {
       // The last of each of `used` equal parts: all of them when there are few.
-      const PoseSample& fix = data.poses[(i + 1) * n / used - 1];
+      const PoseSample& fix = fixes[(i + 1) * n / used - 1];
       const auto last = clone_behind(filter, fix.t_ns);
       if (last) emit(filter.clones[*last - 1], filter.clones[*last], fix, sink);
     }
@@ -200,6 +201,7 @@ class PoseReference final : public Update {
     factor.residual.head<3>() = -log_so3(R_BtoG.transpose() * body.R_GtoB.transpose());
   }
 
+  StreamId fixes_;
   bool with_orientation_;
   std::size_t max_per_epoch_;
   double max_span_s_, gate_probability_;

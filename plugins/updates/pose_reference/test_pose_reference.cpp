@@ -63,7 +63,6 @@ class Drive : public ::testing::Test {
 
   Drive() : motion_("icr_sweep", {.ramp_s = 0.}) {
     for (int k = 0; k < 4; ++k) truth_.clones.push_back(at(1. + kPeriod * k, k));
-    truth_.wheels.x_WI.resize(0);
     truth_.layout();
     truth_.P.setIdentity();
     truth_.P *= 1e-4;
@@ -86,23 +85,21 @@ class Drive : public ::testing::Test {
     return {imu.t_ns, {p.x(), p.y(), p.z()}, {q.x(), q.y(), q.z(), q.w()}};
   }
 
-  static std::shared_ptr<Update> load(const std::string& more = "",
-                                      const std::string& use = "pose") {
+  std::shared_ptr<Update> load(const std::string& more = "", const std::string& use = "pose") {
     const auto update =
         testing::load_update("{type: pose_reference, use: " + use +
                              ", p_BinI_m: [0.2, -0.1, 0.5], rpy_ItoB_rad: [0.3, 0.5, "
                              "-1.2], yaw_WtoG_rad: 0.4, p_WinG_m: [5, -3, 1]" +
                              more + "}");
-    update->start({.max_clones = 4, .max_state_size = 60, .cameras = {}, .wheels = nullptr});
+    truth_.start(*update);
     return update;
   }
 
   static std::vector<ResidualFactor> factors(Update& update, const testing::SmallFilter& filter,
                                              const std::vector<PoseSample>& fixes) {
     FactorSink sink(16, 60);
-    EpochData data;
+    EpochData data = filter.epoch(fixes);
     data.end_ns = filter.clones.back().t_ns;
-    data.poses = fixes;
     update.update(filter.view(), data, sink);
     return {sink.residuals().begin(), sink.residuals().end()};
   }
@@ -198,8 +195,7 @@ TEST_F(Drive, DoesNotAllocate) {
   const auto update = load();
   FactorSink sink(16, 60);
   const std::vector<PoseSample> fixes{fix(1.45), fix(1.5), fix(1.55)};
-  EpochData data;
-  data.poses = fixes;
+  const EpochData data = truth_.epoch(fixes);
   const FilterView view = truth_.view();
   const long before = testing::allocations();
   update->update(view, data, sink);
@@ -210,18 +206,22 @@ TEST_F(Drive, DoesNotAllocate) {
 /// Writes down the stamps of the poses it is given, ms.
 class PoseListener final : public Update {
  public:
-  UpdateKind kind() const override { return UpdateKind::kPoses; }
-  void start(const UpdateSetup&) override {}
+  void declare(Declarations& host) override {
+    poses_ = host.stream({.type = &sample_type<PoseSample>()});
+  }
   void update(const FilterView&, const EpochData& data, FactorSink&) override {
     auto& now = seen.emplace_back();
-    for (const PoseSample& pose : data.poses) now.push_back(pose.t_ns / kMs);
+    for (const PoseSample& pose : data.samples<PoseSample>(poses_)) now.push_back(pose.t_ns / kMs);
   }
   std::vector<std::vector<std::int64_t>> seen;
+
+ private:
+  StreamId poses_;
 };
 
 TEST(EstimatorWithPoses, GivesEachPoseOnceLateOnesWithTheNextEpochAndCountsWhatItDrops) {
   const auto first = std::make_shared<PoseListener>(), second = std::make_shared<PoseListener>();
-  Estimator estimator({}, {}, {}, {{"a", first, -1, 0}, {"b", second, -1, 1}});
+  Estimator estimator({}, {{"a", first, nullptr, "gnss0"}, {"b", second, nullptr, "mocap0"}});
   ImuPrior prior;
   prior.t_ns = 0;
   prior.P.setIdentity();
@@ -231,10 +231,10 @@ TEST(EstimatorWithPoses, GivesEachPoseOnceLateOnesWithTheNextEpochAndCountsWhatI
     while (estimator.step()) {
     }
   };
-  const auto pose = [&](std::int64_t t_ms, int stream = 0) {
+  const auto pose = [&](std::int64_t t_ms, std::size_t stream = 0) {
     PoseSample sample;
     sample.t_ns = t_ms * kMs;
-    estimator.add(sample, stream);
+    estimator.add(stream, sample);
   };
   pose(100);
   pose(200);
@@ -249,15 +249,15 @@ TEST(EstimatorWithPoses, GivesEachPoseOnceLateOnesWithTheNextEpochAndCountsWhatI
   PoseSample broken;
   broken.t_ns = 450 * kMs;
   broken.p_BinW_m[1] = std::nan("");
-  estimator.add(broken, 0);
+  estimator.add(0, broken);
   imu_to(760);
   using Stamps = std::vector<std::vector<std::int64_t>>;
   EXPECT_EQ(first->seen, (Stamps{{100, 200}, {260}, {300, 400}}));
   EXPECT_EQ(second->seen, (Stamps{{90}, {}, {}}));
   std::map<std::string, std::int64_t> dropped;
   for (const RejectionCount& r : estimator.rejections()) dropped[r.reason] = r.count;
-  EXPECT_EQ(dropped, (std::map<std::string, std::int64_t>{{"pose stamp not after the last", 2},
-                                                          {"pose that is not finite", 1}}));
+  EXPECT_EQ(dropped, (std::map<std::string, std::int64_t>{{"poses: stamp not after the last", 2},
+                                                          {"poses: value that is not finite", 1}}));
 }
 
 std::vector<std::string> with(std::vector<std::string> more) {
@@ -342,11 +342,10 @@ TEST_F(PoseConfiguration, TellsWhatIsWrongWithTheNameOfASensor) {
               ::testing::HasSubstr("updates.gnss.sensor: no sensor 'simulator' - did you mean "
                                    "'simulator0'?"));
   EXPECT_THAT(error({"updates.planar_motion.sensor=simulator0"}),
-              ::testing::HasSubstr("updates.planar_motion.sensor: only updates that measure with "
-                                   "poses have one"));
-  EXPECT_THAT(
-      error({"updates.mocap={type: pose_reference}"}),
-      ::testing::HasSubstr("updates.mocap needs the sensor that gives its poses (sensor: NAME)"));
+              ::testing::HasSubstr("updates.planar_motion.sensor: it takes nothing from a sensor "
+                                   "that is named here"));
+  EXPECT_THAT(error({"updates.mocap={type: pose_reference}"}),
+              ::testing::HasSubstr("mocap needs the sensor that gives its poses (sensor: NAME)"));
   EXPECT_THAT(error({"updates.gnss.p_WinG_m=[1, 2]"}), ::testing::HasSubstr("needs three numbers"));
 }
 
@@ -356,7 +355,7 @@ TEST_F(PoseConfiguration, OfALogGivesTheSameBitsAsTheSimulator) {
   experiment::write_log(simulated, folder);
   auto setup = read(run({"sensors.simulator0.duration_s=5"}));
   const auto data = experiment::collect(setup);
-  ASSERT_EQ(data.poses.at("simulator0").size(), 25u);
+  ASSERT_EQ(data.recorded.of<PoseSample>("simulator0").size(), 25u);
   EXPECT_TRUE(data.reference.empty());
   const auto direct = experiment::run_filter(setup, data);
 
@@ -380,7 +379,7 @@ TEST_F(PoseConfiguration, OfALogGivesTheSameBitsAsTheSimulator) {
   config::Node off = from_log;
   config::set_path(off, "updates.gnss.enabled", config::Node::scalar_of("false"));
   auto off_setup = read(off);
-  EXPECT_GT(experiment::collect(off_setup).states.size(), 40u);
+  EXPECT_GT(experiment::collect(off_setup).states().size(), 40u);
 }
 
 }  // namespace

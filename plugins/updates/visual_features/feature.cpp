@@ -17,7 +17,62 @@ constexpr int kMaxIterations = 10;
 /// rest is linear in the point, which is eliminated (VF-8).
 constexpr double kStepTolerance = 1e-6;
 
+/// Rows by the calibration (VF-6), (VF-15), `J` divided by the standard deviation.
+void set_calibration(const WindowCamera& camera, const WindowClone& clone, const CameraPose& pose,
+                     const Eigen::Vector3d& p_FinG, const PixelJacobian& J,
+                     const IntrinsicsJacobian& J_intrinsics, double inverse_sigma,
+                     LinearSight& row) {
+  auto rows = row.calibration.transpose();
+  rows.setZero();
+  if (camera.has_extrinsics) {
+    const Eigen::Vector3d turned = pose.R_GtoC_fej * (p_FinG - pose.p_IinG_fej);  // R_ItoC p_FinI
+    rows.leftCols<3>().noalias() = J * skew(turned);
+    rows.middleCols<3>(3) = J;
+  }
+  if (camera.has_intrinsics) rows.middleCols<8>(kIntrinsicsEntry) = inverse_sigma * J_intrinsics;
+  if (camera.has_clock) {
+    const Eigen::Vector3d w_IinG = clone.R_GtoI_fej.transpose() * clone.w_IinI;
+    rows.col(kClockEntry).noalias() =
+        row.H_f * ((p_FinG - pose.p_IinG_fej).cross(w_IinG) - clone.v_IinG);
+  }
+  rows.col(kCalibrationSize) = row.residual;
+}
+
 }  // namespace
+
+bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vector3d& p_FinG,
+                     const Eigen::Vector3d& p_FinG_fej, double inverse_sigma, LinearSight& row) {
+  const WindowClone& clone = window.clone(sight.clone);
+  const WindowCamera& camera = window.camera(sight.camera);
+  const CameraPose& pose = window.pose(sight.clone, sight.camera);
+  row.clone = sight.clone;
+  row.column = clone.column;
+  row.camera = sight.camera;
+  const Eigen::Vector3d p_C = pose.R_GtoC_fej * (p_FinG_fej - pose.p_CinG_fej);
+  Eigen::Vector2d uv;
+  PixelJacobian J;
+  IntrinsicsJacobian J_intrinsics;
+  if (!project(camera.view, p_C, uv, J, camera.has_intrinsics ? &J_intrinsics : nullptr)) {
+    return false;
+  }
+  if (!clone.at_first_estimate || p_FinG != p_FinG_fej) {
+    const Eigen::Vector3d p_C_now = pose.R_GtoC * (p_FinG - pose.p_CinG);
+    if (!project(camera.view, p_C_now, uv)) return false;
+  }
+  row.residual = inverse_sigma * (sight.observation->uv - uv);
+  J *= inverse_sigma;
+  row.H_f.noalias() = J * pose.R_GtoC_fej;  // (VF-4)
+  // (VF-5): h^T skew(d) = (h x d)^T.
+  const Eigen::Vector3d d = p_FinG_fej - clone.p_IinG_fej;
+  Eigen::Matrix<double, 2, 3> H_f_skew;
+  for (int i = 0; i < 2; ++i) H_f_skew.row(i) = row.H_f.row(i).cross(d.transpose());
+  row.H_x.leftCols<3>().noalias() = H_f_skew * clone.R_GtoI_fej.transpose();
+  row.H_x.rightCols<3>() = -row.H_f;
+  if (camera.calibrates()) {
+    set_calibration(camera, clone, pose, p_FinG_fej, J, J_intrinsics, inverse_sigma, row);
+  }
+  return true;
+}
 
 void Feature::start(int max_sights, double sigma_px, const TriangulationLimits& limits) {
   inverse_sigma_ = 1. / sigma_px;
@@ -33,7 +88,6 @@ int Feature::collect(const TrackStore& tracks, int track, const Window& window) 
     const int slot = window.clone(clone).slot;
     for (int camera = 0; camera < tracks.n_cameras(); ++camera) {
       if ((tracks.mask(track, camera) >> slot & 1u) == 0) continue;
-      if (window.camera(camera).view == nullptr) continue;
       sights_.push_back({clone, camera, &tracks.observation(track, slot, camera)});
     }
   }
@@ -134,38 +188,9 @@ FeatureStatus Feature::check_distance() const {
 FeatureStatus Feature::linearize(const Window& window) {
   linear_.clear();
   for (const Sight& sight : sights_) {
-    const WindowClone& clone = window.clone(sight.clone);
-    const WindowCamera& camera = window.camera(sight.camera);
-    const CameraPose& pose = window.pose(sight.clone, sight.camera);
-    LinearSight& row = linear_.emplace_back();
-    row.column = clone.column;
-    row.camera = sight.camera;
-    const Eigen::Vector3d p_C = pose.R_GtoC_fej * (p_FinG_ - pose.p_CinG_fej);
-    const bool calibrates = camera.intrinsics >= 0;
-    Eigen::Vector2d uv;
-    PixelJacobian J;
-    if (!project(*camera.view, p_C, uv, J, calibrates ? &row.H_intrinsics : nullptr)) {
+    if (!linearize_sight(window, sight, p_FinG_, p_FinG_, inverse_sigma_, linear_.emplace_back())) {
       return FeatureStatus::kNotVisible;
     }
-    if (!clone.at_first_estimate) {
-      const Eigen::Vector3d p_C_now = pose.R_GtoC * (p_FinG_ - pose.p_CinG);
-      if (!project(*camera.view, p_C_now, uv)) return FeatureStatus::kNotVisible;
-    }
-    row.residual = inverse_sigma_ * (sight.observation->uv - uv);
-    J *= inverse_sigma_;
-    row.H_f.noalias() = J * pose.R_GtoC_fej;  // (VF-4)
-    // (VF-5): h^T skew(d) = (h x d)^T.
-    const Eigen::Vector3d d = p_FinG_ - clone.p_IinG_fej;
-    Eigen::Matrix<double, 2, 3> H_f_skew;
-    for (int i = 0; i < 2; ++i) H_f_skew.row(i) = row.H_f.row(i).cross(d.transpose());
-    row.H_x.leftCols<3>().noalias() = H_f_skew * clone.R_GtoI_fej.transpose();
-    row.H_x.rightCols<3>() = -row.H_f;
-    if (camera.extrinsics >= 0) {                                // (VF-6)
-      const Eigen::Vector3d turned = p_C - camera.view->p_IinC;  // R_ItoC p_FinI
-      row.H_extrinsics.leftCols<3>().noalias() = J * skew(turned);
-      row.H_extrinsics.rightCols<3>() = J;
-    }
-    if (calibrates) row.H_intrinsics *= inverse_sigma_;
   }
   return FeatureStatus::kOk;
 }

@@ -27,16 +27,26 @@ struct TriangulationLimits {
 
 enum class FeatureStatus : std::uint8_t { kOk, kParallax, kNotVisible, kDistance };
 
+/// Rows of a sight by the calibration of its camera, and its residual behind them, transposed: one
+/// multiple of the vector registers.
+inline constexpr int kCalibrationRows = kCalibrationSize + 1;
+using CalibrationRows = Eigen::Matrix<double, kCalibrationRows, 2>;
+
 /// Two rows, divided by the standard deviation of the pixels.
 struct LinearSight {
+  int clone = 0;
   int column = 0;  ///< of the clone, in the factor
   int camera = 0;
-  Eigen::Vector2d residual;                  ///< measured - predicted, at the estimates
-  Eigen::Matrix<double, 2, 3> H_f;           ///< by p_FinG
-  Eigen::Matrix<double, 2, 6> H_x;           ///< by dtheta, dp of the clone
-  Eigen::Matrix<double, 2, 6> H_extrinsics;  ///< valid when the camera has such columns
-  IntrinsicsJacobian H_intrinsics;
+  Eigen::Vector2d residual;         ///< measured - predicted, at the estimates
+  Eigen::Matrix<double, 2, 3> H_f;  ///< by p_FinG
+  Eigen::Matrix<double, 2, 6> H_x;  ///< by dtheta, dp of the clone
+  CalibrationRows calibration;      ///< valid when the camera calibrates()
 };
+
+/// Rows of a sight of a point: residual at the estimates and `p_FinG`, Jacobians at the first
+/// estimates of the clones and `p_FinG_fej`. False: the camera model has no image of the point.
+bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vector3d& p_FinG,
+                     const Eigen::Vector3d& p_FinG_fej, double inverse_sigma, LinearSight& row);
 
 /// Finds p_FinG and its linear system. Keeps its storage.
 class Feature {
@@ -51,7 +61,7 @@ class Feature {
   /// use to linearise.
   FeatureStatus triangulate(const Window& window);
 
-  /// Residuals at the estimates, Jacobians at the first estimates, both at point().
+  /// Residuals at the estimates, Jacobians at the first estimates of the clones, both at point().
   /// kNotVisible: a camera model has no image of the point.
   FeatureStatus linearize(const Window& window);
 

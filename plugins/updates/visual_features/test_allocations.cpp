@@ -7,19 +7,23 @@
 namespace viwo::visual {
 namespace {
 
+std::size_t n_reasons(const VisualFeatures& update) {
+  std::vector<RejectionCount> rejections;
+  update.rejections(rejections);
+  return rejections.size();
+}
+
 /// A window that slides over a long path, twice as long as the window: allocations of the second
-/// half.
+/// half, but for the text of a reason that is new.
 void check(const testing::SceneOptions& window, double gate_probability) {
   testing::Random random(41);
   testing::SceneOptions options = window;
   options.n_clones = 3 * window.n_clones;
-  const testing::Scene path = testing::make_scene(options, 300, random);
-  testing::Scene scene = path;
+  testing::Scene path = testing::make_scene(options, 300, random);
+  testing::Scene scene = path.with_clones(static_cast<std::size_t>(window.n_clones));
   VisualFeatures update(testing::params_with({{"gate_probability", gate_probability}}),
                         HostServices{});
-  UpdateSetup setup = scene.setup();
-  setup.max_clones = window.n_clones;
-  update.start(setup);
+  scene.start(update);
   FactorSink sink(1, static_cast<int>(scene.P.cols()));
   const auto n = static_cast<std::size_t>(window.n_clones);
   long counted = 0;
@@ -36,14 +40,15 @@ void check(const testing::SceneOptions& window, double gate_probability) {
     FilterView filter = scene.view();
     filter.oldest_leaves = scene.clones.size() == n;
     const auto samples = testing::images(path, k, 1., random);
-    EpochData data;
-    data.features = samples;
+    EpochData data = scene.epoch(samples);
     data.end_ns = path.clones[k].t_ns;
     sink.clear();
+    const std::size_t reasons = n_reasons(update);
     const long before = viwo::testing::allocations();
     update.update(filter, data, sink);
-    if (k > n) {
-      counted += viwo::testing::allocations() - before;
+    const long allocations = viwo::testing::allocations() - before;
+    if (k > n && n_reasons(update) == reasons) {
+      counted += allocations;
       applied += sink.applied();
     }
   }

@@ -1,4 +1,6 @@
 // Triangulation and Jacobians of one feature.
+#include <stdexcept>
+
 #include <gtest/gtest.h>
 
 #include "feature.hpp"
@@ -18,59 +20,59 @@ struct Track {
   Window window;
   Feature feature;
 
-  Track(const Scene& truth, const Scene& estimate, const Eigen::Vector3d& landmark, double sigma_px,
+  Track(Scene& truth, Scene& estimate, const Eigen::Vector3d& landmark, double sigma_px,
         double noise_px, Random& random, const TriangulationLimits& limits = {}) {
     const int n_clones = static_cast<int>(truth.clones.size());
-    const int n_cameras = static_cast<int>(truth.cameras.size());
+    const int n_cameras = static_cast<int>(truth.n_cameras());
+    window.start(n_clones, estimate.rig().cameras(), estimate.camera_blocks);
+    window.set(estimate.view());
     store.start(4, n_clones, n_cameras);
     store.keep_clones(truth.clones);
     const int track = store.find_or_add(7);
     for (std::size_t i = 0; i < truth.clones.size(); ++i) {
-      for (std::size_t j = 0; j < truth.cameras.size(); ++j) {
+      for (std::size_t j = 0; j < truth.n_cameras(); ++j) {
         Observation seen;
         if (!truth.see(i, j, landmark, seen.uv)) continue;
         seen.uv += noise_px * Eigen::Vector2d(testing::normals(random, 2));
-        seen.ray = unproject(estimate.cameras[j], seen.uv).value();
+        const int camera = static_cast<int>(j);
+        seen.ray = unproject(estimate.camera(j), seen.uv).value();
         Eigen::Vector2d uv;
-        EXPECT_TRUE(project(estimate.cameras[j], seen.ray, uv, seen.J_ray));
-        store.set(track, truth.clones[i].slot, static_cast<int>(j), seen);
+        EXPECT_TRUE(project(estimate.camera(j), seen.ray, uv, seen.J_ray));
+        EXPECT_EQ(window.take_image(camera, truth.stamp_ns(i, j)), truth.clones[i].slot);
+        store.set(track, truth.clones[i].slot, camera, seen);
       }
     }
-    window.start(n_clones, n_cameras);
-    window.set(estimate.view());
+    window.set_poses();
     feature.start(n_clones * n_cameras, sigma_px, limits);
     feature.collect(store, track, window);
   }
 };
 
-/// Pixel that a sight predicts, with everything at the values of `scene`.
-Eigen::Vector2d predicted(const Scene& scene, const Window& window, const Sight& sight,
-                          const Eigen::Vector3d& p_FinG) {
+std::size_t clone_of(const Scene& scene, const Window& window, const Sight& sight) {
   for (std::size_t i = 0; i < scene.clones.size(); ++i) {
-    if (scene.clones[i].slot != window.clone(sight.clone).slot) continue;
-    const CameraView& camera = scene.cameras[static_cast<std::size_t>(sight.camera)];
-    const Eigen::Vector3d p_I = scene.clones[i].R_GtoI * (p_FinG - scene.clones[i].p_IinG);
-    Eigen::Vector2d uv;
-    EXPECT_TRUE(project(camera, camera.R_ItoC * p_I + camera.p_IinC, uv));
-    return uv;
+    if (scene.clones[i].slot == window.clone(sight.clone).slot) return i;
   }
-  ADD_FAILURE();
-  return Eigen::Vector2d::Zero();
+  throw std::logic_error("no such clone");
+}
+
+/// Pixel that a sight predicts, with everything at the values of `scene`.
+Eigen::Vector2d predicted(Scene& scene, const Window& window, const Sight& sight,
+                          const Eigen::Vector3d& p_FinG) {
+  const std::size_t clone = clone_of(scene, window, sight);
+  const auto camera = static_cast<std::size_t>(sight.camera);
+  Eigen::Vector2d uv;
+  EXPECT_TRUE(scene.predict(clone, camera, scene.stamp_ns(clone, camera), p_FinG, uv));
+  return uv;
 }
 
 /// The rows of a sight over the whole error state.
 Eigen::MatrixXd dense_row(const LinearSight& row, const Sight& sight, const Scene& scene,
                           const Window& window) {
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(2, scene.P.cols());
-  for (const CloneView& clone : scene.clones) {
-    if (clone.slot == window.clone(sight.clone).slot) {
-      H.middleCols<6>(clone.column) = row.H_x;
-    }
-  }
-  const CameraView& camera = scene.cameras[static_cast<std::size_t>(sight.camera)];
-  if (camera.extrinsics_column >= 0) {
-    H.middleCols<6>(camera.extrinsics_column) = row.H_extrinsics;
-    H.middleCols<8>(camera.intrinsics_column) = row.H_intrinsics;
+  H.middleCols<6>(scene.clones[clone_of(scene, window, sight)].column) = row.H_x;
+  for (int k = 0; k < kCalibrationSize; ++k) {
+    const int column = window.camera(sight.camera).column[static_cast<std::size_t>(k)];
+    if (column >= 0) H.col(window.state_column(column)) = row.calibration.row(k).transpose();
   }
   return H;
 }
@@ -78,7 +80,7 @@ Eigen::MatrixXd dense_row(const LinearSight& row, const Sight& sight, const Scen
 void check_jacobians(const SceneOptions& options, std::uint64_t seed) {
   SCOPED_TRACE("seed " + std::to_string(seed));
   Random random(seed);
-  const Scene scene = testing::make_scene(options, 1, random);
+  Scene scene = testing::make_scene(options, 1, random);
   const double sigma_px = 0.7;
   Track track(scene, scene, scene.landmarks[0], sigma_px, 0.5, random);
   ASSERT_GE(track.feature.sights().size(), 3u);
@@ -102,11 +104,13 @@ void check_jacobians(const SceneOptions& options, std::uint64_t seed) {
       Eigen::VectorXd dx = Eigen::VectorXd::Zero(numeric.cols());
       Scene plus = first, minus = first;
       dx[c] = step;
-      plus.move(dx);
-      minus.move(-dx);
+      plus.plus(dx);
+      minus.plus(-dx);
       const Eigen::Vector2d difference = predicted(plus, track.window, sight, p_FinG) -
                                          predicted(minus, track.window, sight, p_FinG);
-      numeric.block<2, 1>(0, c) = difference / (2. * step * sigma_px);
+      // What is held has no column.
+      const bool held = scene.P(c, c) == 0.;
+      numeric.col(c) = held ? Eigen::Vector2d(0., 0.) : difference / (2. * step * sigma_px);
     }
     const Eigen::MatrixXd H = dense_row(row, sight, scene, track.window);
     EXPECT_LT((H - numeric).norm(), 1e-6 * numeric.norm()) << H << "\n\n" << numeric;
@@ -138,10 +142,25 @@ TEST(Feature, JacobiansAreThoseOfTheFirstEstimatesAndResidualsThoseOfTheEstimate
   }
 }
 
+TEST(Feature, JacobiansOfAnImageBesideItsCloneAreCentralDifferences) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    for (const double off_s : {0.001, -0.0012}) {
+      check_jacobians({.n_clones = 5,
+                       .n_cameras = 2,
+                       .calibrates = true,
+                       .first_estimate_off = 0.01,
+                       .image_off_s = off_s},
+                      seed);
+      check_jacobians(
+          {.n_clones = 5, .n_cameras = 2, .first_estimate_off = 0.01, .image_off_s = off_s}, seed);
+    }
+  }
+}
+
 TEST(Feature, TriangulationRecoversExactPoints) {
   for (const auto distortion : {CameraDistortion::kRadtan, CameraDistortion::kEquidistant}) {
     Random random(3);
-    const Scene scene = testing::make_scene({.n_clones = 8, .distortion = distortion}, 50, random);
+    Scene scene = testing::make_scene({.n_clones = 8, .distortion = distortion}, 50, random);
     for (const Eigen::Vector3d& landmark : scene.landmarks) {
       Track track(scene, scene, landmark, 1., 0., random);
       if (track.feature.sights().size() < 4) continue;
@@ -153,7 +172,7 @@ TEST(Feature, TriangulationRecoversExactPoints) {
 
 TEST(Feature, TriangulationIsUnbiasedAndAsPreciseAsItsNormalMatrixSays) {
   Random random(4);
-  const Scene scene = testing::make_scene({.n_clones = 10}, 0, random);
+  Scene scene = testing::make_scene({.n_clones = 10}, 0, random);
   const Eigen::Vector3d landmark(0.6, 0.3, 3.);
   const int n = 2000;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -178,7 +197,7 @@ TEST(Feature, TriangulationIsUnbiasedAndAsPreciseAsItsNormalMatrixSays) {
 
 TEST(Feature, TriangulationIsTheMinimumOfThePixelResiduals) {
   Random random(5);
-  const Scene scene = testing::make_scene(
+  Scene scene = testing::make_scene(
       {.n_clones = 6, .n_cameras = 2, .distortion = CameraDistortion::kEquidistant}, 20, random);
   for (const Eigen::Vector3d& landmark : scene.landmarks) {
     Track track(scene, scene, landmark, 1., 1., random);
@@ -204,7 +223,7 @@ TEST(Feature, RefusesPointsWithoutParallaxTooFarTooNearAndBehind) {
   ASSERT_EQ(no_parallax.feature.sights().size(), 6u);
   EXPECT_EQ(no_parallax.feature.triangulate(no_parallax.window), FeatureStatus::kParallax);
 
-  const Scene scene = testing::make_scene({.n_clones = 6}, 0, random);
+  Scene scene = testing::make_scene({.n_clones = 6}, 0, random);
   Track far(scene, scene, {0.4, 0.1, 5.}, 1., 0.1, random, {.max_distance_m = 4.5});
   EXPECT_EQ(far.feature.triangulate(far.window), FeatureStatus::kDistance);
   Track near(scene, scene, {0.4, 0.1, 5.}, 1., 0.1, random, {.min_distance_m = 5.5});

@@ -2,6 +2,7 @@
 #include <Eigen/QR>
 #include <gtest/gtest.h>
 
+#include "chi2_gate.hpp"
 #include "normal_equations.hpp"
 #include "test_support.hpp"
 
@@ -25,12 +26,15 @@ struct Batch {
     const int n_clones = options.n_clones;
     store.start(n_landmarks, n_clones, options.n_cameras);
     store.keep_clones(truth.clones);
+    window.start(n_clones, estimate.rig().cameras(), estimate.camera_blocks);
+    window.set(estimate.view());
     for (std::size_t k = 0; k < truth.clones.size(); ++k) {
       for (const FeatureSample& image : testing::images(truth, k, 1., random)) {
+        EXPECT_TRUE(window.take_image(image.camera, image.t_ns).has_value());
         for (const FeaturePoint& point : image.points) {
           Observation seen;
           seen.uv << point.u_px, point.v_px;
-          const CameraView& camera = truth.cameras[static_cast<std::size_t>(image.camera)];
+          const CameraView camera = truth.camera(static_cast<std::size_t>(image.camera));
           seen.ray = unproject(camera, seen.uv).value();
           Eigen::Vector2d uv;
           EXPECT_TRUE(project(camera, seen.ray, uv, seen.J_ray));
@@ -38,8 +42,7 @@ struct Batch {
         }
       }
     }
-    window.start(n_clones, options.n_cameras);
-    window.set(estimate.view());
+    window.set_poses();
     feature.start(n_clones * options.n_cameras, 1., {});
   }
 
@@ -62,10 +65,10 @@ struct Batch {
         if (clone.slot != window.clone(sight.clone).slot) continue;
         H_x.block<2, 6>(2 * i, clone.column) = row.H_x;
       }
-      const CameraView& camera = estimate.cameras[static_cast<std::size_t>(sight.camera)];
-      if (camera.extrinsics_column >= 0) {
-        H_x.block<2, 6>(2 * i, camera.extrinsics_column) = row.H_extrinsics;
-        H_x.block<2, 8>(2 * i, camera.intrinsics_column) = row.H_intrinsics;
+      for (int k = 0; k < kCalibrationSize; ++k) {
+        const int column = window.camera(sight.camera).column[static_cast<std::size_t>(k)];
+        if (column < 0) continue;
+        H_x.block<2, 1>(2 * i, window.state_column(column)) = row.calibration.row(k).transpose();
       }
       H_f.middleRows<2>(2 * i) = row.H_f;
       residual.segment<2>(2 * i) = row.residual;
@@ -78,9 +81,7 @@ struct Batch {
 
 NormalEquations equations_for(const SceneOptions& options) {
   NormalEquations equations;
-  const int calibration = kCalibrationSize * options.n_cameras;
-  equations.start(kPoseSize * options.n_clones + calibration, calibration,
-                  options.n_clones * options.n_cameras);
+  equations.start(options.n_clones, options.n_cameras);
   return equations;
 }
 
@@ -88,6 +89,7 @@ const std::vector<SceneOptions> kCases{
     {.n_clones = 12},
     {.n_clones = 7, .n_cameras = 2, .distortion = CameraDistortion::kEquidistant},
     {.n_clones = 6, .n_cameras = 2, .calibrates = true, .first_estimate_off = 0.005},
+    {.n_clones = 7, .n_cameras = 3, .calibrates = true, .image_off_s = 0.0005},
     {.n_clones = 12, .n_cameras = 1, .first_estimate_off = 0.005}};
 
 TEST(NormalEquations, EqualTheDenseProjectionOnTheNullSpace) {
@@ -111,7 +113,7 @@ TEST(NormalEquations, EqualTheDenseProjectionOnTheNullSpace) {
       eta += H.transpose() * r;
       ++used;
     }
-    equations.finish(factor);
+    equations.finish(batch.window, factor);
     EXPECT_GT(used, 60);
     Eigen::MatrixXd Lambda_sum = Eigen::MatrixXd::Zero(size, size);
     Eigen::VectorXd eta_sum = Eigen::VectorXd::Zero(size);
@@ -129,8 +131,9 @@ TEST(NormalEquations, KeepTheirPrecisionWhenTheParallaxIsWeak) {
   for (CloneView& clone : batch.estimate.clones) {
     clone.p_IinG = clone.p_IinG_fej = 0.0005 * testing::normal3(random);
   }
-  batch.estimate.cameras[0].p_IinC.setZero();
+  batch.estimate.numbers(batch.estimate.camera_blocks[0].extrinsics).setZero();
   batch.window.set(batch.estimate.view());
+  batch.window.set_poses();
   NormalEquations equations = equations_for(options);
   Eigen::MatrixXd H;
   Eigen::VectorXd r;
@@ -145,7 +148,7 @@ TEST(NormalEquations, KeepTheirPrecisionWhenTheParallaxIsWeak) {
     InformationFactor& factor = sink.add_information();
     equations.begin(batch.window, factor);
     equations.add(batch.feature, batch.window, factor);
-    equations.finish(factor);
+    equations.finish(batch.window, factor);
     batch.project_out(H, r);
     const auto size = batch.truth.P.cols();
     Eigen::MatrixXd Lambda = Eigen::MatrixXd::Zero(size, size);
@@ -163,6 +166,8 @@ TEST(NormalEquations, Chi2IsThatOfTheProjectedResidualAndItsBoundHolds) {
     Random random(13);
     Batch batch(options, 60, random);
     NormalEquations equations = equations_for(options);
+    Chi2Gate gate;
+    gate.start(options.n_clones, options.n_cameras);
     Eigen::MatrixXd H;
     Eigen::VectorXd r;
     int used = 0;
@@ -173,7 +178,7 @@ TEST(NormalEquations, Chi2IsThatOfTheProjectedResidualAndItsBoundHolds) {
       const Eigen::MatrixXd S =
           H * batch.truth.P * H.transpose() + Eigen::MatrixXd::Identity(r.size(), r.size());
       const double expected = r.dot(S.llt().solve(r));
-      const double chi2 = equations.chi2(batch.feature, batch.window);
+      const double chi2 = gate.chi2(batch.feature, batch.window);
       EXPECT_NEAR(chi2, expected, 1e-8 * expected);
       EXPECT_NEAR(equations.chi2_bound(), r.squaredNorm(), 1e-8 * r.squaredNorm());
       EXPECT_LE(chi2, equations.chi2_bound());
@@ -196,12 +201,12 @@ TEST(NormalEquations, ReadOnlyTheLowerTriangleOfTheCovariance) {
   EXPECT_EQ(batch.window.covariance(), whole);
   // By name: the extrinsics of the first camera stand before the clones in the state, after them
   // in the factor.
-  const CameraView& camera = batch.estimate.cameras[0];
   const CloneView& clone = batch.estimate.clones[3];
-  const int row = batch.window.clone_columns() + batch.window.camera(0).extrinsics;
+  const int row = batch.window.camera(0).column[0];
+  EXPECT_GE(row, batch.window.clone_columns());
   const int column = batch.window.clone(batch.window.clone_in_slot(clone.slot)).column;
   EXPECT_EQ((whole.block<6, 6>(row, column)),
-            (batch.truth.P.block<6, 6>(camera.extrinsics_column, clone.column)));
+            (batch.truth.P.block<6, 6>(batch.estimate.extrinsics_column(0), clone.column)));
 }
 
 TEST(NormalEquations, RefuseAPointThatTheRowsDoNotDetermine) {
@@ -210,8 +215,9 @@ TEST(NormalEquations, RefuseAPointThatTheRowsDoNotDetermine) {
   for (CloneView& clone : batch.estimate.clones) {
     clone.p_IinG = clone.p_IinG_fej = Eigen::Vector3d(1e-9 * clone.slot, 0., 0.);
   }
-  batch.estimate.cameras[0].p_IinC.setZero();
+  batch.estimate.numbers(batch.estimate.camera_blocks[0].extrinsics).setZero();
   batch.window.set(batch.estimate.view());
+  batch.window.set_poses();
   NormalEquations equations = equations_for({.n_clones = 5});
   int used = 0;
   for (const int track : batch.store.active()) {

@@ -2,7 +2,9 @@
 // visual_features.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -17,6 +19,7 @@
 #include "viwo/api/params.hpp"
 #include "viwo/camera/camera_model.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/testing/update_host.hpp"
 
 namespace viwo::visual::testing {
 
@@ -71,56 +74,79 @@ struct SceneOptions {
   int n_cameras = 1;
   CameraDistortion distortion = CameraDistortion::kRadtan;
   bool calibrates = false;
-  double first_estimate_off = 0.;  ///< rad, m
+  double first_estimate_off = 0.;  ///< rad, m, also of the calibration
   double sigma_theta = 0.005, sigma_p = 0.02;
+  double image_off_s = 0.;  ///< images of camera j are (j + 1) times as late as their clones
 };
 
-/// `clones`, `cameras`: estimates. Columns: 15 of the IMU, extrinsics of the first camera, clones
-/// (a ring that has turned), the rest of the calibration.
-struct Scene {
-  std::vector<CloneView> clones;
-  std::vector<CameraView> cameras;
-  Eigen::MatrixXd P;
-  std::vector<Eigen::Vector3d> landmarks;
+/// An estimate (or the truth) of a window, with landmarks. Columns: 15 of the IMU, extrinsics of
+/// the first camera, clones (a ring that has turned), the rest of the calibration.
+struct Scene : viwo::testing::UpdateHost {
+  using UpdateHost::UpdateHost;
 
-  FilterView view(std::size_t n_clones) const {
-    FilterView filter;
-    filter.clones = {clones.data(), n_clones};
-    filter.cameras = cameras;
-    filter.size = static_cast<int>(P.rows());
-    filter.covariance_data = P.data();
-    filter.covariance_stride = static_cast<int>(P.outerStride());
-    return filter;
-  }
-  FilterView view() const { return view(clones.size()); }
-  UpdateSetup setup() const {
-    return {.max_clones = static_cast<int>(clones.size()),
-            .max_state_size = static_cast<int>(P.rows()),
-            .cameras = cameras};
-  }
-
-  /// Adds an error to estimates (not to the first ones).
-  void move(const Eigen::VectorXd& dx) {
-    const auto turn = [&](int column, Eigen::Matrix3d& R, Eigen::Vector3d& p) {
-      if (column < 0) return;
-      R = exp_so3(-Eigen::Vector3d(dx.segment<3>(column))) * R;
-      p += dx.segment<3>(column + 3);
-    };
-    for (CloneView& clone : clones) turn(clone.column, clone.R_GtoI, clone.p_IinG);
-    for (CameraView& camera : cameras) {
-      turn(camera.extrinsics_column, camera.R_ItoC, camera.p_IinC);
-      if (camera.intrinsics_column >= 0) {
-        camera.intrinsics += dx.segment<8>(camera.intrinsics_column);
-      }
+  /// Blocks of a room are as others, at the end of the state; free from the first on.
+  RoomId room(const RoomSpec& spec) override {
+    const auto before = P.rows();
+    P.conservativeResizeLike(Eigen::MatrixXd::Zero(before + spec.blocks * spec.entries,
+                                                   before + spec.blocks * spec.entries));
+    for (int i = 0; i < spec.blocks; ++i) {
+      free_blocks.insert(free_blocks.begin(), {static_cast<int>(blocks.size())});
+      Block& block = blocks.emplace_back();
+      block.spec.name = spec.name + "." + std::to_string(i);
+      for (int k = 0; k < spec.entries; ++k) block.spec.add(std::to_string(k), "", 0., 1.);
+      block.value = block.first_estimate = block.spec.value;
+      block.column = static_cast<int>(before) + spec.entries * i;
     }
+    return UpdateHost::room(spec);
+  }
+  /// A sink that knows the room.
+  FactorSink sink() const {
+    FactorSink sink(1, static_cast<int>(P.rows()));
+    for (const RoomSpec& spec : rooms) sink.rooms().push_back({&free_blocks, spec.entries, 0});
+    return sink;
   }
 
-  /// Pixel of a landmark; false when it is not in the image.
-  bool see(std::size_t clone, std::size_t camera, const Eigen::Vector3d& p_FinG,
-           Eigen::Vector2d& uv) const {
-    const CameraView& c = cameras[camera];
-    const Eigen::Vector3d p_I = clones[clone].R_GtoI * (p_FinG - clones[clone].p_IinG);
-    return project(c, c.R_ItoC * p_I + c.p_IinC, uv) && in_image(c, uv);
+  std::vector<BlockId> free_blocks;
+  std::vector<CameraBlocks> camera_blocks;
+  std::vector<Eigen::Vector3d> landmarks;
+  double image_off_s = 0.;
+
+  std::size_t n_cameras() const { return camera_blocks.size(); }
+  CameraView camera(std::size_t j) {
+    CameraView camera = rig().cameras()[j].camera;
+    camera_blocks[j].read(view(), camera);
+    return camera;
+  }
+  int extrinsics_column(std::size_t j) const { return column(camera_blocks[j].extrinsics); }
+  int intrinsics_column(std::size_t j) const { return column(camera_blocks[j].intrinsics); }
+  int clock_column(std::size_t j) const { return column(camera_blocks[j].clock); }
+
+  /// With the first `n` clones only.
+  Scene with_clones(std::size_t n) const {
+    Scene part = *this;
+    part.clones.resize(n);
+    return part;
+  }
+
+  /// Stamp of the image of a clone, for the clock that was declared.
+  std::int64_t stamp_ns(std::size_t clone, std::size_t j) {
+    const double offset_s = static_cast<double>(j + 1) * image_off_s;
+    return clones[clone].t_ns + std::llround(1e9 * (offset_s - rig().cameras()[j].camera.t_CtoI_s));
+  }
+
+  /// Pixel of a landmark by the estimates, in an image with a stamp; false when there is none.
+  bool predict(std::size_t clone, std::size_t j, std::int64_t stamp_ns,
+               const Eigen::Vector3d& p_FinG, Eigen::Vector2d& uv) {
+    const CameraView c = camera(j);
+    const CloneView& at = clones[clone];
+    const double dt = seconds_between(at.t_ns, stamp_ns) + c.t_CtoI_s;
+    const Eigen::Vector3d v_IinI = at.R_GtoI_fej * at.v_IinG;  // kept in I
+    const Eigen::Vector3d p_IinG = at.p_IinG + dt * (at.R_GtoI.transpose() * v_IinI);
+    const Eigen::Matrix3d R_GtoI = exp_so3(-dt * at.w_IinI) * at.R_GtoI;
+    return project(c, c.R_ItoC * (R_GtoI * (p_FinG - p_IinG)) + c.p_IinC, uv);
+  }
+  bool see(std::size_t clone, std::size_t j, const Eigen::Vector3d& p_FinG, Eigen::Vector2d& uv) {
+    return predict(clone, j, stamp_ns(clone, j), p_FinG, uv) && in_image(camera(j), uv);
   }
 };
 
@@ -132,10 +158,10 @@ inline Eigen::MatrixXd make_covariance(const Scene& scene, const SceneOptions& o
     sigma.segment<3>(clone.column).setConstant(options.sigma_theta);
     sigma.segment<3>(clone.column + 3).setConstant(options.sigma_p);
   }
-  for (const CameraView& camera : scene.cameras) {
-    if (camera.extrinsics_column < 0) continue;
-    sigma.segment<6>(camera.extrinsics_column).setConstant(0.002);
-    sigma.segment<8>(camera.intrinsics_column) << 1., 1., 1., 1., 2e-3, 2e-3, 2e-4, 2e-4;
+  for (const viwo::testing::UpdateHost::Block& block : scene.blocks) {
+    for (std::size_t k = 0; block.column >= 0 && k < block.spec.entries.size(); ++k) {
+      sigma[block.column + static_cast<int>(k)] = block.spec.entries[k].sigma;
+    }
   }
   Eigen::MatrixXd A = Eigen::MatrixXd::Identity(size, size);
   for (int i = 0; i < size; ++i) A.col(i) += 0.05 * normals(random, size);
@@ -143,21 +169,39 @@ inline Eigen::MatrixXd make_covariance(const Scene& scene, const SceneOptions& o
   return A * A.transpose();
 }
 
-inline Scene make_scene(const SceneOptions& options, int n_landmarks, Random& random) {
-  Scene scene;
-  int size = kImuSize;
+inline std::vector<CameraPrior> make_cameras(const SceneOptions& options, Random& random) {
+  std::vector<CameraPrior> cameras;
   for (int j = 0; j < options.n_cameras; ++j) {
-    CameraView camera = make_camera(options.distortion);
-    camera.R_ItoC = exp_so3(0.05 * normal3(random));
-    camera.p_IinC = Eigen::Vector3d(-0.2 * j, 0., 0.) + 0.02 * normal3(random);
-    if (options.calibrates && j == 0) {
-      camera.extrinsics_column = size;
-      size += kPoseSize;
-    }
-    scene.cameras.push_back(camera);
+    CameraPrior& prior = cameras.emplace_back();
+    prior.camera = make_camera(options.distortion);
+    prior.camera.R_ItoC = exp_so3(0.05 * normal3(random));
+    prior.camera.p_IinC = Eigen::Vector3d(-0.2 * j, 0., 0.) + 0.02 * normal3(random);
+    if (!options.calibrates) continue;
+    prior.camera.t_CtoI_s = 0.01 + 0.002 * j;
+    prior.sigma_extrinsics.setConstant(0.002);
+    // The last distortion coefficient is held.
+    prior.sigma_intrinsics << 1., 1., 1., 1., 2e-3, 2e-3, 2e-4, 0.;
+    prior.sigma_clock_s = 1e-3;
   }
+  return cameras;
+}
+
+inline Scene make_scene(const SceneOptions& options, int n_landmarks, Random& random) {
+  Scene scene(Rig(make_cameras(options, random), std::nullopt));
+  for (int j = 0; j < options.n_cameras; ++j) {
+    scene.camera_blocks.push_back(declare_camera(scene, j));
+  }
+  scene.image_off_s = options.image_off_s;
+  int size = kImuSize;
+  const auto place = [&](BlockId id) {
+    auto& block = scene.blocks[static_cast<std::size_t>(id.index)];
+    if (!options.calibrates || block.column >= 0) return;
+    block.column = size;
+    size += static_cast<int>(block.spec.entries.size());
+  };
+  place(scene.camera_blocks[0].extrinsics);
   for (int i = 0; i < options.n_clones; ++i) {
-    CloneView clone;
+    CloneView& clone = scene.clones.emplace_back();
     clone.t_ns = 1'000'000'000 + std::int64_t{100'000'000} * i;
     clone.slot = (i + 5) % options.n_clones;
     clone.column = size + kPoseSize * clone.slot;
@@ -165,17 +209,21 @@ inline Scene make_scene(const SceneOptions& options, int n_landmarks, Random& ra
     clone.p_IinG_fej = Eigen::Vector3d(0.15 * i, 0.05 * i, 0.02 * i) + 0.05 * normal3(random);
     clone.R_GtoI = exp_so3(options.first_estimate_off * normal3(random)) * clone.R_GtoI_fej;
     clone.p_IinG = clone.p_IinG_fej + options.first_estimate_off * normal3(random);
-    scene.clones.push_back(clone);
+    clone.w_IinI = 0.3 * normal3(random);
+    clone.v_IinG = Eigen::Vector3d(1.5, 0.5, 0.2) + 0.3 * normal3(random);
   }
   size += kPoseSize * options.n_clones;
-  for (std::size_t j = 0; options.calibrates && j < scene.cameras.size(); ++j) {
-    scene.cameras[j].intrinsics_column = size;
-    size += 8;
-    if (j == 0) continue;
-    scene.cameras[j].extrinsics_column = size;
-    size += kPoseSize;
+  for (const CameraBlocks& blocks : scene.camera_blocks) {
+    for (const BlockId id : {blocks.intrinsics, blocks.extrinsics, blocks.clock}) place(id);
   }
   scene.P = make_covariance(scene, options, size, random);
+  if (options.calibrates) {
+    Eigen::VectorXd off = options.first_estimate_off * normals(random, size);
+    off.head(kImuSize).setZero();
+    for (const CloneView& clone : scene.clones) off.segment<kPoseSize>(clone.column).setZero();
+    for (std::size_t j = 0; j < scene.n_cameras(); ++j) off[scene.clock_column(j)] *= 0.03;
+    scene.plus(off);
+  }
   for (int i = 0; i < n_landmarks; ++i) {
     scene.landmarks.emplace_back(uniform(random, -1., 2.5), uniform(random, -1.2, 1.6),
                                  uniform(random, 2.5, 7.));
@@ -184,12 +232,12 @@ inline Scene make_scene(const SceneOptions& options, int n_landmarks, Random& ra
 }
 
 /// Images of one clone of the true scene; landmark i has id 100 + i.
-inline std::vector<FeatureSample> images(const Scene& truth, std::size_t clone, double sigma_px,
+inline std::vector<FeatureSample> images(Scene& truth, std::size_t clone, double sigma_px,
                                          Random& random) {
   std::vector<FeatureSample> samples;
-  for (std::size_t j = 0; j < truth.cameras.size(); ++j) {
+  for (std::size_t j = 0; j < truth.n_cameras(); ++j) {
     FeatureSample& sample = samples.emplace_back();
-    sample.t_ns = truth.clones[clone].t_ns;
+    sample.t_ns = truth.stamp_ns(clone, j);
     sample.camera = static_cast<int>(j);
     for (std::size_t i = 0; i < truth.landmarks.size(); ++i) {
       Eigen::Vector2d uv;
@@ -201,10 +249,10 @@ inline std::vector<FeatureSample> images(const Scene& truth, std::size_t clone, 
   return samples;
 }
 
-inline std::vector<FeatureSample> empty_images(const Scene& scene, std::size_t clone) {
+inline std::vector<FeatureSample> empty_images(Scene& scene, std::size_t clone) {
   std::vector<FeatureSample> samples;
-  for (std::size_t j = 0; j < scene.cameras.size(); ++j) {
-    samples.push_back({scene.clones[clone].t_ns, static_cast<int>(j), {}});
+  for (std::size_t j = 0; j < scene.n_cameras(); ++j) {
+    samples.push_back({scene.stamp_ns(clone, j), static_cast<int>(j), {}});
   }
   return samples;
 }
@@ -213,20 +261,20 @@ inline std::vector<FeatureSample> empty_images(const Scene& scene, std::size_t c
 inline void epoch(VisualFeatures& update, const Scene& estimate, std::size_t n_clones,
                   const std::vector<FeatureSample>& samples, FactorSink& sink,
                   bool oldest_leaves = false) {
-  FilterView filter = estimate.view(n_clones);
+  FilterView filter = estimate.view();
+  filter.clones = filter.clones.first(n_clones);
   filter.oldest_leaves = oldest_leaves;
-  EpochData data;
+  EpochData data = estimate.epoch(samples);
   data.end_ns = estimate.clones[n_clones - 1].t_ns;
-  data.features = samples;
   sink.clear();
   update.update(filter, data, sink);
 }
 
 /// Shows the true scene clone after clone, then an empty image, so that all tracks are used in the
 /// last epoch: its factor is in `sink`.
-inline void show_all(VisualFeatures& update, const Scene& truth, const Scene& estimate,
-                     double sigma_px, Random& random, FactorSink& sink) {
-  update.start(estimate.setup());
+inline void show_all(VisualFeatures& update, Scene& truth, Scene& estimate, double sigma_px,
+                     Random& random, FactorSink& sink) {
+  estimate.start(update);
   const std::size_t n = truth.clones.size();
   for (std::size_t k = 0; k < n; ++k) {
     epoch(update, estimate, k + 1, images(truth, k, sigma_px, random), sink);

@@ -11,6 +11,7 @@ void TrackStore::start(int max_tracks, int max_clones, int n_cameras) {
   observations_.assign(tracks * index(max_clones) * index(n_cameras), {});
   masks_.assign(tracks * index(n_cameras), 0);
   ids_.assign(tracks, 0);
+  kept_.assign(tracks, false);
   place_in_active_.assign(tracks, -1);
   active_.clear();
   active_.reserve(tracks);
@@ -38,7 +39,8 @@ void TrackStore::keep_clones(std::span<const CloneView> clones) {
     for (int camera = 0; camera < n_cameras_; ++camera) {
       left |= masks_[mask_index(track, camera)] &= same;
     }
-    if (left == 0) remove(track);  // moves a track from behind, already visited
+    if (left == 0 && !kept_[index(track)])
+      remove(track);  // moves a track from behind, already visited
   }
 }
 
@@ -66,7 +68,8 @@ int TrackStore::find_or_add(std::int64_t id) {
   ids_[index(track)] = id;
   place_in_active_[index(track)] = static_cast<int>(active_.size());
   active_.push_back(track);
-  for (int camera = 0; camera < n_cameras_; ++camera) masks_[mask_index(track, camera)] = 0;
+  forget(track);
+  kept_[index(track)] = false;
   return track;
 }
 

@@ -19,13 +19,16 @@ struct Observation {
   Eigen::Matrix<double, 2, 3> J_ray;  ///< d uv / d p_C at `ray`, px
 };
 
+/// Bit of a camera in a set of cameras; those beyond 64 share bits.
+inline std::uint64_t bit_of_camera(int camera) { return std::uint64_t{1} << (camera & 63); }
+
 class TrackStore {
  public:
   /// `max_clones` at most 64. Allocates.
   void start(int max_tracks, int max_clones, int n_cameras);
 
   /// Forgets the observations of clones that are gone (a clone is its slot and its time), then
-  /// tracks without any.
+  /// tracks without any but those to keep().
   void keep_clones(std::span<const CloneView> clones);
 
   /// Track of a landmark: -1 when it has none.
@@ -34,6 +37,8 @@ class TrackStore {
   int find_or_add(std::int64_t id);
   /// The track and all of its observations.
   void remove(int track);
+  /// Stays until it is removed, also without observations.
+  void keep(int track) { kept_[index(track)] = true; }
 
   std::int64_t id(int track) const { return ids_[index(track)]; }
   /// Bit s: camera has an observation at the clone in slot s.
@@ -44,8 +49,9 @@ class TrackStore {
     return observations_[observation_index(track, slot, camera)];
   }
   void set(int track, int slot, int camera, const Observation& observation);
-  void forget(int track, int slot, int camera) {
-    masks_[mask_index(track, camera)] &= ~(std::uint64_t{1} << slot);
+  /// All of its observations.
+  void forget(int track) {
+    for (int camera = 0; camera < n_cameras_; ++camera) masks_[mask_index(track, camera)] = 0;
   }
 
   /// Tracks in use, in no particular order.
@@ -69,6 +75,7 @@ class TrackStore {
   std::vector<Observation> observations_;
   std::vector<std::uint64_t> masks_;
   std::vector<std::int64_t> ids_;
+  std::vector<bool> kept_;
   std::vector<int> place_in_active_;
   std::vector<int> active_;
   std::vector<int> free_;

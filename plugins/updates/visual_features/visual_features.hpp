@@ -1,15 +1,19 @@
-// Update visual_features: feature tracks of any number of cameras, as in the MSCKF (model.md).
+// Update visual_features: feature tracks of any number of cameras, as in the MSCKF, and landmarks
+// in the state (model.md).
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "chi2_gate.hpp"
 #include "feature.hpp"
+#include "landmarks.hpp"
 #include "normal_equations.hpp"
 #include "track_store.hpp"
 #include "viwo/api/host_services.hpp"
 #include "viwo/api/params.hpp"
+#include "viwo/api/rejections.hpp"
 #include "viwo/api/update.hpp"
 #include "window.hpp"
 
@@ -20,32 +24,17 @@ class VisualFeatures final : public Update {
   /// Parameters: visual_features_params.hpp. ParamError when two of them contradict each other.
   VisualFeatures(const ParamSet& params, const HostServices& services);
 
-  UpdateKind kind() const override { return UpdateKind::kBody; }
-  /// InputError when there is no camera, or more clones than kMaxWindowClones.
+  /// InputError when there is no camera.
+  void declare(Declarations& host) override;
+  /// InputError when there are more clones than kMaxWindowClones.
   void start(const UpdateSetup& setup) override;
   /// Adds at most one information factor; never throws on bad data.
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override;
-  void rejections(std::vector<RejectionCount>& out) const override;
+  void settle(const FilterView& filter, BlockEdits& edits) override;
+  void rejections(std::vector<RejectionCount>& out) const override { rejections_.append_to(out); }
+  std::span<const Landmark> landmarks() const { return landmarks_.all(); }
 
  private:
-  enum class Reason : std::uint8_t {
-    kBadCamera,
-    kBadPixel,
-    kDuplicate,
-    kNoRoom,
-    kShort,
-    kTooMany,
-    kParallax,
-    kNotVisible,
-    kDistance,
-    kGate,
-    kCount
-  };
-  struct Rejections {
-    std::int64_t count = 0;
-    std::int64_t first_id = 0;
-    std::int64_t first_t_ns = 0;
-  };
   /// A track whose observations may be used now.
   struct Candidate {
     int track = 0;
@@ -54,32 +43,42 @@ class VisualFeatures final : public Update {
     bool lost = false;  ///< else it has an observation at the oldest clone, which leaves
   };
 
-  void reject(Reason reason, std::int64_t id);
-  void take_image(const FilterView& filter, const FeatureSample& sample, int slot);
+  void reject(const char* reason, std::int64_t id);
+  void take_image(const FeatureSample& sample);
   /// Fills candidates_, best first; drops lost tracks that are too short.
   void select(const FilterView& filter);
   void use(const Candidate& candidate, FactorSink& sink);
   bool passes_gate();
+  /// The factor of this epoch, with the columns of the window.
+  InformationFactor& factor(FactorSink& sink);
 
   double sigma_px_;
   double gate_probability_;
   int max_features_;
   int min_observations_;
   int max_tracks_;
+  int max_landmarks_;
   TriangulationLimits limits_;
+
+  std::vector<CameraPrior> cameras_;
+  std::vector<CameraBlocks> blocks_;  ///< of each camera
+  StreamId images_;
+  RoomId room_;
 
   TrackStore tracks_;
   Window window_;
   Feature feature_;
   NormalEquations equations_;
+  Chi2Gate gate_;
+  Landmarks landmarks_;
   InformationFactor* factor_ = nullptr;  ///< of this epoch, once there is a feature
   std::vector<Candidate> candidates_;
-  std::vector<std::int64_t> seen_epoch_;   ///< per track
-  std::vector<std::int64_t> image_epoch_;  ///< per camera
-  std::vector<double> gates_;              ///< threshold per degree of freedom
+  std::vector<std::int64_t> seen_epoch_;  ///< per track
+  std::vector<double> thresholds_;        ///< of the gate, per degree of freedom
   std::int64_t epoch_ = 0;
+  std::uint64_t images_now_ = 0;  ///< bit of each camera that has an image in this epoch
   std::int64_t now_ns_ = 0;
-  std::array<Rejections, static_cast<std::size_t>(Reason::kCount)> rejections_{};
+  Rejections rejections_;
 };
 
 }  // namespace viwo::visual

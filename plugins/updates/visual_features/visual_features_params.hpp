@@ -38,6 +38,13 @@ inline constexpr std::array kParams{
               .min = 1.,
               .max = 1000000.,
               .help = "room for tracks at a time; new points beyond it are dropped"},
+    ParamSpec{.name = "max_landmarks",
+              .type = ParamType::kInt,
+              .fallback = "0",
+              .min = 0.,
+              .max = 1000.,
+              .help = "most landmarks that are kept in the state, from tracks that outlive the "
+                      "window; 0: none"},
     ParamSpec{.name = "min_distance_m",
               .type = ParamType::kNumber,
               .unit = "m",

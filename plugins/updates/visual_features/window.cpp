@@ -1,29 +1,49 @@
 #include "window.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "viwo/math/so3.hpp"
 
 namespace viwo::visual {
+namespace {
 
-void Window::start(int max_clones, int n_cameras) {
+/// Stamps are whole nanoseconds: below, an image is at the time of its clone.
+constexpr double kStampResolutionS = 1e-9;
+
+}  // namespace
+
+void Window::start(int max_clones, std::span<const CameraPrior> cameras,
+                   std::span<const CameraBlocks> blocks) {
   const auto clones = static_cast<std::size_t>(max_clones);
-  const auto cameras = static_cast<std::size_t>(n_cameras);
+  blocks_.assign(blocks.begin(), blocks.end());
   clones_.reserve(clones);
   order_.reserve(clones);
   index_of_slot_.assign(clones, -1);
-  cameras_.assign(cameras, {});
-  poses_.assign(clones * cameras, {});
-  const int columns = kPoseSize * max_clones + kCalibrationSize * n_cameras;
+  cameras_.assign(cameras.size(), {});
+  for (std::size_t i = 0; i < cameras.size(); ++i) cameras_[i].view = cameras[i].camera;
+  stamps_.assign(clones * cameras.size(), {});
+  poses_.assign(clones * cameras.size(), {});
+  const int columns = kPoseSize * max_clones + kCalibrationSize * n_cameras();
+  state_columns_.reserve(static_cast<std::size_t>(columns));
   covariance_.setZero(columns, columns);
 }
 
 void Window::set(const FilterView& filter) {
   filter_ = filter;
   has_covariance_ = false;
+  set_clones();
+  set_cameras();
+  set_columns();
+}
+
+void Window::set_clones() {
   const int n_slots = static_cast<int>(index_of_slot_.size());
   std::fill(index_of_slot_.begin(), index_of_slot_.end(), -1);
   order_.clear();
-  for (int i = 0; i < static_cast<int>(filter.clones.size()); ++i) {
-    const CloneView& clone = filter.clones[static_cast<std::size_t>(i)];
+  for (int i = 0; i < static_cast<int>(filter_.clones.size()); ++i) {
+    const CloneView& clone = filter_.clones[static_cast<std::size_t>(i)];
     if (clone.column < 0 || clone.slot < 0 || clone.slot >= n_slots) continue;
     int& index = index_of_slot_[static_cast<std::size_t>(clone.slot)];
     if (index >= 0) continue;
@@ -31,64 +51,136 @@ void Window::set(const FilterView& filter) {
     order_.push_back(i);
   }
   std::sort(order_.begin(), order_.end(), [&](int a, int b) {
-    return filter.clones[static_cast<std::size_t>(a)].column <
-           filter.clones[static_cast<std::size_t>(b)].column;
+    return filter_.clones[static_cast<std::size_t>(a)].column <
+           filter_.clones[static_cast<std::size_t>(b)].column;
   });
   clones_.clear();
   for (const int i : order_) {
-    const CloneView& from = filter.clones[static_cast<std::size_t>(i)];
+    const CloneView& from = filter_.clones[static_cast<std::size_t>(i)];
     index_of_slot_[static_cast<std::size_t>(from.slot)] = n_clones();
     WindowClone& clone = clones_.emplace_back();
+    clone.t_ns = from.t_ns;
     clone.slot = from.slot;
     clone.column = kPoseSize * (n_clones() - 1);
     clone.at_first_estimate = from.R_GtoI == from.R_GtoI_fej && from.p_IinG == from.p_IinG_fej;
+    clone.R_GtoI = from.R_GtoI;
+    clone.p_IinG = from.p_IinG;
     clone.R_GtoI_fej = from.R_GtoI_fej;
     clone.p_IinG_fej = from.p_IinG_fej;
+    clone.w_IinI = from.w_IinI;
+    clone.v_IinG = from.v_IinG;
   }
-  add_columns();
-  set_poses(filter);
 }
 
-void Window::add_columns() {
-  columns_.clear();
-  // Clones lie side by side in the error state, in any order: then they are one block.
-  const auto column_of = [&](std::size_t i) {
-    return filter_.clones[static_cast<std::size_t>(order_[i])].column;
-  };
-  for (std::size_t begin = 0; begin < order_.size();) {
-    std::size_t end = begin + 1;
-    while (end < order_.size() && column_of(end) == column_of(end - 1) + kPoseSize) ++end;
-    columns_.add(column_of(begin), kPoseSize * static_cast<int>(end - begin));
-    begin = end;
-  }
+void Window::set_cameras() {
+  const FilterView::Covariance P = filter_.P();
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     WindowCamera& camera = cameras_[i];
-    camera = {};
-    if (i >= filter_.cameras.size()) continue;
-    camera.view = &filter_.cameras[i];
-    const int first = clone_columns();
-    if (camera.view->extrinsics_column >= 0) {
-      camera.extrinsics = columns_.add(camera.view->extrinsics_column, kPoseSize) - first;
-    }
-    if (camera.view->intrinsics_column >= 0) {
-      camera.intrinsics = columns_.add(camera.view->intrinsics_column, 8) - first;
-    }
+    const CameraBlocks& blocks = blocks_[i];
+    blocks.read(filter_, camera.view);
+    // First the columns of the state, without those that are held.
+    const auto place = [&](BlockId id, int entry, bool& has) {
+      const BlockView& block = filter_.block(id);
+      has = false;
+      for (int k = 0; k < block.size(); ++k) {
+        const int column = block.column() + k;
+        const bool free = block.column() >= 0 && P(column, column) > 0.;
+        camera.column[static_cast<std::size_t>(entry + k)] = free ? column : -1;
+        has = has || free;
+      }
+    };
+    place(blocks.extrinsics, 0, camera.has_extrinsics);
+    place(blocks.intrinsics, kIntrinsicsEntry, camera.has_intrinsics);
+    place(blocks.clock, kClockEntry, camera.has_clock);
   }
 }
 
-void Window::set_poses(const FilterView& filter) {
+void Window::set_columns() {
+  state_columns_.clear();
+  for (const int i : order_) {
+    for (int k = 0; k < kPoseSize; ++k) {
+      state_columns_.push_back(filter_.clones[static_cast<std::size_t>(i)].column + k);
+    }
+  }
+  const auto calibration = static_cast<std::ptrdiff_t>(state_columns_.size());
+  for (const WindowCamera& camera : cameras_) {
+    for (const int column : camera.column) {
+      if (column >= 0) state_columns_.push_back(column);
+    }
+  }
+  const auto begin = state_columns_.begin() + calibration;
+  std::sort(begin, state_columns_.end());  // cameras may share a clock
+  state_columns_.erase(std::unique(begin, state_columns_.end()), state_columns_.end());
+  for (WindowCamera& camera : cameras_) {
+    for (int& column : camera.column) {
+      if (column < 0) continue;
+      const auto at = std::lower_bound(begin, state_columns_.end(), column);
+      column = static_cast<int>(at - state_columns_.begin());
+    }
+  }
+  // What lies side by side in the error state is one block.
+  columns_.clear();
+  for (std::size_t first = 0; first < state_columns_.size();) {
+    std::size_t last = first + 1;
+    while (last < state_columns_.size() && state_columns_[last] == state_columns_[last - 1] + 1) {
+      ++last;
+    }
+    columns_.add(state_columns_[first], static_cast<int>(last - first));
+    first = last;
+  }
+}
+
+std::optional<int> Window::take_image(int camera, std::int64_t stamp_ns) {
+  const double offset_s = cameras_[static_cast<std::size_t>(camera)].view.t_CtoI_s;
+  if (!std::isfinite(offset_s)) return std::nullopt;
+  const std::int64_t t_ns = stamp_ns + std::llround(1e9 * offset_s);
+  const WindowClone* nearest = nullptr;
+  for (const WindowClone& clone : clones_) {
+    if (nearest == nullptr || std::abs(clone.t_ns - t_ns) < std::abs(nearest->t_ns - t_ns)) {
+      nearest = &clone;
+    }
+  }
+  if (nearest == nullptr || std::abs(nearest->t_ns - t_ns) > kSameInstantNs) return std::nullopt;
+  ImageStamp& stamp = stamps_[image_index(nearest->slot, camera)];
+  if (stamp.clone_ns == nearest->t_ns && stamp.stamp_ns != stamp_ns) return std::nullopt;
+  stamp = {nearest->t_ns, stamp_ns};
+  return nearest->slot;
+}
+
+double Window::seconds_to_image(int clone, int camera) const {
+  const WindowClone& at = this->clone(clone);
+  const ImageStamp& stamp = stamps_[image_index(at.slot, camera)];
+  if (stamp.clone_ns != at.t_ns) return 0.;
+  const double dt_s = seconds_between(at.t_ns, stamp.stamp_ns) + this->camera(camera).view.t_CtoI_s;
+  return std::abs(dt_s) < kStampResolutionS ? 0. : dt_s;
+}
+
+CameraPose Window::make_pose(int clone, int camera, double dt_s) const {
+  const WindowClone& at = this->clone(clone);
+  const CameraView& view = this->camera(camera).view;
+  Eigen::Matrix3d R_GtoI = at.R_GtoI, R_GtoI_fej = at.R_GtoI_fej;
+  Eigen::Vector3d p_IinG = at.p_IinG;
+  CameraPose pose;
+  pose.p_IinG_fej = at.p_IinG_fej;
+  if (dt_s != 0.) {  // (VF-14)
+    p_IinG += R_GtoI.transpose() * (R_GtoI_fej * at.v_IinG) * dt_s;
+    pose.p_IinG_fej += at.v_IinG * dt_s;
+    const Eigen::Matrix3d turn = exp_so3(-dt_s * at.w_IinI);
+    R_GtoI = turn * R_GtoI;
+    R_GtoI_fej = turn * R_GtoI_fej;
+  }
+  const Eigen::Vector3d p_CinI = -view.R_ItoC.transpose() * view.p_IinC;
+  pose.R_GtoC = view.R_ItoC * R_GtoI;
+  pose.p_CinG = p_IinG + R_GtoI.transpose() * p_CinI;
+  pose.R_GtoC_fej = view.R_ItoC * R_GtoI_fej;
+  pose.p_CinG_fej = pose.p_IinG_fej + R_GtoI_fej.transpose() * p_CinI;
+  return pose;
+}
+
+void Window::set_poses() {
   for (int i = 0; i < n_clones(); ++i) {
-    const CloneView& clone =
-        filter.clones[static_cast<std::size_t>(order_[static_cast<std::size_t>(i)])];
     for (int j = 0; j < n_cameras(); ++j) {
-      const CameraView* camera = cameras_[static_cast<std::size_t>(j)].view;
-      if (camera == nullptr) continue;
-      CameraPose& pose = poses_[static_cast<std::size_t>(i * n_cameras() + j)];
-      const Eigen::Vector3d p_CinI = -camera->R_ItoC.transpose() * camera->p_IinC;
-      pose.R_GtoC = camera->R_ItoC * clone.R_GtoI;
-      pose.p_CinG = clone.p_IinG + clone.R_GtoI.transpose() * p_CinI;
-      pose.R_GtoC_fej = camera->R_ItoC * clone.R_GtoI_fej;
-      pose.p_CinG_fej = clone.p_IinG_fej + clone.R_GtoI_fej.transpose() * p_CinI;
+      poses_[image_index(i, j)] = make_pose(i, j, seconds_to_image(i, j));
     }
   }
 }

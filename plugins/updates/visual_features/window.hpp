@@ -2,56 +2,77 @@
 // arrays, columns of the factor, and the part of the covariance that belongs to them.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "viwo/api/filter_view.hpp"
+#include "viwo/api/rig.hpp"
 #include "viwo/api/update.hpp"
 
 namespace viwo::visual {
 
 /// Most clones: one bit each in a track's masks.
 inline constexpr int kMaxWindowClones = 64;
-/// Extrinsics and intrinsics of a camera.
-inline constexpr int kCalibrationSize = kPoseSize + 8;
+/// Errors of a camera's calibration, in this order: extrinsics, intrinsics, clock.
+inline constexpr int kIntrinsicsEntry = kPoseSize;
+inline constexpr int kClockEntry = kPoseSize + 8;
+inline constexpr int kCalibrationSize = kClockEntry + 1;
 
 struct WindowClone {
+  std::int64_t t_ns = 0;
   int slot = 0;
   int column = 0;                 ///< in the factor
   bool at_first_estimate = true;  ///< first estimate and estimate are the same
-  Eigen::Matrix3d R_GtoI_fej;
-  Eigen::Vector3d p_IinG_fej;
+  Eigen::Matrix3d R_GtoI, R_GtoI_fej;
+  Eigen::Vector3d p_IinG, p_IinG_fej;
+  Eigen::Vector3d w_IinI, v_IinG;  ///< when it was made
 };
 
-/// A camera at the time of a clone.
+/// A camera at the time of its image that belongs to a clone.
 struct CameraPose {
   Eigen::Matrix3d R_GtoC, R_GtoC_fej;
   Eigen::Vector3d p_CinG, p_CinG_fej;
+  Eigen::Vector3d p_IinG_fej;  ///< of the IMU at that time
 };
 
+/// A camera as configured, with its calibration as estimated: Jacobians are taken there, too.
 struct WindowCamera {
-  const CameraView* view = nullptr;
-  int extrinsics = -1;  ///< first column among the calibration columns, -1: held
-  int intrinsics = -1;
+  CameraView view;
+  std::array<int, kCalibrationSize> column{};  ///< of each error in the factor; -1: held
+  bool has_extrinsics = false, has_intrinsics = false, has_clock = false;  ///< any column
+  bool calibrates() const { return has_extrinsics || has_intrinsics || has_clock; }
 };
 
 class Window {
  public:
-  /// Allocates.
-  void start(int max_clones, int n_cameras);
+  /// Allocates. `cameras` and `blocks`, of equal size: what was declared.
+  void start(int max_clones, std::span<const CameraPrior> cameras,
+             std::span<const CameraBlocks> blocks);
 
   /// Takes over clones and cameras; `filter` must outlive the use. Clones that have no column, or
   /// whose slot is out of range or taken, are left out.
   void set(const FilterView& filter);
+  /// Slot of the clone of an image: the nearest one within kSameInstantNs, which remembers the
+  /// stamp. Nothing when there is none, or it has an image of that camera with another stamp.
+  std::optional<int> take_image(int camera, std::int64_t stamp_ns);
+  /// Poses of all cameras, after the last image.
+  void set_poses();
 
-  /// Factor columns: all clones, in the order of the error state, then the calibration.
+  /// Factor columns: all clones, in the order of the error state, then what is estimated of the
+  /// calibration.
   const FactorColumns& columns() const { return columns_; }
   int size() const { return columns_.size(); }
   int clone_columns() const { return kPoseSize * n_clones(); }
   int calibration_columns() const { return size() - clone_columns(); }
+  /// Column of the error state that a factor column is.
+  int state_column(int factor_column) const {
+    return state_columns_[static_cast<std::size_t>(factor_column)];
+  }
 
   /// In the order of their columns.
   const WindowClone& clone(int index) const { return clones_[static_cast<std::size_t>(index)]; }
@@ -60,25 +81,41 @@ class Window {
   int clone_in_slot(int slot) const { return index_of_slot_[static_cast<std::size_t>(slot)]; }
   const WindowCamera& camera(int index) const { return cameras_[static_cast<std::size_t>(index)]; }
   int n_cameras() const { return static_cast<int>(cameras_.size()); }
-  const CameraPose& pose(int clone, int camera) const {
-    return poses_[static_cast<std::size_t>(clone * n_cameras() + camera)];
-  }
+  const CameraPose& pose(int clone, int camera) const { return poses_[image_index(clone, camera)]; }
+  /// The pose of a camera at the time of a clone, not of an image.
+  CameraPose pose_at_clone(int clone, int camera) const { return make_pose(clone, camera, 0.); }
 
+  const FilterView& filter() const { return filter_; }
   /// Covariance of the factor's columns, all of it, in their order. Copied at the first call after
   /// set(); of the filter's covariance only the lower triangle is read.
   const Eigen::MatrixXd& covariance();
 
  private:
-  void add_columns();
-  void set_poses(const FilterView& filter);
+  struct ImageStamp {
+    std::int64_t clone_ns = -1;  ///< of the clone that it belongs to
+    std::int64_t stamp_ns = 0;
+  };
+
+  std::size_t image_index(int clone_or_slot, int camera) const {
+    return static_cast<std::size_t>(clone_or_slot * n_cameras() + camera);
+  }
+  void set_clones();
+  void set_cameras();
+  void set_columns();
+  /// Time from a clone to an image of it.
+  double seconds_to_image(int clone, int camera) const;
+  CameraPose make_pose(int clone, int camera, double dt_s) const;
 
   FilterView filter_;
+  std::vector<CameraBlocks> blocks_;
   std::vector<WindowClone> clones_;
   std::vector<int> order_;  ///< of filter_.clones by column
   std::vector<int> index_of_slot_;
   std::vector<WindowCamera> cameras_;
+  std::vector<ImageStamp> stamps_;  ///< by slot and camera
   std::vector<CameraPose> poses_;
   FactorColumns columns_;
+  std::vector<int> state_columns_;
   Eigen::MatrixXd covariance_;
   bool has_covariance_ = false;
 };

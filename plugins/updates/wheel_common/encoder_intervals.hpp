@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "tally.hpp"
@@ -30,12 +31,13 @@ struct EncoderInterval {
 class EncoderIntervals {
  public:
   /// The interval that ends now, if the samples reach; the next one begins at its end. It is put
-  /// off while it is shorter than `at_least_s` and its first clone stays. The filter must have
-  /// wheels and at least one clone.
-  std::optional<EncoderInterval> next(const FilterView& filter, const EpochData& data,
+  /// off while it is shorter than `at_least_s` and its first clone stays. The filter must have at
+  /// least one clone.
+  std::optional<EncoderInterval> next(const FilterView& filter, double t_OtoI_s,
+                                      std::span<const EncoderSample> encoders,
                                       double at_least_s = 0.) {
     const CloneView& now = filter.clones.back();
-    const std::int64_t cut_ns = now.t_ns - std::llround(1e9 * filter.wheels->t_OtoI_s);  // (WO-1)
+    const std::int64_t cut_ns = now.t_ns - std::llround(1e9 * t_OtoI_s);  // (WO-1)
     if (!started_) {
       start_at(now, cut_ns);
       return std::nullopt;
@@ -46,7 +48,6 @@ class EncoderIntervals {
       start_at(now, cut_ns);
       return std::nullopt;
     }
-    const auto encoders = data.encoders;
     if (encoders.empty() || encoders.back().end_ns < cut_ns || cut_ns <= begin_ns_ ||
         *first + 1 == filter.clones.size()) {
       return std::nullopt;
@@ -113,12 +114,9 @@ class SampleTallies {
 };
 
 /// The host's kinematic model, which outlives the updates, as the wheel module wants it.
-inline std::shared_ptr<const WheelModel> wheel_model_of(const UpdateSetup& setup) {
-  if (setup.wheels == nullptr || setup.wheels->model == nullptr) {
-    throw InputError("this update needs a wheel set");
-  }
+inline std::shared_ptr<const WheelModel> wheel_model_of(const WheelsBlocks& wheels) {
   return std::make_shared<const WheelModel>(
-      std::shared_ptr<const KinematicModel>(setup.wheels->model, [](const KinematicModel*) {}));
+      std::shared_ptr<const KinematicModel>(wheels.model, [](const KinematicModel*) {}));
 }
 
 }  // namespace viwo

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include <Eigen/Cholesky>
 
 #include "encoder_intervals.hpp"
+#include "encoders.hpp"
 #include "relative_pose.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/so3.hpp"
@@ -46,15 +48,15 @@ struct Point {
 
 class WheelOdometry final : public Update {
  public:
-  WheelOdometry(const ParamSet& params, const HostServices& /*services*/)
+  WheelOdometry(const ParamSet& params, const HostServices& services)
       : gate_probability_(params.number("gate_probability")),
         noise_scale_(params.number("noise_scale")),
         sigma_floor_yaw_rad_(params.number("sigma_floor_yaw_rad")),
         sigma_floor_position_m_(params.number("sigma_floor_position_m")),
         sigma_yaw_rad_per_sqrt_m_(params.number("sigma_yaw_rad_per_sqrt_m")),
         sigma_position_m_per_sqrt_m_(params.number("sigma_position_m_per_sqrt_m")),
-        max_iterations_(static_cast<int>(params.integer("max_iterations"))),
-        second_order_noise_(params.flag("second_order_noise")),
+        max_iterations_(services.exact ? 1 : static_cast<int>(params.integer("max_iterations"))),
+        second_order_noise_(!services.exact && params.flag("second_order_noise")),
         max_bridged_s_(params.number("max_bridged_s")) {
     options_.twist.noise_weighted = params.text("twist") == "noise_weighted";
     options_.parity_gate_probability = params.number("sample_gate_probability");
@@ -62,34 +64,44 @@ class WheelOdometry final : public Update {
     options_.twist.fitted_jacobian = true;
   }
 
-  UpdateKind kind() const override { return UpdateKind::kWheels; }
+  void declare(Declarations& host) override {
+    blocks_ = declare_wheels(host);
+    encoders_ = declare_encoders(host, blocks_);
+  }
 
-  void start(const UpdateSetup& setup) override {
-    preintegrator_.emplace(wheel_model_of(setup), options_);
-    shifted_preintegrator_.emplace(wheel_model_of(setup), options_);
+  void start(const UpdateSetup& /*setup*/) override {
+    preintegrator_.emplace(wheel_model_of(blocks_), options_);
+    shifted_preintegrator_.emplace(wheel_model_of(blocks_), options_);
   }
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
-    if (filter.wheels == nullptr || filter.clones.empty()) return;
-    const std::optional<EncoderInterval> interval = intervals_.next(filter, data);
+    if (filter.clones.empty()) return;
+    const WheelsView wheels = blocks_.view(filter);
+    const auto encoders = data.samples<EncoderSample>(encoders_);
+    const std::optional<EncoderInterval> interval =
+        intervals_.next(filter, wheels.t_OtoI_s, encoders);
     if (!interval.has_value()) return;
-    preintegrator_->model().require_channels(data.encoders.back(), "the wheel set");
+    if (!has_channels(preintegrator_->model().description(), encoders.back())) {
+      other_channels_.add(1, filter.clones.back().t_ns);
+      return;
+    }
     const CloneView& first = filter.clones[interval->first_clone];
     const CloneView& last = filter.clones[interval->last_clone];
-    set_start(*filter.wheels, first, last, *interval);
-    if (!measure(data, *interval, at_)) return;
-    measure_rate(data, *interval);
+    set_start(wheels, first, last, *interval);
+    if (!measure(encoders, *interval, at_)) return;
+    measure_rate(encoders, *interval);
     tallies_.add(pose_, last.t_ns);
     if (!(pose_.bridged_s <= max_bridged_s_) || !pose_.g.allFinite() || !pose_.P_g.allFinite()) {
       bridged_.add(1, last.t_ns);
       return;
     }
     ResidualFactor& factor = sink.add_residual();
-    set_columns(filter, first, last, factor.columns);
-    iterate(filter, data, *interval, factor);
+    set_columns(wheels, filter.P(), first, last, factor.columns);
+    iterate(wheels, encoders, *interval, factor);
   }
 
   void rejections(std::vector<RejectionCount>& out) const override {
+    other_channels_.append_to(out);
     intervals_.append_rejections(out);
     tallies_.append_rejections(out);
     bridged_.append_to(out);
@@ -117,17 +129,18 @@ class WheelOdometry final : public Update {
     at_ = start_;
   }
 
-  bool measure(const EpochData& data, const EncoderInterval& interval, const Point& point) {
+  bool measure(std::span<const EncoderSample> encoders, const EncoderInterval& interval,
+               const Point& point) {
     preintegrator_->set_intrinsics(point.x_WI);
-    return preintegrator_->integrate(data.encoders, interval.begin_ns, interval.end_ns, pose_);
+    return preintegrator_->integrate(encoders, interval.begin_ns, interval.end_ns, pose_);
   }
 
   /// How the relative pose changes when both instants move on: of the encoders themselves, whose
   /// rates are less noisy than those of the IMU (WO-13). From the clones where samples are missing.
-  void measure_rate(const EpochData& data, const EncoderInterval& interval) {
+  void measure_rate(std::span<const EncoderSample> encoders, const EncoderInterval& interval) {
     shifted_preintegrator_->set_intrinsics(at_.x_WI);
-    const bool covered = shifted_preintegrator_->integrate(
-        data.encoders, interval.begin_ns - kShiftNs, interval.end_ns - kShiftNs, shifted_);
+    const bool covered = shifted_preintegrator_->integrate(encoders, interval.begin_ns - kShiftNs,
+                                                           interval.end_ns - kShiftNs, shifted_);
     g_rate_ = covered && shifted_.g.allFinite() && shifted_.bridged_s == 0.
                   ? Eigen::Vector3d((pose_.g - shifted_.g) / (1e-9 * kShiftNs))
                   : Eigen::Vector3d(
@@ -135,9 +148,8 @@ class WheelOdometry final : public Update {
   }
 
   /// Columns of what the filter estimates, and where they stand in the geometry and in x_WI.
-  void set_columns(const FilterView& filter, const CloneView& first, const CloneView& last,
-                   FactorColumns& columns) {
-    const WheelsView& wheels = *filter.wheels;
+  void set_columns(const WheelsView& wheels, const FilterView::Covariance& P,
+                   const CloneView& first, const CloneView& last, FactorColumns& columns) {
     n_geometry_ = 0;
     const auto add = [&](int column, int count, int geometry) {
       if (column < 0) return;
@@ -153,7 +165,6 @@ class WheelOdometry final : public Update {
       columns.add(wheels.intrinsics_column, static_cast<int>(wheels.x_WI.size()));
     }
     // The prior of just these columns.
-    const FilterView::Covariance P = filter.P();
     P_.resize(columns.size(), columns.size());
     int row = 0;
     for (const ColumnRange rows : columns.blocks()) {
@@ -221,8 +232,8 @@ class WheelOdometry final : public Update {
   }
 
   /// Gauss-Newton steps with the prior, then the factor of the last linearisation (WO-10).
-  void iterate(const FilterView& filter, const EpochData& data, const EncoderInterval& interval,
-               ResidualFactor& factor) {
+  void iterate(const WheelsView& wheels, std::span<const EncoderSample> encoders,
+               const EncoderInterval& interval, ResidualFactor& factor) {
     linearise();
     Step step = Step::Zero(P_.cols());
     Eigen::Vector3d moved_back = residual_;
@@ -236,7 +247,7 @@ class WheelOdometry final : public Update {
       const PreintegratedPose before = pose_;
       const Point from = at_;
       move(next);
-      if (!measure(data, interval, at_) || !pose_.g.allFinite() || !pose_.P_g.allFinite()) {
+      if (!measure(encoders, interval, at_) || !pose_.g.allFinite() || !pose_.P_g.allFinite()) {
         pose_ = before;
         at_ = from;
         break;
@@ -247,7 +258,7 @@ class WheelOdometry final : public Update {
       const Eigen::Vector3d missed = residual_ - predicted;
       if (missed.dot(R_.llt().solve(missed)) < kConverged) break;
     }
-    if (second_order_noise_) add_second_order_noise(filter);
+    if (second_order_noise_) add_second_order_noise(wheels);
     factor.set_rows(3);
     factor.H = H_;
     factor.residual.head<3>() = moved_back;
@@ -256,8 +267,7 @@ class WheelOdometry final : public Update {
   }
 
   /// (WO-11), for the mount and the time offset, crossed with all of the geometry.
-  void add_second_order_noise(const FilterView& filter) {
-    const WheelsView& wheels = *filter.wheels;
+  void add_second_order_noise(const WheelsView& wheels) {
     if (wheels.extrinsics_column < 0 && wheels.time_offset_column < 0) return;
     std::array<GeometryMatrix, 3>& second = second_derivative_;
     for (GeometryMatrix& D : second) D.setZero();
@@ -314,6 +324,9 @@ class WheelOdometry final : public Update {
   bool second_order_noise_;
   double max_bridged_s_;
 
+  WheelsBlocks blocks_;
+  StreamId encoders_;
+  Tally other_channels_{"interval left out: encoder samples without the channels of the model"};
   EncoderIntervals intervals_;
   SampleTallies tallies_;
   Tally bridged_{"interval left out: too long without believable encoder samples"};

@@ -16,7 +16,9 @@ constexpr std::int64_t kMs = 1'000'000;
 /// Encoder samples of an ICR sweep, and a filter with clones at 1.0 and 1.5 s.
 class ParityInterval : public ::testing::Test {
  protected:
-  ParityInterval() : model_(testing::load_model(testing::swerve("four_wis_wid"))) {
+  ParityInterval()
+      : model_(testing::load_model(testing::swerve("four_wis_wid"))),
+        filter_(testing::free_wheels({}, model_.get())) {
     const sim::PlanarMotion motion("icr_sweep", {.ramp_s = 0.});
     sim::EncoderSimulation simulation;
     simulation.duration_s = 4.;
@@ -26,17 +28,14 @@ class ParityInterval : public ::testing::Test {
       filter_.clones[static_cast<std::size_t>(k)].t_ns = (1000 + 500 * k) * kMs;
       filter_.clones[static_cast<std::size_t>(k)].slot = k;
     }
-    filter_.wheels.model = &model_->model();
-    filter_.wheels.x_WI = model_->nominal();
     filter_.layout();
-    first_ = filter_.wheels.intrinsics_column;
+    first_ = filter_.column(filter_.wheels.intrinsics);
     filter_.P.diagonal().tail(model_->n_intrinsics()) = model_->prior_sigma().cwiseAbs2();
   }
 
-  void run(Update& update, const testing::SmallFilter& filter, FactorSink& sink) const {
-    update.start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = &filter.wheels});
-    EpochData data;
-    data.encoders = encoders_;
+  void run(Update& update, testing::SmallFilter filter, FactorSink& sink) const {
+    filter.start(update);
+    EpochData data = filter.epoch(encoders_);
     FilterView view = filter.view();
     view.clones = view.clones.first(1);
     update.update(view, data, sink);
@@ -65,7 +64,7 @@ TEST_F(ParityInterval, HasTheGradientOfTheParityCostAndLeavesOutTheGauge) {
   const auto update = testing::load_update(
       "{type: wheel_parity, period_s: 0, max_iterations: 1, second_order_noise: false, "
       "gate_probability: 0}");
-  filter_.wheels.x_WI = sim::perturbed_intrinsics(model_->description(), 0.02, 4);
+  filter_.x_WI() = sim::perturbed_intrinsics(model_->description(), 0.02, 4);
   FactorSink sink(1, 60);
   run(*update, filter_, sink);
   ASSERT_NE(sink.information(), nullptr);
@@ -78,7 +77,7 @@ TEST_F(ParityInterval, HasTheGradientOfTheParityCostAndLeavesOutTheGauge) {
       const int entry = block.first + i - first_;
       const double sigma = model_->prior_sigma()[entry];
       EXPECT_GT(sigma, 0.);
-      Intrinsics forward = filter_.wheels.x_WI, backward = forward;
+      Intrinsics forward = filter_.x_WI(), backward = forward;
       forward[entry] += 1e-4 * sigma;
       backward[entry] -= 1e-4 * sigma;
       // d cost / d x = -2 eta. The factor's derivative is at the fitted signal, that of the cost at
@@ -92,8 +91,8 @@ TEST_F(ParityInterval, HasTheGradientOfTheParityCostAndLeavesOutTheGauge) {
 }
 
 TEST_F(ParityInterval, LandsWhereThePriorAndTheWheelsMeetAndNeverMovesTheGauge) {
-  filter_.wheels.x_WI = sim::perturbed_intrinsics(model_->description(), 2., 9);
-  const Intrinsics start = filter_.wheels.x_WI;
+  filter_.x_WI() = sim::perturbed_intrinsics(model_->description(), 2., 9);
+  const Intrinsics start = filter_.x_WI();
   const auto landed_chi2 = [&](const std::string& more) {
     testing::SmallFilter filter = filter_;
     const auto update = testing::load_update(
@@ -102,17 +101,36 @@ TEST_F(ParityInterval, LandsWhereThePriorAndTheWheelsMeetAndNeverMovesTheGauge) 
     run(*update, filter, sink);
     filter.apply(sink);
     for (const char* held : {"x_1", "y_1", "delta_o1"}) {
-      EXPECT_EQ(filter.wheels.x_WI[model_->find(held)], start[model_->find(held)]);
+      EXPECT_EQ(filter.x_WI()[model_->find(held)], start[model_->find(held)]);
     }
-    return chi2_at(filter.wheels.x_WI);
+    return chi2_at(filter.x_WI());
   };
   EXPECT_GT(chi2_at(start), 1e4);
   EXPECT_LT(landed_chi2(", max_iterations: 10"), 400.);  // 250 samples x dof, less 13
   EXPECT_GT(landed_chi2(", max_iterations: 1"), 1.2 * landed_chi2(", max_iterations: 10"));
 }
 
+TEST_F(ParityInterval, IsLinearisedOnceAndAddsNoNoiseWhenItIsToBeExactWhateverTheParametersSay) {
+  filter_.x_WI() = sim::perturbed_intrinsics(model_->description(), 1., 9);
+  const auto information = [&](const std::string& more, bool exact = false) {
+    FactorSink sink(1, 60);
+    run(*testing::load_update("{type: wheel_parity, gate_probability: 0" + more + "}", exact),
+        filter_, sink);
+    EXPECT_NE(sink.information(), nullptr);
+    const auto n = sink.information()->columns.size();
+    Eigen::MatrixXd all(n, n + 1);
+    all << sink.information()->Lambda.topLeftCorner(n, n), sink.information()->eta.head(n);
+    return all;
+  };
+  const Eigen::MatrixXd exact = information(", max_iterations: 10, second_order_noise: true", true);
+  EXPECT_TRUE(exact == information(", max_iterations: 1, second_order_noise: false"));
+  // Otherwise both are seen.
+  EXPECT_FALSE(exact == information(", second_order_noise: false"));
+  EXPECT_FALSE(exact == information(", max_iterations: 1"));
+}
+
 TEST_F(ParityInterval, GatesASlippingWheelButNotWrongIntrinsics) {
-  filter_.wheels.x_WI = sim::perturbed_intrinsics(model_->description(), 1., 9);
+  filter_.x_WI() = sim::perturbed_intrinsics(model_->description(), 1., 9);
   FactorSink sink(1, 60);
   run(*testing::load_update("{type: wheel_parity, period_s: 0}"), filter_, sink);
   EXPECT_EQ(sink.applied(), 1);
@@ -136,11 +154,10 @@ TEST_F(ParityInterval, GatesASlippingWheelButNotWrongIntrinsics) {
 TEST_F(ParityInterval, DoesNotAllocateInTheSteadyState) {
   if (!testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
   const auto update = testing::load_update("{type: wheel_parity, period_s: 0}");
-  filter_.wheels.x_WI = sim::perturbed_intrinsics(model_->description(), 1., 9);
-  update->start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = &filter_.wheels});
+  filter_.x_WI() = sim::perturbed_intrinsics(model_->description(), 1., 9);
+  filter_.start(*update);
   FactorSink sink(1, 60);
-  EpochData data;
-  data.encoders = encoders_;
+  const EpochData data = filter_.epoch(encoders_);
   long allocated = 0;
   std::int64_t applied = 0;
   for (int k = 0; k < 20; ++k) {

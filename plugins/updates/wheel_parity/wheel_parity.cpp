@@ -4,12 +4,14 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include "encoder_intervals.hpp"
+#include "encoders.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/chi2.hpp"
 #include "wheel_params.hpp"
@@ -68,32 +70,40 @@ constexpr int kIntervalsUnchecked = 5;
 
 class WheelParity final : public Update {
  public:
-  WheelParity(const ParamSet& params, const HostServices& /*services*/)
+  WheelParity(const ParamSet& params, const HostServices& services)
       : gate_probability_(params.number("gate_probability")),
         noise_scale_(params.number("noise_scale")),
         period_s_(params.number("period_s")),
-        max_iterations_(static_cast<int>(params.integer("max_iterations"))),
-        second_order_noise_(params.flag("second_order_noise")) {
+        max_iterations_(services.exact ? 1 : static_cast<int>(params.integer("max_iterations"))),
+        second_order_noise_(!services.exact && params.flag("second_order_noise")) {
     options_.twist.noise_weighted = true;
     options_.parity_gate_probability = params.number("sample_gate_probability");
     options_.parity = true;
   }
 
-  UpdateKind kind() const override { return UpdateKind::kWheels; }
+  void declare(Declarations& host) override {
+    blocks_ = declare_wheels(host);
+    encoders_ = declare_encoders(host, blocks_);
+  }
 
-  void start(const UpdateSetup& setup) override {
-    preintegrator_.emplace(wheel_model_of(setup), options_);
+  void start(const UpdateSetup& /*setup*/) override {
+    preintegrator_.emplace(wheel_model_of(blocks_), options_);
   }
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
-    if (filter.wheels == nullptr || filter.clones.empty()) return;
+    if (filter.clones.empty()) return;
+    const WheelsView wheels = blocks_.view(filter);
+    const auto encoders = data.samples<EncoderSample>(encoders_);
     const std::optional<EncoderInterval> interval =
-        intervals_.next(filter, data, period_s_ - kPeriodSlackS);
-    if (!interval.has_value() || filter.wheels->intrinsics_column < 0) return;
-    preintegrator_->model().require_channels(data.encoders.back(), "the wheel set");
-    find_free(filter);
+        intervals_.next(filter, wheels.t_OtoI_s, encoders, period_s_ - kPeriodSlackS);
+    if (!interval.has_value() || wheels.intrinsics_column < 0) return;
+    if (!has_channels(preintegrator_->model().description(), encoders.back())) {
+      other_channels_.add(1, filter.clones.back().t_ns);
+      return;
+    }
+    find_free(wheels, filter.P());
     if (n_free_ == 0) return;
-    const double gain = iterate(filter.wheels->x_WI, data, *interval);
+    const double gain = iterate(wheels.x_WI, encoders, *interval);
     tallies_.add(pose_, data.end_ns);
     if (std::isnan(gain)) return;
     // (WP-5): what no change of the intrinsics within their prior explains.
@@ -104,11 +114,12 @@ class WheelParity final : public Update {
       return;
     }
     ++intervals_used_;
-    if (second_order_noise_ && --unchecked_ < 0) add_second_order_noise(data, *interval);
-    emit(filter.wheels->intrinsics_column, sink.add_information());
+    if (second_order_noise_ && --unchecked_ < 0) add_second_order_noise(encoders, *interval);
+    emit(wheels.intrinsics_column, sink.add_information());
   }
 
   void rejections(std::vector<RejectionCount>& out) const override {
+    other_channels_.append_to(out);
     intervals_.append_rejections(out);
     tallies_.append_rejections(out);
     gated_.append_to(out);
@@ -116,11 +127,10 @@ class WheelParity final : public Update {
 
  private:
   /// The intrinsics that have a variance, their sigmas and correlations.
-  void find_free(const FilterView& filter) {
-    const FilterView::Covariance P = filter.P();
-    const int first = filter.wheels->intrinsics_column;
+  void find_free(const WheelsView& wheels, const FilterView::Covariance& P) {
+    const int first = wheels.intrinsics_column;
     n_free_ = 0;
-    for (int i = 0; i < filter.wheels->x_WI.size(); ++i) {
+    for (int i = 0; i < wheels.x_WI.size(); ++i) {
       if (P(first + i, first + i) > 0.) free_[static_cast<std::size_t>(n_free_++)] = i;
     }
     sigma_.resize(n_free_);
@@ -137,14 +147,15 @@ class WheelParity final : public Update {
   /// Gauss-Newton until the step is small: Lambda_, eta_ and cost_ are then those of the last
   /// linearisation, at at_, but about x0. Returns by how much the best change lowers the cost; NaN
   /// when the interval tells nothing.
-  double iterate(const Intrinsics& x0, const EpochData& data, const EncoderInterval& interval) {
+  double iterate(const Intrinsics& x0, std::span<const EncoderSample> encoders,
+                 const EncoderInterval& interval) {
     Intrinsics& x = at_;
     x = x0;
     Intrinsics z_before = Intrinsics::Zero(n_free_);
     double gain = std::numeric_limits<double>::quiet_NaN();
     for (int i = 0; i < max_iterations_; ++i) {
       preintegrator_->set_intrinsics(x);
-      preintegrator_->integrate(data.encoders, interval.begin_ns, interval.end_ns, pose_);
+      preintegrator_->integrate(encoders, interval.begin_ns, interval.end_ns, pose_);
       if (pose_.parity.dof == 0 || !pose_.parity.eta.allFinite()) break;
       linearise(x0, x);
       // (WP-4): the step is C z in units of sigma.
@@ -187,7 +198,8 @@ class WheelParity final : public Update {
 
   /// (WP-6), (WP-7): the noise of eta_ grows by what the curvature makes of the prior
   /// uncertainty.
-  void add_second_order_noise(const EpochData& data, const EncoderInterval& interval) {
+  void add_second_order_noise(std::span<const EncoderSample> encoders,
+                              const EncoderInterval& interval) {
     eigen_.compute(C_);
     const Square L =
         eigen_.eigenvectors() * eigen_.eigenvalues().cwiseMax(0.).cwiseSqrt().asDiagonal();
@@ -199,7 +211,7 @@ class WheelParity final : public Update {
       Intrinsics x = at_;
       for (int k = 0; k < n_free_; ++k) x[free(k)] += kCurvatureStep * sigma_[k] * L(k, i);
       preintegrator_->set_intrinsics(x);
-      preintegrator_->integrate(data.encoders, interval.begin_ns, interval.end_ns, moved_);
+      preintegrator_->integrate(encoders, interval.begin_ns, interval.end_ns, moved_);
       for (int k = 0; k < n_free_; ++k) {
         for (int l = 0; l < n_free_; ++l) {
           M(l, k) = (weight * sigma_[l] * sigma_[k] * moved_.parity.Lambda(free(l), free(k)) -
@@ -275,6 +287,9 @@ class WheelParity final : public Update {
   int max_iterations_;
   bool second_order_noise_;
 
+  WheelsBlocks blocks_;
+  StreamId encoders_;
+  Tally other_channels_{"interval left out: encoder samples without the channels of the model"};
   EncoderIntervals intervals_;
   SampleTallies tallies_;
   Tally gated_{"interval dropped by the chi-square gate"};

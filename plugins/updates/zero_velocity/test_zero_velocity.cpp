@@ -26,7 +26,7 @@ class Robot {
     }
   }
 
-  EpochData epoch(int k, bool images) {
+  EpochData epoch(int k, bool images, const testing::UpdateHost& host) {
     const ImuNoise noise;
     imu_.clear();
     for (int i = 0; i <= 20; ++i) {
@@ -59,12 +59,10 @@ class Robot {
       sample.drive_rad_per_s.fill(speed_ / 0.025);
       encoders_.push_back(sample);
     }
-    EpochData data;
+    EpochData data = host.epoch(encoders_, std::span(&image_, images ? 1 : 0));
     data.begin_ns = 100 * (k - 1) * kMs;
     data.end_ns = 100 * k * kMs;
     data.imu = imu_;
-    data.encoders = encoders_;
-    if (images) data.features = {&image_, 1};
     return data;
   }
 
@@ -80,7 +78,6 @@ class Robot {
 testing::SmallFilter standing_filter(double sigma_v) {
   testing::SmallFilter filter;
   filter.clones.resize(2);
-  filter.wheels.x_WI.resize(0);
   filter.layout();
   filter.P.setIdentity();
   filter.P *= 1e-6;
@@ -89,14 +86,13 @@ testing::SmallFilter standing_filter(double sigma_v) {
 }
 
 /// Epochs of three seconds in which a factor came, and passed its own gate against `filter`.
-int believed(const std::string& more, Robot robot, bool images,
-             const testing::SmallFilter& filter) {
+int believed(const std::string& more, Robot robot, bool images, testing::SmallFilter filter) {
   const auto update = testing::load_update("{type: zero_velocity" + more + "}");
-  update->start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = &filter.wheels});
+  filter.start(*update);
   int count = 0;
   for (int k = 1; k <= 30; ++k) {
     FactorSink sink(1, 60);
-    update->update(filter.view(), robot.epoch(k, images), sink);
+    update->update(filter.view(), robot.epoch(k, images, filter), sink);
     for (const ResidualFactor& factor : sink.residuals()) {
       const Eigen::MatrixXd H =
           testing::SmallFilter::spread(factor.columns, factor.H, filter.P.rows());
@@ -148,9 +144,10 @@ TEST(ZeroVelocity, HasTheDerivativesOfItsResidualAtFirstEstimates) {
     filter.plus(random);
     filter.first_estimates();
     Robot robot(0.);
-    const EpochData data = robot.epoch(2, false);
+    const auto update = testing::load_update("{type: zero_velocity}");
+    filter.start(*update);
+    const EpochData data = robot.epoch(2, false, filter);
     const auto factor = [&](const testing::SmallFilter& at) {
-      const auto update = testing::load_update("{type: zero_velocity}");
       FactorSink sink(1, 60);
       update->update(at.view(), data, sink);
       EXPECT_EQ(sink.residuals().size(), 1u);
@@ -205,7 +202,9 @@ TEST(ZeroVelocity, IsConsistentAndWithAWrongSignNot) {
     filter.first_estimates();
     FactorSink sink(1, 60);
     Robot robot(0.);
-    testing::load_update(yaml)->update(filter.view(), robot.epoch(2, false), sink);
+    const auto update = testing::load_update(yaml);
+    filter.start(*update);
+    update->update(filter.view(), robot.epoch(2, false, filter), sink);
     ASSERT_EQ(sink.residuals().size(), 1u);
     const auto nees_after = [&](bool flip) {
       testing::SmallFilter updated = filter;
@@ -246,14 +245,14 @@ TEST(ZeroVelocity, IsConsistentAndWithAWrongSignNot) {
 
 TEST(ZeroVelocity, DoesNotAllocateInTheSteadyState) {
   if (!testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
-  const testing::SmallFilter filter = standing_filter(0.01);
+  testing::SmallFilter filter = standing_filter(0.01);
   const auto update = testing::load_update("{type: zero_velocity}");
-  update->start({.max_clones = 2, .max_state_size = 60, .cameras = {}, .wheels = nullptr});
+  filter.start(*update);
   Robot robot(0.);
   FactorSink sink(1, 60);
   long allocated = 0;
   for (int k = 1; k <= 30; ++k) {
-    const EpochData data = robot.epoch(k, true);
+    const EpochData data = robot.epoch(k, true, filter);
     sink.clear();
     const FilterView view = filter.view();
     const long before = testing::allocations();
@@ -265,12 +264,12 @@ TEST(ZeroVelocity, DoesNotAllocateInTheSteadyState) {
 
 TEST(ZeroVelocity, WantsAWheelSetForTheDetectorWheels) {
   const auto update = testing::load_update("{type: zero_velocity, detector: wheels}");
-  EXPECT_EQ(update->kind(), UpdateKind::kWheels);
+  testing::UpdateHost no_wheels;
   try {
-    update->start({});
+    update->declare(no_wheels);
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "zero_velocity: detector 'wheels' needs a wheel set");
+    EXPECT_STREQ(error.what(), "needs wheels: there is no section 'kinematics'");
   }
 }
 

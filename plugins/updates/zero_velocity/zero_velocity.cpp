@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "encoders.hpp"
 #include "still_images.hpp"
 #include "tally.hpp"
 #include "viwo/api/plugin.hpp"
@@ -122,14 +123,16 @@ class ZeroVelocity final : public Update {
         images_(params.number("max_disparity_px"), static_cast<int>(params.integer("min_points")),
                 params.number("window_s")) {}
 
-  UpdateKind kind() const override { return use_wheels_ ? UpdateKind::kWheels : UpdateKind::kBody; }
-
-  void start(const UpdateSetup& setup) override {
-    if (use_wheels_ && setup.wheels == nullptr) {
-      throw InputError("zero_velocity: detector 'wheels' needs a wheel set");
+  void declare(Declarations& host) override {
+    if (use_wheels_) {
+      wheels_ = declare_wheels(host);
+      encoders_ = declare_encoders(host, wheels_);
+    } else {
+      features_ = host.stream({.type = &sample_type<FeatureSample>(), .optional = true});
     }
-    images_.reserve();
   }
+
+  void start(const UpdateSetup& /*setup*/) override { images_.reserve(); }
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
     if (filter.clones.empty()) return;
@@ -140,7 +143,7 @@ class ZeroVelocity final : public Update {
     if (use_wheels_) {
       if (!wheels_stand(filter, data)) return;
     } else {
-      switch (images_.compare(data.features)) {
+      switch (images_.compare(data.samples<FeatureSample>(features_))) {
         case StillImages::kMoved:
           images_moved_.add(1, data.end_ns);
           return;
@@ -183,12 +186,12 @@ class ZeroVelocity final : public Update {
 
   /// No wheel has turned since the last epoch; there must be a sample that says so.
   bool wheels_stand(const FilterView& filter, const EpochData& data) const {
-    if (filter.wheels == nullptr || data.begin_ns == 0 || data.encoders.empty()) return false;
-    const std::int64_t offset_ns = std::llround(1e9 * filter.wheels->t_OtoI_s);
+    if (data.begin_ns == 0) return false;
+    const std::int64_t offset_ns = std::llround(1e9 * filter.block(wheels_.clock).numbers()[0]);
     const std::int64_t from_ns = data.begin_ns - offset_ns;
     const std::int64_t to_ns = data.end_ns - offset_ns;
     std::int64_t reached_ns = from_ns;
-    for (const EncoderSample& sample : data.encoders) {
+    for (const EncoderSample& sample : data.samples<EncoderSample>(encoders_)) {
       if (sample.end_ns <= from_ns || sample.begin_ns >= to_ns) continue;
       for (int i = 0; i < sample.n_drive; ++i) {
         const double rate = sample.drive_rad_per_s[static_cast<std::size_t>(i)];
@@ -252,6 +255,8 @@ class ZeroVelocity final : public Update {
   double slowest_m_per_s_, slowest_rad_per_s_;
   double sigma_velocity_m_per_s_, sigma_rotation_rad_, sigma_position_m_;
   double gate_probability_;
+  WheelsBlocks wheels_;
+  StreamId encoders_, features_;
   StillImages images_;
   Tally images_moved_{"quiet IMU, but the images move"};
 };

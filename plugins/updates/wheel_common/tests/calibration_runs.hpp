@@ -70,15 +70,10 @@ inline CalibrationResult run_calibration(const CalibrationRuns& options) {
     const auto encoders = sim::simulate_encoders(model->model(), truth, motion, simulation,
                                                  static_cast<std::uint64_t>(seed));
     std::mt19937_64 rng(static_cast<std::uint64_t>(1000 + seed));
-    SmallFilter filter;
+    SmallFilter filter(free_wheels(drive, model.get(), kTimeOffset));
     filter.clones.resize(2);
-    filter.wheels.model = &model->model();
-    filter.wheels.R_ItoO = drive.R_ItoO;
-    filter.wheels.p_IinO = drive.p_IinO;
-    filter.wheels.t_OtoI_s = kTimeOffset;
-    filter.wheels.x_WI = truth;
     filter.layout();
-    const int m0 = filter.wheels.extrinsics_column;
+    const int m0 = filter.column(filter.wheels.extrinsics);
     Eigen::VectorXd prior = Eigen::VectorXd::Zero(filter.P.rows());
     if (options.extrinsics) {
       prior.segment<3>(m0).setConstant(0.01);
@@ -90,13 +85,9 @@ inline CalibrationResult run_calibration(const CalibrationRuns& options) {
     filter.plus(-prior.cwiseProduct(gaussian(static_cast<int>(prior.size()), rng)));
 
     std::vector<std::shared_ptr<Update>> updates;
-    const UpdateSetup setup{.max_clones = 2,
-                            .max_state_size = static_cast<int>(filter.P.rows()),
-                            .cameras = {},
-                            .wheels = &filter.wheels};
     for (const std::string& yaml : options.updates) {
       updates.push_back(load_update(yaml));
-      updates.back()->start(setup);
+      filter.start(*updates.back());
     }
     FactorSink sink(4, static_cast<int>(filter.P.rows()));
     sim::PoseIntegrator pose(motion);
@@ -126,23 +117,17 @@ inline CalibrationResult run_calibration(const CalibrationRuns& options) {
         clone.R_GtoI_fej = clone.R_GtoI;
         clone.p_IinG_fej = clone.p_IinG;
       }
-      EpochData data;
-      data.begin_ns = t_ns - kEpochNs;
-      data.end_ns = t_ns;
       const auto first = std::max<std::int64_t>(0, 10 * (k - 4));
       const auto count =
           std::min<std::int64_t>(70, static_cast<std::int64_t>(encoders.size()) - first);
-      data.encoders = std::span(encoders).subspan(static_cast<std::size_t>(first),
-                                                  static_cast<std::size_t>(count));
-      FilterView view = filter.view();
-      view.clones = k == 1 ? view.clones.last(1) : view.clones;
+      EpochData data = filter.epoch(std::span(encoders).subspan(static_cast<std::size_t>(first),
+                                                                static_cast<std::size_t>(count)));
+      data.begin_ns = t_ns - kEpochNs;
+      data.end_ns = t_ns;
       for (const auto& update : updates) {
         sink.clear();
-        const FilterView fresh = [&] {
-          FilterView v = filter.view();
-          v.clones = view.clones;
-          return v;
-        }();
+        FilterView fresh = filter.view();
+        if (k == 1) fresh.clones = fresh.clones.last(1);
         const auto start = std::chrono::steady_clock::now();
         update->update(fresh, data, sink);
         result.microseconds +=
@@ -157,11 +142,12 @@ inline CalibrationResult run_calibration(const CalibrationRuns& options) {
       }
       ++calls;
     }
+    const WheelsView estimate = filter.wheels_view();
     Eigen::VectorXd error = Eigen::VectorXd::Zero(filter.P.rows());
-    error.segment<3>(m0) = -log_so3(drive.R_ItoO * filter.wheels.R_ItoO.transpose());
-    error.segment<3>(m0 + 3) = drive.p_IinO - filter.wheels.p_IinO;
-    error[m0 + 6] = kTimeOffset - filter.wheels.t_OtoI_s;
-    error.tail(n) = truth - filter.wheels.x_WI;
+    error.segment<3>(m0) = -log_so3(drive.R_ItoO * estimate.R_ItoO.transpose());
+    error.segment<3>(m0 + 3) = drive.p_IinO - estimate.p_IinO;
+    error[m0 + 6] = kTimeOffset - estimate.t_OtoI_s;
+    error.tail(n) = truth - estimate.x_WI;
     std::vector<int> intrinsics;
     for (int i = 0; i < n; ++i) {
       if (sigma[i] == 0.) continue;

@@ -1,5 +1,5 @@
-// A filter small enough to see through: views for updates, the boxplus of its states, and the
-// textbook application of factors; and a robot that drives on a tilted plane.
+// A small host with one wheel set for the tests of the wheel updates, and a robot that drives on a
+// tilted plane.
 #pragma once
 
 #include <cmath>
@@ -8,131 +8,26 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
+#include <Eigen/Core>
 
 #include "viwo/api/update.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/plugin_host/registry.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
+#include "viwo/testing/update_host.hpp"
 #include "wheel_fixture.hpp"
 
 namespace viwo::testing {
 
-inline std::shared_ptr<Update> load_update(const std::string& yaml) {
+inline std::shared_ptr<Update> load_update(const std::string& yaml, bool exact = false) {
   static PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
   config::Errors errors;
-  const auto loaded = registry.make_update(config::parse(yaml, "test"), "updates", errors);
+  const auto loaded =
+      registry.make_update(config::parse(yaml, "test"), "updates", 0, errors, {}, exact);
   errors.throw_if_any();
   return loaded.object;
 }
-
-/// States: inertial (15), clones (6 each), then of the wheels extrinsics (6), time offset (1) and
-/// intrinsics.
-struct SmallFilter {
-  ImuView imu;
-  std::vector<CloneView> clones;
-  WheelsView wheels;
-  Eigen::MatrixXd P;
-  bool has_wheels = true;
-
-  /// Sets the columns; P is zero where it grows.
-  void layout() {
-    int column = kImuSize;
-    for (CloneView& clone : clones) {
-      clone.column = column;
-      column += kPoseSize;
-    }
-    wheels.extrinsics_column = column;
-    wheels.time_offset_column = column + kPoseSize;
-    wheels.intrinsics_column = column + kPoseSize + 1;
-    const auto size = wheels.intrinsics_column + wheels.x_WI.size();
-    if (P.rows() != size) P = Eigen::MatrixXd::Zero(size, size);
-  }
-
-  FilterView view() const {
-    FilterView view;
-    view.imu = imu;
-    view.clones = clones;
-    view.wheels = has_wheels ? &wheels : nullptr;
-    view.size = static_cast<int>(P.rows());
-    view.covariance_data = P.data();
-    view.covariance_stride = static_cast<int>(P.rows());
-    return view;
-  }
-
-  void plus(const Eigen::VectorXd& d) {
-    const auto rotate = [&](Eigen::Matrix3d& R, int column) {
-      R = exp_so3(-d.segment<3>(column)) * R;
-    };
-    rotate(imu.R_GtoI, kThetaColumn);
-    imu.p_IinG += d.segment<3>(kPositionColumn);
-    imu.v_IinG += d.segment<3>(kVelocityColumn);
-    imu.gyro_bias += d.segment<3>(kGyroBiasColumn);
-    imu.accel_bias += d.segment<3>(kAccelBiasColumn);
-    for (CloneView& clone : clones) {
-      rotate(clone.R_GtoI, clone.column);
-      clone.p_IinG += d.segment<3>(clone.column + 3);
-    }
-    rotate(wheels.R_ItoO, wheels.extrinsics_column);
-    wheels.p_IinO += d.segment<3>(wheels.extrinsics_column + 3);
-    wheels.t_OtoI_s += d[wheels.time_offset_column];
-    wheels.x_WI += d.tail(wheels.x_WI.size());
-  }
-
-  /// First estimates = estimates.
-  void first_estimates() {
-    imu.R_GtoI_fej = imu.R_GtoI;
-    imu.p_IinG_fej = imu.p_IinG;
-    imu.v_IinG_fej = imu.v_IinG;
-    for (CloneView& clone : clones) {
-      clone.R_GtoI_fej = clone.R_GtoI;
-      clone.p_IinG_fej = clone.p_IinG;
-    }
-  }
-
-  static Eigen::MatrixXd spread(const FactorColumns& columns, const Eigen::MatrixXd& H,
-                                Eigen::Index size) {
-    Eigen::MatrixXd full = Eigen::MatrixXd::Zero(H.rows(), size);
-    int from = 0;
-    for (const ColumnRange block : columns.blocks()) {
-      full.middleCols(block.first, block.count) = H.middleCols(from, block.count);
-      from += block.count;
-    }
-    return full;
-  }
-
-  /// Updates with all factors; returns the chi-square of the residual factors.
-  double apply(const FactorSink& sink) {
-    double chi2 = 0.;
-    Eigen::VectorXd dx = Eigen::VectorXd::Zero(P.rows());
-    for (const ResidualFactor& factor : sink.residuals()) {
-      const Eigen::MatrixXd H = spread(factor.columns, factor.H, P.rows());
-      const Eigen::MatrixXd S = H * P * H.transpose() + factor.R;
-      const Eigen::VectorXd r = factor.residual - H * dx;
-      chi2 += r.dot(S.llt().solve(r));
-      const Eigen::MatrixXd K = S.llt().solve(H * P).transpose();
-      dx += K * r;
-      const Eigen::MatrixXd I_KH = Eigen::MatrixXd::Identity(P.rows(), P.rows()) - K * H;
-      P = (I_KH * P * I_KH.transpose() + K * factor.R * K.transpose()).eval();
-    }
-    if (const InformationFactor* factor = sink.information()) {
-      const int n = factor->columns.size();
-      const Eigen::MatrixXd lower = factor->Lambda.topLeftCorner(n, n);
-      const Eigen::MatrixXd symmetric = lower.selfadjointView<Eigen::Lower>();
-      const Eigen::MatrixXd E = spread(factor->columns, Eigen::MatrixXd::Identity(n, n), P.rows());
-      const Eigen::MatrixXd Lambda = E.transpose() * symmetric * E;
-      const Eigen::VectorXd eta = E.transpose() * (factor->eta.head(n) - symmetric * E * dx);
-      const Eigen::MatrixXd M = Eigen::MatrixXd::Identity(P.rows(), P.rows()) + P * Lambda;
-      P = M.partialPivLu().solve(P).eval();
-      P = (0.5 * (P + P.transpose())).eval();
-      dx += P * eta;
-    }
-    plus(dx);
-    return chi2;
-  }
-};
 
 /// The true state of a base whose odometry frame moves over a tilted plane.
 struct TiltedDrive {
@@ -158,6 +53,37 @@ struct TiltedDrive {
     clone.p_IinG_fej = clone.p_IinG;
     return clone;
   }
+};
+
+/// The wheel set of a base, estimated: what is known of it is up to the test (SmallFilter::P).
+inline WheelsPrior free_wheels(const TiltedDrive& drive, const WheelModel* model = nullptr,
+                               double t_OtoI_s = 0.) {
+  WheelsPrior prior;
+  prior.wheels.R_ItoO = drive.R_ItoO;
+  prior.wheels.p_IinO = drive.p_IinO;
+  prior.wheels.t_OtoI_s = t_OtoI_s;
+  if (model != nullptr) {
+    prior.wheels.model = &model->model();
+    prior.wheels.x_WI = model->nominal();
+  }
+  prior.sigma_extrinsics.setOnes();
+  prior.sigma_time_offset_s = 1.;
+  prior.sigma_intrinsics.setOnes(prior.wheels.x_WI.size());
+  return prior;
+}
+
+/// A host whose first blocks are those of a wheel set.
+struct SmallFilter : UpdateHost {
+  explicit SmallFilter(const WheelsPrior& prior = free_wheels({}))
+      : UpdateHost(Rig({}, prior)), wheels(declare_wheels(*this)) {}
+
+  WheelsBlocks wheels;
+
+  WheelsView wheels_view() const { return wheels.view(view()); }
+  auto R_ItoO() { return rotation(wheels.extrinsics); }
+  auto p_IinO() { return numbers(wheels.extrinsics); }
+  double& t_OtoI_s() { return *numbers(wheels.clock).data(); }
+  auto x_WI() { return numbers(wheels.intrinsics); }
 };
 
 inline Eigen::VectorXd gaussian(int n, std::mt19937_64& rng) {

@@ -17,6 +17,7 @@ struct CheckResult {
   std::vector<std::string> failures;
   std::vector<std::string> notes;     ///< what is worth knowing, and what could not be checked
   std::vector<std::string> warnings;  ///< what is allowed, and more often a mistake
+  std::string skipped = {};           ///< why it was left out; empty: it was not
   bool passed() const { return failures.empty(); }
 };
 
@@ -42,7 +43,8 @@ struct Conformance {
 /// InputError when `config` cannot be used.
 Conformance check_plugin(const std::filesystem::path& file, const Options& options = {});
 
-/// "ok      NAME" or "FAILED  NAME" and a line for each failure and warning; `verbose`: notes too.
+/// "ok      NAME", "FAILED  NAME" or "skipped NAME" and a line for each failure and warning;
+/// `verbose`: notes too.
 std::string to_text(const CheckResult& result, bool verbose = false);
 
 }  // namespace viwo::conformance

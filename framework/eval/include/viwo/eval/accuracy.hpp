@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -61,6 +62,9 @@ struct Accuracy {
 /// (association.hpp, alignment.hpp) and for options out of range.
 Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate,
                   const Options& options = {});
+
+/// What results call a segment length: "10", "2.5", the shortest text that reads back to it.
+std::string length_text(double length_m);
 
 /// The "accuracy" entry of summary.json; numbers that do not exist are null. Without the series.
 nlohmann::json to_json(const Accuracy& accuracy);

@@ -1,6 +1,7 @@
 // The filter's part of a run configuration: estimator, IMU, cameras, wheels, updates.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,12 +32,10 @@ struct StartSetup {
   double state_error_scale = 0.;  ///< start at the reference plus this times a draw of the prior
 };
 
-/// A wheel set of the run: its model, its prior, and the sensor that gives its encoder samples.
+/// A wheel set of the run: its model and its prior.
 struct WheelSet {
-  std::string name;    ///< "" for the first: its parameters have no prefix
-  std::string sensor;  ///< "" if only one sensor gives encoder samples
   std::shared_ptr<const WheelModel> model;
-  WheelsPrior prior;
+  WheelsPrior prior;  ///< name "" for the first: its parameters have no prefix
 };
 
 struct FilterSetup {
@@ -47,35 +46,43 @@ struct FilterSetup {
   struct Entry {
     std::string name;
     Loaded<Update> update;
-    int wheels = -1;
-    int poses = -1;  ///< index into pose_sensors
+    std::shared_ptr<Rig> rig;  ///< with its wheel set, if it is for one
+    std::string sensor;        ///< `sensor: NAME`
     config::Mark mark;
   };
   std::vector<Entry> updates;
-  /// Sensors that updates name as `sensor`, also updates that are turned off: what they give is
-  /// measurement and not reference.
-  std::vector<std::string> pose_sensors;
+  /// Sensors of which updates take poses, also updates that are turned off: those are measurements
+  /// and not the reference.
+  std::vector<std::string> measuring;
+  /// What the estimator will take, in its order.
+  std::vector<SharedStream> streams;
+  /// Calibration before it was made wrong by calibration_error_scale: the truth, where no sensor
+  /// knows another one.
+  std::map<std::string, double> drawn_from;
 };
 
-/// Names of a wheel set's calibration parameters in the order of its columns: extrinsics
-/// (theta_ItoO_x.. [rad], p_IinO_x.. [m]), t_OtoI [s], intrinsics.
-std::vector<std::string> calibration_names(const WheelSet& wheels);
+/// The estimator of a run, which has not started. `live`: measurements come as they arrive.
+Estimator make_estimator(const FilterSetup& setup, bool live = false);
 
-struct CalibrationValue {
-  double value = 0.;
-  double sigma = 0.;  ///< 0 for what is held
+/// Names of the calibration parameters of a filter, in the order of the blocks.
+std::vector<std::string> calibration_names(const Filter& filter);
+
+/// Its estimates, in the same order.
+std::vector<BlockEstimate> calibration_of(const Filter& filter);
+
+/// What a run configuration is read with.
+struct ReadContext {
+  PluginRegistry& plugins;
+  std::uint64_t seed = 1;
+  bool exact = false;  ///< HostServices::exact: no noise, no wrong start
 };
-
-/// What a filter knows of the calibration of its wheel set `wheels`, in the order of
-/// calibration_names().
-std::vector<CalibrationValue> calibration_of(const Filter& filter, std::size_t wheels);
 
 /// Reads the sections `estimator`, `imu`, `cameras`, `wheels`, `wheel_sets` and `updates` of a run
 /// and appends what is wrong to `errors`. `model`, `x_WI` and `sigma` are those of the section
 /// `kinematics`; `model` may be null. The resolved sections are set in `resolved`.
 FilterSetup read_filter(const config::Node& run, const std::shared_ptr<const WheelModel>& model,
-                        const Intrinsics& x_WI, const Intrinsics& sigma, std::uint64_t seed,
-                        PluginRegistry& plugins, config::Node& resolved, config::Errors& errors);
+                        const Intrinsics& x_WI, const Intrinsics& sigma, const ReadContext& context,
+                        config::Node& resolved, config::Errors& errors);
 
 /// Whether a run configuration has any of the sections that read_filter() reads.
 bool has_filter_sections(const config::Node& run);

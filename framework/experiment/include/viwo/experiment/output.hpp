@@ -62,9 +62,6 @@ DisplayUnit display_unit(const std::string& si_unit, double magnitude);
 /// "heading [unit]"; the heading alone without a unit.
 std::string with_unit(const std::string& heading, const std::string& unit);
 
-/// SI units of RunResult::calibration, in its order.
-std::vector<std::string> calibration_units(const RunSetup& setup);
-
 /// Half the width of the bands of a page.
 inline constexpr double kBandSigmas = 3.;
 

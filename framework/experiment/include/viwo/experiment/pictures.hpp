@@ -47,12 +47,13 @@ class RunPictures final : public EstimatorObserver {
  private:
   /// What one camera saw last.
   struct Camera {
-    std::optional<std::int64_t> t_ns;  ///< in the IMU clock; nothing: no image yet
+    std::optional<std::int64_t> t_ns;  ///< in its clock; nothing: no image yet
     view::Tracks tracks;
     Image pixels;
     std::vector<ImageSample> images;  ///< of a recorded run, in time order
   };
 
+  void see(std::span<const FeatureSample> images);
   void after_epoch(const RunResult& result);
   void make_pictures(const RunResult& result);
   bool snapshot_due(double t_s);
@@ -68,7 +69,6 @@ class RunPictures final : public EstimatorObserver {
   std::string failure_;  ///< then there are no more pictures
   std::vector<Camera> cameras_;
   Trajectory reference_;
-  std::vector<std::string> units_;  ///< of the calibration
   double sigma_position_m_ = 0.;
   bool seen_ = false;  ///< any image
 

@@ -12,6 +12,8 @@
 #include "viwo/config/node.hpp"
 #include "viwo/eval/accuracy.hpp"
 #include "viwo/experiment/filter_setup.hpp"
+#include "viwo/experiment/recorded.hpp"
+#include "viwo/experiment/routes.hpp"
 #include "viwo/math/trajectory.hpp"
 #include "viwo/plugin_host/registry.hpp"
 #include "viwo/wheel/preintegration.hpp"
@@ -44,18 +46,18 @@ struct RunSetup {
   double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
   double reference_max_gap_s = 0.5;
   eval::Options evaluation;
-  /// Sensors whose poses are measurements (updates.NAME.sensor), not reference.
-  std::vector<std::string> measured_poses;
   std::optional<FilterSetup> filter;           ///< nothing: dead reckoning from the wheels alone
+  Routes routes;                               ///< who gets what the sensors give
   config::Mark kinematics_mark, sensors_mark;  ///< where the sections are written
   config::Node resolved;              ///< all of it, with defaults: a valid run configuration
   std::vector<std::string> warnings;  ///< what is suspicious in it, for those of the result
 };
 
-/// Reads a run configuration without placeholders. `seed` overrules the configured one. Throws
-/// InputError with everything that is wrong in it.
+/// Reads a run configuration without placeholders. `seed` overrules the configured one; `exact`:
+/// without noise and wrong starts (HostServices::exact). Throws InputError with everything that is
+/// wrong in it.
 RunSetup read_run(const config::Node& run, PluginRegistry& plugins,
-                  std::optional<std::uint64_t> seed = {});
+                  std::optional<std::uint64_t> seed = {}, bool exact = false);
 
 /// A sensor that is read while the filter runs: what turns images into tracks.
 struct SensorStream {
@@ -66,33 +68,32 @@ struct SensorStream {
   std::shared_ptr<Sensor> input;  ///< what it reads from; null where that is a live sensor
 };
 
-/// What the sensors of a run gave.
+/// What the sensors of a run gave, as far as somebody wants it.
 struct RunData {
-  std::string wheels_name;             ///< sensor that gave the encoder samples
-  std::vector<EncoderSample> samples;  ///< in time order
-  Trajectory reference;                ///< planar; empty if there is none
-  std::vector<ImuSample> imu;
-  std::string tracks_name;  ///< sensor that gave the tracks
-  std::vector<FeatureSample> images;
-  std::vector<ImageSample> pixels;            ///< of the images, in time order; for pictures
+  Recorded recorded;
+  std::string wheels_name;                    ///< sensor that gave the encoder samples
+  Trajectory reference;                       ///< planar; empty if there is none
   std::vector<SensorStream> streams;          ///< not read yet
   std::vector<SensorStream> live;             ///< measurements that are still to happen
-  std::vector<StateSample> states;            ///< truth of the inertial state, if there is one
   std::map<std::string, double> calibration;  ///< true values, if known
-  /// Encoder samples of further wheel sets, by sensor.
-  std::map<std::string, std::vector<EncoderSample>> other_wheels;
-  /// Poses that an update measures with, by sensor; no part of the reference.
-  std::map<std::string, std::vector<PoseSample>> poses;
   std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor
+
+  std::span<const ImuSample> imu() const { return recorded.of<ImuSample>(); }
+  /// Of the first wheel set.
+  std::span<const EncoderSample> wheels() const { return recorded.of<EncoderSample>(wheels_name); }
+  /// Truth of the inertial state, if there is one.
+  std::span<const StateSample> states() const { return recorded.of<StateSample>(); }
+  /// Of images, for pictures.
+  std::span<const ImageSample> pixels() const { return recorded.of<ImageSample>(); }
 };
 
 /// Whether measurements may still be to happen; then none may have been recorded.
 enum class LiveSensors { kRefused, kAllowed };
 
 /// Reads all sensors to their end, but for the last of a chain of sensors that take inputs: the
-/// filter is going to read that one, and only once. Throws InputError when no sensor or more than
-/// one gives encoder samples (or a reference), when channels do not fit the model, or when a
-/// sensor's input is broken.
+/// filter is going to read that one, and only once. Throws InputError when a sensor gives nothing
+/// of what is wanted from it, when channels do not fit the model, or when a sensor's input is
+/// broken.
 RunData collect(RunSetup& setup, LiveSensors live = LiveSensors::kRefused);
 
 /// Statistics of the time that a stage took per epoch.
@@ -108,6 +109,7 @@ const char* name(RunStatus status);
 /// One calibration parameter over a run.
 struct CalibrationTrack {
   std::string name;
+  std::string unit;              ///< "m", "rad", ...; "" for none
   std::vector<double> estimate;  ///< at RunResult::epoch_t_s
   std::vector<double> sigma;
   /// In the gauge that the estimate holds; NaN: not known.

@@ -1,19 +1,19 @@
 // Writing what the sensors of a run yield as a log folder.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
-#include <variant>
 
 #include "viwo/experiment/run.hpp"
 
 namespace viwo::experiment {
 
-/// How many measurements of each kind were written; the index is that of the kind in Measurement.
+/// How many measurements of each kind were written, by SampleType::name.
 struct SimulateResult {
-  std::array<std::int64_t, std::variant_size_v<Measurement>> counts{};
+  std::map<std::string, std::int64_t> counts;
+  std::map<std::string, std::int64_t> left_out;  ///< kinds that no table is for
 };
 
 /// Reads all sensors to their end and writes `folder` in the layout that the sensors asl_* read

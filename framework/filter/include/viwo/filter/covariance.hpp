@@ -2,7 +2,7 @@
 // Equations: docs/math/filter.md.
 #pragma once
 
-#include <string>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,7 +23,8 @@ enum class FactorResult {
 
 class Covariance {
  public:
-  explicit Covariance(int size);
+  /// `max_new`: most columns that are initialised at a time.
+  explicit Covariance(int size, int max_new = 0);
 
   int size() const { return static_cast<int>(P_.rows()); }
   const Eigen::MatrixXd& matrix() const { return P_; }
@@ -37,11 +38,25 @@ class Covariance {
   /// The pose at `column` becomes a copy of the inertial one.
   void clone_pose(int column);
 
+  /// One column of the error becomes `kept` of what it was, and gains `variance`.
+  void decay(int column, double kept, double variance);
+  /// The errors of J's rows, from column `first` on, become J times those of `columns` (F-24).
+  void rewrite(int first, const FactorColumns& columns, const Eigen::Ref<const Eigen::MatrixXd>& J);
+
   /// Kalman update (F-7). `dx` (of the whole error state) is the correction; it is zero unless the
   /// factor was applied.
   FactorResult apply(const ResidualFactor& factor, Eigen::VectorXd& dx);
   /// Update by normal equations (F-8). Columns without variance are left out.
   FactorResult apply(const InformationFactor& factor, Eigen::VectorXd& dx);
+  /// Takes new columns, without variance so far, out of an information factor (F-22): what it tells
+  /// about the others remains. False: it does not determine them. Columns without variance that are
+  /// not new stay in it and are left out by apply().
+  bool split(std::span<const int> new_columns, InformationFactor& factor);
+  /// Whether the factor that was split has columns with variance: something to apply().
+  bool ties_known_columns() const { return !known_.empty(); }
+  /// After apply() of what split() has left: the new columns (F-23). `dx` is that of apply() and
+  /// gains what the new columns are corrected by.
+  void initialise(Eigen::VectorXd& dx);
   /// Takes from what apply() did what it did to the directions; held.before() came before it.
   void hold(HeldDirections& held, Eigen::VectorXd& dx) { held.after(dx, P_); }
 
@@ -63,6 +78,10 @@ class Covariance {
   std::vector<Run> runs_;  // order_ in pieces that are contiguous in both
   Eigen::MatrixXd C_, T_, Y_, Z_, G_, W_;
   Eigen::VectorXd y_;
+  // Delayed initialisation: new columns, those that they are tied to, and what ties them.
+  std::vector<int> new_, known_, new_index_, known_index_;
+  Eigen::MatrixXd N_, G_new_, P_new_;
+  Eigen::VectorXd eta_new_;
   struct Gate {
     int rows;
     double probability;

@@ -1,5 +1,5 @@
-// Watches what the recent motion tells about the calibration of a wheel set: says so, warns in
-// words when it tells nothing, and names the directions that are better left alone. Equations:
+// Watches what the recent motion tells about a group of blocks: says so, warns in words when it
+// tells nothing, and names the directions that are better left alone. Equations:
 // docs/math/filter.md.
 #pragma once
 
@@ -34,21 +34,16 @@ struct ExcitationWarning {
   std::vector<std::string> parameters;  ///< what cannot be learned
 };
 
-/// Names of a wheel set's calibration parameters in the order of its columns: extrinsics
-/// (theta_ItoO_x.. [rad], p_IinO_x.. [m]), t_OtoI [s], intrinsics. `name`: of the wheel set, "" for
-/// no prefix.
-std::vector<std::string> calibration_names(const std::string& name,
-                                           std::span<const IntrinsicSpec> intrinsics);
-
 /// "x_2, x_3, x_4, y_2" becomes "x_2..x_4, y_2".
 std::string compressed(std::span<const std::string> names);
 
-/// One per wheel set. Allocates in the constructor and for a warning.
+/// One per group. Allocates in the constructor and for a warning.
 class ExcitationMonitor {
  public:
-  /// `prior` with the columns that the filter gave to its blocks. std::invalid_argument for times
-  /// that are not positive or more than a thousand periods in the window.
-  ExcitationMonitor(const MonitorOptions& options, const WheelsPrior& prior);
+  /// std::invalid_argument for times that are not positive, more than a thousand periods in the
+  /// window, or a group without a mount.
+  ExcitationMonitor(const MonitorOptions& options, const StateBlocks& blocks,
+                    const BlockGroup& group);
 
   /// Before a factor is applied to `filter`, and after it was.
   template <class Factor>
@@ -61,7 +56,7 @@ class ExcitationMonitor {
 
   /// At the end of an epoch; `imu` are its samples. True when period_s have gone: everything below
   /// is new, of as much of the window as there is.
-  bool epoch(const Filter& filter, const WheelsView& wheels, std::span<const ImuSample> imu);
+  bool epoch(const Filter& filter, std::span<const ImuSample> imu);
 
   /// Whether it is new since the last epoch, and of a full window.
   bool has_news() const { return has_news_; }
@@ -79,16 +74,13 @@ class ExcitationMonitor {
   const InformationWindow& information() const { return information_; }
 
  private:
-  /// What kind of motion a parameter needs.
-  enum class Need { kPlanar, kClock, kTilt };
-
   bool measure(const Filter& filter, const ResidualFactor& factor) {
     return information_.measure(factor, filter.covariance());
   }
   bool measure(const Filter& /*filter*/, const InformationFactor& factor) {
     return information_.measure(factor);
   }
-  void add_motion(const Filter& filter, const WheelsView& wheels, std::span<const ImuSample> imu);
+  void add_motion(const Filter& filter, std::span<const ImuSample> imu);
   void evaluate();
   double unexcited_part(Eigen::Index parameter) const;
   void warn(std::int64_t t_ns);
@@ -98,7 +90,8 @@ class ExcitationMonitor {
   InformationWindow information_;
   MotionWindow motion_;
   std::vector<std::string> names_;
-  std::vector<Need> needs_;
+  std::vector<Excitation> needs_;
+  BlockId mount_;
   std::size_t n_bins_;
   std::size_t bins_done_ = 0;
   std::optional<std::int64_t> bin_begin_ns_;

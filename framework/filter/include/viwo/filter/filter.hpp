@@ -1,5 +1,5 @@
-// The filter: inertial state, ring of clones, calibration blocks and their covariance. Knows
-// nothing of cameras or wheels beyond where their errors stand in the state.
+// The filter: inertial state, ring of clones, state blocks and their covariance. Knows nothing of
+// what the blocks mean beyond where their errors stand in the state.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +14,7 @@
 #include "viwo/api/update.hpp"
 #include "viwo/filter/covariance.hpp"
 #include "viwo/filter/held_directions.hpp"
+#include "viwo/filter/state_blocks.hpp"
 
 namespace viwo {
 
@@ -22,26 +23,6 @@ struct FilterOptions {
   bool first_estimates = true;
   ImuNoise imu_noise;
   double gravity_m_per_s2 = 9.81;
-};
-
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Vector8d = Eigen::Matrix<double, 8, 1>;
-
-/// A camera with the prior of its calibration; all-zero sigmas hold a block.
-struct CameraPrior {
-  CameraView camera;
-  Vector6d sigma_extrinsics = Vector6d::Zero();  ///< rad x 3, m x 3
-  Vector8d sigma_intrinsics = Vector8d::Zero();  ///< px x 4, 1 x 4
-};
-
-/// A wheel set with the prior of its calibration; all-zero sigmas hold a block, single zeros hold
-/// an entry.
-struct WheelsPrior {
-  std::string name;  ///< in front of its parameters; "" for nothing
-  WheelsView wheels;
-  Vector6d sigma_extrinsics = Vector6d::Zero();  ///< rad x 3, m x 3
-  double sigma_time_offset_s = 0.;
-  Intrinsics sigma_intrinsics;
 };
 
 /// An inertial state to start from.
@@ -53,10 +34,10 @@ struct ImuPrior {
 
 class Filter {
  public:
-  /// Allocates all that is ever needed. std::invalid_argument for priors that are negative or not
-  /// finite, and for sizes that do not fit.
-  Filter(const FilterOptions& options, std::vector<CameraPrior> cameras,
-         std::vector<WheelsPrior> wheels);
+  /// Allocates all that is ever needed. InputError for blocks and rooms that are none, with their
+  /// names; std::invalid_argument for a number of clones that does not fit.
+  explicit Filter(const FilterOptions& options, std::vector<BlockSpec> blocks = {},
+                  std::vector<RoomSpec> rooms = {});
 
   void initialize(const ImuPrior& prior);
   bool initialized() const { return t_ns_ != kNever; }
@@ -76,31 +57,36 @@ class Filter {
   /// Applies a factor and corrects the estimate.
   FactorResult apply(const ResidualFactor& factor);
   FactorResult apply(const InformationFactor& factor);
-  /// What of the calibration of the wheels the factors to come are to leave alone.
+  /// The same for a factor that determines blocks that are new; they exist if it was applied. What
+  /// it says of the others is left in `factor`.
+  FactorResult apply(InformationFactor& factor, std::span<const AddedBlock> added);
+  /// Of blocks in rooms that exist.
+  void drop(BlockId id);
+  void rewrite(const BlockRewrite& block);
+  /// What of the watched blocks the factors to come are to leave alone.
   HeldDirections& held() { return held_; }
   const HeldDirections& held() const { return held_; }
   /// What the last apply() corrected the estimate by; zero unless its factor was applied.
   const Eigen::VectorXd& correction() const { return dx_; }
 
-  /// Why the filter cannot go on; empty as long as it can.
-  std::string failure() const;
+  /// Whether an information matrix stopped being positive definite.
+  bool covariance_failed() const { return covariance_failed_; }
 
   std::int64_t t_ns() const { return t_ns_; }
   const FilterOptions& options() const { return options_; }
   const ImuView& imu() const { return imu_; }
   std::span<const CloneView> clones() const { return clones_; }
-  std::span<const CameraView> cameras() const { return cameras_; }
-  std::span<const WheelsView> wheels() const { return wheels_; }
+  const StateBlocks& blocks() const { return blocks_; }
   const Eigen::MatrixXd& covariance() const { return covariance_.matrix(); }
   int size() const { return covariance_.size(); }
-  /// What an update of the wheel set `wheels` (-1: of none) sees.
-  FilterView view(int wheels) const;
+  /// Estimates of the entries of a declared block, in their order; appended to `out`.
+  void estimates(BlockId id, std::vector<BlockEstimate>& out) const {
+    blocks_.estimates(id, covariance_, out);
+  }
+  FilterView view() const;
 
  private:
   static constexpr std::int64_t kNever = -1;
-  static int state_size(const FilterOptions& options, std::span<const CameraPrior> cameras,
-                        std::span<const WheelsPrior> wheels);
-  int place(const Eigen::VectorXd& sigma, int& next);
   template <class Factor>
   FactorResult apply_factor(const Factor& factor);
   void correct();
@@ -111,11 +97,11 @@ class Filter {
   std::vector<CloneView> clones_;  // oldest first
   std::vector<bool> slots_;        // taken
   std::size_t window_limit_ = std::numeric_limits<std::size_t>::max();
-  std::vector<CameraView> cameras_;
-  std::vector<WheelsView> wheels_;
+  StateBlocks blocks_;
   Covariance covariance_;
   HeldDirections held_;
   Eigen::VectorXd dx_;
+  std::vector<int> new_columns_;
   bool covariance_failed_ = false;
 };
 

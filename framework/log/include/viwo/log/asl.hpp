@@ -1,8 +1,11 @@
-// Log folders in the layout of the EuRoC/ASL datasets, extended by wheels, features, calibration:
+// Log folders in the layout of the EuRoC/ASL datasets, extended by wheels, features, fixes of
+// satellite receivers, calibration:
 //   imu0/data.csv                          the EuRoC columns
 //   wheels0/data.csv                       timestamp_ns, drive_1..N [rad/s], steer_1..M [rad]
 //   features0/data.csv                     timestamp_ns, camera, id, u [px], v [px]; a row with
 //                                          empty id, u and v is an image (maybe without points)
+//   gnss0/data.csv                         timestamp_ns, latitude [deg], longitude [deg],
+//                                          altitude [m], cov_EE, cov_EN, .., cov_UU [m^2]
 //   state_groundtruth_estimate0/data.csv   the EuRoC columns; nan for what is not known
 //   calibration_groundtruth0/data.csv      timestamp_ns, name, value
 //   camN/data.csv, camN/data/*.png         timestamp_ns, file name; the images of camera N
@@ -31,6 +34,9 @@ StateRecording read_asl_states(const std::filesystem::path& path, const LogLimit
 
 ImuRecording read_asl_imu(const std::filesystem::path& path, const LogLimits& limits);
 
+/// Gaps are not counted.
+GnssRecording read_asl_gnss(const std::filesystem::path& path, double max_rejected_fraction);
+
 /// One sample for each camera and time.
 FeatureRecording read_asl_features(const std::filesystem::path& path, const LogLimits& limits);
 
@@ -54,10 +60,11 @@ class AslWriter {
   AslWriter(const AslWriter&) = delete;
   AslWriter& operator=(const AslWriter&) = delete;
 
-  /// Appends to the table of its kind. std::runtime_error when writing fails; std::logic_error when
-  /// encoder samples change their number of channels, or for a name that a table cannot hold;
-  /// InputError when poses and states, which share a table, are both to be written.
-  void write(const Measurement& measurement);
+  /// Appends to the table of its kind. False for a kind that has no table, nothing is written then:
+  /// the caller counts it. std::runtime_error when writing fails; std::logic_error when encoder
+  /// samples change their number of channels, or for a name that a table cannot hold; InputError
+  /// when poses and states, which share a table, are both to be written.
+  [[nodiscard]] bool write(const Measurement& measurement);
   /// A pose that is a measurement and no reference: into poses0, which asl_pose reads.
   void write_measured(const PoseSample& pose);
   /// Must be called at the end: the last bytes may fail, too.

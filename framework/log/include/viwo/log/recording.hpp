@@ -31,6 +31,7 @@ struct Recording {
 using EncoderRecording = Recording<EncoderSample>;
 using PoseRecording = Recording<PoseSample>;
 using ImuRecording = Recording<ImuSample>;
+using GnssRecording = Recording<GnssSample>;
 using FeatureRecording = Recording<FeatureSample>;
 using StateRecording = Recording<StateSample>;
 using CalibrationRecording = Recording<CalibrationSample>;
@@ -58,9 +59,9 @@ class EncoderCollector {
   std::vector<EncoderReading> readings_;
 };
 
-/// Takes samples that stand for themselves, in the order of the file: PoseSample, ImuSample and
-/// StateSample. Values must be finite; quaternions off the unit norm by less than 1e-3 are
-/// normalised, others rejected.
+/// Takes samples that stand for themselves, in the order of the file: PoseSample, ImuSample,
+/// GnssSample and StateSample. Values must be finite; quaternions off the unit norm by less than
+/// 1e-3 are normalised, others rejected.
 template <class Sample>
 class SampleCollector {
  public:
@@ -76,10 +77,12 @@ class SampleCollector {
 };
 using PoseCollector = SampleCollector<PoseSample>;
 using ImuCollector = SampleCollector<ImuSample>;
+using GnssCollector = SampleCollector<GnssSample>;
 using StateCollector = SampleCollector<StateSample>;
 
 extern template class SampleCollector<PoseSample>;
 extern template class SampleCollector<ImuSample>;
+extern template class SampleCollector<GnssSample>;
 extern template class SampleCollector<StateSample>;
 
 /// Gathers points to images: one for each camera at each time, in the order in which they come
@@ -104,10 +107,11 @@ class FeatureCollector {
   std::vector<std::unordered_set<std::int64_t>> ids_;  ///< of the images from first_ on
 };
 
-/// A sensor that plays a recording back.
-template <class Sample>
+/// A sensor that plays a recording back: of one kind, or of measurements of several.
+template <class T>
 class RecordingSensor : public Sensor {
  public:
+  SampleTypes yields() const final { return yields_; }
   Status next(Measurement& out) final {
     if (next_ == recording_.samples.size()) return Status::kEnd;
     out = recording_.samples[next_++];
@@ -118,10 +122,15 @@ class RecordingSensor : public Sensor {
   }
 
  protected:
-  explicit RecordingSensor(Recording<Sample> recording) : recording_(std::move(recording)) {}
+  explicit RecordingSensor(Recording<T> recording)
+      : RecordingSensor(std::move(recording), sample_types<T>()) {}
+  /// `yields`: the kinds of the measurements, as they are configured.
+  RecordingSensor(Recording<T> recording, SampleTypes yields)
+      : recording_(std::move(recording)), yields_(std::move(yields)) {}
 
  private:
-  Recording<Sample> recording_;
+  Recording<T> recording_;
+  SampleTypes yields_;
   std::size_t next_ = 0;
 };
 

@@ -1,24 +1,16 @@
-// What a log must satisfy datum by datum: stamps that increase, values that are finite. Single bad
-// data are dropped and counted; too many of them are an error.
+// The order of stamps (stamp_order.hpp) of the rows of a text file, and why rows are dropped.
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "viwo/api/sensor.hpp"
+#include "viwo/log/stamp_order.hpp"
 #include "viwo/log/text_reader.hpp"
 
 namespace viwo::log {
 
-/// Limits on how bad a log may be.
-struct LogLimits {
-  double max_gap_s = 0.2;              ///< longer spacings are counted as gaps
-  double max_rejected_fraction = 0.1;  ///< more rejected data than this are an InputError
-};
-
-inline constexpr const char* kStampNotAfter = "stamp not after the previous one";
 inline constexpr const char* kLastLineCutShort = "last line cut short";
 inline constexpr const char* kNotFinite = "value that is not finite";
 inline constexpr const char* kIdTwice = "point whose id the image already has";
@@ -26,32 +18,28 @@ inline constexpr const char* kNotUnit = "quaternion that is not of unit norm";
 
 class StampFilter {
  public:
-  explicit StampFilter(const LogLimits& limits);
+  explicit StampFilter(const LogLimits& limits) : order_(limits) {}
 
-  /// True for a stamp after all stamps accepted before; otherwise it is rejected and counted. A gap
-  /// before an accepted stamp is counted, too. `at` is at the datum.
-  bool accept(std::int64_t t_ns, const TextReader& at);
-  /// True also for the stamp that was accepted last: several data of one time.
-  bool accept_or_same(std::int64_t t_ns, const TextReader& at);
-  /// Counts a datum that is dropped.
-  void reject(const std::string& reason, const TextReader& at);
+  /// As StampOrder has it; `at` is at the datum.
+  bool accept(std::int64_t t_ns, const TextReader& at) { return order_.accept(t_ns, Place{at}); }
+  bool accept_or_same(std::int64_t t_ns, const TextReader& at) {
+    return order_.accept_or_same(t_ns, Place{at});
+  }
+  void reject(std::string_view reason, const TextReader& at) { order_.reject(reason, Place{at}); }
 
   /// To be called once at the end of the file: InputError when nothing was accepted or more than
   /// max_rejected_fraction of the data were rejected. A last line that was left out counts.
   void finish(const TextReader& at);
 
-  /// Rejected data and gaps by reason, in order of first occurrence.
-  const std::vector<RejectionCount>& counts() const { return counts_; }
+  const std::vector<RejectionCount>& counts() const { return order_.counts(); }
 
  private:
-  void count(const std::string& reason, const TextReader& at);
+  struct Place {
+    const TextReader& at;
+    std::string operator()() const { return at.where(); }
+  };
 
-  LogLimits limits_;
-  std::string gap_reason_;
-  std::optional<std::int64_t> last_ns_;
-  std::int64_t accepted_ = 0;
-  std::int64_t rejected_ = 0;
-  std::vector<RejectionCount> counts_;
+  StampOrder order_;
 };
 
 }  // namespace viwo::log

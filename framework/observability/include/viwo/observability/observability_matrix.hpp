@@ -18,11 +18,13 @@ struct FeatureOptions {
   double sigma_bearing_rad = 0.0035;        ///< of each of the two angles: 1 px at f = 286 px
 };
 
-/// Watches an estimator (EstimatorOptions::frozen) and accumulates (OB-1) .. (OB-3).
+/// Watches an estimator (RunnerOptions::frozen) and accumulates (OB-1) .. (OB-3).
 ///
 /// State: inertial state of the start (15, as in filter_view.hpp), then the calibration columns of
 /// the filter that have a prior variance, then the feature (3). The clone of the start, six more
-/// columns tied to the inertial state, is left out: it adds as much to the rank as to the size.
+/// columns tied to the inertial state, is left out: it adds as much to the rank as to the size. So
+/// are blocks that come and go (landmarks): of a factor that has them the part counts that they do
+/// not enter.
 class ObservabilityMatrix final : public EstimatorObserver {
  public:
   static constexpr int kCloneSize = kPoseSize;  ///< size of the clone that is left out
@@ -57,6 +59,8 @@ class ObservabilityMatrix final : public EstimatorObserver {
 
  private:
   void set_carry(const FactorColumns& columns);
+  /// Rows of a factor's own columns, in units of its noise.
+  void add_factor(const FactorColumns& columns, const Eigen::MatrixXd& rows);
   void add_rows(const Eigen::MatrixXd& rows);
   void add_bearing(const CloneView& clone);
   void compress();
@@ -64,7 +68,8 @@ class ObservabilityMatrix final : public EstimatorObserver {
   FeatureOptions feature_;
   ImuView start_;
   std::vector<int> calibration_;
-  std::vector<int> column_of_;  // of the state, per column of the filter; -1: none
+  std::vector<int> column_of_;    // of the state, per column of the filter; -1: none
+  std::vector<bool> is_in_room_;  // per column of the filter: of a block that comes and goes
   Eigen::VectorXd prior_sigma_;
   Eigen::Vector3d p_FinG_ = Eigen::Vector3d::Zero();
   ImuMatrix Phi_ = ImuMatrix::Identity();                              // from the start to now

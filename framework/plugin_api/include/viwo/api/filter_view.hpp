@@ -7,11 +7,13 @@
 
 #include <cstdint>
 #include <span>
+#include <stdexcept>
 
 #include <Eigen/Core>
 
-#include "viwo/api/kinematic_model.hpp"
+#include "viwo/api/block.hpp"
 #include "viwo/api/measurement.hpp"
+#include "viwo/api/rig.hpp"
 
 namespace viwo {
 
@@ -22,8 +24,6 @@ inline constexpr int kVelocityColumn = 6;
 inline constexpr int kGyroBiasColumn = 9;
 inline constexpr int kAccelBiasColumn = 12;
 inline constexpr int kImuSize = 15;
-/// dtheta, dp of a clone, or of the extrinsics of a camera or of a wheel set.
-inline constexpr int kPoseSize = 6;
 
 /// Pose and velocity of the IMU. `_fej`: as it was before the first update that saw it; Jacobians
 /// are taken there (equal to the estimate when first estimates are turned off).
@@ -52,35 +52,6 @@ struct CloneView {
   Eigen::Vector3d v_IinG = Eigen::Vector3d::Zero();  ///< m/s
 };
 
-enum class CameraDistortion : std::uint8_t { kRadtan, kEquidistant };
-
-/// Camera model and where the camera sits: p_C = R_ItoC p_I + p_IinC.
-struct CameraView {
-  CameraDistortion distortion = CameraDistortion::kRadtan;
-  int width_px = 0;
-  int height_px = 0;
-  /// fx, fy, cx, cy [px], then the four distortion coefficients in the order of Kalibr.
-  Eigen::Matrix<double, 8, 1> intrinsics = Eigen::Matrix<double, 8, 1>::Zero();
-  Eigen::Matrix3d R_ItoC = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p_IinC = Eigen::Vector3d::Zero();
-  double t_CtoI_s = 0.;        ///< t_imu = t_camera + t_CtoI; stamps of features are in t_imu
-  int extrinsics_column = -1;  ///< of dtheta of R_ItoC (same convention as R_GtoI); dp follows
-  int intrinsics_column = -1;  ///< of the eight numbers
-};
-
-/// A wheel set: its kinematic model, and how its odometry frame O sits on the IMU.
-struct WheelsView {
-  const KinematicModel* model = nullptr;
-  Eigen::Matrix3d R_ItoO = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p_IinO = Eigen::Vector3d::Zero();
-  double t_OtoI_s = 0.;  ///< t_imu = t_odom + t_OtoI
-  Intrinsics x_WI;
-  int extrinsics_column = -1;  ///< of dtheta of R_ItoO (same convention as R_GtoI); dp follows
-  int time_offset_column = -1;
-  /// Of x_WI[0]; the others follow. Entries held by the gauge have columns, with zero variance.
-  int intrinsics_column = -1;
-};
-
 /// White noise and bias random walk of the IMU, continuous time.
 struct ImuNoise {
   double gyro_rad_per_s_sqrt_hz = 1.7e-4;
@@ -91,9 +62,8 @@ struct ImuNoise {
 
 struct FilterView {
   ImuView imu;
-  std::span<const CloneView> clones;    ///< oldest first; the last one is now
-  std::span<const CameraView> cameras;  ///< in the order of the configuration
-  const WheelsView* wheels = nullptr;   ///< the wheel set that this update is for, if any
+  std::span<const CloneView> clones;  ///< oldest first; the last one is now
+  std::span<const BlockView> blocks;  ///< by BlockId::index
   ImuNoise imu_noise;
   double gravity_m_per_s2 = 9.81;
   bool oldest_leaves = false;  ///< the oldest clone is dropped after this epoch
@@ -105,19 +75,40 @@ struct FilterView {
   Covariance P() const {
     return {covariance_data, size, size, Eigen::OuterStride<>(covariance_stride)};
   }
+
+  const BlockView& block(BlockId id) const { return blocks[static_cast<std::size_t>(id.index)]; }
+};
+
+/// Which of an update's streams; given by the host when it is declared.
+struct StreamId {
+  int index = -1;
+};
+
+/// Samples of one kind, side by side.
+struct SampleSpan {
+  const SampleType* type = nullptr;
+  const void* data = nullptr;
+  std::size_t size = 0;
 };
 
 /// Measurements of one epoch.
 struct EpochData {
-  std::int64_t begin_ns = 0;  ///< the epoch before this one, IMU clock; 0 for the first
-  std::int64_t end_ns = 0;    ///< now; time of the last clone
-  std::span<const FeatureSample> features;  ///< images taken now
-  std::span<const ImuSample> imu;  ///< from begin to end, both included (interpolated there)
-  /// Of the wheel set: everything since the oldest clone that the filter has, in the wheel clock.
-  std::span<const EncoderSample> encoders;
-  /// Of the sensor that a kPoses update is for: what came since the last epoch, up to now, in time
-  /// order. Each sample is given once; one that came late has its old stamp (IMU clock).
-  std::span<const PoseSample> poses;
+  std::int64_t begin_ns = 0;            ///< the epoch before this one, IMU clock; 0 for the first
+  std::int64_t end_ns = 0;              ///< now; time of the last clone
+  std::span<const ImuSample> imu;       ///< from begin to end, both included (interpolated there)
+  std::span<const SampleSpan> streams;  ///< by StreamId::index
+
+  /// What the epoch has of a stream (StreamSpec::given). std::logic_error for another kind than was
+  /// declared.
+  template <Sample T>
+  std::span<const T> samples(StreamId id) const {
+    const SampleSpan& samples = streams[static_cast<std::size_t>(id.index)];
+    if (samples.size == 0) return {};
+    if (!(*samples.type == sample_type<T>())) {
+      throw std::logic_error("samples of another kind than the stream was declared with");
+    }
+    return {static_cast<const T*>(samples.data), samples.size};
+  }
 };
 
 }  // namespace viwo

@@ -8,16 +8,10 @@
 
 #include "viwo/api/export.hpp"
 #include "viwo/api/measurement.hpp"
+#include "viwo/api/rejections.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo {
-
-/// One kind of datum that a sensor dropped, and how often: never silently.
-struct RejectionCount {
-  std::string reason;      ///< "stamp not after the previous one", ...
-  std::int64_t count = 0;  ///< how often
-  std::string first;       ///< where it happened first, e.g. "odom_1.csv.gz:17"
-};
 
 /// What the filter knows after an epoch, for whoever publishes it.
 struct EstimateSample {
@@ -41,9 +35,17 @@ class VIWO_API Sensor {
  public:
   virtual ~Sensor();
 
+  /// The kinds of samples that next() may give, as it is configured: from them the host knows
+  /// before a run who gets what. What is not among them is an error when it comes.
+  virtual SampleTypes yields() const = 0;
+
   /// The next measurement in time order; kEnd when there is none. Throws InputError when the source
   /// is broken beyond single data (not a number where one must be, missing column, truncated file).
   virtual Status next(Measurement& out) = 0;
+
+  /// Whether what it yields is free of noise, and of errors that it draws, when that is asked for
+  /// (HostServices::exact). False: an analysis says that noise may count as observed.
+  virtual bool can_be_exact() const;
 
   /// What was dropped so far; appended to `out`.
   virtual void rejections(std::vector<RejectionCount>& out) const;

@@ -38,4 +38,12 @@ class VIWO_API ParamError : public InputError {
   std::string key_;
 };
 
+/// A plugin does what its contract forbids: it drops a block that it does not own, or declares
+/// something after the start. The host turns it off.
+class VIWO_API ContractError : public std::logic_error {
+ public:
+  explicit ContractError(const std::string& text);
+  ~ContractError() override;
+};
+
 }  // namespace viwo

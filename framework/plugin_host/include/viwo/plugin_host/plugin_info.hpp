@@ -25,6 +25,9 @@ struct PluginInfo {
   std::span<const ParamSpec> params;
 };
 
+/// "sensor plugin 'ticks' 0.1.0 (/usr/lib/.../libviwo_sensor_ticks.so)"
+std::string full_name(const PluginInfo& info);
+
 /// A file that is not loaded. what() is "refusing FILE: REASON"; the reason says what to do.
 class PluginRefused : public InputError {
  public:

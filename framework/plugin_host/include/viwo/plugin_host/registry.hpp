@@ -21,6 +21,7 @@
 #include "viwo/config/errors.hpp"
 #include "viwo/config/node.hpp"
 #include "viwo/plugin_host/plugin_info.hpp"
+#include "viwo/plugin_host/sample_kinds.hpp"
 
 namespace viwo {
 
@@ -44,6 +45,12 @@ struct PluginListing {
   std::optional<PluginInfo> info;
   std::string refusal;  ///< PluginRefused::reason(); empty with `info`
 };
+
+/// Seed of the plugin of `kind` ("kinematics", "update") that a run with `run_seed` makes from the
+/// section at `path` ("updates.height"). It depends on these three alone, not on what other
+/// sections there are nor on their order: SplitMix64's output function of the run's seed, plus
+/// FNV-1a (64 bit) over kind, a zero byte and path, mixed by that function again.
+std::uint64_t instance_seed(std::uint64_t run_seed, std::string_view kind, std::string_view path);
 
 /// Plugins are files libviwo_<kind>_<name>.so; one is loaded when it is first asked for and stays
 /// loaded until the process exits. Two files of the same kind and name anywhere in the search path
@@ -73,21 +80,23 @@ class PluginRegistry {
   std::vector<PluginListing> list();
 
   /// Makes a model from {type: NAME, its parameters}. `path` is where the section is, for messages;
-  /// keys in `other_keys` are the caller's. What the user has to mend goes into `errors`, then the
-  /// object is null; PluginFailure if the plugin's constructor failed in another way.
+  /// `seed` is for its random numbers, and models nested in it get seeds made from it and their
+  /// path; keys in `other_keys` are the caller's. What the user has to mend goes into `errors`,
+  /// then the object is null; PluginFailure if the plugin's constructor failed in another way.
   Loaded<KinematicModel> make_kinematics(const config::Node& section, const std::string& path,
-                                         config::Errors& errors,
+                                         std::uint64_t seed, config::Errors& errors,
                                          std::span<const std::string_view> other_keys = {});
 
-  /// The same for a sensor; `seed` is for its random numbers.
+  /// The same for a sensor; `exact`: HostServices::exact. Kinds of samples that another plugin, or
+  /// viwo, knows in another version or layout are an error.
   Loaded<Sensor> make_sensor(const config::Node& section, const std::string& path,
                              std::uint64_t seed, config::Errors& errors,
-                             std::span<const std::string_view> other_keys = {});
+                             std::span<const std::string_view> other_keys = {}, bool exact = false);
 
-  /// The same for an update.
+  /// The same for an update; its declare() throws the InputError for kinds of samples.
   Loaded<Update> make_update(const config::Node& section, const std::string& path,
-                             config::Errors& errors,
-                             std::span<const std::string_view> other_keys = {});
+                             std::uint64_t seed, config::Errors& errors,
+                             std::span<const std::string_view> other_keys = {}, bool exact = false);
 
  private:
   std::vector<std::string> names(std::string_view kind) const;
@@ -96,10 +105,12 @@ class PluginRegistry {
   std::shared_ptr<const Library> load_file(const std::filesystem::path& file);
   template <class Interface>
   Loaded<Interface> make(const config::Node& section, const std::string& path, std::uint64_t seed,
-                         std::span<const std::string_view> other_keys, config::Errors& errors);
+                         std::span<const std::string_view> other_keys, bool exact,
+                         config::Errors& errors);
 
   std::vector<std::filesystem::path> folders_;
   PluginLog log_;
+  std::shared_ptr<SampleKinds> sample_kinds_ = std::make_shared<SampleKinds>();
   std::mutex mutex_;
   std::map<std::filesystem::path, std::shared_ptr<const Library>> loaded_;  ///< by canonical path
 };

@@ -33,6 +33,9 @@ struct EncoderSimulation {
   /// A base that cannot move sideways follows a twist all the same whose v_y is not more than this:
   /// it slides then. For twists that are exact only up to an approximation.
   double sliding_m_per_s = 0.;
+
+  /// Readings of the motion itself: no noise, slip, outliers and resolution.
+  void make_exact();
 };
 
 /// Stamp of the sample `k` of a sensor with `rate_hz`, in nanoseconds from its first one.

@@ -30,16 +30,18 @@ struct FeatureSimulation {
 };
 
 struct SimulatedFeatures {
-  std::vector<FeatureSample> samples;  ///< in time order, cameras in their order at each stamp
+  /// In the order in which they are taken, at each time in the order of the cameras; stamps are in
+  /// the clocks of the cameras.
+  std::vector<FeatureSample> samples;
   /// Place of the landmark with that id. One landmark has several ids when it was lost and seen
   /// again.
   std::vector<Eigen::Vector3d> p_FinG;
 };
 
-/// Stamps of the images, without start_ns: phase + k / rate up to the duration.
+/// Times of the images, IMU clock without start_ns: phase + k / rate up to the duration.
 std::vector<std::int64_t> image_times_ns(const FeatureSimulation& options);
 
-/// Images of all cameras at the same stamps. A landmark keeps its id, the same in all cameras, as
+/// Images of all cameras at the same times. A landmark keeps its id, the same in all cameras, as
 /// long as one camera sees it without a break; dropouts are not breaks. Where an image has less
 /// than `features` points, landmarks seen before come first, then new ones are put on the ray of a
 /// random pixel. Pixel noise can put a point out of the image.

@@ -28,6 +28,7 @@ enum class Stream : std::uint64_t {
   kStartError,
   kPoseNoise,
   kPoseOutliers,
+  kTrueCameras,
 };
 
 /// A stream of independent numbers; equal seed, purpose and index give equal numbers. `index`

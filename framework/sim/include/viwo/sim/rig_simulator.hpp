@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "viwo/api/host_services.hpp"
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/params.hpp"
 #include "viwo/sim/body_trajectory.hpp"
@@ -20,18 +21,23 @@ struct RigSimulation {
   bool with_imu = true;
   ImuSimulation imu;
   FeatureSimulation features;       ///< no images with features.features = 0
-  std::vector<CameraView> cameras;  ///< read from the file, the first n
+  std::vector<CameraView> cameras;  ///< as they truly are; none without images
 };
 
-/// Parameters of kRigParams as they were configured; `duration_s` and `start_ns` are the caller's.
+/// Parameters of kRigParams and kTrueCameraParams as they were configured; `duration_s` and
+/// `start_ns` are the caller's. With `services.exact` nothing is noisy, missing or off.
 /// ParamError for lists of a wrong length, contradictions and a missing camera file.
-RigSimulation rig_from(const ParamSet& params, double duration_s, std::int64_t start_ns);
+RigSimulation rig_from(const ParamSet& params, double duration_s, std::int64_t start_ns,
+                       const HostServices& services);
+
+/// The kinds of samples that simulate_rig() gives for these parameters.
+SampleTypes rig_kinds(const ParamSet& params);
 
 /// What the trajectory must cover for the rig, s.
 double rig_end_s(const RigSimulation& rig);
 
-/// The true state at the first IMU stamp and at each image stamp (also without images), then IMU
-/// samples, then images: not sorted by time.
+/// The truth of the cameras, true states at the first IMU stamp and at the time of each image (also
+/// without images), then IMU samples, then images: not sorted by time.
 std::vector<Measurement> simulate_rig(const BodyTrajectory& trajectory, const RigSimulation& rig,
                                       std::uint64_t seed);
 

@@ -1,0 +1,115 @@
+// Readings of the IMU: their order, what is cut out of them, what is forgotten.
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "estimator_fixture.hpp"
+#include "viwo/filter/imu_buffer.hpp"
+
+namespace viwo {
+namespace {
+
+using testing::Counts;
+using testing::expect_same;
+using testing::imu_at;
+using testing::kMs;
+using testing::kNaN;
+using testing::kStart;
+
+/// Readings at these times, ms after the start; longest gap 50 ms.
+struct ImuBench {
+  ImuBuffer buffer{0.05};
+  Rejections rejections;
+
+  explicit ImuBench(const std::vector<std::int64_t>& t_ms) {
+    for (const std::int64_t t : t_ms) buffer.add(imu_at(kStart + t * kMs), rejections);
+  }
+  Counts rejected() const {
+    Counts counts;
+    for (const RejectionCount& r : rejections.counts()) counts[r.reason] = r.count;
+    return counts;
+  }
+  /// Times of a cut, ms; its readings are those of the straight lines.
+  std::vector<std::int64_t> cut(std::int64_t begin_ms, std::int64_t end_ms) {
+    std::vector<std::int64_t> t_ms;
+    for (const ImuSample& sample : buffer.cut(kStart + begin_ms * kMs, kStart + end_ms * kMs)) {
+      t_ms.push_back((sample.t_ns - kStart) / kMs);
+      expect_same(sample, imu_at(sample.t_ns), 1e-12);
+    }
+    return t_ms;
+  }
+};
+
+using Times = std::vector<std::int64_t>;
+
+TEST(ImuBuffer, RefusesReadingsThatAreNotFiniteOrNotLater) {
+  ImuBench bench({0, 10, 10, 5, 20});
+  ImuSample broken = imu_at(kStart + 30 * kMs);
+  broken.accel_m_per_s2[1] = kNaN;
+  bench.buffer.add(broken, bench.rejections);
+  EXPECT_EQ(bench.rejected(),
+            (Counts{{"imu: stamp not after the last", 2}, {"imu: value that is not finite", 1}}));
+  EXPECT_EQ(bench.buffer.newest_ns(), kStart + 20 * kMs);
+  EXPECT_EQ(bench.buffer.samples().size(), 3u);
+}
+
+TEST(ImuBuffer, CountsGapsThatAreLongerThanAllowed) {
+  EXPECT_EQ(ImuBench({0, 50, 100}).rejected(), Counts{});
+  EXPECT_EQ(ImuBench({0, 51, 102}).rejected(), (Counts{{"imu: gap bridged", 2}}));
+}
+
+TEST(ImuBuffer, CutsAtReadingsAndBetweenThem) {
+  ImuBench bench({0, 10, 20, 30, 40});
+  EXPECT_EQ(bench.cut(10, 30), (Times{10, 20, 30}));
+  EXPECT_EQ(bench.cut(13, 37), (Times{13, 20, 30, 37}));
+  EXPECT_EQ(bench.cut(13, 17), (Times{13, 17})) << "both between the same two";
+  EXPECT_EQ(bench.cut(10, 17), (Times{10, 17}));
+  EXPECT_EQ(bench.cut(13, 40), (Times{13, 20, 30, 40}));
+}
+
+TEST(ImuBuffer, HoldsItsFirstReadingBeforeIt) {
+  ImuBench bench({50, 60});
+  const auto cut = bench.buffer.cut(kStart, kStart + 55 * kMs);
+  ASSERT_EQ(cut.size(), 3u);
+  ImuSample held = imu_at(kStart + 50 * kMs);
+  expect_same(cut[1], held, 1e-12);
+  expect_same(cut[2], imu_at(kStart + 55 * kMs), 1e-12);
+  held.t_ns = kStart;
+  expect_same(cut[0], held, 0.);
+  const auto all_before = bench.buffer.cut(kStart, kStart + 45 * kMs);
+  ASSERT_EQ(all_before.size(), 2u);
+  held.t_ns = kStart + 45 * kMs;
+  expect_same(all_before[1], held, 1e-12);
+}
+
+TEST(ImuBuffer, KeepsTheLastReadingAtOrBeforeWhatItGoesOnFrom) {
+  ImuBench bench({0, 10, 20, 30, 40});
+  bench.buffer.forget_before(kStart + 25 * kMs);
+  EXPECT_EQ(bench.buffer.samples().front().t_ns, kStart + 20 * kMs);
+  EXPECT_EQ(bench.cut(25, 40), (Times{25, 30, 40}));
+  bench.buffer.forget_before(kStart + 30 * kMs);
+  EXPECT_EQ(bench.buffer.samples().front().t_ns, kStart + 30 * kMs);
+  bench.buffer.forget_before(kStart + 1000 * kMs);
+  EXPECT_EQ(bench.buffer.samples().size(), 1u);
+  bench.buffer.forget_before(kStart);
+  EXPECT_EQ(bench.buffer.samples().size(), 1u);
+}
+
+TEST(ImuBuffer, ForgetsBeforeAStartWhatNoneLooksAt) {
+  ImuBench bench({});
+  bench.buffer.forget_before_start();
+  EXPECT_TRUE(bench.buffer.empty());
+  for (std::int64_t t = 0; t < 120'000; t += 100) {
+    bench.buffer.add(imu_at(kStart + t * kMs), bench.rejections);
+    bench.buffer.forget_before_start();
+  }
+  EXPECT_EQ(bench.buffer.samples().size(), 1200u);
+  bench.buffer.add(imu_at(kStart + 120'000 * kMs), bench.rejections);
+  bench.buffer.forget_before_start();
+  EXPECT_EQ(bench.buffer.samples().size(), 601u);
+}
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,86 @@
+// What the data of one source must satisfy, whatever it is read from: stamps that increase. Single
+// bad data are dropped and counted; too many of them are an error.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "viwo/api/rejections.hpp"
+
+namespace viwo::log {
+
+/// Limits on how bad a log may be.
+struct LogLimits {
+  double max_gap_s = 0.2;              ///< longer spacings are counted as gaps
+  double max_rejected_fraction = 0.1;  ///< more rejected data than this are an InputError
+};
+
+inline constexpr const char* kStampNotAfter = "stamp not after the previous one";
+
+/// "gap longer than 0.2 s"
+std::string gap_reason(double max_gap_s);
+
+/// `where` gives the text of the place of a datum, asked for when it is the first of its kind.
+class StampOrder {
+ public:
+  /// `prefix` stands before all reasons.
+  explicit StampOrder(const LogLimits& limits, std::string prefix = "");
+
+  /// True for a stamp after all stamps accepted before; otherwise it is rejected and counted. A gap
+  /// before an accepted stamp is counted, too.
+  template <class Where>
+  bool accept(std::int64_t t_ns, const Where& where) {
+    if (last_ns_ && t_ns <= *last_ns_) {
+      reject(kStampNotAfter, where);
+      return false;
+    }
+    if (is_behind_gap(t_ns)) counts_.add(gap_reason_, where);
+    last_ns_ = t_ns;
+    ++accepted_;
+    return true;
+  }
+  /// True also for the stamp that was accepted last: several data of one time.
+  template <class Where>
+  bool accept_or_same(std::int64_t t_ns, const Where& where) {
+    if (last_ns_ != t_ns) return accept(t_ns, where);
+    ++accepted_;
+    return true;
+  }
+  /// Counts a datum that is dropped.
+  template <class Where>
+  void reject(std::string_view reason, const Where& where) {
+    ++rejected_;
+    counts_.add(prefix_.empty() ? std::string(reason) : prefix_ + std::string(reason), where);
+  }
+
+  /// Counts a datum that is not used, and is no fault of the source: for no limit.
+  template <class Where>
+  void leave_out(std::string_view reason, const Where& where) {
+    counts_.add(prefix_ + std::string(reason), where);
+  }
+
+  bool empty() const { return accepted_ + rejected_ == 0; }
+  /// InputError "source  n of m data rejected, ..." when nothing was accepted or more than
+  /// max_rejected_fraction were rejected; `data` is what they are called.
+  void require_enough(const std::string& source, const char* data) const;
+
+  /// Rejected data and gaps by reason, in order of first occurrence.
+  const std::vector<RejectionCount>& counts() const { return counts_.counts(); }
+
+ private:
+  bool is_behind_gap(std::int64_t t_ns) const;
+
+  LogLimits limits_;
+  std::string prefix_;
+  std::string gap_reason_;
+  std::optional<std::int64_t> last_ns_;
+  std::int64_t accepted_ = 0;
+  std::int64_t rejected_ = 0;
+  Rejections counts_;
+};
+
+}  // namespace viwo::log

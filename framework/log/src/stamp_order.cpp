@@ -1,0 +1,37 @@
+#include "viwo/log/stamp_order.hpp"
+
+#include "viwo/api/measurement.hpp"
+#include "viwo/api/status.hpp"
+#include "viwo/log/text.hpp"
+
+namespace viwo::log {
+
+std::string gap_reason(double max_gap_s) {
+  return "gap longer than " + number_text(max_gap_s) + " s";
+}
+
+StampOrder::StampOrder(const LogLimits& limits, std::string prefix)
+    : limits_(limits),
+      prefix_(std::move(prefix)),
+      gap_reason_(prefix_ + gap_reason(limits.max_gap_s)) {}
+
+bool StampOrder::is_behind_gap(std::int64_t t_ns) const {
+  return last_ns_ && seconds_between(*last_ns_, t_ns) > limits_.max_gap_s;
+}
+
+void StampOrder::require_enough(const std::string& source, const char* data) const {
+  const std::int64_t total = accepted_ + rejected_;
+  const double fraction = static_cast<double>(rejected_) / static_cast<double>(total);
+  if (accepted_ > 0 && fraction <= limits_.max_rejected_fraction) return;
+  std::string text = source + "  " + std::to_string(rejected_) + " of " + std::to_string(total) +
+                     " " + data + " rejected, allowed is a fraction of " +
+                     number_text(limits_.max_rejected_fraction) + ":";
+  for (const RejectionCount& known : counts()) {
+    if (known.reason == gap_reason_) continue;
+    text += (text.back() == ':' ? " " : "; ") + known.reason + " (" + std::to_string(known.count) +
+            ", first at " + known.first + ")";
+  }
+  throw InputError(text);
+}
+
+}  // namespace viwo::log

@@ -1,0 +1,53 @@
+// Counting what is not used: never silently.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "viwo/api/export.hpp"
+
+namespace viwo {
+
+/// One kind of datum that was dropped, and how often.
+struct RejectionCount {
+  std::string reason;      ///< "stamp not after the previous one", ...
+  std::int64_t count = 0;  ///< how often
+  std::string first;       ///< where it happened first, e.g. "odom_1.csv.gz:17"
+};
+
+/// "stamp 1403715273262142976 ns".
+VIWO_API std::string stamp_text(std::int64_t t_ns);
+
+/// Counts by reason, in the order of their first times. Allocates for a reason that is new only.
+class VIWO_API Rejections {
+ public:
+  /// True for a reason that is new. `where` gives the text of the place, asked for then only.
+  template <class Where>
+  requires requires(const Where& where) { std::string(where()); }
+  bool add(std::string_view reason, const Where& where, std::int64_t count = 1) {
+    if (RejectionCount* known = find(reason)) {
+      known->count += count;
+      return false;
+    }
+    counts_.push_back({std::string(reason), count, where()});
+    return true;
+  }
+  /// The place is a stamp.
+  bool add(std::string_view reason, std::int64_t t_ns) {
+    return add(reason, [t_ns] { return stamp_text(t_ns); });
+  }
+
+  const std::vector<RejectionCount>& counts() const { return counts_; }
+  void append_to(std::vector<RejectionCount>& out) const {
+    out.insert(out.end(), counts_.begin(), counts_.end());
+  }
+
+ private:
+  RejectionCount* find(std::string_view reason);
+
+  std::vector<RejectionCount> counts_;
+};
+
+}  // namespace viwo

@@ -1,0 +1,31 @@
+// A first state from a rest: gravity gives roll and pitch, the gyro its bias.
+#pragma once
+
+#include <span>
+
+#include "viwo/api/measurement.hpp"
+#include "viwo/filter/start_search.hpp"
+
+namespace viwo {
+
+struct StandstillOptions {
+  double window_s = 1.;
+  ImuNoise noise;
+  double gravity_m_per_s2 = 9.81;
+  double sigma_position_m = 0.01;           ///< of the origin, a matter of definition
+  double sigma_yaw_rad = 0.01;              ///< likewise
+  double sigma_gyro_bias_rad_per_s = 0.02;  ///< a mean rate beyond three of these is a motion
+  double sigma_accel_bias_m_per_s2 = 0.05;  ///< tilts the estimate of gravity (F-10)
+};
+
+/// The state at the end of the last `window_s` of the IMU if the base stood still in it (F-9):
+/// the readings scatter as their noise does (with room for vibration), the mean specific force is
+/// gravity within the bias prior, the mean rate within the bias prior, and no wheel turned.
+/// `encoders`: those of each wheel set.
+/// The origin of G is there where the IMU is then, and the x axis of G in the IMU's x-z plane (y-z,
+/// if x is nearly vertical).
+StartAttempt start_from_standstill(std::span<const ImuSample> imu,
+                                   std::span<const std::span<const EncoderSample>> encoders,
+                                   const StandstillOptions& options);
+
+}  // namespace viwo
