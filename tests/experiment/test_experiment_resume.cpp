@@ -97,7 +97,8 @@ TEST(RunRecord, ComesBackBitForBit) {
 TEST(RunRecord, IsThinnedToItsEndsAndEveryNthPointWithCountsSummed) {
   RunResult run;
   run.updates = {{"parity", {}, {}, {}}};
-  run.calibration = {{"r_1", {}, {}}};
+  run.calibration.emplace_back();
+  run.calibration.back().name = "r_1";
   for (int i = 0; i < 1001; ++i) {
     run.epoch_t_s.push_back(i);
     run.calibration[0].estimate.push_back(i);

@@ -177,10 +177,18 @@ TEST(TrueCalibration, OfCamerasThatStartWrongIsKnownInARun) {
     if (track.sigma.back() == 0. || !track.name.starts_with("cam")) continue;
     EXPECT_LT(std::abs(track.final_error), 4. * track.sigma.back()) << track.name;
     EXPECT_LE(track.sigma.back(), track.sigma.front() * (1. + 1e-9)) << track.name;
-    if (track.name == "cam0.fx") EXPECT_EQ(track.truth, 460.);
-    if (track.name == "cam0.fx") EXPECT_EQ(track.unit, "px");
-    if (track.name == "cam0.t_CtoI") EXPECT_EQ(track.unit, "s");
-    if (track.name == "r_1") EXPECT_EQ(track.unit, "m");
+    if (track.name == "cam0.fx") {
+      EXPECT_EQ(track.truth, 460.);
+    }
+    if (track.name == "cam0.fx") {
+      EXPECT_EQ(track.unit, "px");
+    }
+    if (track.name == "cam0.t_CtoI") {
+      EXPECT_EQ(track.unit, "s");
+    }
+    if (track.name == "r_1") {
+      EXPECT_EQ(track.unit, "m");
+    }
   }
 }
 

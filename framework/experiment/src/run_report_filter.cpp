@@ -178,7 +178,7 @@ std::optional<std::pair<double, double>> settled_range(const Series& series, dou
 }
 
 Plot calibration_plot(const RunResult& result, const CalibrationTrack& track,
-                      const std::string& si_unit) {
+                      const std::string& /*si_unit*/) {
   const DisplayUnit unit = unit_of(track, track.unit);
   Plot plot = half_plot(track.name, "time [s]", with_unit(track.name, unit.name));
   const std::size_t n = std::min(result.epoch_t_s.size(), track.estimate.size());

@@ -57,7 +57,7 @@ class BreaksAnchors final : public Update {
   }
   void settle(const FilterView& filter, BlockEdits& edits) override {
     struct Broken final : BlockEdits {
-      explicit Broken(BlockEdits& host) : host(host) {}
+      explicit Broken(BlockEdits& given) : host(given) {}
       void drop(BlockId id) override { host.drop(id); }
       void rewrite(const BlockRewrite& block) override {
         BlockRewrite broken = block;
