@@ -22,6 +22,7 @@ constexpr const char* kParallax = "track with too little parallax (max_condition
 constexpr const char* kNotVisible = "point out of the sight of one of its cameras";
 constexpr const char* kDistance = "point too near or too far";
 constexpr const char* kGate = "track dropped by the chi-square gate";
+constexpr std::size_t kReasons = 11;
 
 const char* reason_of(FeatureStatus status) {
   switch (status) {
@@ -46,6 +47,7 @@ VisualFeatures::VisualFeatures(const ParamSet& params, const HostServices& /*ser
       limits_{.min_distance_m = params.number("min_distance_m"),
               .max_distance_m = params.number("max_distance_m"),
               .max_condition = params.number("max_condition")} {
+  dropped_.reserve(kReasons);
   if (limits_.min_distance_m >= limits_.max_distance_m) {
     throw ParamError("min_distance_m", "min_distance_m must be less than max_distance_m");
   }
@@ -96,10 +98,19 @@ void VisualFeatures::start(const UpdateSetup& setup) {
 }
 
 void VisualFeatures::reject(const char* reason, std::int64_t id) {
-  rejections_.add(reason, [&] {
-    return (reason == kBadCamera || reason == kNoClone ? "camera " : "id ") + std::to_string(id) +
-           " at " + std::to_string(now_ns_) + " ns";
-  });
+  auto known = std::find_if(dropped_.begin(), dropped_.end(),
+                            [&](const Dropped& dropped) { return dropped.reason == reason; });
+  if (known == dropped_.end()) known = dropped_.insert(known, {reason, 0, id, now_ns_});
+  ++known->count;
+}
+
+void VisualFeatures::rejections(std::vector<RejectionCount>& out) const {
+  for (const Dropped& dropped : dropped_) {
+    const bool of_camera = dropped.reason == kBadCamera || dropped.reason == kNoClone;
+    out.push_back({dropped.reason, dropped.count,
+                   (of_camera ? "camera " : "id ") + std::to_string(dropped.first_id) + " at " +
+                       std::to_string(dropped.first_ns) + " ns"});
+  }
 }
 
 void VisualFeatures::update(const FilterView& filter, const EpochData& data, FactorSink& sink) {

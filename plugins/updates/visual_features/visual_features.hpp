@@ -31,7 +31,7 @@ class VisualFeatures final : public Update {
   /// Adds at most one information factor; never throws on bad data.
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override;
   void settle(const FilterView& filter, BlockEdits& edits) override;
-  void rejections(std::vector<RejectionCount>& out) const override { rejections_.append_to(out); }
+  void rejections(std::vector<RejectionCount>& out) const override;
   std::span<const Landmark> landmarks() const { return landmarks_.all(); }
 
  private:
@@ -43,6 +43,11 @@ class VisualFeatures final : public Update {
     bool lost = false;  ///< else it has an observation at the oldest clone, which leaves
   };
 
+  /// What was not used for one reason. Counting it allocates nothing.
+  struct Dropped {
+    const char* reason;
+    std::int64_t count, first_id, first_ns;
+  };
   void reject(const char* reason, std::int64_t id);
   void take_image(const FeatureSample& sample);
   /// Fills candidates_, best first; drops lost tracks that are too short.
@@ -78,7 +83,7 @@ class VisualFeatures final : public Update {
   std::int64_t epoch_ = 0;
   std::uint64_t images_now_ = 0;  ///< bit of each camera that has an image in this epoch
   std::int64_t now_ns_ = 0;
-  Rejections rejections_;
+  std::vector<Dropped> dropped_;  ///< in the order of their first times; room for all reasons
 };
 
 }  // namespace viwo::visual

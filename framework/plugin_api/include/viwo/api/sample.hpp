@@ -140,8 +140,9 @@ class TypedBuffer final : public SampleBuffer {
     slots_[first_ + size_++] = sample;
   }
   void drop_front(std::size_t count) override {
-    first_ += std::min(count, size_);
-    size_ -= std::min(count, size_);
+    count = std::min(count, size_);
+    size_ -= count;
+    first_ = size_ == 0 ? 0 : first_ + count;
   }
   const void* at(std::size_t i) const override { return &slots_[first_ + i]; }
   std::span<const T> samples() const { return {slots_.data() + first_, size_}; }
