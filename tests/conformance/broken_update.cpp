@@ -78,6 +78,7 @@ class Broken final : public Update {
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
     ++shared_calls;
     if (is("throws") && data.imu.size() < 2) throw std::out_of_range("no IMU");
+    if (is("throws_int") && data.imu.empty()) throw 42;
     if (is("crash") && data.imu.empty()) std::raise(SIGSEGV);
     if (is("other_samples")) data.samples<EncoderSample>(poses_);
     add_height(filter, sink);

@@ -184,6 +184,9 @@ TEST(BrokenUpdate, AnExceptionInAnEpochWithoutImu) {
   EXPECT_EQ(update_failures("throws"),
             "hostile epochs: update() threw 'no IMU' in epoch 9 - leave out what cannot be "
             "used, and count it in rejections()");
+  EXPECT_EQ(update_failures("throws_int"),
+            "hostile epochs: update() threw something that is not a std::exception in epoch 9 - "
+            "leave out what cannot be used, and count it in rejections()");
 }
 
 TEST(BrokenUpdate, ACrashInAnEpochWithoutImu) {

@@ -47,6 +47,25 @@ void Watch::fail_once(const std::string& what, const std::string& text) {
   if (findings_ != nullptr && reported_.insert(what).second) findings_->fail(text);
 }
 
+/// False when `call`, the function `name` of the plugin, has thrown.
+template <class Call>
+bool Watch::returns(const std::string& name, const Remedies& remedies, Call&& call) {
+  std::string what = name + " threw something that is not a std::exception";
+  const char* remedy = remedies.of_exception;
+  try {
+    call();
+    return true;
+  } catch (const ContractError& error) {
+    what = name + " " + error.what();
+    remedy = remedies.of_breach;
+  } catch (const std::exception& error) {
+    what = name + " threw '" + error.what() + "'";
+  } catch (...) {
+  }
+  fail_once(what, what + " in " + where() + remedy);
+  return false;
+}
+
 void Watch::update(const FilterView& filter, const EpochData& given, FactorSink& sink) {
   static const std::vector<BlockId> kNone;
   EpochData data = given;
@@ -57,16 +76,8 @@ void Watch::update(const FilterView& filter, const EpochData& given, FactorSink&
     if (options_.full_rooms && room.free != nullptr) room.free = &kNone;
   }
   sink_.clear();
-  try {
-    plugin_.object->update(filter, data, sink_);
-  } catch (const ContractError& error) {
-    const std::string what = "update() " + std::string(error.what());
-    return fail_once(what, what + " in " + where());
-  } catch (const std::exception& error) {
-    const std::string what = "update() threw '" + std::string(error.what()) + "'";
-    return fail_once(what, what + " in " + where() +
-                               " - leave out what cannot be used, and count it in rejections()");
-  }
+  const Remedies remedies{" - leave out what cannot be used, and count it in rejections()", ""};
+  if (!returns("update()", remedies, [&] { plugin_.object->update(filter, data, sink_); })) return;
   Digest digest;
   digest.add(digest_of(sink_));
   for (const AddedBlock& block : sink_.added()) add(block, digest);
@@ -76,16 +87,8 @@ void Watch::update(const FilterView& filter, const EpochData& given, FactorSink&
 
 void Watch::settle(const FilterView& filter, BlockEdits& edits) {
   WatchedEdits watched(edits);
-  try {
-    plugin_.object->settle(filter, watched);
-  } catch (const ContractError& error) {
-    const std::string what = "settle() " + std::string(error.what());
-    fail_once(what, what + " in " + where() +
-                        " - only blocks that it has added itself, as long as they exist");
-  } catch (const std::exception& error) {
-    const std::string what = "settle() threw '" + std::string(error.what()) + "'";
-    fail_once(what, what + " in " + where());
-  }
+  const Remedies remedies{"", " - only blocks that it has added itself, as long as they exist"};
+  returns("settle()", remedies, [&] { plugin_.object->settle(filter, watched); });
   digests_.back() ^= watched.digest();
 }
 

@@ -46,6 +46,12 @@ class Watch final : public Update {
 
  private:
   std::string where() const { return "epoch " + std::to_string(digests_.size()); }
+  /// What to do about it, behind the finding.
+  struct Remedies {
+    const char *of_exception, *of_breach;
+  };
+  template <class Call>
+  bool returns(const std::string& name, const Remedies& remedies, Call&& call);
   void fail_once(const std::string& what, const std::string& text);
   bool check(const FilterView& filter);
   bool report(const std::string& what, const std::string& fault);
