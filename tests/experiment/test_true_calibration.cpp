@@ -171,24 +171,17 @@ TEST(TrueCalibration, OfCamerasThatStartWrongIsKnownInARun) {
   const RunResult result = run_filter(setup, collect(setup));
   ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
   ASSERT_EQ(result.calibration.size(), 15U + 23U);
+  const std::map<std::string, std::string> units{
+      {"cam0.fx", "px"}, {"cam0.t_CtoI", "s"}, {"cam0.p_IinC_x", "m"}, {"r_1", "m"}};
   for (const CalibrationTrack& track : result.calibration) {
+    const auto unit = units.find(track.name);
+    EXPECT_EQ(track.unit, unit == units.end() ? track.unit : unit->second) << track.name;
     EXPECT_TRUE(std::isfinite(track.truth)) << track.name;
     // The configuration of the wheels knows nothing of where the simulator has the IMU.
     if (track.sigma.back() == 0. || !track.name.starts_with("cam")) continue;
     EXPECT_LT(std::abs(track.final_error), 4. * track.sigma.back()) << track.name;
     EXPECT_LE(track.sigma.back(), track.sigma.front() * (1. + 1e-9)) << track.name;
-    if (track.name == "cam0.fx") {
-      EXPECT_EQ(track.truth, 460.);
-    }
-    if (track.name == "cam0.fx") {
-      EXPECT_EQ(track.unit, "px");
-    }
-    if (track.name == "cam0.t_CtoI") {
-      EXPECT_EQ(track.unit, "s");
-    }
-    if (track.name == "r_1") {
-      EXPECT_EQ(track.unit, "m");
-    }
+    EXPECT_EQ(track.truth, track.name == "cam0.fx" ? 460. : track.truth);
   }
 }
 

@@ -153,8 +153,8 @@ bool is_estimated(const CalibrationTrack& track) {
   return !track.estimate.empty() && track.sigma.front() > 0.;
 }
 
-DisplayUnit unit_of(const CalibrationTrack& track, const std::string& si_unit) {
-  return display_unit(si_unit, kBandSigmas * track.sigma.back());
+DisplayUnit unit_of(const CalibrationTrack& track) {
+  return display_unit(track.unit, kBandSigmas * track.sigma.back());
 }
 
 /// A range of y that shows how a parameter ends: all after the first fifth of the run. Nothing when
@@ -177,9 +177,8 @@ std::optional<std::pair<double, double>> settled_range(const Series& series, dou
   return std::pair{settled.low - margin, settled.high + margin};
 }
 
-Plot calibration_plot(const RunResult& result, const CalibrationTrack& track,
-                      const std::string& /*si_unit*/) {
-  const DisplayUnit unit = unit_of(track, track.unit);
+Plot calibration_plot(const RunResult& result, const CalibrationTrack& track) {
+  const DisplayUnit unit = unit_of(track);
   Plot plot = half_plot(track.name, "time [s]", with_unit(track.name, unit.name));
   const std::size_t n = std::min(result.epoch_t_s.size(), track.estimate.size());
   const std::span<const double> t_s(result.epoch_t_s.data(), n);
@@ -264,14 +263,14 @@ void add_calibration_section(const RunResult& result, Document& document) {
       held += (held.empty() ? "" : ", ") + track.name;
       continue;
     }
-    const DisplayUnit unit = unit_of(track, track.unit);
+    const DisplayUnit unit = unit_of(track);
     const double sigma = track.sigma.back();
     table.rows.push_back({track.name, unit.name, unit.scale * track.estimate.front(),
                           unit.scale * track.sigma.front(), unit.scale * track.estimate.back(),
                           unit.scale * sigma, unit.scale * track.truth,
                           std::abs(unit.scale * track.final_error),
                           std::abs(track.final_error) / sigma});
-    plots.emplace_back(calibration_plot(result, track, track.unit));
+    plots.emplace_back(calibration_plot(result, track));
   }
   if (plots.empty()) return;
   Section section{"Calibration", {std::move(table)}};

@@ -110,7 +110,7 @@ class UpdateReader {
         context_(context),
         setup_(setup),
         errors_(errors),
-        errors_before_(errors.size()) {}
+        rig_is_read_(errors.empty()) {}
 
   void read(const Node& updates, Node& resolved) {
     for (const auto& entry : updates.entries()) {
@@ -154,7 +154,7 @@ class UpdateReader {
     if (!sensor.empty()) resolved_update.set("sensor", Node::scalar_of(sensor));
     resolved.set(name, resolved_update, mark);
     // Without cameras and wheels that could be read, what it lacks says nothing.
-    if (errors_.size() > before || errors_before_ > 0) return;
+    if (errors_.size() > before || !rig_is_read_) return;
     if (!enabled) {
       note_measured({name, std::move(loaded), nullptr, sensor, mark}, path);
       return;
@@ -229,7 +229,7 @@ class UpdateReader {
   const ReadContext& context_;
   FilterSetup& setup_;
   Errors& errors_;
-  std::size_t errors_before_;
+  bool rig_is_read_;
   std::vector<FilterSetup::Entry> trial_;
 };
 
