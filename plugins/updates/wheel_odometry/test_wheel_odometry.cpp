@@ -371,5 +371,24 @@ TEST_F(OneInterval, SurvivesReadingsThatAreNotNumbers) {
   EXPECT_EQ(counts[1].reason, "interval left out: too long without believable encoder samples");
 }
 
+TEST_F(OneInterval, CountsSamplesThatAreNotOfTheModelsWheels) {
+  for (EncoderSample& sample : encoders_) sample.n_drive = 2;
+  const auto update = testing::load_update("{type: wheel_odometry}");
+  truth_.start(*update);
+  FactorSink sink(2, 60);
+  const EpochData data = truth_.epoch(encoders_);
+  FilterView view = truth_.view();
+  view.clones = view.clones.first(1);
+  update->update(view, data, sink);
+  update->update(truth_.view(), data, sink);
+  EXPECT_EQ(sink.residuals().size(), 0u);
+  std::vector<RejectionCount> counts;
+  update->rejections(counts);
+  ASSERT_EQ(counts.size(), 1u);
+  EXPECT_EQ(counts[0].reason,
+            "interval left out: encoder samples without the channels of the model");
+  EXPECT_EQ(counts[0].count, 1);
+}
+
 }  // namespace
 }  // namespace viwo
