@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """test_consumers.py SOURCE BUILD WORK CMAKE [CLASS...]: builds against the installation and runs.
 
-Tutorial: every file and command of docs/writing_a_plugin.md, writing_an_update.md and
-writing_a_sensor.md. Skeletons: what `viwo plugins new` writes. Headers: each compiles alone.
+Tutorial: every file and command of docs/writing_a_plugin.md, writing_an_update.md,
+writing_a_state.md and writing_a_sensor.md. Skeletons: what `viwo plugins new` writes. Headers:
+each compiles alone.
 """
 
 import json
 import re
 import shutil
+import statistics
 import unittest
 
 import tutorial
@@ -79,6 +81,45 @@ class Tutorial(ConsumerTest):
 
     def test_writing_an_update(self):
         self.follow('writing_an_update.md')
+
+    def test_writing_a_state(self):
+        self.follow('writing_a_state.md')
+        summary = json.loads((self.folder / 'beacons/results/experiment/summary.json').read_text())
+        variants = summary['variants']
+        self.assertEqual({(v['runs'], v['diverged'], v['failed']) for v in variants.values()},
+                         {(40, 0, 0)})
+
+        def coordinates(name, axes):
+            return [c for entry, c in variants[name]['calibration'].items()
+                    if re.fullmatch(rf'beacon\d_[{axes}]', entry)]
+
+        with self.subTest('the table of the page is what was measured'):
+            page = (Installation.source / 'docs/writing_a_state.md').read_text(encoding='utf-8')
+            for name, variant in variants.items():
+                measured = [variant['metrics']['ate_m']['mean'], variant['nees_pose']]
+                for found in (coordinates(name, 'xy'), coordinates(name, 'z')):
+                    if not found:
+                        continue
+                    measured.append(statistics.mean(c['rmse'] ** 2 for c in found) ** 0.5)
+                    measured.append(statistics.mean(c['nees'] for c in found))
+                row = re.search(rf'^\| `{name}` \|(.*)$', page, re.M)[1].replace('0.3 m, held', '')
+                printed = [float(number) for number in re.findall(r'\d+(?:\.\d+)?', row)]
+                self.assertEqual(len(printed), len(measured), name)
+                for number, value in zip(printed, measured):
+                    # Two digits: rounding alone is up to a twentieth.
+                    self.assertAlmostEqual(number, value, delta=0.05 * value, msg=name)
+        # Two-sided 99.9 % bounds of the mean over 40 runs, of chi-square with 1 and with 6 degrees
+        # of freedom; of the latter the mean over the time of a run varies less than one sample.
+        worst = {name: max(c['nees'] for c in coordinates(name, 'xyz'))
+                 for name in ('estimated', 'known_yaw', 'present_estimates')}
+        with self.subTest('the filter knows how well it knows the beacons, and itself'):
+            for name in ('estimated', 'known_yaw'):
+                self.assertLess(worst[name], 1.902, name)
+                self.assertGreater(min(c['nees'] for c in coordinates(name, 'xyz')), 0.423, name)
+                self.assertTrue(4.36 < variants[name]['nees_pose'] < 7.97, name)
+        with self.subTest('what is wrong on purpose is found to be wrong'):
+            self.assertGreater(variants['as_surveyed']['nees_pose'], 7.97)
+            self.assertGreater(worst['present_estimates'], 1.902)
 
     def test_writing_a_sensor(self):
         self.follow('writing_a_sensor.md')

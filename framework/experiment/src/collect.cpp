@@ -81,6 +81,15 @@ class Collector {
   RunData& data_;
 };
 
+/// Whether a sensor may be read while the filter runs: what else than streams it gives, such as
+/// true values, must be known before.
+bool gives_only_streams(const RunSetup& setup, const SensorEntry& entry) {
+  const auto routes = setup.routes.all();
+  return std::all_of(routes.begin(), routes.end(), [&](const Route& route) {
+    return route.sensor != entry.name || route.consumer == Consumer::kStream;
+  });
+}
+
 /// The live sensors of a run and those that work on them, unread.
 RunData listen(const RunSetup& setup) {
   RunData data;
@@ -126,7 +135,8 @@ RunData collect(RunSetup& setup, LiveSensors live) {
     require_no_live_sensor(setup, entry);
     const Loaded<Sensor>& sensor = entry.sensor;
     auto input = inputs.connect(entry);
-    if (setup.filter && input != nullptr && !inputs.is_input(entry)) {
+    if (setup.filter && input != nullptr && !inputs.is_input(entry) &&
+        gives_only_streams(setup, entry)) {
       data.streams.push_back(
           {entry.name, sensor.info, sensor.object, entry.input, std::move(input)});
       continue;
