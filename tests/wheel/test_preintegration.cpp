@@ -1,6 +1,8 @@
 // Preintegrated pose, Jacobian and covariance against closed forms, fine numerical integration,
 // central differences and sampling.
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
@@ -207,7 +209,7 @@ TEST(Preintegration, HasTheCovarianceOfManyNoisyRuns) {
 }
 
 TEST(Preintegration, HasTheCovarianceOfManyNoisyRunsWhereCutSamplesDominate) {
-  // Three pieces, two of them interpolated from the samples beside: without the correlation of
+  // Three pieces, two of them with a part of the sample before: without the correlation of
   // neighbours the covariance would be wrong by a third.
   const int runs = 4000;
   const Bounds limit = bounds(runs);
@@ -217,7 +219,7 @@ TEST(Preintegration, HasTheCovarianceOfManyNoisyRunsWhereCutSamplesDominate) {
   EXPECT_LT(nees, limit.high);
 }
 
-TEST(Preintegration, HasTheCovarianceOfTwoPiecesThatBorrowFromEachOther) {
+TEST(Preintegration, HasTheCovarianceOfTwoPiecesOfWhichOneBorrowsFromTheOther) {
   const int runs = 4000;
   const Bounds limit = bounds(runs);
   const double nees = mean_nees(swerve("four_wis_wid", kSmallSwerveNoise), false, 1., 506'000'000,
@@ -272,6 +274,45 @@ TEST(Preintegration, UsesTheParityOfACutSampleOnceOverBothIntervals) {
     append(total, part);
   }
   EXPECT_LT((total.parity.Lambda - whole.parity.Lambda).norm(), 1e-9 * whole.parity.Lambda.norm());
+}
+
+TEST(Preintegration, GivesWhatWasCountedHoweverIntervalsCutAndStampsJitter) {
+  const auto model = load_model(swerve("four_wis_wid"));
+  // Counts of a straight way at a speed that changes, with stamps up to half a period off.
+  const double radius_m = 0.1, rate_hz = 50.;
+  const auto angle_rad = [&](double t) { return (0.8 * t + 0.3 * std::sin(1.1 * t)) / radius_m; };
+  std::mt19937_64 rng(3);
+  std::uniform_int_distribution<std::int64_t> jitter_ns(-9'900'000, 9'900'000);
+  std::vector<EncoderSample> samples;
+  std::int64_t begin_ns = 0;
+  for (int k = 1; k <= 500; ++k) {
+    EncoderSample sample;
+    sample.n_drive = sample.n_steer = 4;
+    sample.begin_ns = begin_ns;
+    sample.end_ns = sample.t_ns = begin_ns = k * (kSecond / 50) + jitter_ns(rng);
+    const double counted = angle_rad(k / rate_hz) - angle_rad((k - 1) / rate_hz);
+    for (std::size_t i = 0; i < 4; ++i) {
+      sample.drive_rad_per_s[i] = counted / seconds_between(sample.begin_ns, sample.end_ns);
+    }
+    samples.push_back(sample);
+  }
+  Preintegrator preintegrator(model, {});
+  PreintegratedPose whole, total, part;
+  ASSERT_TRUE(preintegrator.integrate(samples, 0, begin_ns, whole));
+  EXPECT_GT(whole.g[1], 1.);
+  for (const std::int64_t epoch_ns : {7'000'000, 20'000'000, 50'000'000, 333'000'000}) {
+    total.reset(16);
+    for (std::int64_t from_ns = 0; from_ns < begin_ns; from_ns += epoch_ns) {
+      // No sample is known but those that reach over the interval, as while driving.
+      const std::int64_t to_ns = std::min(from_ns + epoch_ns, begin_ns);
+      const auto known = std::find_if(samples.begin(), samples.end(),
+                                      [&](const auto& sample) { return sample.end_ns >= to_ns; });
+      const auto n = static_cast<std::size_t>(known - samples.begin()) + 1;
+      ASSERT_TRUE(preintegrator.integrate({samples.data(), n}, from_ns, to_ns, part));
+      append(total, part);
+    }
+    EXPECT_NEAR(total.g[1], whole.g[1], 1e-12) << epoch_ns;
+  }
 }
 
 TEST(Preintegration, SaysWhenTheSamplesDoNotReachOverTheInterval) {

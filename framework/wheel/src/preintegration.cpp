@@ -23,23 +23,20 @@ EncoderSample blend(const EncoderSample& a, const EncoderSample& b, double weigh
   return mixed;
 }
 
-/// The piece [begin_ns, end_ns] of sample k, read at its middle; `weight` is how much of the
-/// neighbour went in (negative: the neighbour before).
+/// The piece [begin_ns, end_ns] of sample k, read at its middle. Readings change evenly within a
+/// cell, as since the cell before: so the pieces of a cell add up to what was counted in it, also
+/// when one is asked for before the next sample is known (W-11). `share`: how much of the sample
+/// before is taken off.
 EncoderSample cut(std::span<const EncoderSample> samples, std::size_t k, std::int64_t begin_ns,
-                  std::int64_t end_ns, double& weight) {
+                  std::int64_t end_ns, double& share) {
   const EncoderSample& sample = samples[k];
-  const std::int64_t middle_ns = begin_ns + (end_ns - begin_ns) / 2;
-  const bool later = middle_ns > sample.t_ns;
-  weight = 0.;
-  if (later ? k + 1 >= samples.size() : k == 0) return sample;
-  const EncoderSample& neighbour = later ? samples[k + 1] : samples[k - 1];
-  const bool adjacent =
-      later ? neighbour.begin_ns == sample.end_ns : neighbour.end_ns == sample.begin_ns;
-  if (!adjacent || neighbour.t_ns == sample.t_ns) return sample;
-  weight = seconds_between(sample.t_ns, middle_ns) / seconds_between(sample.t_ns, neighbour.t_ns);
-  const EncoderSample mixed = blend(sample, neighbour, weight);
-  if (!later) weight = -weight;
-  return mixed;
+  share = 0.;
+  if (k == 0 || samples[k - 1].end_ns != sample.begin_ns) return sample;
+  // Twice the middles.
+  const std::int64_t cell = sample.begin_ns + sample.end_ns;
+  const std::int64_t cell_before = samples[k - 1].begin_ns + samples[k - 1].end_ns;
+  share = seconds_between(cell, begin_ns + end_ns) / seconds_between(cell_before, cell);
+  return blend(sample, samples[k - 1], -share);
 }
 
 /// P <- Phi_tr P Phi_tr^T (W-7), P symmetric: the yaw moves the end by [-dy, dx].
@@ -132,15 +129,14 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   const auto first = std::partition_point(samples.begin(), samples.end(), after_begin);
   std::int64_t reached_ns = begin_ns;
   bool covered = true;
-  // The piece before: how much of its own sample and of the one after went into it.
-  double previous_own = 0., previous_next = 0.;
+  double previous_own = 0.;  // how much of its own sample went into the piece before
   // A hole between cells: the mean of its neighbours, a piece of its own.
   const auto bridge_hole = [&](std::size_t next, std::int64_t until_ns) {
     const double dt = seconds_between(reached_ns, until_ns);
     add_piece(blend(samples[next - 1], samples[next], 0.5), dt, {}, out);
     out.bridged_s += dt;
     --out.samples;
-    previous_own = previous_next = 0.;
+    previous_own = 0.;
     reached_ns = until_ns;
   };
   auto k = static_cast<std::size_t>(first - samples.begin());
@@ -157,19 +153,14 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
     const std::int64_t to_ns = std::min(sample.end_ns, end_ns);
     const double dt = seconds_between(from_ns, to_ns);
     if (from_ns == sample.begin_ns && to_ns == sample.end_ns) {
-      add_piece(sample, dt, {1., previous_next}, out);
+      add_piece(sample, dt, {}, out);
       previous_own = 1.;
-      previous_next = 0.;
     } else {
-      double weight = 0.;
-      const EncoderSample piece = cut(samples, k, from_ns, to_ns, weight);
-      const double share = std::abs(weight);
-      const double own = 1. - share;
-      const double before = weight < 0. ? share : 0.;
-      add_piece(piece, dt, {own * own + share * share, previous_next * own + previous_own * before},
-                out);
+      double share = 0.;
+      const EncoderSample piece = cut(samples, k, from_ns, to_ns, share);
+      const double own = 1. + share;
+      add_piece(piece, dt, {own * own + share * share, -share * previous_own}, out);
       previous_own = own;
-      previous_next = weight > 0. ? share : 0.;
       // A sample that is cut counts where its stamp is.
       if (sample.t_ns < from_ns || sample.t_ns >= to_ns) --out.samples;
     }

@@ -57,8 +57,8 @@ class Preintegrator {
   const WheelModel& model() const { return solver_.model(); }
 
   /// Motion from begin_ns to end_ns in the wheel clock. The samples that the ends fall into are cut
-  /// there, with the readings interpolated to the middle of the piece; holes between cells are
-  /// bridged with the mean of their neighbours. Returns false, with the part that is covered, when
+  /// there so that their pieces add up (W-11); holes between cells are bridged with the mean of
+  /// their neighbours. Returns false, with the part that is covered, when
   /// the samples do not reach over the whole interval. What is not believed at the start of an
   /// interval that continues the one before is bridged from there.
   bool integrate(std::span<const EncoderSample> samples, std::int64_t begin_ns, std::int64_t end_ns,
