@@ -33,7 +33,8 @@ struct MessageAllocator : std::allocator<T> {
 
 namespace msg {
 
-using AnyAllocator = MessageAllocator<char>;
+// Of any type but char: rebound to its own, an allocator must be itself.
+using AnyAllocator = MessageAllocator<int>;
 
 using CompressedImage = sensor_msgs::CompressedImage_<AnyAllocator>;
 using DiagnosticArray = diagnostic_msgs::DiagnosticArray_<AnyAllocator>;

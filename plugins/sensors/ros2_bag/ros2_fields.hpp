@@ -6,10 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
-#include <fastcdr/exceptions/Exception.h>
-
+#include "cdr.hpp"
 #include "field_reader.hpp"
 
 namespace viwo::bag {
@@ -19,7 +16,7 @@ class Ros2Fields final : public FieldReader {
   explicit Ros2Fields(std::span<const std::uint8_t> message)
       // A buffer has no constant form; reading does not write.
       : buffer_(reinterpret_cast<char*>(const_cast<std::uint8_t*>(message.data())), message.size()),
-        in_(buffer_, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR) {
+        in_(buffer_, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, kDdsCdr) {
     try {
       in_.read_encapsulation();
     } catch (const eprosima::fastcdr::exception::Exception&) {
@@ -43,7 +40,7 @@ class Ros2Fields final : public FieldReader {
   }
   std::span<const std::uint8_t> bytes() override {
     const std::size_t n = count(1);
-    const auto* const begin = reinterpret_cast<const std::uint8_t*>(in_.getCurrentPosition());
+    const auto* const begin = reinterpret_cast<const std::uint8_t*>(position(in_));
     if (n == 0) return {};
     // The last byte is read: the next number is aligned by the size of what was read before it.
     if (!in_.jump(n - 1)) throw BrokenMessage("it ends too early");
@@ -52,7 +49,7 @@ class Ros2Fields final : public FieldReader {
   }
   std::size_t left() const override {
     auto& in = const_cast<eprosima::fastcdr::Cdr&>(in_);
-    const auto read = static_cast<std::size_t>(in.getCurrentPosition() - in.getBufferPointer());
+    const auto read = static_cast<std::size_t>(position(in) - buffer_begin(in));
     return buffer_.getBufferSize() - read;
   }
 

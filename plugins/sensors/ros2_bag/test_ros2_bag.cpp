@@ -7,11 +7,10 @@
 #include <string>
 #include <vector>
 
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
 #include <gmock/gmock.h>
 #include <sqlite3.h>
 
+#include "cdr.hpp"
 #include "support.hpp"
 #include "viwo/image/image_file.hpp"
 
@@ -31,7 +30,7 @@ constexpr std::int64_t kMs = 1'000'000;
 class Cdr2 {
  public:
   explicit Cdr2(Cdr::Endianness order = Cdr::LITTLE_ENDIANNESS)
-      : out_(buffer_, order, Cdr::DDS_CDR) {
+      : out_(buffer_, order, bag::kDdsCdr) {
     out_.serialize_encapsulation();
   }
   template <class T>
@@ -43,7 +42,7 @@ class Cdr2 {
     return *this << static_cast<std::int32_t>(t_ns / 1'000'000'000)
                  << static_cast<std::uint32_t>(t_ns % 1'000'000'000) << frame;
   }
-  std::string bytes() { return {buffer_.getBuffer(), out_.getSerializedDataLength()}; }
+  std::string bytes() { return {buffer_.getBuffer(), bag::written(out_)}; }
 
  private:
   FastBuffer buffer_;
