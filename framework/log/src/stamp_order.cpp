@@ -1,5 +1,7 @@
 #include "viwo/log/stamp_order.hpp"
 
+#include <cmath>
+
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
@@ -13,7 +15,8 @@ std::string gap_reason(double max_gap_s) {
 StampOrder::StampOrder(const LogLimits& limits, std::string prefix)
     : limits_(limits),
       prefix_(std::move(prefix)),
-      gap_reason_(prefix_ + gap_reason(limits.max_gap_s)) {}
+      gap_reason_(prefix_ + gap_reason(limits.max_gap_s)),
+      has_rate_(std::isfinite(limits.max_gap_s)) {}
 
 bool StampOrder::is_behind_gap(std::int64_t t_ns) const {
   return last_ns_ && seconds_between(*last_ns_, t_ns) > limits_.max_gap_s;

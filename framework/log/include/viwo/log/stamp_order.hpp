@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "viwo/api/rejections.hpp"
+#include "viwo/math/stamp_jump.hpp"
 
 namespace viwo::log {
 
@@ -20,6 +21,7 @@ struct LogLimits {
 };
 
 inline constexpr const char* kStampNotAfter = "stamp not after the previous one";
+inline constexpr const char* kStampFarAhead = "stamp far ahead of the previous one";
 
 /// "gap longer than 0.2 s"
 std::string gap_reason(double max_gap_s);
@@ -30,12 +32,16 @@ class StampOrder {
   /// `prefix` stands before all reasons.
   explicit StampOrder(const LogLimits& limits, std::string prefix = "");
 
-  /// True for a stamp after all stamps accepted before; otherwise it is rejected and counted. A gap
-  /// before an accepted stamp is counted, too.
+  /// True for a stamp after all stamps accepted before and not far ahead of them (StampJump);
+  /// otherwise it is rejected and counted. A gap before an accepted stamp is counted, too.
   template <class Where>
   bool accept(std::int64_t t_ns, const Where& where) {
     if (last_ns_ && t_ns <= *last_ns_) {
       reject(kStampNotAfter, where);
+      return false;
+    }
+    if (has_rate_ && !jump_.is_believed(t_ns)) {
+      reject(kStampFarAhead, where);
       return false;
     }
     if (is_behind_gap(t_ns)) counts_.add(gap_reason_, where);
@@ -78,6 +84,8 @@ class StampOrder {
   std::string prefix_;
   std::string gap_reason_;
   std::optional<std::int64_t> last_ns_;
+  bool has_rate_;  ///< not of data without any, for which nothing is a gap
+  StampJump jump_;
   std::int64_t accepted_ = 0;
   std::int64_t rejected_ = 0;
   Rejections counts_;
