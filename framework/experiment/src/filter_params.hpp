@@ -54,7 +54,16 @@ inline constexpr std::array kEstimatorParams{
               .fallback = "0.05",
               .min = 0.,
               .min_exclusive = true,
-              .help = "longer spacings of the IMU are counted"},
+              .help =
+                  "longer spacings of the IMU are gaps: counted, and how the robot moved in them "
+                  "is unknown"},
+    ParamSpec{.name = "max_speed_m_per_s",
+              .type = ParamType::kNumber,
+              .unit = "m/s",
+              .fallback = "100",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "an estimate that is faster has diverged"},
     ParamSpec{.name = "max_update_failures",
               .type = ParamType::kInt,
               .fallback = "10",
@@ -177,6 +186,20 @@ inline constexpr std::array kImuParams{
               .fallback = "3e-3",
               .min = 0.,
               .help = "random walk of the accelerometer bias"},
+    ParamSpec{.name = "range_gyro_rad_per_s",
+              .type = ParamType::kNumber,
+              .unit = "rad/s",
+              .fallback = "35",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "readings beyond are left out (35: a little above 2000 deg/s)"},
+    ParamSpec{.name = "range_accel_m_per_s2",
+              .type = ParamType::kNumber,
+              .unit = "m/s^2",
+              .fallback = "160",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "readings beyond are left out (160: a little above 16 g)"},
 };
 
 inline constexpr std::array kCamerasParams{

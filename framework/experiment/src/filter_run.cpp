@@ -299,6 +299,12 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
     result.status = RunStatus::kFailed;
     result.cause = no_epoch(*setup.filter, estimator);
   }
+  if (const Contact& contact = estimator.contact(); contact.loosened() > 0) {
+    result.warnings.push_back("all updates contradicted the estimate, first at " +
+                              stamp_text(contact.first_ns()) + "; it was loosened " +
+                              std::to_string(contact.loosened()) +
+                              " times - look for faults of the IMU there");
+  }
   for (std::string& line : contradictions(result.updates)) {
     result.warnings.push_back(std::move(line));
   }

@@ -48,7 +48,8 @@ void read_estimator(const ParamSet& p, FilterSetup& setup) {
   setup.options.growing_window = p.flag("growing_window");
   setup.options.schedule.max_epoch_s = p.number("max_epoch_s");
   setup.options.schedule.max_wait_s = p.number("max_wait_s");
-  setup.options.max_imu_gap_s = p.number("max_imu_gap_s");
+  setup.options.imu.max_gap_s = p.number("max_imu_gap_s");
+  setup.options.health.max_speed_m_per_s = p.number("max_speed_m_per_s");
   setup.options.runner.max_update_failures = static_cast<int>(p.integer("max_update_failures"));
   setup.options.monitor.enabled = p.flag("monitor");
   setup.options.monitor.window_s = p.number("monitor_window_s");
@@ -105,6 +106,8 @@ void read_imu(ParamSet p, const Node& section, FilterSetup& setup, Node& resolve
   }
   for (const auto& [key, value] : numbers) value = p.number(key);
   setup.options.filter.imu_noise = noise;
+  setup.options.imu.max_gyro_rad_per_s = p.number("range_gyro_rad_per_s");
+  setup.options.imu.max_accel_m_per_s2 = p.number("range_accel_m_per_s2");
 }
 
 /// Draws how wrong calibration starts: the same whether it is then calibrated or not.

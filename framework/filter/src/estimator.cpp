@@ -52,7 +52,7 @@ Estimator::Estimator(const EstimatorOptions& options, std::vector<UpdateEntry> u
       filter_(options.filter, declared_.blocks(), declared_.rooms()),
       runner_(options.runner, std::move(updates), declared_, filter_),
       n_extra_(n_extra),
-      imu_(options.max_imu_gap_s),
+      imu_(options.imu),
       taken_(declared_.taken().size()),
       stage_ms_(runner_.updates().size() + 2, 0.) {
   for (const SharedStream& stream : declared_.streams()) streams_.emplace_back(stream);
@@ -121,7 +121,8 @@ bool Estimator::step() {
   watch(data);
   if (filter_.window_full()) filter_.drop_oldest_clone();
   forget_used();
-  failure_ = failure_of(filter_);
+  failure_ = failure_of(filter_, options_.health);
+  if (failure_.empty()) failure_ = contact_.epoch(runner_.counts(), filter_);
   ++epochs_;
   stage_done(stage_ms_.size() - 1);
   return true;
@@ -140,7 +141,7 @@ void Estimator::propagate_to(std::int64_t t_ns, EpochData& data) {
   if (options_.growing_window) {
     filter_.limit_window(kFirstWindow + static_cast<std::size_t>(epochs_) / kEpochsPerClone);
   }
-  const ImuTransition transition = filter_.propagate(data.imu);
+  const ImuTransition transition = filter_.propagate(data.imu, imu_.gaps_s());
   filter_.clone(data.imu.back());
   if (runner_.observer() != nullptr) runner_.observer()->on_clone(filter_, transition.Phi);
   stage_done(0);

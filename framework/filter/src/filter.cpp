@@ -11,6 +11,13 @@
 namespace viwo {
 namespace {
 
+/// What may be off in a filter that has lost contact with all that is measured (F-28).
+constexpr double kLostThetaRad = 0.1;
+constexpr double kLostPositionM = 0.3;
+constexpr double kLostVelocityMPerS = 1.;
+constexpr double kLostGyroBiasRadPerS = 0.05;
+constexpr double kLostAccelBiasMPerS2 = 0.3;
+
 int clone_columns(const FilterOptions& options) {
   if (options.clones < 2 || options.clones > 100) {
     throw std::invalid_argument("the number of clones must be within 2 .. 100");
@@ -68,7 +75,8 @@ void Filter::initialize(const ImuPrior& prior) {
   covariance_.set_block(0, prior.P);
 }
 
-ImuTransition Filter::propagate(std::span<const ImuSample> samples) {
+ImuTransition Filter::propagate(std::span<const ImuSample> samples,
+                                std::span<const double> gaps_s) {
   if (samples.empty()) return {ImuMatrix::Identity(), ImuMatrix::Zero()};
   if (!options_.first_estimates) {
     imu_.R_GtoI_fej = imu_.R_GtoI;
@@ -76,11 +84,24 @@ ImuTransition Filter::propagate(std::span<const ImuSample> samples) {
     imu_.v_IinG_fej = imu_.v_IinG;
   }
   const ImuTransition transition =
-      viwo::propagate(samples, options_.imu_noise, options_.gravity_m_per_s2, imu_);
+      viwo::propagate(samples, options_.imu_noise, options_.gravity_m_per_s2, imu_, gaps_s);
   covariance_.propagate(transition);
   blocks_.propagate(seconds_between(samples.front().t_ns, samples.back().t_ns), covariance_);
   t_ns_ = samples.back().t_ns;
   return transition;
+}
+
+void Filter::loosen(double times) {
+  ImuTransition unknown{ImuMatrix::Identity(), ImuMatrix::Zero()};
+  const auto add = [&](int column, double sigma) {
+    unknown.Q.diagonal().segment<3>(column).setConstant(times * times * sigma * sigma);
+  };
+  add(kThetaColumn, kLostThetaRad);
+  add(kPositionColumn, kLostPositionM);
+  add(kVelocityColumn, kLostVelocityMPerS);
+  add(kGyroBiasColumn, kLostGyroBiasRadPerS);
+  add(kAccelBiasColumn, kLostAccelBiasMPerS2);
+  covariance_.propagate(unknown);
 }
 
 void Filter::clone(const ImuSample& sample) {

@@ -1,8 +1,25 @@
 #include "viwo/filter/health.hpp"
 
-namespace viwo {
+#include <algorithm>
+#include <cstdio>
+#include <utility>
 
-std::string failure_of(const Filter& filter) {
+namespace viwo {
+namespace {
+
+constexpr double kPeriodS = 0.5;
+constexpr std::int64_t kFewest = 5;  ///< measurements of a period that say something
+constexpr int kMostPeriods = 8;      ///< lost without a break: four seconds
+
+std::string beyond(const char* what, double value, double limit, const char* unit) {
+  char text[160];
+  std::snprintf(text, sizeof text, "%s is %.3g %s, more than %.3g", what, value, unit, limit);
+  return text;
+}
+
+}  // namespace
+
+std::string failure_of(const Filter& filter, const HealthLimits& limits) {
   if (filter.covariance_failed()) {
     return "the covariance of the clones is not positive definite any more";
   }
@@ -14,7 +31,57 @@ std::string failure_of(const Filter& filter) {
   if (!finite) return "the estimate or its covariance is not finite any more";
   if ((P.diagonal().array() < 0.).any()) return "a variance is negative";
   const std::string block = filter.blocks().not_finite();
-  return block.empty() ? "" : "the block '" + block + "' is not finite any more";
+  if (!block.empty()) return "the block '" + block + "' is not finite any more";
+  const double speed = imu.v_IinG.norm(), gyro = imu.gyro_bias.norm(),
+               accel = imu.accel_bias.norm();
+  if (speed > limits.max_speed_m_per_s) {
+    return beyond("the speed", speed, limits.max_speed_m_per_s,
+                  "m/s (estimator.max_speed_m_per_s)");
+  }
+  if (gyro > limits.max_gyro_bias_rad_per_s) {
+    return beyond("the gyro bias", gyro, limits.max_gyro_bias_rad_per_s, "rad/s");
+  }
+  if (accel > limits.max_accel_bias_m_per_s2) {
+    return beyond("the accelerometer bias", accel, limits.max_accel_bias_m_per_s2, "m/s^2");
+  }
+  return "";
+}
+
+bool Contact::is_lost(std::span<const UpdateCounts> counts) const {
+  std::int64_t updates = 0;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const std::int64_t applied = counts[i].applied - before_[i].applied;
+    const std::int64_t rejected = counts[i].rejected - before_[i].rejected;
+    if (applied + rejected < kFewest) continue;
+    if (5 * applied > applied + rejected) return false;
+    ++updates;
+  }
+  return updates > 0;
+}
+
+std::string Contact::epoch(std::span<const UpdateCounts> counts, Filter& filter) {
+  const std::int64_t t_ns = filter.t_ns();
+  if (before_.empty()) {
+    before_.assign(counts.begin(), counts.end());
+    begin_ns_ = t_ns;
+  }
+  if (seconds_between(begin_ns_, t_ns) < kPeriodS) return "";
+  const bool lost = is_lost(counts);
+  std::copy(counts.begin(), counts.end(), before_.begin());
+  const std::int64_t begin_ns = std::exchange(begin_ns_, t_ns);
+  if (!lost) {
+    lost_periods_ = 0;
+    return "";
+  }
+  if (lost_periods_++ == 0) lost_since_ns_ = begin_ns;
+  if (lost_periods_ == kMostPeriods) {
+    return "all updates contradict the estimate since " + stamp_text(lost_since_ns_) +
+           ": check units, axes and clock of the IMU, then calibration and noise of the other "
+           "sensors";
+  }
+  if (loosened_++ == 0) first_ns_ = begin_ns;
+  filter.loosen(lost_periods_);
+  return "";
 }
 
 }  // namespace viwo

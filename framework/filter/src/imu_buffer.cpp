@@ -1,30 +1,53 @@
 #include "viwo/filter/imu_buffer.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "viwo/filter/propagation.hpp"
 
 namespace viwo {
+namespace {
+
+bool is_within(const std::array<double, 3>& values, double most) {
+  return std::all_of(values.begin(), values.end(),
+                     [most](double value) { return std::abs(value) <= most; });
+}
+
+}  // namespace
+
+double ImuBuffer::gap_s(const ImuSample& before, const ImuSample& after) const {
+  const double spacing_s = seconds_between(before.t_ns, after.t_ns);
+  return spacing_s > limits_.max_gap_s ? spacing_s : 0.;
+}
 
 void ImuBuffer::add(const ImuSample& sample, Rejections& rejections) {
   if (const char* fault = sample.fault()) {
     rejections.add(std::string("imu: ") + fault, sample.t_ns);
     return;
   }
-  if (!empty()) {
-    if (sample.t_ns <= newest_ns()) {
-      rejections.add("imu: stamp not after the last", sample.t_ns);
-      return;
-    }
-    if (seconds_between(newest_ns(), sample.t_ns) > max_gap_s_) {
-      rejections.add("imu: gap bridged", sample.t_ns);
-    }
+  if (!is_within(sample.gyro_rad_per_s, limits_.max_gyro_rad_per_s) ||
+      !is_within(sample.accel_m_per_s2, limits_.max_accel_m_per_s2)) {
+    rejections.add("imu: out of range (range_gyro_rad_per_s, range_accel_m_per_s2)", sample.t_ns);
+    return;
+  }
+  if (!empty() && sample.t_ns <= newest_ns()) {
+    rejections.add("imu: stamp not after the last", sample.t_ns);
+    return;
+  }
+  if (!jump_.is_believed(sample.t_ns)) {
+    rejections.add("imu: stamp far ahead of the last", sample.t_ns);
+    return;
+  }
+  if (!empty() && gap_s(samples().back(), sample) > 0.) {
+    rejections.add("imu: gap bridged", sample.t_ns);
   }
   buffer_.push(sample);
 }
 
 std::span<const ImuSample> ImuBuffer::cut(std::int64_t begin_ns, std::int64_t end_ns) {
   cut_.clear();
+  gaps_s_.assign(1, 0.);
   const auto all = samples();
   const auto after = [](std::int64_t t_ns, const ImuSample& sample) { return t_ns < sample.t_ns; };
   const auto first = std::upper_bound(all.begin(), all.end(), begin_ns, after);
@@ -35,6 +58,7 @@ std::span<const ImuSample> ImuBuffer::cut(std::int64_t begin_ns, std::int64_t en
   }
   cut_.back().t_ns = begin_ns;
   for (auto sample = first; sample != all.end(); ++sample) {
+    gaps_s_.push_back(sample == all.begin() ? 0. : gap_s(*std::prev(sample), *sample));
     if (sample->t_ns < end_ns) {
       cut_.push_back(*sample);
       continue;

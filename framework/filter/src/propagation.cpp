@@ -9,6 +9,11 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+/// How a robot turns and accelerates while nothing is measured, off the line between the readings
+/// around the gap.
+constexpr double kGapGyroRadPerS = 0.5;
+constexpr double kGapAccelMPerS2 = 2.;
+
 /// One step between two samples, in an error state whose orientation error is in G
 /// (phi = R_ItoG dtheta): there the orientation's own transition is the identity (F-3, F-4).
 struct Step {
@@ -35,13 +40,16 @@ struct Step {
   }
 
   /// Q <- Phi_step Q Phi_step^T + Q_step (F-5).
-  void add_noise(const ImuNoise& noise, ImuMatrix& Q) const {
+  void add_noise(const ImuNoise& noise, double gap_s, ImuMatrix& Q) const {
     apply(Q);
     Q.transposeInPlace();
     apply(Q);
     const auto squared = [](double sigma) { return sigma * sigma; };
-    const double gyro = squared(noise.gyro_rad_per_s_sqrt_hz) * dt;
-    const double accel = squared(noise.accel_m_per_s2_sqrt_hz) * dt;
+    // (F-27): white noise that over the whole gap is as much as an error that lasts.
+    const double gyro =
+        (squared(noise.gyro_rad_per_s_sqrt_hz) + squared(kGapGyroRadPerS) * gap_s) * dt;
+    const double accel =
+        (squared(noise.accel_m_per_s2_sqrt_hz) + squared(kGapAccelMPerS2) * gap_s) * dt;
     // White noise is isotropic: the rotation that turns it into G leaves its covariance alone.
     Q.diagonal().segment<3>(kThetaColumn).array() += gyro;
     Q.diagonal().segment<3>(kVelocityColumn).array() += accel;
@@ -103,13 +111,13 @@ ImuSample interpolate(const ImuSample& before, const ImuSample& after, std::int6
 }
 
 ImuTransition propagate(std::span<const ImuSample> samples, const ImuNoise& noise,
-                        double gravity_m_per_s2, ImuView& imu) {
+                        double gravity_m_per_s2, ImuView& imu, std::span<const double> gaps_s) {
   ImuTransition transition{ImuMatrix::Identity(), ImuMatrix::Zero()};
   if (samples.size() < 2) return transition;
   for (std::size_t i = 1; i < samples.size(); ++i) {
     const Step step = integrate(samples[i - 1], samples[i], gravity_m_per_s2, imu);
     step.apply(transition.Phi);
-    step.add_noise(noise, transition.Q);
+    step.add_noise(noise, gaps_s.empty() ? 0. : gaps_s[i], transition.Q);
   }
   imu.R_GtoI = normalized_rotation(imu.R_GtoI);
 

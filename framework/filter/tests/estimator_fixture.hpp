@@ -174,6 +174,14 @@ inline Counts counts_of(const Estimator& estimator) {
   return counts;
 }
 
+/// For readings that grow and grow (imu_at).
+inline EstimatorOptions any_motion() {
+  EstimatorOptions options;
+  options.imu.max_gyro_rad_per_s = options.imu.max_accel_m_per_s2 = 1e9;
+  options.health.max_speed_m_per_s = 1e9;
+  return options;
+}
+
 /// An estimator with one fake update.
 struct Bench {
   std::shared_ptr<FakeUpdate> update;
@@ -181,7 +189,8 @@ struct Bench {
   // Which of the estimator's streams is which; -1: it has none of that kind.
   int ticks, cells, fixes;
 
-  explicit Bench(Wants wants = {}, const FakeUpdate::Emit& emit = {}, EstimatorOptions options = {})
+  explicit Bench(Wants wants = {}, const FakeUpdate::Emit& emit = {},
+                 EstimatorOptions options = any_motion())
       : update(std::make_shared<FakeUpdate>(emit, wants)),
         estimator(options, {{"fake", update, nullptr, ""}}),
         ticks(find(sample_type<TickSample>())),
@@ -190,7 +199,7 @@ struct Bench {
 
   /// One that has been started at kStart.
   static Bench started(Wants wants = {}, const FakeUpdate::Emit& emit = {},
-                       EstimatorOptions options = {}) {
+                       EstimatorOptions options = any_motion()) {
     Bench bench(wants, emit, options);
     bench.estimator.start(level_prior(kStart));
     return bench;

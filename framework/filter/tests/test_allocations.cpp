@@ -94,7 +94,7 @@ class Busy final : public Update {
 TEST(Allocations, ThereAreNoneInTheSteadyState) {
   if (!testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
   const auto busy = std::make_shared<Busy>();
-  EstimatorOptions options;
+  EstimatorOptions options = testing::any_motion();
   options.monitor.window_s = 1.;
   options.monitor.hold = true;
   Estimator estimator(options, {{"busy", busy, nullptr, ""}});

@@ -22,7 +22,7 @@ using testing::tick_at;
 struct ScheduleBench {
   StateBlocks blocks{{testing::base_clock(0.)}, {}, 0};
   ScheduleOptions options;
-  ImuBuffer imu{1.};
+  ImuBuffer imu{ImuLimits{.max_gap_s = 1.}};
   std::vector<Stream> streams;
   Rejections rejections;
   bool finished = false;

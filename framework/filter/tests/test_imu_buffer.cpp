@@ -20,7 +20,7 @@ using testing::kStart;
 
 /// Readings at these times, ms after the start; longest gap 50 ms.
 struct ImuBench {
-  ImuBuffer buffer{0.05};
+  ImuBuffer buffer{ImuLimits{}};
   Rejections rejections;
 
   explicit ImuBench(const std::vector<std::int64_t>& t_ms) {
@@ -109,6 +109,45 @@ TEST(ImuBuffer, ForgetsBeforeAStartWhatNoneLooksAt) {
   bench.buffer.add(imu_at(kStart + 120'000 * kMs), bench.rejections);
   bench.buffer.forget_before_start();
   EXPECT_EQ(bench.buffer.samples().size(), 601u);
+}
+
+TEST(ImuBuffer, DoesNotBelieveAStampFarAheadUntilAnotherOneFollows) {
+  ImuBench broken({0, 10, 30'000, 20, 30});
+  EXPECT_EQ(broken.buffer.samples().size(), 4u);
+  EXPECT_EQ(broken.buffer.newest_ns(), kStart + 30 * kMs);
+  EXPECT_EQ(broken.rejected(), (Counts{{"imu: stamp far ahead of the last", 1}}));
+  ImuBench late({0, 10, 30'000, 30'010, 30'020});
+  EXPECT_EQ(late.buffer.newest_ns(), kStart + 30'020 * kMs);
+  EXPECT_EQ(late.rejected(),
+            (Counts{{"imu: stamp far ahead of the last", 1}, {"imu: gap bridged", 1}}));
+}
+
+TEST(ImuBuffer, LeavesOutReadingsBeyondTheRange) {
+  ImuBench bench({0});
+  ImuSample sample = imu_at(kStart + 10 * kMs);
+  sample.accel_m_per_s2[1] = -160.1;
+  bench.buffer.add(sample, bench.rejections);
+  sample.accel_m_per_s2[1] = -160.;
+  sample.gyro_rad_per_s[2] = 1e20;
+  bench.buffer.add(sample, bench.rejections);
+  sample.gyro_rad_per_s[2] = 35.;
+  bench.buffer.add(sample, bench.rejections);
+  EXPECT_EQ(bench.buffer.samples().size(), 2u);
+  EXPECT_EQ(bench.rejected(),
+            (Counts{{"imu: out of range (range_gyro_rad_per_s, range_accel_m_per_s2)", 2}}));
+}
+
+TEST(ImuBuffer, SaysWhichPartsOfACutLieInAGap) {
+  ImuBench bench({0, 10, 110, 120});
+  const auto gaps = [&](std::int64_t begin_ms, std::int64_t end_ms) {
+    bench.cut(begin_ms, end_ms);
+    const auto gaps_s = bench.buffer.gaps_s();
+    return std::vector<double>(gaps_s.begin(), gaps_s.end());
+  };
+  EXPECT_EQ(gaps(0, 10), (std::vector{0., 0.}));
+  EXPECT_EQ(gaps(0, 60), (std::vector{0., 0., 0.1}));
+  EXPECT_EQ(gaps(60, 90), (std::vector{0., 0.1}));
+  EXPECT_EQ(gaps(60, 120), (std::vector{0., 0.1, 0.}));
 }
 
 }  // namespace

@@ -177,5 +177,24 @@ TEST(Propagation, InterpolatesReadingsLinearly) {
   }
 }
 
+TEST(Propagation, KnowsLittleOfAGapHoweverItIsCut) {
+  const double T = 2.;
+  for (const double step_s : {2., 0.1}) {
+    const auto all = samples(T, step_s);
+    std::vector<double> gaps_s(all.size(), T);
+    ImuView imu = start(), same = start();
+    const ImuTransition without = propagate(all, {}, 9.81, same);
+    const ImuTransition with = propagate(all, {}, 9.81, imu, gaps_s);
+    EXPECT_EQ(imu.p_IinG, same.p_IinG);
+    // White noise of this size over T is an angle of 0.5 rad/s T and a velocity of 2 m/s^2 T.
+    const ImuMatrix more = with.Q - without.Q;
+    EXPECT_NEAR(more(kThetaColumn, kThetaColumn), 0.25 * T * T, 1e-9);
+    // What the turn makes of gravity and motion comes on top.
+    EXPECT_GT(more(kVelocityColumn, kVelocityColumn), 4. * T * T * (1. - 1e-9));
+    EXPECT_GT(more(kPositionColumn, kPositionColumn), 4. * T * T * T * T / 3. * (1. - 1e-9));
+    EXPECT_NEAR(more.diagonal().tail<6>().norm(), 0., 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace viwo

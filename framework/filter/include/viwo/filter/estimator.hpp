@@ -12,6 +12,7 @@
 #include "viwo/filter/epoch_schedule.hpp"
 #include "viwo/filter/excitation_monitor.hpp"
 #include "viwo/filter/filter.hpp"
+#include "viwo/filter/health.hpp"
 #include "viwo/filter/imu_buffer.hpp"
 #include "viwo/filter/start_search.hpp"
 #include "viwo/filter/stream.hpp"
@@ -29,8 +30,8 @@ struct EstimatorOptions {
   /// wrong for more than a second, and tracks of near points would be linearised centimetres off.
   /// A start that is right is better off with the whole window: short ones lose yaw for good.
   bool growing_window = true;
-  /// Longer spacings of the IMU are counted.
-  double max_imu_gap_s = 0.05;
+  ImuLimits imu;
+  HealthLimits health;
 };
 
 /// A stream that somebody else than an update wants, for a start.
@@ -83,6 +84,9 @@ class Estimator {
   std::int64_t epochs() const { return epochs_; }
   /// One for each group of blocks of which something is estimated; none if they are turned off.
   std::span<const ExcitationMonitor> monitors() const { return monitors_; }
+  /// How often, and when first, the estimate was loosened because all that is measured contradicted
+  /// it.
+  const Contact& contact() const { return contact_; }
 
   /// Stages of an epoch: "propagate", the updates, "marginalise".
   std::vector<std::string> stage_names() const;
@@ -111,6 +115,7 @@ class Estimator {
   std::vector<ExcitationMonitor> monitors_;
   Rejections rejections_;
   bool finished_ = false;
+  Contact contact_;
   std::string failure_;
   std::int64_t epochs_ = 0;
   std::vector<double> stage_ms_;

@@ -44,7 +44,10 @@ class Filter {
 
   /// Moves the inertial state to the stamp of the last sample; the first one is at t_ns(). Returns
   /// the transition (identity, without noise, for no samples).
-  ImuTransition propagate(std::span<const ImuSample> samples);
+  ImuTransition propagate(std::span<const ImuSample> samples, std::span<const double> gaps_s = {});
+  /// Something has moved the IMU's state that no noise explains: its covariance grows by what it
+  /// may be off, `times` over (F-28).
+  void loosen(double times);
   /// Appends the present pose; `sample` is the IMU reading at t_ns(). There must be room (drop the
   /// oldest clone first).
   void clone(const ImuSample& sample);

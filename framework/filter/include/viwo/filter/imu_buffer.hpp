@@ -7,15 +7,23 @@
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/rejections.hpp"
+#include "viwo/math/stamp_jump.hpp"
 
 namespace viwo {
 
+/// What an IMU can say. Readings beyond are none.
+struct ImuLimits {
+  double max_gap_s = 0.05;           ///< longer spacings are gaps
+  double max_gyro_rad_per_s = 35.;   ///< 2000 deg/s
+  double max_accel_m_per_s2 = 160.;  ///< 16 g
+};
+
 class ImuBuffer {
  public:
-  /// Longer spacings are counted.
-  explicit ImuBuffer(double max_gap_s) : max_gap_s_(max_gap_s) {}
+  explicit ImuBuffer(const ImuLimits& limits) : limits_(limits) {}
 
-  /// A reading that is not finite, or not after the last, is dropped and counted.
+  /// A reading that is not finite or out of range, not after the last or far ahead of it
+  /// (StampJump) is dropped and counted.
   void add(const ImuSample& sample, Rejections& rejections);
   bool empty() const { return buffer_.empty(); }
   std::int64_t newest_ns() const { return samples().back().t_ns; }
@@ -24,15 +32,21 @@ class ImuBuffer {
   /// Readings from `begin_ns` to `end_ns`, interpolated at both; before the first reading that one
   /// holds. Valid until the next call. Readings must reach `end_ns`.
   std::span<const ImuSample> cut(std::int64_t begin_ns, std::int64_t end_ns);
+  /// For each reading of the last cut the length of the gap that it ends, or lies in; 0: none.
+  std::span<const double> gaps_s() const { return gaps_s_; }
   /// What is not needed to go on from `t_ns`.
   void forget_before(std::int64_t t_ns);
   /// What no start looks at any more.
   void forget_before_start();
 
  private:
-  double max_gap_s_;
+  double gap_s(const ImuSample& before, const ImuSample& after) const;
+
+  ImuLimits limits_;
+  StampJump jump_;
   TypedBuffer<ImuSample> buffer_;
   std::vector<ImuSample> cut_;
+  std::vector<double> gaps_s_;
 };
 
 }  // namespace viwo

@@ -25,8 +25,10 @@ struct ImuTransition {
 /// Moves `imu` over the samples, from the stamp of the first to that of the last (F-1, F-2), and
 /// returns the transition (F-3 .. F-5). Readings are taken as linear between samples. Phi is taken
 /// between the first estimates at the start (imu.*_fej) and the new estimate (F-6), which becomes
-/// the first estimate of what follows. With fewer than two samples nothing moves.
+/// the first estimate of what follows. With fewer than two samples nothing moves. `gaps_s`: for
+/// each sample the length of the gap that it ends or lies in, where the line between samples is a
+/// guess (F-27); empty: there is none.
 ImuTransition propagate(std::span<const ImuSample> samples, const ImuNoise& noise,
-                        double gravity_m_per_s2, ImuView& imu);
+                        double gravity_m_per_s2, ImuView& imu, std::span<const double> gaps_s = {});
 
 }  // namespace viwo
