@@ -48,6 +48,12 @@ std::array<std::size_t, 4> xyzw_columns(const TableReader& table) {
           table.column("q_RS_w", "")};
 }
 
+/// Calls `row` at each row; those that cannot be read are counted by `counter`.
+template <class Counter, class Row>
+void read_rows(TableReader& table, Counter& counter, Row&& row) {
+  table.for_each_row(row, [&](const BadRow& bad) { counter.reject_row(bad, table.reader()); });
+}
+
 template <std::size_t N>
 void read_numbers(const TableReader& table, const std::array<std::size_t, N>& columns,
                   std::array<double, N>& out) {
@@ -67,12 +73,12 @@ EncoderRecording read_asl_encoders(const std::filesystem::path& path,
   EncoderReading reading;
   reading.n_drive = static_cast<int>(drives.size());
   reading.n_steer = static_cast<int>(steers.size());
-  while (table.next()) {
+  read_rows(table, collector, [&] {
     reading.t_ns = table.stamp_ns(stamp);
     for (std::size_t i = 0; i < drives.size(); ++i) reading.drive[i] = table.number(drives[i]);
     for (std::size_t i = 0; i < steers.size(); ++i) reading.steer_rad[i] = table.number(steers[i]);
     collector.add(reading, table.reader());
-  }
+  });
   return collector.finish(table.reader());
 }
 
@@ -82,13 +88,13 @@ PoseRecording read_asl_poses(const std::filesystem::path& path, const LogLimits&
   const auto p = xyz_columns(table, "p_RS_R_", "m");
   const auto q = xyzw_columns(table);
   PoseCollector collector(limits);
-  while (table.next()) {
+  read_rows(table, collector, [&] {
     PoseSample pose;
     pose.t_ns = table.stamp_ns(stamp);
     read_numbers(table, p, pose.p_BinW_m);
     read_numbers(table, q, pose.q_BtoW_xyzw);
     collector.add(pose, table.reader());
-  }
+  });
   return collector.finish(table.reader());
 }
 
@@ -101,7 +107,7 @@ StateRecording read_asl_states(const std::filesystem::path& path, const LogLimit
   const auto gyro_bias = xyz_columns(table, "b_w_RS_S_", "rad s^-1");
   const auto accel_bias = xyz_columns(table, "b_a_RS_S_", "m s^-2");
   StateCollector collector(limits);
-  while (table.next()) {
+  read_rows(table, collector, [&] {
     StateSample state;
     state.t_ns = table.stamp_ns(stamp);
     read_numbers(table, q, state.q_ItoG_xyzw);
@@ -110,7 +116,7 @@ StateRecording read_asl_states(const std::filesystem::path& path, const LogLimit
     read_numbers(table, gyro_bias, state.gyro_bias_rad_per_s);
     read_numbers(table, accel_bias, state.accel_bias_m_per_s2);
     collector.add(state, table.reader());
-  }
+  });
   return collector.finish(table.reader());
 }
 
@@ -120,13 +126,13 @@ ImuRecording read_asl_imu(const std::filesystem::path& path, const LogLimits& li
   const auto gyro = xyz_columns(table, "w_RS_S_", "rad s^-1");
   const auto accel = xyz_columns(table, "a_RS_S_", "m s^-2");
   ImuCollector collector(limits);
-  while (table.next()) {
+  read_rows(table, collector, [&] {
     ImuSample imu;
     imu.t_ns = table.stamp_ns(stamp);
     read_numbers(table, gyro, imu.gyro_rad_per_s);
     read_numbers(table, accel, imu.accel_m_per_s2);
     collector.add(imu, table.reader());
-  }
+  });
   return collector.finish(table.reader());
 }
 
@@ -142,7 +148,7 @@ GnssRecording read_asl_gnss(const std::filesystem::path& path, double max_reject
     covariance[i] = table.column("cov_" + entry, "m^2");
   }
   GnssCollector collector({std::numeric_limits<double>::infinity(), max_rejected_fraction});
-  while (table.next()) {
+  read_rows(table, collector, [&] {
     GnssSample fix;
     fix.t_ns = table.stamp_ns(stamp);
     fix.latitude_deg = table.number(latitude);
@@ -150,7 +156,7 @@ GnssRecording read_asl_gnss(const std::filesystem::path& path, double max_reject
     fix.altitude_m = table.number(altitude);
     read_numbers(table, covariance, fix.covariance_ENU_m2);
     collector.add(fix, table.reader());
-  }
+  });
   return collector.finish(table.reader());
 }
 
@@ -171,7 +177,7 @@ FeatureRecording read_asl_features(const std::filesystem::path& path, const LogL
   const std::size_t u = table.column("u", "px");
   const std::size_t v = table.column("v", "px");
   FeatureCollector collector(limits);
-  while (table.next()) {
+  read_rows(table, collector, [&] {
     const std::int64_t t_ns = table.stamp_ns(stamp);
     const int index = camera_index(table, camera);
     if (table.text(id).empty() && table.text(u).empty() && table.text(v).empty()) {
@@ -180,7 +186,7 @@ FeatureRecording read_asl_features(const std::filesystem::path& path, const LogL
       const FeaturePoint point{table.integer(id), table.number(u), table.number(v)};
       collector.add(t_ns, index, point, table.reader());
     }
-  }
+  });
   return collector.finish(table.reader());
 }
 
@@ -192,7 +198,7 @@ CalibrationRecording read_asl_calibration(const std::filesystem::path& path,
   const std::size_t value = table.column("value");
   StampFilter filter({std::numeric_limits<double>::infinity(), max_rejected_fraction});
   CalibrationRecording out;
-  while (table.next()) {
+  read_rows(table, filter, [&] {
     const CalibrationSample sample{table.stamp_ns(stamp), std::string(table.text(name)),
                                    table.number(value)};
     if (sample.name.empty()) table.fail(name, "is empty");
@@ -201,7 +207,7 @@ CalibrationRecording read_asl_calibration(const std::filesystem::path& path,
     } else if (filter.accept_or_same(sample.t_ns, table.reader())) {
       out.samples.push_back(sample);
     }
-  }
+  });
   filter.finish(table.reader());
   out.rejections = filter.counts();
   return out;

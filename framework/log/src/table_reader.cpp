@@ -80,8 +80,8 @@ bool TableReader::next() {
     return false;
   }
   if (fields_.size() != columns_.size()) {
-    reader_.fail(fields_text(fields_.size()) + " where the header has " +
-                 std::to_string(columns_.size()));
+    refuse(fields_text(fields_.size()) + " where the header has " +
+           std::to_string(columns_.size()));
   }
   return true;
 }
@@ -111,7 +111,9 @@ std::int64_t TableReader::seconds_ns(std::size_t column) const {
 }
 
 void TableReader::fail(std::size_t column, const std::string& text) const {
-  reader_.fail("column '" + columns_[column] + "': " + text);
+  refuse("column '" + columns_[column] + "': " + text);
 }
+
+void TableReader::refuse(const std::string& text) const { throw BadRow(reader_.place(), text); }
 
 }  // namespace viwo::log

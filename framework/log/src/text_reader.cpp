@@ -42,9 +42,7 @@ std::string TextReader::where() const {
   return file_.filename().string() + ":" + std::to_string(line_);
 }
 
-void TextReader::fail(const std::string& text) const {
-  throw InputError(file_.string() + ":" + std::to_string(line_) + "  " + text);
-}
+void TextReader::fail(const std::string& text) const { throw InputError(place() + "  " + text); }
 
 bool TextReader::fill() {
   std::move(buffer_.begin() + static_cast<std::ptrdiff_t>(begin_),

@@ -98,7 +98,9 @@ TEST_F(AslTest, RefusesTablesWithoutTheirColumnsOrData) {
   EXPECT_EQ(message("timestamp_ns,drive_1,drive_3\n"),
             ":1  no column 'drive_2 [rad/s]' - there are: timestamp_ns, drive_1, drive_3");
   EXPECT_EQ(message("timestamp_ns,drive_1\n"), "  holds no data after its header");
-  EXPECT_EQ(message("timestamp_ns,drive_1\n1,x\n"), ":2  column 'drive_1': 'x' is not a number");
+  EXPECT_EQ(message("timestamp_ns,drive_1\n1,x\n"),
+            "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read (1, "
+            "first at w.csv:2  column 'drive_1': 'x' is not a number)");
   std::string nine = "timestamp_ns";
   for (int i = 1; i <= 9; ++i) nine += ",drive_" + std::to_string(i);
   EXPECT_EQ(message(nine + "\n"), ":1  9 columns 'drive_...', at most 8 are possible");

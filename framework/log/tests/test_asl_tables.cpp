@@ -134,8 +134,9 @@ TEST_F(AslTables, ALastLineThatIsCutShortIsCountedAndTheRestIsRead) {
   EXPECT_EQ(read.rejections[0].reason, "last line cut short");
   EXPECT_EQ(read.rejections[0].count, 1);
   EXPECT_EQ(read.rejections[0].first, "wheels.csv:22");
-  EXPECT_EQ(refusal(text + "210000000,1\n", [](const auto& f) { read_asl_encoders(f, {}); }),
-            ":22  2 fields where the header has 3");
+  const EncoderRecording whole = read_asl_encoders(write("wheels.csv", text + "210000000,1\n"), {});
+  ASSERT_EQ(whole.rejections.size(), 1U);
+  EXPECT_EQ(whole.rejections[0].reason, "row that cannot be read");
 }
 
 TEST_F(AslTables, ImagesReadBackToTheSameBitsAlsoWithoutPoints) {
@@ -270,11 +271,18 @@ TEST_F(AslTables, RefusesBrokenImuTables) {
             "w_RS_S_z, a_RS_x, a_RS_S_y, a_RS_S_z");
   EXPECT_EQ(refusal("timestamp,w_RS_S_x [deg s^-1]\n", read),
             ":1  column 'w_RS_S_x [deg s^-1]' has another unit than 'w_RS_S_x [rad s^-1]'");
-  EXPECT_EQ(refusal(header + "1,2,3,4,5,6,7\n2,2,3,4,5,6,fast\n", read),
-            ":3  column 'a_RS_S_z': 'fast' is not a number");
-  EXPECT_EQ(refusal(header + "1,2,3,4,5,6\n", read), ":2  6 fields where the header has 7");
-  EXPECT_EQ(refusal(header + "1.5,2,3,4,5,6,7\n", read),
-            ":2  column 'timestamp': '1.5' is not an integer");
+  EXPECT_EQ(
+      refusal(header + "1,2,3,4,5,6,7\n2,2,3,4,5,6,fast\n", read),
+      "  1 of 2 data rejected, allowed is a fraction of 0.1: row that cannot be read (1, first "
+      "at t.csv:3  column 'a_RS_S_z': 'fast' is not a number)");
+  EXPECT_EQ(
+      refusal(header + "1,2,3,4,5,6\n", read),
+      "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read (1, first "
+      "at t.csv:2  6 fields where the header has 7)");
+  EXPECT_EQ(
+      refusal(header + "1.5,2,3,4,5,6,7\n", read),
+      "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read (1, first "
+      "at t.csv:2  column 'timestamp': '1.5' is not an integer)");
   EXPECT_EQ(refusal(header, read), "  holds no data after its header");
   EXPECT_EQ(refusal("", read), ":1  the file is empty");
 }
@@ -292,6 +300,20 @@ TEST_F(AslTables, ImuRowsThatAreNotFiniteOrGoBackAreCounted) {
   EXPECT_EQ(read.rejections[1].reason, "value that is not finite");
   EXPECT_EQ(read.rejections[1].first, "imu.csv:43");
   EXPECT_EQ(read.rejections[2].reason, "gap longer than 0.2 s");
+}
+
+TEST_F(AslTables, ARowThatCannotBeReadIsCountedAndTheRestIsRead) {
+  std::string text = kImuHeader;
+  for (int k = 0; k < 40; ++k) {
+    text += std::to_string(5'000'000 * k) + (k == 20 ? ",0,0x1,0,0,0,9.81\n" : ",0,0,0,0,0,9.81\n");
+  }
+  text += "200000000,0,0\n200000001,0,0,0,0,0,9.81\n";
+  const ImuRecording read = read_asl_imu(write("imu.csv", text), {});
+  EXPECT_EQ(read.samples.size(), 40U);
+  ASSERT_EQ(read.rejections.size(), 1U);
+  EXPECT_EQ(read.rejections[0].reason, "row that cannot be read");
+  EXPECT_EQ(read.rejections[0].count, 2);
+  EXPECT_EQ(read.rejections[0].first, "imu.csv:22  column 'w_RS_S_y': '0x1' is not a number");
 }
 
 TEST_F(AslTables, ReadsGzipAndRefusesATruncatedOne) {
@@ -348,19 +370,52 @@ TEST_F(AslTables, RefusesBrokenFeatureAndCalibrationTables) {
   const std::string header = "timestamp_ns,camera,id,u,v\n";
   EXPECT_EQ(refusal("timestamp_ns,camra,id,u,v\n", features),
             ":1  no column 'camera' - did you mean 'camra'?");
-  EXPECT_EQ(refusal(header + "1,-1,1,2,3\n", features),
-            ":2  column 'camera': '-1' is no camera: they are counted from 0 to 63");
-  EXPECT_EQ(refusal(header + "1,64,1,2,3\n", features),
-            ":2  column 'camera': '64' is no camera: they are counted from 0 to 63");
-  EXPECT_EQ(refusal(header + "1,0,1,,3\n", features), ":2  column 'u': '' is not a number");
-  EXPECT_EQ(refusal(header + "1,0,,2,3\n", features), ":2  column 'id': '' is not an integer");
+  EXPECT_EQ(
+      refusal(header + "1,-1,1,2,3\n", features),
+      "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read (1, first "
+      "at t.csv:2  column 'camera': '-1' is no camera: they are counted from 0 to 63)");
+  EXPECT_EQ(
+      refusal(header + "1,64,1,2,3\n", features),
+      "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read (1, first "
+      "at t.csv:2  column 'camera': '64' is no camera: they are counted from 0 to 63)");
+  EXPECT_EQ(
+      refusal(header + "1,0,1,,3\n", features),
+      "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read (1, first "
+      "at t.csv:2  column 'u': '' is not a number)");
+  EXPECT_EQ(
+      refusal(header + "1,0,,2,3\n", features),
+      "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read (1, first "
+      "at t.csv:2  column 'id': '' is not an integer)");
   const auto calibration = [](const auto& file) { read_asl_calibration(file, 0.1); };
   EXPECT_EQ(refusal("timestamp_ns,name\n", calibration),
             ":1  no column 'value' - there are: timestamp_ns, name");
-  EXPECT_EQ(refusal("timestamp_ns,name,value\n0,,1\n", calibration), ":2  column 'name': is empty");
+  EXPECT_EQ(
+      refusal("timestamp_ns,name,value\n0,,1\n", calibration),
+      "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read (1, first "
+      "at t.csv:2  column 'name': is empty)");
   EXPECT_EQ(refusal("timestamp_ns,name,value\n5,r_1,1\n4,r_1,1\n", calibration),
             "  1 of 2 data rejected, allowed is a fraction of 0.1: stamp not after the previous "
             "one (1, first at t.csv:3)");
+}
+
+TEST_F(AslTables, OneStampFarAheadIsCountedAndTheRestIsRead) {
+  std::string text = kImuHeader;
+  for (int k = 0; k < 40; ++k) {
+    const std::int64_t t_ns = k == 20 ? 4'000'000'000'000'000'000 : 5'000'000 * k;
+    text += std::to_string(t_ns) + ",0,0,0,0,0,9.81\n";
+  }
+  const ImuRecording read = read_asl_imu(write("imu.csv", text), {});
+  EXPECT_EQ(read.samples.size(), 39U);
+  ASSERT_EQ(read.rejections.size(), 1U);
+  EXPECT_EQ(read.rejections[0].reason, "stamp far ahead of the previous one");
+  EXPECT_EQ(read.rejections[0].first, "imu.csv:22");
+}
+
+TEST_F(AslTables, DataThatAreFarApartAreReadFromTheThirdOn) {
+  std::string text = kImuHeader;
+  for (int k = 0; k < 40; ++k) text += std::to_string(60'000'000'000 * k) + ",0,0,0,0,0,9.81\n";
+  const ImuRecording read = read_asl_imu(write("imu.csv", text), {});
+  EXPECT_EQ(read.samples.size(), 39U);
 }
 
 }  // namespace

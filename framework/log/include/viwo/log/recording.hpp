@@ -50,6 +50,8 @@ class EncoderCollector {
   /// `at` is at the row of the reading.
   void add(const EncoderReading& reading, const TextReader& at);
   void reject(const std::string& reason, const TextReader& at) { filter_.reject(reason, at); }
+  /// Counts a row that cannot be read.
+  void reject_row(const BadRow& bad, const TextReader& at) { filter_.reject_row(bad, at); }
   /// InputError when too little is left (see StampFilter::finish).
   EncoderRecording finish(const TextReader& at);
 
@@ -68,6 +70,8 @@ class SampleCollector {
   explicit SampleCollector(const LogLimits& limits) : filter_(limits) {}
   /// `at` is at the row of the sample.
   void add(Sample sample, const TextReader& at);
+  /// Counts a row that cannot be read.
+  void reject_row(const BadRow& bad, const TextReader& at) { filter_.reject_row(bad, at); }
   /// InputError when too little is left (see StampFilter::finish).
   Recording<Sample> finish(const TextReader& at);
 
@@ -94,6 +98,8 @@ class FeatureCollector {
   void add(std::int64_t t_ns, int camera, const FeaturePoint& point, const TextReader& at);
   /// An image, whether or not points of it follow.
   void add_image(std::int64_t t_ns, int camera, const TextReader& at);
+  /// Counts a row that cannot be read.
+  void reject_row(const BadRow& bad, const TextReader& at) { filter_.reject_row(bad, at); }
   FeatureRecording finish(const TextReader& at);
 
  private:

@@ -7,11 +7,13 @@
 #include <vector>
 
 #include "viwo/log/stamp_order.hpp"
+#include "viwo/log/table_reader.hpp"
 #include "viwo/log/text_reader.hpp"
 
 namespace viwo::log {
 
 inline constexpr const char* kLastLineCutShort = "last line cut short";
+inline constexpr const char* kUnreadable = "row that cannot be read";
 inline constexpr const char* kNotFinite = "value that is not finite";
 inline constexpr const char* kIdTwice = "point whose id the image already has";
 inline constexpr const char* kNotUnit = "quaternion that is not of unit norm";
@@ -26,6 +28,11 @@ class StampFilter {
     return order_.accept_or_same(t_ns, Place{at});
   }
   void reject(std::string_view reason, const TextReader& at) { order_.reject(reason, Place{at}); }
+
+  /// Counts a row that cannot be read; the first with what is wrong.
+  void reject_row(const BadRow& bad, const TextReader& at) {
+    order_.reject(kUnreadable, [&] { return at.where() + "  " + bad.text(); });
+  }
 
   /// To be called once at the end of the file: InputError when nothing was accepted or more than
   /// max_rejected_fraction of the data were rejected. A last line that was left out counts.

@@ -8,13 +8,25 @@
 #include <string_view>
 #include <vector>
 
+#include "viwo/api/status.hpp"
 #include "viwo/log/text_reader.hpp"
 
 namespace viwo::log {
 
+/// "file:line  what": of a row that is no row of the table, while others may be.
+class BadRow : public InputError {
+ public:
+  BadRow(const std::string& place, const std::string& text)
+      : InputError(place + "  " + text), text_(text) {}
+  /// What is wrong, without the place.
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
 /// Reads row by row. The header may begin with '#' as in EuRoC files; the separator is ';' if the
-/// header has one and ',' otherwise; empty lines are skipped. Wrong rows are an InputError
-/// "file:line  what".
+/// header has one and ',' otherwise; empty lines are skipped. Wrong rows are a BadRow.
 class TableReader {
  public:
   explicit TableReader(const std::filesystem::path& file);
@@ -27,7 +39,20 @@ class TableReader {
   /// Column "name [unit]", or "name" where the file gives no unit; InputError for another unit.
   std::size_t column(std::string_view name, std::string_view unit) const;
 
-  /// Goes to the next row; false at the end. InputError for a wrong number of fields. A last line
+  /// Calls `row` at each row to the end; `reject` with the BadRow for those that cannot be read.
+  template <class Row, class Reject>
+  void for_each_row(Row&& row, Reject&& reject) {
+    for (bool more = true; more;) {
+      try {
+        more = next();
+        if (more) row();
+      } catch (const BadRow& bad) {
+        reject(bad);
+      }
+    }
+  }
+
+  /// Goes to the next row; false at the end. BadRow for a wrong number of fields. A last line
   /// that has no line ending, and too few fields or half a number at its end, is left out: whoever
   /// wrote it did not come further.
   bool next();
@@ -44,10 +69,11 @@ class TableReader {
   std::int64_t seconds_ns(std::size_t column) const;
 
   const TextReader& reader() const { return reader_; }
-  /// Throws InputError "file:line  column 'name': text".
+  /// Throws BadRow "file:line  column 'name': text".
   [[noreturn]] void fail(std::size_t column, const std::string& text) const;
 
  private:
+  [[noreturn]] void refuse(const std::string& text) const;
   std::optional<std::size_t> find(std::string_view name) const;
 
   TextReader reader_;

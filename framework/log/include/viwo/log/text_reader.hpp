@@ -31,6 +31,8 @@ class TextReader {
   bool last_left_out() const { return last_left_out_; }
 
   const std::filesystem::path& file() const { return file_; }
+  /// "folder/file:line"
+  std::string place() const { return file_.string() + ":" + std::to_string(line_); }
   std::int64_t line_number() const { return line_; }  ///< of the line read last, from 1
   std::string where() const;  ///< "name:line" of the line read last, without folders
 
