@@ -15,8 +15,6 @@ namespace {
 constexpr double kLostThetaRad = 0.1;
 constexpr double kLostPositionM = 0.3;
 constexpr double kLostVelocityMPerS = 1.;
-constexpr double kLostGyroBiasRadPerS = 0.05;
-constexpr double kLostAccelBiasMPerS2 = 0.3;
 
 int clone_columns(const FilterOptions& options) {
   if (options.clones < 2 || options.clones > 100) {
@@ -99,8 +97,6 @@ void Filter::loosen(double times) {
   add(kThetaColumn, kLostThetaRad);
   add(kPositionColumn, kLostPositionM);
   add(kVelocityColumn, kLostVelocityMPerS);
-  add(kGyroBiasColumn, kLostGyroBiasRadPerS);
-  add(kAccelBiasColumn, kLostAccelBiasMPerS2);
   covariance_.propagate(unknown);
 }
 

@@ -7,9 +7,10 @@
 namespace viwo {
 namespace {
 
-constexpr double kPeriodS = 0.5;
-constexpr std::int64_t kFewest = 5;  ///< measurements of a period that say something
-constexpr int kMostPeriods = 8;      ///< lost without a break: four seconds
+constexpr double kPeriodS = 0.5;        ///< longer where there are few measurements ...
+constexpr double kLongestPeriodS = 5.;  ///< ... but not for ever
+constexpr std::int64_t kFewest = 5;     ///< measurements of a period that say something
+constexpr int kMostPeriods = 8;         ///< lost without a break
 
 std::string beyond(const char* what, double value, double limit, const char* unit) {
   char text[160];
@@ -47,16 +48,16 @@ std::string failure_of(const Filter& filter, const HealthLimits& limits) {
   return "";
 }
 
-bool Contact::is_lost(std::span<const UpdateCounts> counts) const {
-  std::int64_t updates = 0;
+Contact::Verdict Contact::verdict(std::span<const UpdateCounts> counts) const {
+  Verdict verdict = Verdict::kNone;
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const std::int64_t applied = counts[i].applied - before_[i].applied;
     const std::int64_t rejected = counts[i].rejected - before_[i].rejected;
     if (applied + rejected < kFewest) continue;
-    if (5 * applied > applied + rejected) return false;
-    ++updates;
+    if (5 * applied > applied + rejected) return Verdict::kAgrees;
+    verdict = Verdict::kContradicts;
   }
-  return updates > 0;
+  return verdict;
 }
 
 std::string Contact::epoch(std::span<const UpdateCounts> counts, Filter& filter) {
@@ -65,11 +66,13 @@ std::string Contact::epoch(std::span<const UpdateCounts> counts, Filter& filter)
     before_.assign(counts.begin(), counts.end());
     begin_ns_ = t_ns;
   }
-  if (seconds_between(begin_ns_, t_ns) < kPeriodS) return "";
-  const bool lost = is_lost(counts);
+  const double period_s = seconds_between(begin_ns_, t_ns);
+  if (period_s < kPeriodS) return "";
+  const Verdict says = verdict(counts);
+  if (says == Verdict::kNone && period_s < kLongestPeriodS) return "";
   std::copy(counts.begin(), counts.end(), before_.begin());
   const std::int64_t begin_ns = std::exchange(begin_ns_, t_ns);
-  if (!lost) {
+  if (says != Verdict::kContradicts) {
     lost_periods_ = 0;
     return "";
   }

@@ -122,9 +122,17 @@ TEST(Contact, IsThereAsLongAsOneUpdateAgrees) {
   ContactBench bench;
   for (int i = 0; i < 20; ++i) bench.period(0, 50, {5, 5});
   for (int i = 0; i < 20; ++i) bench.period(11, 40);
-  for (int i = 0; i < 20; ++i) bench.period(0, 4);  // too few to say anything
+  for (int i = 0; i < 40; ++i) bench.period(0, i % 3 == 0 ? 1 : 0);  // too few to say anything
   EXPECT_EQ(bench.contact.loosened(), 0);
   EXPECT_EQ(bench.failure, "");
+}
+
+TEST(Contact, WaitsForFiveMeasurementsWhereThereAreFew) {
+  ContactBench bench;
+  for (int i = 0; i < 2; ++i) bench.period(0, 2);
+  EXPECT_EQ(bench.contact.loosened(), 0);
+  bench.period(0, 2);
+  EXPECT_EQ(bench.contact.loosened(), 1);
 }
 
 TEST(Contact, LoosensAFilterThatAllUpdatesContradictAndGivesItUpAfterAWhile) {

@@ -35,7 +35,8 @@ class Contact {
   std::int64_t first_ns() const { return first_ns_; }
 
  private:
-  bool is_lost(std::span<const UpdateCounts> counts) const;
+  enum class Verdict : std::uint8_t { kNone, kAgrees, kContradicts };
+  Verdict verdict(std::span<const UpdateCounts> counts) const;
 
   std::vector<UpdateCounts> before_;  ///< at the start of the present period
   std::int64_t begin_ns_ = 0;
