@@ -42,11 +42,12 @@ for package in ca-certificates libeigen3-dev libboost-dev libboost-program-optio
   need_package "$package"
 done
 
-# What is left out where it is not to be had: bags and live topics of ROS.
+# What is left out where it is not to be had: bags and live topics of ROS, fixes of satellites.
 required=("${missing[@]}")
 missing=()
 for package in librosbag-storage-dev libroscpp-dev libsensor-msgs-dev libnav-msgs-dev \
-  libgeometry-msgs-dev libtf2-msgs-dev libdiagnostic-msgs-dev libsqlite3-dev libfastcdr-dev; do
+  libgeometry-msgs-dev libtf2-msgs-dev libdiagnostic-msgs-dev libsqlite3-dev libfastcdr-dev \
+  libgeographiclib-dev; do
   need_package "$package"
 done
 if [ "${1:-}" = --tests ]; then
