@@ -46,10 +46,13 @@ done
 required=("${missing[@]}")
 missing=()
 for package in librosbag-storage-dev libroscpp-dev libsensor-msgs-dev libnav-msgs-dev \
-  libgeometry-msgs-dev libtf2-msgs-dev libdiagnostic-msgs-dev libsqlite3-dev libfastcdr-dev \
-  libgeographiclib-dev; do
+  libgeometry-msgs-dev libtf2-msgs-dev libdiagnostic-msgs-dev libsqlite3-dev libfastcdr-dev; do
   need_package "$package"
 done
+# Ubuntu 22.04 has it by another name.
+if ! dpkg-query -W -f '${db:Status-Status}' libgeographic-dev 2> /dev/null | grep -qx installed; then
+  need_package libgeographiclib-dev
+fi
 if [ "${1:-}" = --tests ]; then
   need_command clang-format-14 clang-format-14
   need_command gnuplot-nox gnuplot
@@ -83,6 +86,9 @@ echo "Installing with apt: ${missing[*]} ${optional[*]}"
 "${apt[@]}" update < /dev/null
 # What this release may not have: parts and tests that need it are then left out.
 for package in "${optional[@]}"; do
+  if [ "$package" = libgeographiclib-dev ] && ! apt-cache show "$package" > /dev/null 2>&1; then
+    package=libgeographic-dev
+  fi
   if apt-cache show "$package" > /dev/null 2>&1; then
     missing+=("$package")
   else

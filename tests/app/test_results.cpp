@@ -279,6 +279,20 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationForACalibrationBoard) {
   EXPECT_LT(calibration.at("cam1.fx").at("sigma").get<double>(), 0.5);
 }
 
+TEST_F(ResultsTest, OfTheDeliveredConfigurationForSatelliteFixes) {
+  const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/real";
+  if (!fs::exists(data / "husky_bag")) GTEST_SKIP() << "the recording is not here";
+  for (const char* plugin : {"update_gnss", "sensor_ros1_bag"}) {
+    const std::string file = std::string("libviwo_") + plugin + ".so";
+    if (!fs::exists(fs::path(VIWO_TEST_PLUGIN_DIR) / file)) GTEST_SKIP() << file << " is left out";
+  }
+  expect_done({"run", kConfigFolder + "runs/husky_gnss.yaml", "--out", "run", "--set",
+               "placeholders.data=" + fs::canonical(data).string()});
+  const nlohmann::json result = summary("run");
+  EXPECT_EQ(result.at("status"), "ok");
+  EXPECT_LT(result.at("calibration").at("gnss.yaw_EtoG").at("sigma").get<double>(), 0.1);
+}
+
 TEST_F(ResultsTest, OfTheDeliveredExperimentWithWrongCameras) {
   if (!fs::exists(fs::path(VIWO_TEST_SHARED_DIR) / "data/openvins_sim")) {
     GTEST_SKIP() << "the measurements are not here";
@@ -334,6 +348,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                                           "observability/differential.yaml",
                                           "runs/euroc.yaml",
                                           "runs/euroc_board.yaml",
+                                          "runs/husky_gnss.yaml",
                                           "runs/hybrid.yaml",
                                           "runs/kaist_urban.yaml",
                                           "runs/openvins_sim.yaml",

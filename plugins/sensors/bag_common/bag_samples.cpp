@@ -86,8 +86,9 @@ Readers make_readers(const std::shared_ptr<const Bag>& bag, const BagOptions& op
     all.add(topic, true, make_image_reader(options, kind, static_cast<int>(camera), bag));
   }
   if (!options.joint_topic.empty()) {
-    kind_of_topic(*bag, "joint_topic", options.joint_topic, {Kind::kJoints});
-    all.add(options.joint_topic, false, make_joint_reader(options));
+    const Kind kind =
+        kind_of_topic(*bag, "joint_topic", options.joint_topic, {Kind::kJoints, Kind::kOdometry});
+    all.add(options.joint_topic, false, make_joint_reader(options, kind));
   }
   if (!options.pose_topic.empty()) {
     const Kind kind = kind_of_topic(*bag, "pose_topic", options.pose_topic,

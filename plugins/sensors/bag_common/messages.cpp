@@ -136,6 +136,19 @@ Joints read_joints(FieldReader& in) {
   return joints;
 }
 
+Joints read_twist(FieldReader& in) {
+  Joints joints;
+  joints.t_ns = in.header();
+  in.text();         // child_frame_id
+  skip(in, 7 + 36);  // the pose and its covariance
+  const double v_x = in.f64();
+  skip(in, 4);
+  const double omega_z = in.f64();
+  joints.names = {"left", "right"};
+  joints.velocities = {v_x - 0.5 * omega_z, v_x + 0.5 * omega_z};
+  return joints;
+}
+
 PoseSample read_pose(Kind kind, FieldReader& in) {
   PoseSample pose;
   pose.t_ns = in.header();

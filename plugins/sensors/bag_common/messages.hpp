@@ -55,6 +55,9 @@ struct ImageHead {
 /// All throw BrokenMessage.
 ImuSample read_imu(FieldReader& in);
 Joints read_joints(FieldReader& in);
+/// The twist of a nav_msgs/Odometry as the velocities of two joints, `left` and `right`: wheels of
+/// 1 m radius that stand 1 m apart, so that their rates are speeds, v_x -+ omega_z / 2.
+Joints read_twist(FieldReader& in);
 /// PoseStamped, PoseWithCovarianceStamped or Odometry.
 PoseSample read_pose(Kind kind, FieldReader& in);
 /// sensor_msgs/NavSatFix. Nothing when it says that there is no fix. A covariance that is said to

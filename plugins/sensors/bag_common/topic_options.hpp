@@ -23,7 +23,9 @@ inline constexpr std::array kTopicParams{
     ParamSpec{.name = "joint_topic",
               .type = ParamType::kString,
               .fallback = "",
-              .help = "sensor_msgs/JointState of the wheels"},
+              .help =
+                  "sensor_msgs/JointState of the wheels; of a bag also nav_msgs/Odometry, whose "
+                  "twist is taken as joints left and right: wheels of 1 m radius, 1 m apart"},
     ParamSpec{.name = "drive_joints",
               .type = ParamType::kStrings,
               .fallback = "[]",

@@ -114,11 +114,11 @@ class ImageReader final : public TopicReader {
 
 class JointReader final : public TopicReader {
  public:
-  explicit JointReader(const BagOptions& options)
-      : TopicReader(options, options.joint_topic), options_(options) {}
+  JointReader(const BagOptions& options, Kind kind)
+      : TopicReader(options, options.joint_topic), options_(options), kind_(kind) {}
 
   void take(FieldReader& in, const Message& message) override {
-    Joints joints = read_joints(in);
+    Joints joints = kind_ == Kind::kOdometry ? read_twist(in) : read_joints(in);
     log::EncoderReading reading;
     const auto missing = joint_reading(joints, options_, reading);
     if (!missing || missing->what != MissingJoint::What::kJoint) any_has_all_ = true;
@@ -170,6 +170,7 @@ class JointReader final : public TopicReader {
   }
 
   BagOptions options_;
+  Kind kind_;
   std::vector<std::string> names_;  ///< of the last message
   std::vector<std::string> known_;  ///< of all messages
   bool any_has_all_ = false;
@@ -227,8 +228,8 @@ std::unique_ptr<TopicReader> make_pose_reader(const BagOptions& options, Kind ki
   return std::make_unique<PoseReader>(options, kind);
 }
 
-std::unique_ptr<TopicReader> make_joint_reader(const BagOptions& options) {
-  return std::make_unique<JointReader>(options);
+std::unique_ptr<TopicReader> make_joint_reader(const BagOptions& options, Kind kind) {
+  return std::make_unique<JointReader>(options, kind);
 }
 
 std::unique_ptr<TopicReader> make_fix_reader(const BagOptions& options) {

@@ -44,7 +44,7 @@ class TopicReader {
 
 std::unique_ptr<TopicReader> make_imu_reader(const BagOptions& options);
 std::unique_ptr<TopicReader> make_pose_reader(const BagOptions& options, Kind kind);
-std::unique_ptr<TopicReader> make_joint_reader(const BagOptions& options);
+std::unique_ptr<TopicReader> make_joint_reader(const BagOptions& options, Kind kind);
 std::unique_ptr<TopicReader> make_fix_reader(const BagOptions& options);
 std::unique_ptr<TopicReader> make_image_reader(const BagOptions& options, Kind kind, int camera,
                                                const std::shared_ptr<const Bag>& bag);

@@ -141,12 +141,14 @@ void Ros1Writer::write_pose_with_covariance(const std::string& topic, const Stam
 }
 
 void Ros1Writer::write_odometry(const std::string& topic, const Stamps& stamps,
-                                const std::array<double, 3>& p,
-                                const std::array<double, 4>& q_xyzw) {
+                                const std::array<double, 3>& p, const std::array<double, 4>& q_xyzw,
+                                double v_x, double omega_z) {
   nav_msgs::Odometry message;
   message.header.frame_id = "world";
   message.child_frame_id = "base_link";
   message.pose.pose = pose(p, q_xyzw);
+  message.twist.twist.linear.x = v_x;
+  message.twist.twist.angular.z = omega_z;
   write(topic, stamps, message);
 }
 

@@ -58,7 +58,8 @@ class Ros1Writer {
                                   const std::array<double, 3>& p,
                                   const std::array<double, 4>& q_xyzw);
   void write_odometry(const std::string& topic, const Stamps& stamps,
-                      const std::array<double, 3>& p, const std::array<double, 4>& q_xyzw);
+                      const std::array<double, 3>& p, const std::array<double, 4>& q_xyzw,
+                      double v_x = 0., double omega_z = 0.);
   void write_fix(const std::string& topic, const Stamps& stamps, const RawFix& fix);
   void write_image(const std::string& topic, const Stamps& stamps, const RawImage& image);
   void write_compressed_image(const std::string& topic, const Stamps& stamps,

@@ -155,6 +155,24 @@ TEST_F(Ros1Bag, TakesPositionsOfDrivesAsMultiTurnAngles) {
                 "velocities of the joints (3, first at a.bag: message 1)"));
 }
 
+TEST_F(Ros1Bag, TakesTheTwistOfAnOdometryForTwoWheels) {
+  {
+    Ros1Writer out(file());
+    for (const std::int64_t t : {kStart, kStart + 100 * kMs}) {
+      out.write_odometry("/o", {t, t}, {4., 5., 6.}, {0., 0.6, 0., 0.8}, 0.75, 0.5);
+    }
+    out.close();
+  }
+  const auto wheels =
+      play_only<EncoderSample>(section("joint_topic: /o, drive_joints: [left, right]"));
+  ASSERT_EQ(wheels.size(), 2U);
+  EXPECT_EQ(wheels[0].drive_rad_per_s[0], 0.5);
+  EXPECT_EQ(wheels[0].drive_rad_per_s[1], 1.);
+  EXPECT_THAT(error_of(section("joint_topic: /o, drive_joints: [Left, right]")),
+              HasSubstr("sensor.drive_joints: no joint 'Left' on topic '/o' in " + file() +
+                        " - did you mean 'left'?"));
+}
+
 TEST_F(Ros1Bag, ReadsPosesWithCovarianceAndOdometry) {
   {
     Ros1Writer out(file());

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -29,8 +30,9 @@ using pose_reference::BodyJacobian;
 using pose_reference::ClonePose;
 using pose_reference::Lever;
 
-/// The host has room for 16 factors of one update in an epoch; the alignment brings two at once.
-constexpr std::size_t kMostFixes = 15;
+/// The host has room for 16 factors of one update in an epoch. A fix is two, horizontal and height;
+/// the alignment brings two fixes at once.
+constexpr std::size_t kMostFixes = 7;
 /// What lies further from the origin is no fix: E is flat.
 constexpr double kFarthestM = 1e5;
 /// How tightly the start is tied to the clones: far below what any filter knows.
@@ -225,13 +227,12 @@ class Gnss final : public Update {
       if (!yaw) return std::nullopt;
       const Place start = place_of_start(filter);
       at.yaw_EtoG += std::remainder(*yaw - at.yaw_EtoG, 2. * std::numbers::pi);
-      first_p_EinG_ = at.p_EinG = start.p_G;
+      at.p_EinG = start.p_G;
       emit(filter, start, start_->fix, at, 0., sink);
     } else if (!frame_) {
       frame_.emplace(fix.latitude_deg, fix.longitude_deg, fix.altitude_m);
       at.p_EinG = place.p_G;
     }
-    first_p_EinG_ = at.p_EinG;
     is_aligned_ = true;
     tell(at);
     return at;
@@ -294,21 +295,34 @@ class Gnss final : public Update {
   void emit(const FilterView& filter, const Place& place, const LocalFix& fix, const Alignment& at,
             double gate_probability, FactorSink& sink) const {
     const BlockView& block = filter.block(alignment_);
-    ResidualFactor& factor = sink.add_residual();
-    factor.columns = place.columns;
-    const int aligned = block.column() < 0 ? -1 : factor.columns.add(block.column(), 4);
-    factor.set_rows(3);
-    factor.gate_probability = gate_probability;
+    const auto alignment = block.numbers();
+    FactorColumns columns = place.columns;
+    const int aligned = block.column() < 0 ? -1 : columns.add(block.column(), 4);
     // (GN-4)
     const Matrix3d R = R_GtoE(at.yaw_EtoG);
-    const Vector3d by_yaw = -R * Vector3d::UnitZ().cross(place.first_p_G - first_p_EinG_);
-    factor.H.leftCols(place.J.cols()) = R.lazyProduct(place.J);
-    if (aligned >= 0) factor.H.middleCols<4>(aligned) << by_yaw, -R;
-    factor.R = fix.R;
+    const Vector3d by_yaw = -R * Vector3d::UnitZ().cross(place.first_p_G - at.p_EinG);
+    Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 22> H(3, columns.size());
+    H.leftCols(place.J.cols()) = R.lazyProduct(place.J);
+    if (aligned >= 0) H.rightCols<4>() << by_yaw, -R;
     // (GN-3), (GN-9)
-    const auto alignment = block.numbers();
-    factor.residual =
+    Vector3d residual =
         fix.p_AinE - R * (place.p_G - alignment.tail<3>()) - by_yaw * (alignment[0] - at.yaw_EtoG);
+    // (GN-10): heights have a gate of their own.
+    Matrix3d noise = fix.R;
+    const Eigen::RowVector2d K =
+        noise.topLeftCorner<2, 2>().llt().solve(noise.topRightCorner<2, 1>()).transpose();
+    H.row(2) -= K.lazyProduct(H.topRows<2>());
+    residual[2] -= K * residual.head<2>();
+    noise(2, 2) -= K * noise.topRightCorner<2, 1>();
+    for (const auto& [first, rows] : {std::pair{0, 2}, std::pair{2, 1}}) {
+      ResidualFactor& factor = sink.add_residual();
+      factor.columns = columns;
+      factor.set_rows(rows);
+      factor.gate_probability = gate_probability;
+      factor.H = H.middleRows(first, rows);
+      factor.residual = residual.segment(first, rows);
+      factor.R = noise.block(first, first, rows, rows);
+    }
   }
 
   void tell(const Alignment& at) const {
@@ -327,14 +341,13 @@ class Gnss final : public Update {
   std::optional<LocalFrame> frame_;
   std::optional<Start> start_;  // while the yaw is sought
   bool is_aligned_ = false;
-  Vector3d first_p_EinG_ = Vector3d::Zero();  // as it was found
   StreamId fixes_;
   BlockId lever_, alignment_, drift_;
   RoomId room_;
 
   Tally too_late_{"fix that is older than the oldest clone"};
   Tally too_far_{"fix between clones that are too far apart"};
-  Tally too_many_{"fix beyond 15 in an epoch"};
+  Tally too_many_{"fix beyond 7 in an epoch"};
   Tally faulty_{"fix with values that cannot be used"};
   Tally bad_covariance_{"fix whose covariance is not positive definite"};
   Tally far_away_{"fix more than 100 km from the origin"};

@@ -44,10 +44,11 @@ struct GnssDrive {
   double sigma_lever_m = 0.05;
   /// Noise and first errors of the inertial state, in those of a cheap IMU: without wheels it is
   /// the odometry between fixes.
-  double inertia = 0.1;
+  double inertia = 0.03;
   bool first_estimates = true;
   std::string update;  ///< further parameters of the update: ", sigma_scale: 2"
-  /// What is done to the factors of the update before they are applied.
+  /// What is done to the fixes, and to the factors of the update before they are applied.
+  std::function<void(std::vector<GnssSample>&)> edit;
   std::function<void(ResidualFactor&)> spoil;
   std::vector<double> instants_s{10., 50., 99.};
 };
@@ -182,10 +183,13 @@ inline BlockId block_named(const Filter& filter, const std::string& name) {
 /// What the update says of its frames.
 struct Frames {
   std::array<double, 3> origin = kOriginOfE;  ///< of E: latitude, longitude [deg], altitude [m]
+  bool is_known = false;
 
   void read(const std::string& text) {
-    std::sscanf(text.substr(text.find("latitude ")).c_str(),
-                "latitude %lf, longitude %lf, altitude %lf", &origin[0], &origin[1], &origin[2]);
+    const auto at = text.find("latitude ");
+    if (at == std::string::npos) return;
+    is_known = std::sscanf(text.substr(at).c_str(), "latitude %lf, longitude %lf, altitude %lf",
+                           &origin[0], &origin[1], &origin[2]) == 3;
   }
   /// Where the origin is in the E of the truth.
   Eigen::Vector3d offset() const {
@@ -236,41 +240,53 @@ inline double nees_of(const Filter& filter, int column, const Eigen::VectorXd& e
   return eval::nees(error, filter.covariance().block(column, column, error.size(), error.size()));
 }
 
-/// Of pose, alignment and lever arm, and of the antenna in E, which needs their correlations.
-inline void judge(const Filter& filter, const GnssTruth& truth, const StateSample& state,
-                  const Frames& frames, const std::string& when, GnssRun& run) {
-  const auto& P = filter.covariance();
+/// Where the filter has the antenna in E, with its covariance, `ahead_s` after its last epoch.
+struct AntennaInE {
+  Eigen::Vector3d p;
+  Eigen::Matrix3d P;
+};
+
+inline AntennaInE antenna_in_E(const Filter& filter, double ahead_s = 0.) {
   const BlockView& alignment = filter.blocks().view(block_named(filter, "gnss.alignment"));
   const BlockView& lever = filter.blocks().view(block_named(filter, "gnss.lever_arm"));
-  const double yaw = alignment.numbers()[0];
-  const Eigen::Vector3d p_EinG = alignment.numbers().tail<3>(), l = lever.numbers();
-
-  Eigen::VectorXd pose(6), aligned(4);
-  const Eigen::Matrix3d R_GtoI = to_quaternion(state.q_ItoG_xyzw).toRotationMatrix().transpose();
-  pose << -log_so3(R_GtoI * filter.imu().R_GtoI.transpose()),
-      to_vector(state.p_IinG_m) - filter.imu().p_IinG;
-  aligned << std::remainder(truth.yaw_EtoG - yaw, 2. * std::numbers::pi),
-      truth.p_EinG + exp_so3({0., 0., truth.yaw_EtoG}) * frames.offset() - p_EinG;
-  run.error_yaw = aligned[0];
-  run.sigma_yaw = std::sqrt(P(alignment.column(), alignment.column()));
-  run.aligned = run.sigma_yaw < 0.5;
-  run.nees["pose " + when] = {nees_of(filter, kThetaColumn, pose), 6};
-  if (!run.aligned) return;
-  run.nees["alignment " + when] = {nees_of(filter, alignment.column(), aligned), 4};
-  run.nees["lever arm " + when] = {nees_of(filter, lever.column(), truth.p_AinI - l), 3};
-
   const Eigen::Matrix3d R_ItoG = filter.imu().R_GtoI.transpose();
-  const Eigen::Matrix3d R_GtoE = exp_so3({0., 0., -yaw});
-  const Eigen::Vector3d u = filter.imu().p_IinG + R_ItoG * l - p_EinG;
+  const Eigen::Matrix3d R_GtoE = exp_so3({0., 0., -alignment.numbers()[0]});
+  const Eigen::Vector3d l = lever.numbers();
+  const Eigen::Vector3d u = filter.imu().p_IinG + ahead_s * filter.imu().v_IinG + R_ItoG * l -
+                            alignment.numbers().tail<3>();
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(3, filter.size());
   H.middleCols<3>(kThetaColumn) = -R_GtoE * R_ItoG * skew(l);
   H.middleCols<3>(kPositionColumn) = R_GtoE;
   H.middleCols<3>(lever.column()) = R_GtoE * R_ItoG;
   H.col(alignment.column()) = -R_GtoE * Eigen::Vector3d::UnitZ().cross(u);
   H.middleCols<3>(alignment.column() + 1) = -R_GtoE;
+  return {R_GtoE * u, H * filter.covariance() * H.transpose()};
+}
+
+/// Of pose, alignment and lever arm, and of the antenna in E, which needs their correlations.
+inline void judge(const Filter& filter, const GnssTruth& truth, const StateSample& state,
+                  const Frames& frames, const std::string& when, GnssRun& run) {
+  const BlockView& alignment = filter.blocks().view(block_named(filter, "gnss.alignment"));
+  const BlockView& lever = filter.blocks().view(block_named(filter, "gnss.lever_arm"));
+  Eigen::VectorXd pose(6), aligned(4);
+  const Eigen::Matrix3d R_GtoI = to_quaternion(state.q_ItoG_xyzw).toRotationMatrix().transpose();
+  pose << -log_so3(R_GtoI * filter.imu().R_GtoI.transpose()),
+      to_vector(state.p_IinG_m) - filter.imu().p_IinG;
+  aligned << std::remainder(truth.yaw_EtoG - alignment.numbers()[0], 2. * std::numbers::pi),
+      truth.p_EinG + exp_so3({0., 0., truth.yaw_EtoG}) * frames.offset() -
+          alignment.numbers().tail<3>();
+  run.error_yaw = aligned[0];
+  run.sigma_yaw = std::sqrt(filter.covariance()(alignment.column(), alignment.column()));
+  run.aligned = run.sigma_yaw < 0.5;
+  run.nees["pose " + when] = {nees_of(filter, kThetaColumn, pose), 6};
+  if (!run.aligned) return;
+  run.nees["alignment " + when] = {nees_of(filter, alignment.column(), aligned), 4};
+  run.nees["lever arm " + when] = {nees_of(filter, lever.column(), truth.p_AinI - lever.numbers()),
+                                   3};
+  const AntennaInE antenna = antenna_in_E(filter);
   const double t_s = seconds_between(kGnssStartNs, filter.t_ns());
-  const Eigen::Vector3d error = truth.p_AinE(t_s) - frames.offset() - R_GtoE * u;
-  run.nees["antenna in E " + when] = {eval::nees(error, H * P * H.transpose()), 3};
+  run.nees["antenna in E " + when] = {
+      eval::nees(truth.p_AinE(t_s) - frames.offset() - antenna.p, antenna.P), 3};
 }
 
 inline GnssRun run_gnss(const GnssDrive& drive, std::uint64_t seed) {
@@ -287,7 +303,8 @@ inline GnssRun run_gnss(const GnssDrive& drive, std::uint64_t seed) {
   const auto state = [&](std::int64_t t_ns) {
     return sim::true_state(truth.trajectory, truth.mounting, readings, kGnssStartNs, t_ns);
   };
-  const std::vector<GnssSample> fixes = simulate_fixes(drive, truth, rng);
+  std::vector<GnssSample> fixes = simulate_fixes(drive, truth, rng);
+  if (drive.edit) drive.edit(fixes);
 
   EstimatorOptions options;
   options.filter.first_estimates = drive.first_estimates;
