@@ -63,6 +63,8 @@ void measurements() {
   MEMBER(EncoderSample, n_steer);
   MEMBER(EncoderSample, drive_rad_per_s);
   MEMBER(EncoderSample, steer_rad);
+  MEMBER(EncoderSample, bad_drives);
+  MEMBER(EncoderSample, bad_steers);
   SAMPLE(EncoderSample);
   RECORD(ImuSample);
   MEMBER(ImuSample, t_ns);
@@ -334,10 +336,18 @@ void filter_view() {
 }
 
 void sensors() {
+  RECORD(NoiseFound);
+  MEMBER(NoiseFound, name);
+  MEMBER(NoiseFound, unit);
+  MEMBER(NoiseFound, configured);
+  MEMBER(NoiseFound, found);
+  MEMBER(NoiseFound, count);
+  RECORD(NoiseScale);
   RECORD(RejectionCount);
   MEMBER(RejectionCount, reason);
   MEMBER(RejectionCount, count);
   MEMBER(RejectionCount, first);
+  MEMBER(RejectionCount, of);
   RECORD(Rejections);
   RECORD(EstimateSample);
   MEMBER(EstimateSample, t_ns);
@@ -374,6 +384,8 @@ void factors() {
   MEMBER(ResidualFactor, residual);
   MEMBER(ResidualFactor, R);
   MEMBER(ResidualFactor, gate_probability);
+  MEMBER(ResidualFactor, heavy_tailed);
+  MEMBER(ResidualFactor, noise);
   RECORD(InformationFactor);
   MEMBER(InformationFactor, columns);
   MEMBER(InformationFactor, Lambda);
@@ -429,6 +441,7 @@ void updates() {
   VIRTUAL(Update, update);
   VIRTUAL(Update, settle);
   VIRTUAL(Update, rejections);
+  VIRTUAL(Update, noises);
 }
 
 }  // namespace

@@ -82,6 +82,8 @@ std::uint64_t digest_of(const FactorSink& sink) {
     digest.add(factor.residual);
     digest.add(factor.R);
     digest.add(factor.gate_probability);
+    digest.add(static_cast<int>(factor.heavy_tailed));
+    digest.add(static_cast<int>(factor.noise != nullptr));
   }
   if (const InformationFactor* factor = sink.information()) {
     const int n = factor->columns.size();

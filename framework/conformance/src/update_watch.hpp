@@ -35,6 +35,7 @@ class Watch final : public Update {
   void start(const UpdateSetup& setup) override;
   void update(const FilterView& filter, const EpochData& given, FactorSink& sink) override;
   void settle(const FilterView& filter, BlockEdits& edits) override;
+  void noises(std::vector<NoiseFound>& out) const override { plugin_.object->noises(out); }
   void rejections(std::vector<RejectionCount>& out) const override {
     plugin_.object->rejections(out);
   }

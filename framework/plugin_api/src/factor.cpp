@@ -37,6 +37,8 @@ ResidualFactor& FactorSink::add_residual() {
   ResidualFactor& factor = residuals_[n_residuals_++];
   factor.columns.clear();
   factor.gate_probability = 0.;
+  factor.heavy_tailed = false;
+  factor.noise = nullptr;
   return factor;
 }
 

@@ -57,4 +57,6 @@ void Update::settle(const FilterView& /*filter*/, BlockEdits& /*edits*/) {}
 
 void Update::rejections(std::vector<RejectionCount>& /*out*/) const {}
 
+void Update::noises(std::vector<NoiseFound>& /*out*/) const {}
+
 }  // namespace viwo

@@ -28,6 +28,7 @@ class CheckedUpdate final : public Update {
     update_->settle(filter, edits);
   }
   void rejections(std::vector<RejectionCount>& out) const override { update_->rejections(out); }
+  void noises(std::vector<NoiseFound>& out) const override { update_->noises(out); }
 
  private:
   std::shared_ptr<Update> update_;

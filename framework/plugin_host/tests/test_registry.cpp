@@ -116,7 +116,7 @@ TEST_F(Registry, SearchesCommandLineThenEnvironmentThenInstallation) {
   EXPECT_EQ(folders[1], "/env/a");
   EXPECT_EQ(folders[2], "/env/b");
   EXPECT_EQ(folders[3],
-            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v3");
+            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v4");
   EXPECT_EQ(error_of([] { PluginRegistry::default_search_path({"/no/such"}); }),
             "--plugin-path /no/such: no such folder");
 }
@@ -224,9 +224,9 @@ TEST_F(Registry, RefusesALibraryWithoutARecord) {
 }
 
 TEST_F(Registry, RefusesAnotherApiInTheRecord) {
-  EXPECT_EQ(reason(doctored("{api=3;", "{api=0;")),
+  EXPECT_EQ(reason(doctored("{api=4;", "{api=0;")),
             "is built differently from this host\n"
-            "  api: host 3, plugin 0\n"
+            "  api: host 4, plugin 0\n"
             "  -> it is for another version of the plugin API: rebuild it against this viwo");
 }
 
@@ -343,7 +343,7 @@ TEST_F(Registry, RefusesAShortDescriptor) {
 
 TEST_F(Registry, RefusesAnotherApiInTheDescriptor) {
   EXPECT_EQ(reason(bad("wrong_api")),
-            "is for version 7 of the plugin API, this host has version 3 - rebuild it against this "
+            "is for version 7 of the plugin API, this host has version 4 - rebuild it against this "
             "viwo");
 }
 

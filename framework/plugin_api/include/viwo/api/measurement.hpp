@@ -49,6 +49,9 @@ struct EncoderSample {
   int n_steer = 0;                                   ///< channels used in steer_rad
   std::array<double, kMaxDrives> drive_rad_per_s{};  ///< wheel rotation rates, forward positive
   std::array<double, kMaxSteers> steer_rad{};  ///< steering angles, counter-clockwise positive
+  /// Channels that are not to be believed, a bit each.
+  std::uint32_t bad_drives = 0;
+  std::uint32_t bad_steers = 0;
 
   const char* fault() const {
     if (!all_finite(drive_rad_per_s) || !all_finite(steer_rad)) return "value that is not finite";

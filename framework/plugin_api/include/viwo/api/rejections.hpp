@@ -15,6 +15,7 @@ struct RejectionCount {
   std::string reason;      ///< "stamp not after the previous one", ...
   std::int64_t count = 0;  ///< how often
   std::string first;       ///< where it happened first, e.g. "odom_1.csv.gz:17"
+  std::int64_t of = 0;     ///< out of how many, for what is suspicious when it is most; 0: unsaid
 };
 
 /// "stamp 1403715273262142976 ns".

@@ -15,6 +15,7 @@
 
 #include "viwo/api/export.hpp"
 #include "viwo/api/filter_view.hpp"
+#include "viwo/api/noise_scale.hpp"
 #include "viwo/api/rejections.hpp"
 
 namespace viwo {
@@ -57,9 +58,15 @@ struct ResidualFactor {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxFactorRows,
                 kMaxFactorRows>
       R;
-  /// The host drops the factor, and counts it, when the residual is less likely than this. 0: no
-  /// gate.
+  /// A residual that is less likely than this counts as rejected. 0: no gate.
   double gate_probability = 0.;
+  /// Such a factor is not dropped but weighed down, until its residual is just as likely as the
+  /// gate (F-32): for what is always measured, if sometimes badly. The estimate cannot be locked
+  /// out.
+  bool heavy_tailed = false;
+  /// The host takes R times what was found, and tells what it finds; null: R as it is. Of the
+  /// plugin, which keeps it.
+  NoiseScale* noise = nullptr;
 
   /// Sizes H (zero), residual and R (zero) for `rows` and the columns added so far.
   VIWO_API void set_rows(int rows);
@@ -224,6 +231,8 @@ class VIWO_API Update {
   virtual void settle(const FilterView& filter, BlockEdits& edits);
   /// What was not used, and why; appended to `out`.
   virtual void rejections(std::vector<RejectionCount>& out) const;
+  /// How large its noises were found to be; appended to `out`.
+  virtual void noises(std::vector<NoiseFound>& out) const;
 };
 
 }  // namespace viwo
