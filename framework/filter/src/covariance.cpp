@@ -1,6 +1,7 @@
 #include "viwo/filter/covariance.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include <Eigen/Cholesky>
 
@@ -15,6 +16,52 @@ using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen:
                                   kMaxFactorRows, kMaxFactorRows>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxFactorRows, 1>;
 using InPlaceCholesky = Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>;
+
+/// A residual, and the noise that it is weighed with.
+class Innovation {
+ public:
+  /// HPHt: what the estimate leaves open of the residual; R: its noise.
+  Innovation(const SmallMatrix& HPHt, const SmallMatrix& R, const SmallVector& residual)
+      : HPHt_(HPHt), R_(R), residual_(residual) {}
+
+  /// With noise of `scale` R; false when that is not positive definite.
+  bool weigh(double scale) {
+    scale_ = scale;
+    llt_.compute(HPHt_ + scale * R_);
+    if (llt_.info() != Eigen::Success) return false;
+    white_ = llt_.matrixL().solve(residual_);
+    return true;
+  }
+  /// Raises the scale until the residual is as likely as `threshold` (F-32).
+  bool weaken(double threshold) {
+    for (int i = 0; i < kMostWeakenings && chi2() > kNearEnough * threshold; ++i) {
+      if (!weigh(scale_ * chi2() / threshold)) return false;
+    }
+    return true;
+  }
+  double chi2() const { return white_.squaredNorm(); }
+  /// Tells the noise what the residual says of its scale (F-30).
+  void tell(NoiseScale& noise) const {
+    const SmallVector u = llt_.matrixU().solve(white_);
+    const SmallMatrix claimed = llt_.solve(R_);
+    const double information = claimed.cwiseProduct(claimed.transpose()).sum();
+    noise.add(scale_ + (u.dot(R_ * u) - claimed.trace()) / information,
+              scale_ * scale_ * information / static_cast<double>(u.size()));
+  }
+  const Eigen::LLT<SmallMatrix>& llt() const { return llt_; }
+  const SmallVector& white() const { return white_; }
+
+ private:
+  static constexpr int kMostWeakenings = 20;
+  static constexpr double kNearEnough = 1.01;
+
+  const SmallMatrix& HPHt_;
+  const SmallMatrix& R_;
+  const SmallVector& residual_;
+  double scale_ = 1.;
+  Eigen::LLT<SmallMatrix> llt_;
+  SmallVector white_;
+};
 
 void mirror_lower(Eigen::MatrixXd& M) { M.triangularView<Eigen::StrictlyUpper>() = M.transpose(); }
 
@@ -104,33 +151,42 @@ FactorResult Covariance::apply(const ResidualFactor& factor, Eigen::VectorXd& dx
                      factor.H.middleCols(start, block.count).transpose();
     start += block.count;
   }
-  SmallMatrix S = factor.R;
+  SmallMatrix HPHt = SmallMatrix::Zero(rows, rows);
   start = 0;
   for (const ColumnRange& block : factor.columns.blocks()) {
-    S += factor.H.middleCols(start, block.count)
-             .lazyProduct(PHt.middleRows(block.first, block.count));
+    HPHt += factor.H.middleCols(start, block.count)
+                .lazyProduct(PHt.middleRows(block.first, block.count));
     start += block.count;
   }
-  const Eigen::LLT<SmallMatrix> llt(S);
-  if (llt.info() != Eigen::Success) return FactorResult::kRejected;
-  const SmallVector white = llt.matrixL().solve(factor.residual);
-  if (factor.gate_probability > 0. &&
-      !(white.squaredNorm() <= gate(static_cast<int>(rows), factor.gate_probability))) {
-    return FactorResult::kGated;
+  Innovation innovation(HPHt, factor.R, factor.residual);
+  if (!innovation.weigh(factor.noise != nullptr ? factor.noise->variance() : 1.)) {
+    return FactorResult::kRejected;
   }
+  FactorResult result = FactorResult::kApplied;
+  const double threshold = factor.gate_probability > 0.
+                               ? gate(static_cast<int>(rows), factor.gate_probability)
+                               : std::numeric_limits<double>::infinity();
+  if (innovation.chi2() <= threshold) {
+    if (factor.noise != nullptr) innovation.tell(*factor.noise);
+  } else {
+    if (factor.noise != nullptr) factor.noise->add_beyond(threshold / static_cast<double>(rows));
+    if (!factor.heavy_tailed || !innovation.weaken(threshold)) return FactorResult::kGated;
+    result = FactorResult::kWeakened;
+  }
+  const Eigen::LLT<SmallMatrix>& llt = innovation.llt();
   // W = P H^T L^-T: P <- P - W W^T, dx = W L^-1 r (F-7).
   for (Index i = 0; i < rows; ++i) {
     for (Index k = 0; k < i; ++k) PHt.col(i) -= llt.matrixLLT()(i, k) * PHt.col(k);
     PHt.col(i) /= llt.matrixLLT()(i, i);
   }
-  dx.noalias() = PHt * white;
+  dx.noalias() = PHt * innovation.white();
   for (Index j = 0; j < P_.cols(); ++j) {
     for (Index k = 0; k < rows; ++k) {
       P_.col(j).tail(P_.rows() - j) -= PHt(j, k) * PHt.col(k).tail(P_.rows() - j);
     }
   }
   mirror_lower(P_);
-  return FactorResult::kApplied;
+  return result;
 }
 
 void Covariance::collect_columns(const FactorColumns& columns) {

@@ -1,8 +1,10 @@
 #include "viwo/filter/estimator.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <time.h>
 
 #include "viwo/filter/health.hpp"
@@ -39,7 +41,31 @@ DeclarationTable declare_all(std::span<const UpdateEntry> updates,
   return declared;
 }
 
+std::vector<BlockSpec> continued(std::vector<BlockSpec> blocks, const Continuation& before) {
+  for (BlockSpec& block : blocks) {
+    for (const auto& [name, value] : before.blocks) {
+      if (name == block.name && value.size() == block.value.size()) block.value = value;
+    }
+  }
+  return blocks;
+}
+
 }  // namespace
+
+ImuPrior moved_to(const Continuation::Place& place, ImuPrior prior) {
+  // The turn that makes the trace of R R_ItoG(prior) R_GtoI(place) largest.
+  const Eigen::Matrix3d M = prior.state.R_GtoI.transpose() * place.R_GtoI;
+  const double turn = std::atan2(M(0, 1) - M(1, 0), M(0, 0) + M(1, 1));
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  prior.state.R_GtoI = prior.state.R_GtoI * R.transpose();
+  prior.state.p_IinG = place.p_IinG + R * prior.state.p_IinG;
+  prior.state.v_IinG = R * prior.state.v_IinG;
+  ImuMatrix turned = ImuMatrix::Identity();
+  turned.block<3, 3>(kPositionColumn, kPositionColumn) = R;
+  turned.block<3, 3>(kVelocityColumn, kVelocityColumn) = R;
+  prior.P = turned * prior.P * turned.transpose();
+  return prior;
+}
 
 Estimator::Estimator(const EstimatorOptions& options, std::vector<UpdateEntry> updates,
                      const std::vector<ExtraStream>& extra)
@@ -49,7 +75,8 @@ Estimator::Estimator(const EstimatorOptions& options, std::vector<UpdateEntry> u
                      std::size_t n_extra, DeclarationTable declared)
     : options_(options),
       declared_(std::move(declared)),
-      filter_(options.filter, declared_.blocks(), declared_.rooms()),
+      filter_(options.filter, continued(declared_.blocks(), options.continuation),
+              declared_.rooms()),
       runner_(options.runner, std::move(updates), declared_, filter_),
       n_extra_(n_extra),
       imu_(options.imu),
@@ -66,6 +93,12 @@ Estimator::Estimator(const EstimatorOptions& options, std::vector<UpdateEntry> u
 std::vector<RejectionCount> Estimator::rejections() const {
   std::vector<RejectionCount> all = rejections_.counts();
   runner_.rejections(all);
+  return all;
+}
+
+std::vector<NoiseFound> Estimator::noises() const {
+  std::vector<NoiseFound> all;
+  runner_.noises(all);
   return all;
 }
 
@@ -104,12 +137,17 @@ bool Estimator::find_start() {
   }
   const auto prior = search_.attempt({imu_.samples(), taken_});
   if (!prior) return false;
-  start(*prior);
+  const auto& place = options_.continuation.place;
+  start(place ? moved_to(*place, *prior) : *prior);
   return true;
 }
 
 bool Estimator::step() {
   if (!failure_.empty()) return false;
+  if (imu_.set_back_s() > 0.) {
+    failure_ = "the clock of the IMU was set back by " + std::to_string(imu_.set_back_s()) + " s";
+    return false;
+  }
   if (!filter_.initialized() && !find_start()) return false;
   const auto t_ns =
       next_epoch_ns(options_.schedule, filter_.t_ns(), imu_, streams_, filter_.blocks(), finished_);

@@ -174,6 +174,8 @@ void ExcitationMonitor::warn(std::int64_t t_ns, Degeneracy kind) {
   std::snprintf(head.data(), head.size(), "%s for %g s: ", words.motion, options_.window_s);
   warning.text =
       head.data() + compressed(warning.parameters) + " " + words.missing + " - " + words.advice;
+  constexpr std::size_t kMostWarnings = 1000;  // of a run that goes on for days, the latest
+  if (warnings_.size() == kMostWarnings) warnings_.erase(warnings_.begin());
   warnings_.push_back(std::move(warning));
 }
 

@@ -128,7 +128,7 @@ template <class Factor>
 FactorResult Filter::apply_factor(const Factor& factor) {
   held_.before(covariance_.matrix());
   const FactorResult result = covariance_.apply(factor, dx_);
-  if (result == FactorResult::kApplied) {
+  if (is_applied(result)) {
     covariance_.hold(held_, dx_);
     correct();
   }

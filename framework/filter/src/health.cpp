@@ -10,7 +10,7 @@ namespace {
 constexpr double kPeriodS = 0.5;        ///< longer where there are few measurements ...
 constexpr double kLongestPeriodS = 5.;  ///< ... but not for ever
 constexpr std::int64_t kFewest = 5;     ///< measurements of a period that say something
-constexpr int kMostPeriods = 8;         ///< lost without a break
+constexpr int kMostPeriods = 8;         ///< lost, less those in touch
 
 std::string beyond(const char* what, double value, double limit, const char* unit) {
   char text[160];
@@ -74,10 +74,12 @@ std::string Contact::epoch(std::span<const UpdateCounts> counts, Filter& filter)
   const std::int64_t begin_ns = std::exchange(begin_ns_, t_ns);
   if (says != Verdict::kContradicts) {
     lost_periods_ = 0;
+    if (says == Verdict::kAgrees) balance_ = std::max(0, balance_ - 1);
     return "";
   }
-  if (lost_periods_++ == 0) lost_since_ns_ = begin_ns;
-  if (lost_periods_ == kMostPeriods) {
+  ++lost_periods_;
+  if (balance_++ == 0) lost_since_ns_ = begin_ns;
+  if (balance_ == kMostPeriods) {
     return "all updates contradict the estimate since " + stamp_text(lost_since_ns_) +
            ": check units, axes and clock of the IMU, then calibration and noise of the other "
            "sensors";

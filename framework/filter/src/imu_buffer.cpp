@@ -21,6 +21,35 @@ double ImuBuffer::gap_s(const ImuSample& before, const ImuSample& after) const {
   return spacing_s > limits_.max_gap_s ? spacing_s : 0.;
 }
 
+bool ImuBuffer::is_after_the_last(std::int64_t t_ns) {
+  constexpr double kLongS = 1.;
+  if (empty() || t_ns > newest_ns()) {
+    n_behind_ = 0;
+    return true;
+  }
+  const double behind_s = seconds_between(t_ns, newest_ns());
+  const bool follows = n_behind_ == 0 || t_ns > last_behind_ns_;
+  n_behind_ = behind_s <= kLongS ? 0 : follows ? n_behind_ + 1 : 1;
+  last_behind_ns_ = t_ns;
+  if (n_behind_ == 1) behind_s_ = behind_s;
+  return false;
+}
+
+bool ImuBuffer::is_stuck(const ImuSample& sample) {
+  constexpr int kMostRepeated = 10;
+  constexpr int kAlive = 100;
+  if (empty()) return false;
+  const ImuSample& last = samples().back();
+  if (sample.gyro_rad_per_s != last.gyro_rad_per_s ||
+      sample.accel_m_per_s2 != last.accel_m_per_s2) {
+    n_changes_ = std::min(n_changes_ + 1, kAlive);
+    n_repeated_ = 0;
+    return false;
+  }
+  ++n_repeated_;
+  return n_changes_ == kAlive && n_repeated_ > kMostRepeated;
+}
+
 void ImuBuffer::add(const ImuSample& sample, Rejections& rejections) {
   if (const char* fault = sample.fault()) {
     rejections.add(std::string("imu: ") + fault, sample.t_ns);
@@ -31,12 +60,16 @@ void ImuBuffer::add(const ImuSample& sample, Rejections& rejections) {
     rejections.add("imu: out of range (range_gyro_rad_per_s, range_accel_m_per_s2)", sample.t_ns);
     return;
   }
-  if (!empty() && sample.t_ns <= newest_ns()) {
+  if (!is_after_the_last(sample.t_ns)) {
     rejections.add("imu: stamp not after the last", sample.t_ns);
     return;
   }
   if (!jump_.is_believed(sample.t_ns)) {
     rejections.add("imu: stamp far ahead of the last", sample.t_ns);
+    return;
+  }
+  if (is_stuck(sample)) {
+    rejections.add("imu: stuck, the same reading again and again", sample.t_ns);
     return;
   }
   if (!empty() && gap_s(samples().back(), sample) > 0.) {

@@ -11,6 +11,7 @@ namespace {
 /// A stamp this far after that of the newest IMU sample is of another clock, or broken: taken, it
 /// would make all that come after it late.
 constexpr double kMaxAheadS = 10.;
+constexpr const char* kFarAhead = "stamp more than 10 s ahead of the IMU";
 /// For clocks that are found to be off, and interpolation.
 constexpr std::int64_t kMarginNs = 500'000'000;
 /// Moving fewer samples than this is not worth while.
@@ -56,7 +57,7 @@ void Stream::reject(const char* what, std::int64_t t_ns, Rejections& rejections)
 const char* Stream::objection(const Arrival& arrival, const StateBlocks& blocks,
                               std::optional<std::int64_t> imu_ns) {
   if (imu_ns && seconds_between(*imu_ns, arrival.t_ns) > kMaxAheadS) {
-    return "stamp more than 10 s ahead of the IMU";
+    return kFarAhead;
   }
   const SampleExtent& extent = arrival.extent;
   if (const auto* last = last_of(arrival.channel); last != nullptr && *last) {
@@ -76,11 +77,24 @@ const char* Stream::objection(const Arrival& arrival, const StateBlocks& blocks,
   return nullptr;
 }
 
+void Stream::forget_other_clock(std::int64_t imu_ns, Rejections& rejections) {
+  if (newest_ns_ == kNever || seconds_between(imu_ns, newest_ns_) <= kMaxAheadS) return;
+  for (std::size_t i = 0; i < buffer_->size(); ++i) {
+    reject(kFarAhead, buffer_->extent(i).t_ns, rejections);
+  }
+  buffer_->drop_front(buffer_->size());
+  taken_from_ = taken_to_ = 0;
+  last_.reset();
+  last_of_.clear();
+  newest_ns_ = kNever;
+}
+
 void Stream::add(SampleView sample, const StateBlocks& blocks, std::optional<std::int64_t> imu_ns,
                  Rejections& rejections) {
   if (!(sample.type() == *spec().type)) {
     throw std::invalid_argument("a sample of another kind than the stream's");
   }
+  if (imu_ns) forget_other_clock(*imu_ns, rejections);
   Arrival arrival{sample.extent(), sample.type().channel(sample.data())};
   arrival.t_ns = arrival.extent.t_ns + offset_ns(arrival.channel, blocks);
   const char* why = sample.type().fault(sample.data());

@@ -125,6 +125,7 @@ UpdateRunner::UpdateRunner(const RunnerOptions& options, std::vector<UpdateEntry
       counts_(updates_.size()),
       failures_(updates_.size()),
       gated_(updates_.size()),
+      weakened_(updates_.size()),
       rejected_(updates_.size()),
       sink_(kMaxFactorsPerUpdate, filter.size()),
       moved_(Eigen::VectorXd::Zero(filter.size())),
@@ -154,10 +155,19 @@ void UpdateRunner::rejections(std::vector<RejectionCount>& out) const {
     const std::size_t before = out.size();
     updates_[k].update->rejections(out);
     gated_[k].append_to("measurement dropped by the chi-square gate", out);
+    weakened_[k].append_to("measurement beyond the chi-square gate, weighed down", out);
     rejected_[k].append_to(out);
     for (std::size_t i = before; i < out.size(); ++i) {
       out[i].reason = updates_[k].name + ": " + out[i].reason;
     }
+  }
+}
+
+void UpdateRunner::noises(std::vector<NoiseFound>& out) const {
+  for (const UpdateEntry& entry : updates_) {
+    const std::size_t before = out.size();
+    entry.update->noises(out);
+    for (std::size_t i = before; i < out.size(); ++i) out[i].name = entry.name + "." + out[i].name;
   }
 }
 
@@ -235,7 +245,7 @@ FactorResult UpdateRunner::apply(const Context& context, Factor& factor) {
   } else {
     result = context.filter.apply(factor);
   }
-  if (result == FactorResult::kApplied) {
+  if (is_applied(result)) {
     for (ExcitationMonitor& monitor : context.monitors) monitor.applied();
   }
   return result;
@@ -248,16 +258,18 @@ void UpdateRunner::apply_residuals(const Context& context) {
     if (has_moved_ || options_.frozen) {
       residual_factor_ = factor;
       if (has_moved_) take_off(moved_, residual_factor_);
-      if (options_.frozen) residual_factor_.residual.setZero();
+      if (options_.frozen) {
+        residual_factor_.residual.setZero();
+        residual_factor_.noise = nullptr;  // zeros tell nothing about it
+      }
       next = &residual_factor_;
     }
     const FactorResult result = apply(context, *next);
-    if (result == FactorResult::kGated) {
-      gated_[context.index].add(context.filter.t_ns());
-    }
-    const bool applied = result == FactorResult::kApplied;
-    ++(applied ? counts.applied : counts.rejected);
-    if (!applied) continue;
+    const std::int64_t t_ns = context.filter.t_ns();
+    if (result == FactorResult::kGated) gated_[context.index].add(t_ns);
+    if (result == FactorResult::kWeakened) weakened_[context.index].add(t_ns);
+    ++(result == FactorResult::kApplied ? counts.applied : counts.rejected);
+    if (!is_applied(result)) continue;
     if (!has_moved_) moved_.setZero();
     has_moved_ = true;
     moved_ += context.filter.correction();

@@ -256,6 +256,15 @@ TEST(Estimator, IsNotSpoiltByAStampInTheFuture) {
                                       {"cells: stamp more than 10 s ahead of the IMU", 1}}));
 }
 
+TEST(Estimator, CannotGoOnWhenTheClockOfTheImuWasSetBack) {
+  Bench bench = Bench::started();
+  bench.imu(-10, 100);
+  EXPECT_EQ(bench.steps(), 0);
+  bench.imu(-60'000, -59'800);
+  EXPECT_EQ(bench.steps(), 0);
+  EXPECT_EQ(bench.estimator.failure(), "the clock of the IMU was set back by 60.090000 s");
+}
+
 TEST(Estimator, OfLiveMeasurementsWaitsForTheTickOfTheOtherChannel) {
   const auto ticks_of_epoch = [](bool second_comes, std::int64_t imu_until_ms) {
     EstimatorOptions options;

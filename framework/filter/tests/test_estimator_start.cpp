@@ -90,6 +90,46 @@ TEST(EstimatorStart, IsTriedAtTheEndWithoutAnyImuSoThatItSaysWhatIsMissing) {
   EXPECT_EQ(waiting.asked_ms, (std::vector<std::int64_t>{-1}));
 }
 
+TEST(EstimatorStart, OfAContinuationIsWhereTheImuWasWithTheBlocksOfThen) {
+  EstimatorOptions options = testing::any_motion();
+  Continuation::Place place;
+  place.R_GtoI = exp_so3({0.1, -0.2, 2.5});
+  place.p_IinG = {1., 2., 3.};
+  options.continuation = {{{"base.clock", {0.009}}, {"unknown", {1.}}}, place};
+  Bench bench({.cells = true}, {}, options);
+  ImuPrior found = level_prior(kStart);
+  found.state.v_IinG = {1., 0., 0.};
+  found.P(kVelocityColumn, kVelocityColumn) = 4.;
+  bench.estimator.start([&](const StartData&) -> StartAttempt { return {found, {}}; });
+  bench.imu(0, 20);
+  bench.estimator.step();
+  const Filter& filter = bench.estimator.filter();
+  ASSERT_TRUE(filter.initialized());
+  std::vector<BlockEstimate> clock;
+  for (int i = 0; i < static_cast<int>(filter.blocks().specs().size()); ++i) {
+    if (filter.blocks().specs()[static_cast<std::size_t>(i)].name == "base.clock") {
+      filter.estimates({i}, clock);
+    }
+  }
+  ASSERT_EQ(clock.size(), 1U);
+  EXPECT_EQ(clock[0].value, 0.009);
+  EXPECT_EQ(clock[0].sigma, testing::base_clock(0.).entries[0].sigma) << "that of the prior";
+  // Level stays level; what is left of the turn to the former orientation is none about the
+  // vertical.
+  const ImuView& imu = filter.imu();
+  EXPECT_NEAR(imu.R_GtoI(2, 2), 1., 1e-12);
+  const Eigen::Vector3d left = log_so3(imu.R_GtoI.transpose() * place.R_GtoI);
+  EXPECT_NEAR(left.z(), 0., 1e-12);
+  EXPECT_LT(left.norm(), 0.3);
+  EXPECT_EQ(imu.p_IinG, place.p_IinG);
+  // The velocity, and its covariance, are turned along.
+  const Eigen::Vector3d v_IinI = imu.R_GtoI * imu.v_IinG;
+  EXPECT_NEAR((v_IinI - found.state.R_GtoI * found.state.v_IinG).norm(), 0., 1e-12);
+  const Eigen::Vector3d along = imu.v_IinG.normalized();
+  const Eigen::Matrix3d P_v = filter.covariance().block<3, 3>(kVelocityColumn, kVelocityColumn);
+  EXPECT_NEAR(along.dot(P_v * along), 4., 1e-12);
+}
+
 TEST(EstimatorStart, FromThereOnMakesEpochs) {
   Bench bench;
   int asked = 0;

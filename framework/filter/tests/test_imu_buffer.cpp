@@ -55,6 +55,29 @@ TEST(ImuBuffer, RefusesReadingsThatAreNotFiniteOrNotLater) {
   EXPECT_EQ(bench.buffer.samples().size(), 3u);
 }
 
+TEST(ImuBuffer, LeavesOutAnImuThatIsStuck) {
+  ImuBench bench({});
+  std::int64_t t = 0;
+  for (; t < 600; t += 5) bench.buffer.add(imu_at(kStart + t * kMs), bench.rejections);
+  ImuSample stuck = imu_at(kStart + t * kMs);
+  for (; t < 1000; t += 5) {
+    stuck.t_ns = kStart + t * kMs;
+    bench.buffer.add(stuck, bench.rejections);
+  }
+  // Eleven readings are believed of the 80, then what is left out is a gap.
+  EXPECT_EQ(bench.buffer.newest_ns(), kStart + 650 * kMs);
+  bench.buffer.add(imu_at(kStart + t * kMs), bench.rejections);
+  EXPECT_EQ(bench.rejected(), (Counts{{"imu: stuck, the same reading again and again", 69},
+                                      {"imu: gap bridged", 1}}));
+  // One without noise may say the same for ever.
+  ImuBench noiseless({});
+  for (t = 0; t < 1000; t += 5) {
+    stuck.t_ns = kStart + t * kMs;
+    noiseless.buffer.add(stuck, noiseless.rejections);
+  }
+  EXPECT_EQ(noiseless.rejected(), Counts{});
+}
+
 TEST(ImuBuffer, CountsGapsThatAreLongerThanAllowed) {
   EXPECT_EQ(ImuBench({0, 50, 100}).rejected(), Counts{});
   EXPECT_EQ(ImuBench({0, 51, 102}).rejected(), (Counts{{"imu: gap bridged", 2}}));
@@ -120,6 +143,25 @@ TEST(ImuBuffer, DoesNotBelieveAStampFarAheadUntilAnotherOneFollows) {
   EXPECT_EQ(late.buffer.newest_ns(), kStart + 30'020 * kMs);
   EXPECT_EQ(late.rejected(),
             (Counts{{"imu: stamp far ahead of the last", 1}, {"imu: gap bridged", 1}}));
+}
+
+TEST(ImuBuffer, DoesNotBelieveAStampThatIsSecondsAheadEither) {
+  ImuBench broken({0, 10, 5000, 20, 30});
+  EXPECT_EQ(broken.buffer.newest_ns(), kStart + 30 * kMs);
+  EXPECT_EQ(broken.rejected(), (Counts{{"imu: stamp far ahead of the last", 1}}));
+}
+
+TEST(ImuBuffer, KnowsAClockThatWasSetBackFromReadingsThatAreLate) {
+  std::vector<std::int64_t> t_ms{0, 10, 20};
+  for (std::int64_t t = -5000; t < -4810; t += 10) t_ms.push_back(t);
+  ImuBench bench(t_ms);
+  EXPECT_EQ(bench.buffer.set_back_s(), 0.) << "nineteen readings";
+  bench.buffer.add(imu_at(kStart - 4810 * kMs), bench.rejections);
+  EXPECT_DOUBLE_EQ(bench.buffer.set_back_s(), 5.02);
+  ImuBench late(t_ms);
+  late.buffer.add(imu_at(kStart + 30 * kMs), late.rejections);
+  late.buffer.add(imu_at(kStart - 4800 * kMs), late.rejections);
+  EXPECT_EQ(late.buffer.set_back_s(), 0.) << "the clock goes on between them";
 }
 
 TEST(ImuBuffer, LeavesOutReadingsBeyondTheRange) {

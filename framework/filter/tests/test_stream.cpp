@@ -181,6 +181,16 @@ TEST(Stream, CannotTellWhatIsAheadBeforeThereIsAnImu) {
   EXPECT_EQ(bench.rejected(), Counts{});
 }
 
+TEST(Stream, IsNotSpoiltByAStampInTheFutureThatCameBeforeTheImu) {
+  StreamBench bench(testing::ticks_spec());
+  bench.stream.add(tick_at(3'600'000 * kMs), bench.blocks, std::nullopt, bench.rejections);
+  for (const std::int64_t t : {10, 20, 30})
+    bench.stream.add(tick_at(t * kMs), bench.blocks, 0, bench.rejections);
+  EXPECT_EQ(bench.rejected(), (Counts{{"ticks: stamp more than 10 s ahead of the IMU", 1}}));
+  EXPECT_EQ(bench.stream.all().size, 3U);
+  EXPECT_EQ(bench.stream.newest_ns(), 30 * kMs);
+}
+
 TEST(Stream, DropsWhatIsBeforeTheStart) {
   StreamBench bench(testing::fixes_spec());
   for (const std::int64_t t : {10, 20, 30}) bench.add(FixSample{t * kMs, 0.});

@@ -16,10 +16,16 @@ namespace viwo {
 /// What came of a factor.
 enum class FactorResult {
   kApplied,
+  kWeakened,  ///< less likely than the factor's gate: applied with more noise
   kGated,     ///< less likely than the factor's gate
   kRejected,  ///< not finite, or its noise is not positive definite
   kFailed,    ///< the covariance is not positive definite any more
 };
+
+/// Whether the estimate has taken it in.
+inline bool is_applied(FactorResult result) {
+  return result == FactorResult::kApplied || result == FactorResult::kWeakened;
+}
 
 class Covariance {
  public:
@@ -43,8 +49,9 @@ class Covariance {
   /// The errors of J's rows, from column `first` on, become J times those of `columns` (F-24).
   void rewrite(int first, const FactorColumns& columns, const Eigen::Ref<const Eigen::MatrixXd>& J);
 
-  /// Kalman update (F-7). `dx` (of the whole error state) is the correction; it is zero unless the
-  /// factor was applied.
+  /// Kalman update (F-7), its noise scaled by what was found and, beyond a gate of heavy tails, by
+  /// as much as it takes; tells the noise what it has seen. `dx` (of the whole error state) is the
+  /// correction; it is zero unless the factor was applied.
   FactorResult apply(const ResidualFactor& factor, Eigen::VectorXd& dx);
   /// Update by normal equations (F-8). Columns without variance are left out.
   FactorResult apply(const InformationFactor& factor, Eigen::VectorXd& dx);

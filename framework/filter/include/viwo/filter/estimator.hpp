@@ -4,8 +4,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "viwo/api/update.hpp"
 #include "viwo/filter/declarations.hpp"
@@ -20,6 +24,19 @@
 
 namespace viwo {
 
+/// What is known from before where a filter begins anew.
+struct Continuation {
+  /// Block and its numbers, as in BlockSpec::value, instead of those that are declared. Priors are
+  /// as declared, too.
+  std::vector<std::pair<std::string, std::vector<double>>> blocks;
+  /// Where the IMU was: a start that is found is turned about the vertical and moved there.
+  struct Place {
+    Eigen::Matrix3d R_GtoI = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d p_IinG = Eigen::Vector3d::Zero();
+  };
+  std::optional<Place> place;
+};
+
 struct EstimatorOptions {
   FilterOptions filter;
   ScheduleOptions schedule;
@@ -32,7 +49,12 @@ struct EstimatorOptions {
   bool growing_window = true;
   ImuLimits imu;
   HealthLimits health;
+  Continuation continuation;
 };
+
+/// `prior`, turned about the vertical so that its R_GtoI is as near as it gets to that of `place`,
+/// and from there.
+ImuPrior moved_to(const Continuation::Place& place, ImuPrior prior);
 
 /// A stream that somebody else than an update wants, for a start.
 struct ExtraStream {
@@ -81,6 +103,8 @@ class Estimator {
   std::span<const UpdateCounts> counts() const { return runner_.counts(); }
   std::span<const UpdateFailures> failures() const { return runner_.failures(); }
   std::vector<RejectionCount> rejections() const;
+  /// Noises that updates have found, "UPDATE.NAME".
+  std::vector<NoiseFound> noises() const;
   std::int64_t epochs() const { return epochs_; }
   /// One for each group of blocks of which something is estimated; none if they are turned off.
   std::span<const ExcitationMonitor> monitors() const { return monitors_; }

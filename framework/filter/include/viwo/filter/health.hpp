@@ -41,6 +41,7 @@ class Contact {
   std::vector<UpdateCounts> before_;  ///< at the start of the present period
   std::int64_t begin_ns_ = 0;
   int lost_periods_ = 0;  ///< without a break
+  int balance_ = 0;       ///< periods that were lost, less those in touch
   std::int64_t lost_since_ns_ = 0;
   std::int64_t loosened_ = 0;
   std::int64_t first_ns_ = 0;

@@ -22,9 +22,13 @@ class ImuBuffer {
  public:
   explicit ImuBuffer(const ImuLimits& limits) : limits_(limits) {}
 
-  /// A reading that is not finite or out of range, not after the last or far ahead of it
-  /// (StampJump) is dropped and counted.
+  /// A reading that is not finite or out of range, not after the last or more than a second ahead
+  /// of it (StampJump) is dropped and counted; so are those of an IMU that had noise and now
+  /// repeats the same six numbers.
   void add(const ImuSample& sample, Rejections& rejections);
+  /// By how much the clock of the IMU was set back, s: its readings follow each other, all of them
+  /// long before one that came earlier. 0: it was not.
+  double set_back_s() const { return n_behind_ < kMostBehind ? 0. : behind_s_; }
   bool empty() const { return buffer_.empty(); }
   std::int64_t newest_ns() const { return samples().back().t_ns; }
   std::span<const ImuSample> samples() const { return buffer_.samples(); }
@@ -40,10 +44,20 @@ class ImuBuffer {
   void forget_before_start();
 
  private:
+  static constexpr int kMostBehind = 20;
+
   double gap_s(const ImuSample& before, const ImuSample& after) const;
+  bool is_after_the_last(std::int64_t t_ns);
+  bool is_stuck(const ImuSample& sample);
 
   ImuLimits limits_;
-  StampJump jump_;
+  // An IMU has no pauses of a second; that one is in doubt costs one reading more.
+  StampJump jump_{1., 0};
+  std::int64_t last_behind_ns_ = 0;
+  int n_behind_ = 0;  ///< readings without a break that are long before the newest
+  double behind_s_ = 0.;
+  int n_changes_ = 0;   ///< from one reading to the next, as far as they matter
+  int n_repeated_ = 0;  ///< of the last reading
   TypedBuffer<ImuSample> buffer_;
   std::vector<ImuSample> cut_;
   std::vector<double> gaps_s_;

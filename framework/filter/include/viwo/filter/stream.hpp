@@ -74,6 +74,9 @@ class Stream {
   /// Why a sample that has values to be used comes at the wrong time; nullptr: it does not.
   const char* objection(const Arrival& arrival, const StateBlocks& blocks,
                         std::optional<std::int64_t> imu_ns);
+  /// What came before there was an IMU, with stamps that are not of its clock: all that follow
+  /// would be late.
+  void forget_other_clock(std::int64_t imu_ns, Rejections& rejections);
   void reject(const char* what, std::int64_t t_ns, Rejections& rejections);
 
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();

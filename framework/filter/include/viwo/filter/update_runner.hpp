@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include "viwo/api/rejections.hpp"
+#include "viwo/api/update.hpp"
 #include "viwo/filter/declarations.hpp"
 #include "viwo/filter/excitation_monitor.hpp"
 #include "viwo/filter/filter.hpp"
@@ -82,6 +83,8 @@ class UpdateRunner {
   std::span<const UpdateFailures> failures() const { return failures_; }
   /// What updates did not use, with their names in front; appended to `out`.
   void rejections(std::vector<RejectionCount>& out) const;
+  /// Noises that updates have found, "UPDATE.NAME"; appended to `out`.
+  void noises(std::vector<NoiseFound>& out) const;
 
  private:
   struct Context;
@@ -111,6 +114,7 @@ class UpdateRunner {
     }
   };
   std::vector<Dropped> gated_;        ///< residual factors, by the chi-square gate
+  std::vector<Dropped> weakened_;     ///< the same with heavy tails
   std::vector<Rejections> rejected_;  ///< by the host: factors that are none
   std::vector<std::size_t> room_owners_;
   std::vector<std::size_t> stream_takers_;  ///< updates, by StreamId::index
