@@ -14,6 +14,8 @@ namespace {
 /// Readings of `a` moved towards those of `b`: (1 - weight) a + weight b.
 EncoderSample blend(const EncoderSample& a, const EncoderSample& b, double weight) {
   EncoderSample mixed = a;
+  mixed.bad_drives |= b.bad_drives;
+  mixed.bad_steers |= b.bad_steers;
   for (std::size_t i = 0; i < static_cast<std::size_t>(a.n_drive); ++i) {
     mixed.drive_rad_per_s[i] += weight * (b.drive_rad_per_s[i] - a.drive_rad_per_s[i]);
   }

@@ -1,5 +1,6 @@
 #include "viwo/wheel/twist_solver.hpp"
 
+#include <algorithm>
 #include <array>
 #include <type_traits>
 #include <utility>
@@ -12,6 +13,12 @@
 
 namespace viwo {
 namespace {
+
+bool is_bad(const NoiseSpec& noise, const EncoderSample& y) {
+  const std::uint32_t bit = 1u << static_cast<unsigned>(noise.channel);
+  if (noise.kind == NoiseKind::kDrive) return (y.bad_drives & bit) != 0;
+  return noise.kind == NoiseKind::kSteer && (y.bad_steers & bit) != 0;
+}
 
 /// For the parity residual only directions that A cannot tell at all are left out.
 constexpr double kParityRankTolerance = 1e-6;
@@ -123,13 +130,18 @@ void TwistSolver::set_intrinsics(const Intrinsics& x_WI) {
 Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   const KinematicModel& model = model_->model();
   y_ = &y;
+  find_left_out(y);
   if (model.rows(y, x_WI_, A_is_current_, rows_) != Status::kOk) return Status::kRejected;
+  clear_left_out(rows_.A);
+  clear_left_out(rows_.b);
   fit_plain();
   if (options_.noise_weighted) {
     // The weights are those of the nominal intrinsics: they do not move with x_WI, so that the
     // master identity below is the whole derivative.
     model.rows(y, nominal_, nominal_A_is_current_, nominal_rows_);
-    nominal_A_is_current_ = model_->description().constant_A;
+    clear_left_out(nominal_rows_.A);
+    clear_left_out(nominal_rows_.b);
+    nominal_A_is_current_ = model_->description().constant_A && n_left_out_ == 0;
     model.noise_derivatives(y, nominal_, nominal_rows_, nominal_rows_.b, nominal_twist(), plain_.e,
                             by_n_);
     fit_weighted(options_.rank_tolerance);
@@ -150,6 +162,7 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
     model.intrinsic_derivatives(y, x_WI_, rows_, rows_.b, fit.xi,
                                 options_.noise_weighted ? We_ : fit.e, by_x_);
   }
+  clear_left_out(by_x_.J);
   with_block_size(model_->description().noise_block, [&](auto size) {
     constexpr int kSize = decltype(size)::value;
     twist_jacobian<kSize>(fit, out.J_xi_WI);
@@ -164,13 +177,36 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   return Status::kOk;
 }
 
+/// The rows that bad channels enter; A is then that of this sample alone.
+void TwistSolver::find_left_out(const EncoderSample& y) {
+  if (y.bad_drives == 0 && y.bad_steers == 0 && n_left_out_ == 0) return;
+  A_is_current_ = nominal_A_is_current_ = false;
+  left_out_.fill(false);
+  const std::vector<NoiseSpec>& noises = model_->description().noises;
+  for (std::size_t k = 0; k < noises.size(); ++k) {
+    if (!is_bad(noises[k], y)) continue;
+    for (int i = 0; i < noise_rows_[k].count; ++i) {
+      left_out_[static_cast<std::size_t>(noise_rows_[k].first + i)] = true;
+    }
+  }
+  n_left_out_ = static_cast<int>(std::count(left_out_.begin(), left_out_.end(), true));
+}
+
+template <class Rows>
+void TwistSolver::clear_left_out(Rows& rows) const {
+  if (n_left_out_ == 0) return;
+  for (int i = 0; i < model_->n_rows(); ++i) {
+    if (left_out_[static_cast<std::size_t>(i)]) rows.row(i).setZero();
+  }
+}
+
 void TwistSolver::fit_plain() {
   if (!A_is_current_) {
     plain_.WA.topRows<3>() = rows_.A.transpose();
     factor(rows_.A.transpose() * rows_.A, options_.rank_tolerance, plain_);
     set_gain(plain_);
-    A_is_current_ = model_->description().constant_A;
-    if (A_is_current_ && plain_.rank < 3) {
+    A_is_current_ = model_->description().constant_A && n_left_out_ == 0;
+    if (A_is_current_ && plain_.rank < 3 && n_left_out_ == 0) {
       throw InputError(
           "kinematic model: its rows cannot tell the body twist, whatever the encoders read "
           "(are all wheels at one place?)");
@@ -307,6 +343,7 @@ double TwistSolver::parity_chi2() {
 void TwistSolver::add_parity(double weight, ParityInformation& out) {
   model_->model().intrinsic_derivatives(*y_, x_WI_, rows_, weighted_.b, weighted_.xi, weighted_.e,
                                         by_x_);
+  clear_left_out(by_x_.J);
   with_block_size(model_->description().noise_block, [&](auto size) {
     constexpr int kSize = decltype(size)::value;
     weigh_jacobian<kSize>();

@@ -13,6 +13,22 @@ inline constexpr ParamSpec kIntervalGateParam{
     .max = 0.5,
     .help = "intervals less likely than this are left out; 0: none"};
 
+inline constexpr ParamSpec kWheelCheckParam{
+    .name = "wheel_check_probability",
+    .type = ParamType::kNumber,
+    .fallback = "1e-6",
+    .min = 0.,
+    .max = 0.5,
+    .help =
+        "of a sample whose wheels contradict each other more than this, the one that all others "
+        "contradict is left out; 0: never"};
+
+inline constexpr ParamSpec kFindNoiseParam{
+    .name = "find_noise",
+    .type = ParamType::kBool,
+    .fallback = "true",
+    .help = "the noise is scaled to what the residuals tell, and reported; false: as configured"};
+
 inline constexpr ParamSpec kSecondOrderNoiseParam{
     .name = "second_order_noise",
     .type = ParamType::kBool,

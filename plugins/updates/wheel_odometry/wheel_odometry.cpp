@@ -10,6 +10,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "checked_encoders.hpp"
 #include "encoder_intervals.hpp"
 #include "encoders.hpp"
 #include "relative_pose.hpp"
@@ -57,7 +58,9 @@ class WheelOdometry final : public Update {
         sigma_position_m_per_sqrt_m_(params.number("sigma_position_m_per_sqrt_m")),
         max_iterations_(services.exact ? 1 : static_cast<int>(params.integer("max_iterations"))),
         second_order_noise_(!services.exact && params.flag("second_order_noise")),
-        max_bridged_s_(params.number("max_bridged_s")) {
+        max_bridged_s_(params.number("max_bridged_s")),
+        wheel_check_probability_(services.exact ? 0. : params.number("wheel_check_probability")) {
+    noise_.set_enabled(!services.exact && params.flag("find_noise"));
     options_.twist.noise_weighted = params.text("twist") == "noise_weighted";
     options_.parity_gate_probability = params.number("sample_gate_probability");
     options_.parity = false;
@@ -70,6 +73,7 @@ class WheelOdometry final : public Update {
   }
 
   void start(const UpdateSetup& /*setup*/) override {
+    checked_.start(wheel_model_of(blocks_), wheel_check_probability_);
     preintegrator_.emplace(wheel_model_of(blocks_), options_);
     shifted_preintegrator_.emplace(wheel_model_of(blocks_), options_);
   }
@@ -77,14 +81,15 @@ class WheelOdometry final : public Update {
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
     if (filter.clones.empty()) return;
     const WheelsView wheels = blocks_.view(filter);
-    const auto encoders = data.samples<EncoderSample>(encoders_);
+    const auto samples = data.samples<EncoderSample>(encoders_);
     const std::optional<EncoderInterval> interval =
-        intervals_.next(filter, wheels.t_OtoI_s, encoders);
+        intervals_.next(filter, wheels.t_OtoI_s, samples);
     if (!interval.has_value()) return;
-    if (!has_channels(preintegrator_->model().description(), encoders.back())) {
+    if (!has_channels(preintegrator_->model().description(), samples.back())) {
       other_channels_.add(1, filter.clones.back().t_ns);
       return;
     }
+    const auto encoders = checked_.next(samples, wheels, filter.P());
     const CloneView& first = filter.clones[interval->first_clone];
     const CloneView& last = filter.clones[interval->last_clone];
     set_start(wheels, first, last, *interval);
@@ -105,6 +110,12 @@ class WheelOdometry final : public Update {
     intervals_.append_rejections(out);
     tallies_.append_rejections(out);
     bridged_.append_to(out);
+    checked_.append_rejections(out);
+  }
+
+  void noises(std::vector<NoiseFound>& out) const override {
+    if (noise_.count() == 0) return;
+    out.push_back({"noise_scale", "", noise_scale_, noise_scale_ * noise_.found(), noise_.count()});
   }
 
  private:
@@ -264,6 +275,8 @@ class WheelOdometry final : public Update {
     factor.residual.head<3>() = moved_back;
     factor.R = R_;
     factor.gate_probability = gate_probability_;
+    factor.heavy_tailed = true;
+    factor.noise = noise_.enabled() ? &noise_ : nullptr;
   }
 
   /// (WO-11), for the mount and the time offset, crossed with all of the geometry.
@@ -323,11 +336,15 @@ class WheelOdometry final : public Update {
   int max_iterations_;
   bool second_order_noise_;
   double max_bridged_s_;
+  double wheel_check_probability_;
 
   WheelsBlocks blocks_;
   StreamId encoders_;
   Tally other_channels_{"interval left out: encoder samples without the channels of the model"};
   EncoderIntervals intervals_;
+  CheckedEncoders checked_;
+  // Slip comes and goes within seconds.
+  NoiseScale noise_{10., 30., 30.};
   SampleTallies tallies_;
   Tally bridged_{"interval left out: too long without believable encoder samples"};
   std::optional<Preintegrator> preintegrator_, shifted_preintegrator_;

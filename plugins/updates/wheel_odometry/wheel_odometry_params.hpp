@@ -64,6 +64,8 @@ inline constexpr std::array kParams{
               .max = 20,
               .help = "linearisations per interval at most; 1: a plain EKF update"},
     kSecondOrderNoiseParam,
+    kWheelCheckParam,
+    kFindNoiseParam,
     ParamSpec{.name = "max_bridged_s",
               .type = ParamType::kNumber,
               .unit = "s",

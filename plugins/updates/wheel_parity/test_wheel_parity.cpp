@@ -137,7 +137,8 @@ TEST_F(ParityInterval, GatesASlippingWheelButNotWrongIntrinsics) {
   EXPECT_EQ(sink.rejected(), 0);
   for (std::size_t i = 110; i < 130; ++i) encoders_[i].drive_rad_per_s[2] *= 1.1;
   sink.clear();
-  const auto update = testing::load_update("{type: wheel_parity, period_s: 0}");
+  const auto update =
+      testing::load_update("{type: wheel_parity, period_s: 0, wheel_check_probability: 0}");
   run(*update, filter_, sink);
   EXPECT_EQ(sink.applied(), 0);
   EXPECT_EQ(sink.rejected(), 1);
@@ -196,10 +197,11 @@ TEST(WheelParity, IsConsistentWithTheRelativePoseAndNotAsAPlainUpdateOrWithAWron
             "gate_probability: 0}"},
        .extrinsics = false});
   EXPECT_GT(plain.nees_intrinsics, 2.);
-  const auto wrong_noise = testing::run_calibration(
-      {.updates = {odometry,
-                   "{type: wheel_parity, period_s: 0, noise_scale: 0.5, gate_probability: 0}"},
-       .extrinsics = false});
+  const auto wrong_noise =
+      testing::run_calibration({.updates = {odometry,
+                                            "{type: wheel_parity, period_s: 0, noise_scale: 0.5, "
+                                            "gate_probability: 0, find_noise: false}"},
+                                .extrinsics = false});
   EXPECT_GT(wrong_noise.nees_intrinsics, 2.);
 }
 

@@ -1,5 +1,6 @@
 // What the wheels contradict each other by, as information about the intrinsics: one information
 // factor per epoch, linearised where prior and wheels meet. Equations: model.md beside this file.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -10,6 +11,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "checked_encoders.hpp"
 #include "encoder_intervals.hpp"
 #include "encoders.hpp"
 #include "viwo/api/plugin.hpp"
@@ -49,6 +51,8 @@ constexpr std::array kParams{
               .max = 20,
               .help = "linearisations per interval at most; 1: a plain EKF update"},
     kSecondOrderNoiseParam,
+    kWheelCheckParam,
+    kFindNoiseParam,
 };
 
 using Square = IntrinsicMatrix;
@@ -68,6 +72,14 @@ constexpr double kNegligibleInformation = 1e-4;
 constexpr double kPeriodSlackS = 0.02;
 constexpr int kIntervalsUnchecked = 5;
 
+/// An interval has hundreds of contradictions: few of them tell the noise, and a gate on so many is
+/// narrow, so that what is beyond it may be many times beyond.
+constexpr int kFirstIntervals = 5;
+constexpr double kBelievedIntervals = 3.;
+constexpr double kRememberedIntervals = 20.;
+constexpr double kMostNoise = 100.;
+constexpr double kMostBeyond = 4.;
+
 class WheelParity final : public Update {
  public:
   WheelParity(const ParamSet& params, const HostServices& services)
@@ -75,7 +87,9 @@ class WheelParity final : public Update {
         noise_scale_(params.number("noise_scale")),
         period_s_(params.number("period_s")),
         max_iterations_(services.exact ? 1 : static_cast<int>(params.integer("max_iterations"))),
-        second_order_noise_(!services.exact && params.flag("second_order_noise")) {
+        second_order_noise_(!services.exact && params.flag("second_order_noise")),
+        wheel_check_probability_(services.exact ? 0. : params.number("wheel_check_probability")) {
+    noise_.set_enabled(!services.exact && params.flag("find_noise"));
     options_.twist.noise_weighted = true;
     options_.parity_gate_probability = params.number("sample_gate_probability");
     options_.parity = true;
@@ -87,27 +101,38 @@ class WheelParity final : public Update {
   }
 
   void start(const UpdateSetup& /*setup*/) override {
+    checked_.start(wheel_model_of(blocks_), wheel_check_probability_);
     preintegrator_.emplace(wheel_model_of(blocks_), options_);
   }
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
     if (filter.clones.empty()) return;
     const WheelsView wheels = blocks_.view(filter);
-    const auto encoders = data.samples<EncoderSample>(encoders_);
+    const auto samples = data.samples<EncoderSample>(encoders_);
     const std::optional<EncoderInterval> interval =
-        intervals_.next(filter, wheels.t_OtoI_s, encoders, period_s_ - kPeriodSlackS);
+        intervals_.next(filter, wheels.t_OtoI_s, samples, period_s_ - kPeriodSlackS);
     if (!interval.has_value() || wheels.intrinsics_column < 0) return;
-    if (!has_channels(preintegrator_->model().description(), encoders.back())) {
+    if (!has_channels(preintegrator_->model().description(), samples.back())) {
       other_channels_.add(1, filter.clones.back().t_ns);
       return;
     }
+    const auto encoders = checked_.next(samples, wheels, filter.P());
     find_free(wheels, filter.P());
     if (n_free_ == 0) return;
     const double gain = iterate(wheels.x_WI, encoders, *interval);
     tallies_.add(pose_, data.end_ns);
     if (std::isnan(gain)) return;
     // (WP-5): what no change of the intrinsics within their prior explains.
-    const bool believed = cost_ - gain <= gate(pose_.parity.dof);
+    const int dof = pose_.parity.dof;
+    const double threshold = gate(dof);
+    const bool believed = cost_ - gain <= threshold;
+    if (++intervals_seen_ <= kFirstIntervals) {
+      // Nothing is known well enough yet for the linearisation to be that good.
+    } else if (believed) {
+      noise_.add(noise_.variance() * (cost_ - gain) / dof);
+    } else {
+      noise_.add_beyond(std::min(cost_ - gain, kMostBeyond * threshold) / dof);
+    }
     sink.count(believed ? 1 : 0, believed ? 0 : 1);
     if (!believed) {
       gated_.add(1, data.end_ns);
@@ -123,6 +148,12 @@ class WheelParity final : public Update {
     intervals_.append_rejections(out);
     tallies_.append_rejections(out);
     gated_.append_to(out);
+    checked_.append_rejections(out);
+  }
+
+  void noises(std::vector<NoiseFound>& out) const override {
+    if (noise_.count() == 0) return;
+    out.push_back({"noise_scale", "", noise_scale_, noise_scale_ * noise_.found(), noise_.count()});
   }
 
  private:
@@ -179,7 +210,7 @@ class WheelParity final : public Update {
   /// of sigma.
   void linearise(const Intrinsics& x0, const Intrinsics& x) {
     const ParityInformation& parity = pose_.parity;
-    const double weight = 1. / (noise_scale_ * noise_scale_);
+    const double weight = 1. / (noise_scale_ * noise_scale_ * noise_.variance());
     Lambda_.resize(n_free_, n_free_);
     eta_.resize(n_free_);
     Intrinsics back(n_free_);
@@ -204,7 +235,7 @@ class WheelParity final : public Update {
     const Square L =
         eigen_.eigenvectors() * eigen_.eigenvalues().cwiseMax(0.).cwiseSqrt().asDiagonal();
     Square M(n_free_, n_free_);
-    const double weight = 1. / (noise_scale_ * noise_scale_);
+    const double weight = 1. / (noise_scale_ * noise_scale_ * noise_.variance());
     Square noise = Square::Zero(n_free_, n_free_);
     Intrinsics mean = Intrinsics::Zero(n_free_);
     for (int i = 0; i < n_free_; ++i) {
@@ -286,17 +317,21 @@ class WheelParity final : public Update {
   double period_s_;
   int max_iterations_;
   bool second_order_noise_;
+  double wheel_check_probability_;
 
   WheelsBlocks blocks_;
   StreamId encoders_;
   Tally other_channels_{"interval left out: encoder samples without the channels of the model"};
   EncoderIntervals intervals_;
+  CheckedEncoders checked_;
+  NoiseScale noise_{kBelievedIntervals, kRememberedIntervals, kMostNoise};
   SampleTallies tallies_;
   Tally gated_{"interval dropped by the chi-square gate"};
   std::optional<Preintegrator> preintegrator_;
   double gate_ = 0.;
   int gate_dof_ = 0;
   double intervals_used_ = 0.;
+  int intervals_seen_ = 0;
   int unchecked_ = 0;  // intervals for which curvature needs no look
 
   // Of the interval at hand; entries of the free intrinsics, in units of their sigma.

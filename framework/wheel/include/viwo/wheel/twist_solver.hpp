@@ -2,6 +2,7 @@
 // sensitivities, its covariance and the parity residual. Equations: docs/math/wheel_odometry.md.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -69,13 +70,14 @@ class TwistSolver {
   void set_intrinsics(const Intrinsics& x_WI);
 
   /// Twist, residual, sensitivity and covariance. kRejected: the model refuses the sample or the
-  /// result is not finite. Keeps a reference to `y` for the calls about the sample last solved.
+  /// result is not finite. Channels that `y` calls bad are left out, with all rows of their noise
+  /// blocks. Keeps a reference to `y` for the calls about the sample last solved.
   Status solve(const EncoderSample& y, TwistSolution& out);
 
   /// For the sample last solved: whitened squared parity residual (chi-square with n_rows - 3
   /// degrees of freedom for white noise of the stated size), and what add_parity() needs.
   double parity_chi2();
-  int parity_dof() const { return model_->n_rows() - weighted_.rank; }
+  int parity_dof() const { return model_->n_rows() - n_left_out_ - weighted_.rank; }
 
   /// Adds `weight` times the sample last solved (after parity_chi2()). The Jacobian is that at the
   /// fitted signal (W-9).
@@ -97,6 +99,9 @@ class TwistSolver {
     RowVector b, e;  // A xi, and what it leaves of the measured b
   };
 
+  void find_left_out(const EncoderSample& y);
+  template <class Rows>
+  void clear_left_out(Rows& rows) const;
   void fit_plain();
   void fit_weighted(double rank_tolerance);
   Twist nominal_twist() const;
@@ -144,6 +149,9 @@ class TwistSolver {
 
   Intrinsics nominal_;
   bool nominal_A_is_current_ = false;  // A in nominal_rows_ is that of nominal_
+
+  std::array<bool, kMaxRows> left_out_{};  // rows of the sample at hand
+  int n_left_out_ = 0;
 
   const EncoderSample* y_ = nullptr;
   RowSystem rows_, nominal_rows_;
