@@ -319,6 +319,7 @@ class Gnss final : public Update {
       factor.columns = columns;
       factor.set_rows(rows);
       factor.gate_probability = gate_probability;
+      factor.heavy_tailed = true;
       factor.H = H.middleRows(first, rows);
       factor.residual = residual.segment(first, rows);
       factor.R = noise.block(first, first, rows, rows);

@@ -87,6 +87,7 @@ class PlanarMotion final : public Update {
     if (free_mount) factor.columns.add(wheels.extrinsics_column, 3);
     factor.set_rows(rows_);
     factor.gate_probability = gate_probability_;
+    factor.heavy_tailed = true;
     factor.residual = -off.head(rows_);  // (PM-8)
     factor.H = J.topLeftCorner(rows_, free_mount ? kColumns : 2 * kPoseSize);
     const auto variance = [path_m](double floor, double per_sqrt_m) {

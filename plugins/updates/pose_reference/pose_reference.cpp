@@ -191,6 +191,7 @@ class PoseReference final : public Update {
     factor.columns.add(last.column, kPoseSize);
     factor.set_rows(rows);
     factor.gate_probability = gate_probability_;
+    factor.heavy_tailed = true;
     factor.H = J.bottomRows(rows);
     factor.R.diagonal() = sigma_.tail(rows).cwiseAbs2();
     // (PR-7)

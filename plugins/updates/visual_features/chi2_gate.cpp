@@ -23,6 +23,8 @@ void Chi2Gate::start(int max_clones, int n_cameras) {
   T_.setZero(2 * max_clones, kCalibrationRows);
   M_.setZero(2 * max_clones, 2 * max_clones);
   rhs_.setZero(2 * max_sights, 4);
+  L_inverse_.setZero(2 * max_sights, 2 * max_sights);
+  S_inverse_.setZero(2 * max_sights, 2 * max_sights);
   PHt_.setZero(kPoseSize * max_clones, 2);
 }
 
@@ -46,11 +48,34 @@ double Chi2Gate::chi2(const Feature& feature, Window& window) {
   llt.matrixL().solveInPlace(rhs);
   // (VF-9), minimised as (VF-10)
   const Eigen::Matrix4d G = rhs.transpose().lazyProduct(rhs);
-  Eigen::Matrix3d L;
-  if (!cholesky(G.bottomRightCorner<3, 3>(), L)) return std::numeric_limits<double>::infinity();
-  const Eigen::Vector3d y =
-      L.triangularView<Eigen::Lower>().solve(Eigen::Vector3d(G.bottomLeftCorner<3, 1>()));
-  return std::max(0., G(0, 0) - y.squaredNorm());
+  if (!cholesky(G.bottomRightCorner<3, 3>(), L_f_)) return std::numeric_limits<double>::infinity();
+  y_f_ = L_f_.triangularView<Eigen::Lower>().solve(Eigen::Vector3d(G.bottomLeftCorner<3, 1>()));
+  n_rows_ = 2 * n;
+  return std::max(0., G(0, 0) - y_f_.squaredNorm());
+}
+
+void Chi2Gate::tell(NoiseScale& noise) {
+  const auto L = S_.topLeftCorner(n_rows_, n_rows_).triangularView<Eigen::Lower>();
+  auto rhs = rhs_.topRows(n_rows_);
+  // M = S^-1 - Q Q^T, what is outside of what the point explains: M r, tr M and tr M^2.
+  const Eigen::Vector3d by_point = L_f_.transpose().triangularView<Eigen::Upper>().solve(y_f_);
+  rhs.col(0) -= rhs.rightCols<3>().lazyProduct(by_point);
+  L.transpose().solveInPlace(rhs);
+  auto Q = rhs.rightCols<3>();
+  for (int k = 0; k < 3; ++k) {
+    for (int i = 0; i < k; ++i) Q.col(k) -= L_f_(k, i) * Q.col(i);
+    Q.col(k) /= L_f_(k, k);
+  }
+  auto L_inverse = L_inverse_.topLeftCorner(n_rows_, n_rows_);
+  L_inverse.setIdentity();
+  L.solveInPlace(L_inverse);
+  auto M = S_inverse_.topLeftCorner(n_rows_, n_rows_);
+  M.noalias() = L_inverse.transpose().lazyProduct(L_inverse);
+  M.noalias() -= Q.lazyProduct(Q.transpose());
+  const double information = M.squaredNorm();
+  const double variance = noise.variance();
+  noise.add(variance * (1. + (rhs.col(0).squaredNorm() - M.trace()) / information),
+            information / static_cast<double>(n_rows_ - 3));
 }
 
 void Chi2Gate::add_poses(const Feature& feature, Window& window) {

@@ -1,5 +1,6 @@
 #include "feature.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -16,6 +17,11 @@ constexpr int kMaxIterations = 10;
 /// Steps below this part of the distance end the refinement: far below any pixel noise, and the
 /// rest is linear in the point, which is eliminated (VF-8).
 constexpr double kStepTolerance = 1e-6;
+
+/// A sight farther from the point of the others is none of it.
+constexpr double kStraySigmas = 4.;
+/// Two sights agree on a point whatever they see.
+constexpr int kLeastAgreeing = 3;
 
 /// Rows by the calibration (VF-6), (VF-15), `J` divided by the standard deviation.
 void set_calibration(const WindowCamera& camera, const WindowClone& clone, const CameraPose& pose,
@@ -75,11 +81,13 @@ bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vect
 }
 
 void Feature::start(int max_sights, double sigma_px, const TriangulationLimits& limits) {
-  inverse_sigma_ = 1. / sigma_px;
+  set_sigma(sigma_px);
   limits_ = limits;
   sights_.reserve(static_cast<std::size_t>(max_sights));
   rays_.reserve(static_cast<std::size_t>(max_sights));
   linear_.reserve(static_cast<std::size_t>(max_sights));
+  agrees_.reserve(static_cast<std::size_t>(max_sights));
+  best_.reserve(static_cast<std::size_t>(max_sights));
 }
 
 int Feature::collect(const TrackStore& tracks, int track, const Window& window) {
@@ -106,6 +114,57 @@ FeatureStatus Feature::triangulate(const Window& window) {
   FeatureStatus status = intersect_rays();
   if (status == FeatureStatus::kOk) status = refine();
   return status == FeatureStatus::kOk ? check_distance() : status;
+}
+
+/// Sights within kStraySigmas of the point, and in front of it; returns how many.
+int Feature::mark_agreeing(const Eigen::Vector3d& point, std::vector<bool>& agrees) const {
+  const double most_px = kStraySigmas / inverse_sigma_;
+  agrees.assign(rays_.size(), false);
+  int count = 0;
+  for (std::size_t i = 0; i < rays_.size(); ++i) {
+    const Eigen::Vector3d q = point - rays_[i].origin;
+    const double depth = rays_[i].direction.dot(q);
+    if (!(depth > 0.)) continue;
+    const Eigen::Vector2d e = rays_[i].J * q / depth;
+    if (!(e.squaredNorm() < most_px * most_px)) continue;
+    agrees[i] = true;
+    ++count;
+  }
+  return count;
+}
+
+int Feature::leave_out_strays() {
+  const auto is_finite = [](const Ray& ray) {
+    return ray.origin.allFinite() && ray.direction.allFinite() && ray.J.allFinite();
+  };
+  if (!std::all_of(rays_.begin(), rays_.end(), is_finite)) return 0;  // no fault of the matches
+  // The point of each pair of sights: that which most others see, too.
+  int most = 0;
+  for (std::size_t i = 0; i < rays_.size(); ++i) {
+    for (std::size_t j = i + 1; j < rays_.size(); ++j) {
+      const Eigen::Vector3d& a = rays_[i].direction;
+      const Eigen::Vector3d& b = rays_[j].direction;
+      const Eigen::Vector3d o = rays_[j].origin - rays_[i].origin;
+      const double ab = a.dot(b) / (a.norm() * b.norm());
+      const double sine2 = 1. - ab * ab;
+      if (!(sine2 * limits_.max_condition > 1.)) continue;
+      const Eigen::Vector3d u = a.normalized();
+      const Eigen::Vector3d v = b.normalized();
+      const double along = (u.dot(o) - ab * v.dot(o)) / sine2;
+      const int count = mark_agreeing(rays_[i].origin + along * u, agrees_);
+      if (count <= most) continue;
+      most = count;
+      best_.swap(agrees_);
+    }
+  }
+  const int n = static_cast<int>(sights_.size());
+  if (most < kLeastAgreeing || 2 * most <= n || most == n) return 0;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < sights_.size(); ++i) {
+    if (best_[i]) sights_[kept++] = sights_[i];
+  }
+  sights_.resize(kept);
+  return n - most;
 }
 
 FeatureStatus Feature::intersect_rays() {

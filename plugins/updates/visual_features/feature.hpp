@@ -53,6 +53,7 @@ class Feature {
  public:
   /// Allocates for tracks of up to `max_sights` observations.
   void start(int max_sights, double sigma_px, const TriangulationLimits& limits);
+  void set_sigma(double sigma_px) { inverse_sigma_ = 1. / sigma_px; }
 
   /// All observations of a track whose clones are in the window; returns how many.
   int collect(const TrackStore& tracks, int track, const Window& window);
@@ -60,6 +61,10 @@ class Feature {
   /// Least squares of the pixel residuals, from the point next to all rays; anything but kOk: no
   /// use to linearise.
   FeatureStatus triangulate(const Window& window);
+
+  /// After triangulate(): leaves out the sights that do not see the point of the others. Returns
+  /// how many; 0 when none does so, or when no half of the sights agrees on a point (VF-22).
+  int leave_out_strays();
 
   /// Residuals at the estimates, Jacobians at the first estimates of the clones, both at point().
   /// kNotVisible: a camera model has no image of the point.
@@ -78,6 +83,7 @@ class Feature {
     Eigen::Matrix<double, 2, 3> J;  ///< d uv / d (p_FinG - origin) at `direction`
   };
   FeatureStatus intersect_rays();
+  int mark_agreeing(const Eigen::Vector3d& point, std::vector<bool>& agrees) const;
   FeatureStatus refine();
   FeatureStatus check_distance() const;
 
@@ -87,6 +93,7 @@ class Feature {
   std::vector<Sight> sights_;
   std::vector<Ray> rays_;
   std::vector<LinearSight> linear_;
+  std::vector<bool> agrees_, best_;  ///< of sights
 };
 
 }  // namespace viwo::visual

@@ -17,7 +17,7 @@ Anchor anchor_at_first(const WindowClone& clone, const CameraView& camera) {
 }  // namespace
 
 void LandmarkRows::start(int max_clones, int n_cameras, int max_factor_columns, double sigma_px) {
-  inverse_sigma_ = 1. / sigma_px;
+  set_sigma(sigma_px);
   const int rows = 2 * max_clones * n_cameras;
   const int columns = kPoseSize * max_clones + kCalibrationSize * n_cameras + 3;
   columns_.reserve(static_cast<std::size_t>(columns));

@@ -26,6 +26,7 @@ class LandmarkRows {
  public:
   /// Allocates for `max_factor_columns`, landmarks included.
   void start(int max_clones, int n_cameras, int max_factor_columns, double sigma_px);
+  void set_sigma(double sigma_px) { inverse_sigma_ = 1. / sigma_px; }
 
   /// False when a camera model has no image of the landmark, or something is not finite.
   bool linearize(std::span<const Sight> sights, const Window& window,

@@ -41,6 +41,8 @@ class Landmarks {
   void start(const LandmarkOptions& options, RoomId room, int max_tracks, int max_clones,
              std::span<const CameraBlocks> cameras, std::span<const double> thresholds);
 
+  void set_sigma(double sigma_px) { rows_.set_sigma(sigma_px); }
+
   bool is_landmark(int track) const { return of_track_[static_cast<std::size_t>(track)] >= 0; }
   int size() const { return static_cast<int>(landmarks_.size()); }
   std::span<const Landmark> all() const { return landmarks_; }

@@ -240,5 +240,34 @@ TEST(Feature, RefusesPointsWithoutParallaxTooFarTooNearAndBehind) {
   EXPECT_NE(nan.feature.triangulate(nan.window), FeatureStatus::kOk);
 }
 
+TEST(Feature, LeavesOutObservationsOfSomethingElse) {
+  Random random(21);
+  SceneOptions options;
+  Scene scene = testing::make_scene(options, 1, random);
+  Track track(scene, scene, scene.landmarks[0], 1., 0.3, random);
+  const std::size_t n = track.feature.sights().size();
+  ASSERT_GE(n, 7u);
+  EXPECT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+  EXPECT_EQ(track.feature.leave_out_strays(), 0) << "all see the point";
+  // Two matches of another thing.
+  for (const std::size_t i : {std::size_t{1}, n - 2}) {
+    const Sight& sight = track.feature.sights()[i];
+    auto& seen = const_cast<Observation&>(*sight.observation);
+    seen.uv += Eigen::Vector2d(90., -60.);
+    const auto& camera = scene.camera(static_cast<std::size_t>(sight.camera));
+    seen.ray = unproject(camera, seen.uv).value();
+    Eigen::Vector2d uv;
+    ASSERT_TRUE(project(camera, seen.ray, uv, seen.J_ray));
+  }
+  track.feature.triangulate(track.window);
+  EXPECT_EQ(track.feature.leave_out_strays(), 2);
+  EXPECT_EQ(track.feature.sights().size(), n - 2);
+  ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+  ASSERT_EQ(track.feature.linearize(track.window), FeatureStatus::kOk);
+  double chi2 = 0.;
+  for (const LinearSight& row : track.feature.linear()) chi2 += row.residual.squaredNorm();
+  EXPECT_LT(chi2, chi2_quantile(0.999, 2. * static_cast<double>(n - 2) - 3.));
+}
+
 }  // namespace
 }  // namespace viwo::visual

@@ -46,6 +46,11 @@ inline ParamSet params_with(const std::vector<std::pair<std::string, double>>& c
     }
   };
   for (const ParamSpec& spec : kParams) {
+    if (spec.type == ParamType::kBool) {
+      params.set(spec.name,
+                 false);  // find_noise: what is asked for is the noise that is configured
+      continue;
+    }
     put(spec, std::stod(spec.fallback));
     for (const auto& [name, value] : changes) {
       if (name == spec.name) put(spec, value);

