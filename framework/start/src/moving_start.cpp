@@ -7,6 +7,7 @@
 
 #include <Eigen/Dense>
 
+#include "start_frame.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/so3.hpp"
@@ -44,8 +45,6 @@ enum Offset : Eigen::Index {
 /// What is found, at the end of the window, in I.
 enum Output : Eigen::Index { kUp = 0, kVelocity = 3, kBias = 6, kGravity = 9, kOutputs = 10 };
 using Outputs = Eigen::Matrix<double, kOutputs, 1>;
-
-double squared(double x) { return x * x; }
 
 class Window {
  public:
@@ -302,11 +301,8 @@ StartAttempt start_from_motion(std::span<const ImuSample> imu,
 
   ImuPrior prior;
   prior.t_ns = window.t_ns();
-  // R_GtoI e3 is up; yaw zero: the x axis of G lies in I's x-z plane.
   const Vector3d z = found.segment<3>(kUp);
-  const Vector3d reference = std::abs(z.x()) < 0.9 ? Vector3d::UnitX() : Vector3d::UnitY();
-  const Vector3d x = (reference - z * z.dot(reference)).normalized();
-  prior.state.R_GtoI << x, z.cross(x), z;
+  prior.state.R_GtoI = R_GtoI_from_up(z);
   const Vector3d v = found.segment<3>(kVelocity);
   prior.state.v_IinG = prior.state.R_GtoI.transpose() * v;
   prior.state.gyro_bias = found.segment<3>(kBias);

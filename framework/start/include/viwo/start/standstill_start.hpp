@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/filter/start_search.hpp"
@@ -16,16 +17,20 @@ struct StandstillOptions {
   double sigma_yaw_rad = 0.01;              ///< likewise
   double sigma_gyro_bias_rad_per_s = 0.02;  ///< a mean rate beyond three of these is a motion
   double sigma_accel_bias_m_per_s2 = 0.05;  ///< tilts the estimate of gravity (F-10)
+  std::vector<double> t_CtoI_s = {};        ///< by camera: t_imu = t_camera + t_CtoI
 };
 
-/// The state at the end of the last `window_s` of the IMU if the base stood still in it (F-9):
-/// the readings scatter as their noise does (with room for vibration), the mean specific force is
-/// gravity within the bias prior, the mean rate within the bias prior, and no wheel turned.
-/// `encoders`: those of each wheel set.
+/// The state at the end of the last `window_s` of the IMU (5 % less will do) if the base stood
+/// still in it (F-9): no wheel turned, no image moved, the mean specific force is gravity within
+/// the bias prior, the mean rate within the bias prior, and both halves of the window agree.
+/// Vibration may scatter the readings if wheels or images have seen the rest; then the covariance
+/// is that of the means as they are (F-33). Where neither has, the readings scatter as their noise
+/// does. `encoders`: those of each wheel set. `tracks`: of one sensor, its points keep their ids.
 /// The origin of G is there where the IMU is then, and the x axis of G in the IMU's x-z plane (y-z,
 /// if x is nearly vertical).
 StartAttempt start_from_standstill(std::span<const ImuSample> imu,
                                    std::span<const std::span<const EncoderSample>> encoders,
-                                   const StandstillOptions& options);
+                                   const StandstillOptions& options,
+                                   std::span<const FeatureSample> tracks = {});
 
 }  // namespace viwo

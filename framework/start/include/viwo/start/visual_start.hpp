@@ -1,0 +1,37 @@
+// A first state from cameras and IMU while the robot moves, without wheels: images tell where it
+// went up to a scale, the accelerometer tells the scale and where down is; two cameras know the
+// scale by themselves. Equations: docs/math/filter.md.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "viwo/api/measurement.hpp"
+#include "viwo/api/rig.hpp"
+#include "viwo/filter/start_search.hpp"
+
+namespace viwo {
+
+struct VisualStartOptions {
+  double window_s = 1.;
+  ImuNoise noise;
+  double gravity_m_per_s2 = 9.81;
+  double sigma_position_m = 0.01;  ///< of the origin, a matter of definition
+  double sigma_yaw_rad = 0.01;     ///< likewise
+  double sigma_gyro_bias_rad_per_s = 0.02;
+  double sigma_accel_bias_m_per_s2 = 0.05;
+  std::vector<CameraPrior> cameras;  ///< by FeatureSample::camera
+};
+
+/// The state at the last image, from the images of the last `window_s` before it, or of twice that
+/// where this is too short to tell the scale. `tracks`: of one sensor, its points keep their ids;
+/// those of one landmark in several cameras have the same. The origin of G is there where the IMU
+/// is then, and the x axis of G in the IMU's x-z plane (y-z, if x is nearly vertical).
+///
+/// Nothing: the measurements do not fill the window, contradict each other or what the options say
+/// of biases by more than four sigma, or leave velocity or tilt too uncertain to begin with.
+StartAttempt start_from_images(std::span<const ImuSample> imu,
+                               std::span<const FeatureSample> tracks,
+                               const VisualStartOptions& options);
+
+}  // namespace viwo
