@@ -68,7 +68,7 @@ Intake::Intake(const bag::TopicOptions& options, const HostServices& services, L
   for (std::size_t i = 0; i < options.image_topics.size(); ++i) {
     want(options.image_topics[i], {Kind::kImage, Kind::kCompressedImage}, static_cast<int>(i));
   }
-  states_.resize(topics_.size());
+  for (const Topic& topic : topics_) states_.emplace_back().jump = jump_of(topic);
 }
 
 void Intake::take(std::size_t topic, const std::string& type, const std::string& md5,
@@ -177,6 +177,42 @@ bool Intake::is_slow(std::size_t topic) const {
   return topics_[topic].kinds.front() == Kind::kNavSatFix;
 }
 
+/// An IMU has no pauses of a second, and what images and joints have is soon seen. Poses and fixes
+/// may be seldom from the first on.
+StampJump Intake::jump_of(const Topic& topic) const {
+  switch (topic.kinds.front()) {
+    case Kind::kImu:
+      return StampJump(1., 0);
+    case Kind::kJoints:
+    case Kind::kImage:
+      return StampJump(1.);
+    default:
+      return StampJump();
+  }
+}
+
+/// Whether a stamp that is not after the last is one of many: their clock was set back, or the one
+/// that they are compared with was broken.
+bool Intake::is_clock_set_back(State& state, std::int64_t t_ns) const {
+  constexpr int kMany = 10;
+  constexpr double kLongS = 1.;
+  const bool is_long = seconds_between(t_ns, *state.last_ns) > kLongS;
+  const bool follows = state.n_behind == 0 || t_ns > state.behind_ns;
+  state.n_behind = !is_long ? 0 : follows ? state.n_behind + 1 : 1;
+  state.behind_ns = t_ns;
+  return state.n_behind >= kMany;
+}
+
+/// Forgets what came on a topic before.
+void Intake::begin_again(std::size_t topic) {
+  State& state = states_[topic];
+  state.last_ns.reset();
+  state.jump = jump_of(topics_[topic]);
+  const Kind kind = topics_[topic].kinds.front();
+  if (kind == Kind::kJoints) cells_ = LiveCells(options_.drive_is_angle, options_.max_gap_s);
+  if (kind == Kind::kImage) image_order_ = ImageOrder(options_.image_topics.size());
+}
+
 bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
   State& state = states_[topic];
   if (t_ns == 0) {
@@ -184,7 +220,16 @@ bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
     return false;
   }
   if (state.last_ns && t_ns <= *state.last_ns) {
-    reject(topic, log::kStampNotAfter, t_ns);
+    if (!is_clock_set_back(state, t_ns)) {
+      reject(topic, log::kStampNotAfter, t_ns);
+      return false;
+    }
+    count(topic, "clock set back", t_ns, "its messages are taken from here on");
+    begin_again(topic);
+  }
+  state.n_behind = 0;
+  if (!state.jump.is_believed(t_ns)) {
+    reject(topic, log::kStampFarAhead, t_ns);
     return false;
   }
   if (state.last_ns && !is_slow(topic) &&

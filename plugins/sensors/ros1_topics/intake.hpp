@@ -19,6 +19,7 @@
 #include "topic_options.hpp"
 #include "viwo/api/host_services.hpp"
 #include "viwo/api/rejections.hpp"
+#include "viwo/math/stamp_jump.hpp"
 
 namespace viwo::ros1 {
 
@@ -52,6 +53,9 @@ class Intake {
  private:
   struct State {
     std::optional<std::int64_t> last_ns;
+    StampJump jump;
+    std::int64_t behind_ns = 0;
+    int n_behind = 0;  ///< messages without a break, in their order, that are long before last_ns
     Clock::time_point last_use = Clock::now();
   };
 
@@ -62,6 +66,9 @@ class Intake {
   void take_joints(std::size_t topic, const bag::Joints& joints);
   void take_image(std::size_t topic, const ImageSample& image);
   bool is_slow(std::size_t topic) const;
+  StampJump jump_of(const Topic& topic) const;
+  bool is_clock_set_back(State& state, std::int64_t t_ns) const;
+  void begin_again(std::size_t topic);
   bool accept(std::size_t topic, std::int64_t t_ns);
   void reject(std::size_t topic, const std::string& reason, std::int64_t t_ns);
   void count(std::size_t topic, const std::string& reason, std::int64_t t_ns,

@@ -47,6 +47,8 @@ void LiveQueue::push(Measurement measurement) {
     if (measurement.get_if<ImageSample>() != nullptr) {
       if (n_images_ == max_images_) drop_oldest_images();
       ++n_images_;
+    } else if (queue_.size() - n_images_ == max_others_) {
+      drop_oldest_other();
     }
     queue_.push_back(std::move(measurement));
   }
@@ -67,6 +69,14 @@ void LiveQueue::drop_oldest_images() {
       [oldest_ns] { return stamp_text(oldest_ns); }, n);
   n_images_ -= static_cast<std::size_t>(n);
   queue_.erase(kept, queue_.end());
+}
+
+void LiveQueue::drop_oldest_other() {
+  const auto oldest = std::find_if(queue_.begin(), queue_.end(), [](const Measurement& m) {
+    return m.get_if<ImageSample>() == nullptr;
+  });
+  rejections_.add("measurement dropped: they come faster than they are taken", stamp_ns(*oldest));
+  queue_.erase(oldest);
 }
 
 LiveQueue::Taken LiveQueue::pop(Measurement& out, std::chrono::milliseconds wait) {

@@ -1,5 +1,6 @@
 // Between the threads that receive and the one that takes: a queue that loses images when it is
-// read too slowly, but nothing else; and what brings the images of several cameras into order.
+// read too slowly, and anything else only when it is hardly read at all; and what brings the images
+// of several cameras into order.
 #pragma once
 
 #include <chrono>
@@ -50,11 +51,15 @@ class LiveQueue {
  public:
   enum class Taken : std::uint8_t { kMeasurement, kNothing, kEnded };
 
-  /// Holds `max_images` images at most.
-  explicit LiveQueue(std::size_t max_images) : max_images_(max_images) {}
+  /// A minute and a half of an IMU of 200 Hz: who is further behind is not going to catch up.
+  static constexpr std::size_t kMaxOthers = 20'000;
+
+  /// Holds `max_images` images at most, and `max_others` measurements that are none.
+  explicit LiveQueue(std::size_t max_images, std::size_t max_others = kMaxOthers)
+      : max_images_(max_images), max_others_(max_others) {}
 
   /// Where an image has no room, all images of the oldest instant go: one of a stereo pair alone is
-  /// of little use. After end() nothing is taken in.
+  /// of little use. Of other measurements the oldest goes. After end() nothing is taken in.
   void push(Measurement measurement);
   /// Waits for a measurement. kEnded: nothing will come any more.
   Taken pop(Measurement& out, std::chrono::milliseconds wait);
@@ -66,8 +71,9 @@ class LiveQueue {
 
  private:
   void drop_oldest_images();
+  void drop_oldest_other();
 
-  std::size_t max_images_;
+  std::size_t max_images_, max_others_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Measurement> queue_;

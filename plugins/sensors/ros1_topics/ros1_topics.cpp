@@ -218,12 +218,14 @@ class Ros1Topics final : public Sensor {
 
  private:
   void subscribe() {
-    constexpr std::uint32_t kNoLimit = 0;  // the queue of the sensor has one, and counts
+    // Messages that are received and not looked at yet. Looking at one takes microseconds, and the
+    // queue behind it has limits of its own and counts: these are never reached.
+    constexpr std::uint32_t kMostImages = 100, kMostOthers = 10'000;
     const auto hints = ros::TransportHints().tcpNoDelay();
     for (std::size_t i = 0; i < intake_.topics().size(); ++i) {
       ros::SubscribeOptions wanted;
       wanted.template initByFullCallbackType<const ros::MessageEvent<const RawMessage>&>(
-          intake_.topics()[i].name, kNoLimit,
+          intake_.topics()[i].name, intake_.topics()[i].camera < 0 ? kMostOthers : kMostImages,
           [this, i](const ros::MessageEvent<const RawMessage>& event) {
             const ros::M_string& connection = event.getConnectionHeader();
             intake_.take(i, connection.at("type"), connection.at("md5sum"), event.getMessage());

@@ -164,6 +164,54 @@ msg::JointState joint_message(std::int64_t t_ns, double drive_1, double drive_2,
   return message;
 }
 
+/// Stamps of what was taken, ms.
+std::vector<std::int64_t> stamps_ms(const std::vector<Measurement>& all) {
+  std::vector<std::int64_t> t_ms;
+  for (const Measurement& m : all) t_ms.push_back(stamp_ns(m) / 1'000'000);
+  return t_ms;
+}
+
+TEST_F(IntakeTest, IsNotSpoiltByOneStampInTheFuture) {
+  for (const std::int64_t ahead_s : {2, 3600}) {
+    Intake intake = make(imu_only());
+    take(intake, 0, imu_message(5 * kSecond));
+    take(intake, 0, imu_message((5 + ahead_s) * kSecond));
+    take(intake, 0, imu_message(5 * kSecond + 10'000'000));
+    take(intake, 0, imu_message(5 * kSecond + 20'000'000));
+    EXPECT_THAT(stamps_ms(taken()), ElementsAre(5000, 5010, 5020)) << ahead_s;
+    EXPECT_THAT(rejections(intake),
+                ElementsAre("/imu0: stamp far ahead of the previous one | 1 | stamp " +
+                            std::to_string((5 + ahead_s) * kSecond) + " ns"));
+  }
+}
+
+TEST_F(IntakeTest, GoesOnFromAClockThatWasSetBack) {
+  TopicOptions options = imu_only();
+  options.image_topics = {"/cam0"};
+  Intake intake = make(options);
+  const auto image = [](std::int64_t t_ns) {
+    msg::Image message;
+    message.header.stamp = time_of(t_ns);
+    message.height = message.width = message.step = 1;
+    message.encoding = "mono8";
+    message.data = {0};
+    return message;
+  };
+  take(intake, 0, imu_message(3600 * kSecond));
+  take(intake, 1, image(3600 * kSecond));
+  for (std::int64_t k = 0; k < 12; ++k) {
+    take(intake, 0, imu_message(5 * kSecond + k * 10'000'000));
+    take(intake, 1, image(5 * kSecond + k * 100'000'000));
+  }
+  EXPECT_THAT(stamps_ms(taken()),
+              ElementsAre(3'600'000, 3'600'000, 5090, 5900, 5100, 6000, 5110, 6100));
+  EXPECT_THAT(rejections(intake),
+              ElementsAre("/imu0: stamp not after the previous one | 9 | stamp 5000000000 ns",
+                          "/cam0: stamp not after the previous one | 9 | stamp 5000000000 ns",
+                          "/imu0: clock set back | 1 | stamp 5090000000 ns",
+                          "/cam0: clock set back | 1 | stamp 5900000000 ns"));
+}
+
 TEST_F(IntakeTest, MakesCausalCellsOfRates) {
   Intake intake = make(wheels());
   take(intake, 0, joint_message(kTime, 1., 2., 3.1));

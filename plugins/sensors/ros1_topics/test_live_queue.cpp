@@ -125,6 +125,22 @@ TEST(LiveQueue, DropsTheOldestImagesWhenItIsFullAndNothingElse) {
   EXPECT_EQ(rejections[0].first, "stamp 10000000 ns");
 }
 
+TEST(LiveQueue, DropsTheOldestOfAllElseWhenHardlyAnythingIsTaken) {
+  LiveQueue queue(2, 3);
+  queue.push(ImageSample{0, 0, nullptr});
+  for (std::int64_t t = 1; t <= 5; ++t) queue.push(imu(t));
+  std::vector<std::int64_t> taken;
+  Measurement out;
+  while (queue.pop(out, 0ms) == Taken::kMeasurement) taken.push_back(stamp_ns(out));
+  EXPECT_EQ(taken, (std::vector<std::int64_t>{0, 3, 4, 5}));
+  std::vector<RejectionCount> counts;
+  queue.rejections(counts);
+  ASSERT_EQ(counts.size(), 1U);
+  EXPECT_EQ(counts[0].reason, "measurement dropped: they come faster than they are taken");
+  EXPECT_EQ(counts[0].count, 2);
+  EXPECT_EQ(counts[0].first, "stamp 1 ns");
+}
+
 TEST(LiveQueue, HasRoomAgainForImagesThatWereTaken) {
   LiveQueue queue(2);
   Measurement out;
