@@ -97,6 +97,37 @@ TEST(FilterRun, AStartFromMotionHasTheWheelsWithoutAnyUpdate) {
   EXPECT_GT(result.epochs, 30);
 }
 
+/// The same robot without its wheels.
+std::string swerve_without_wheels(int features) {
+  std::string all = testing::swerve_with_camera(features);
+  // A circle tells one camera little of its scale.
+  all.replace(all.find("motion: circle"), 14, "motion: icr_sweep");
+  return all.substr(0, all.find("kinematics:"));
+}
+
+TEST(FilterRun, AStartFromMotionHasImagesWhereThereAreNoWheels) {
+  const config::Node run = config::parse(
+      swerve_without_wheels(60) + "cameras: {kalibr: " VIWO_TEST_SOURCE_DIR
+                                  "/configs/cameras/pinhole.yaml, calibrate: false}\n"
+                                  "estimator: {start: moving}\nupdates: {visual_features: {}}\n",
+      "run.yaml");
+  RunSetup setup = read_run(run, registry(), 1);
+  const RunData data = collect(setup);
+  const RunResult result = experiment::run(setup, data);
+  ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
+  EXPECT_LT(seconds_between(data.imu().front().t_ns, result.estimate.front().t_ns), 2.5);
+}
+
+TEST(FilterRun, AStartFromMotionNeedsWheelsOrTracks) {
+  const config::Node run = config::parse(
+      swerve_without_wheels(10) + "estimator: {type: msckf, start: moving}\n", "run.yaml");
+  RunSetup setup = read_run(run, registry(), 1);
+  const RunData data = collect(setup);
+  EXPECT_EQ(testing::error_of([&] { experiment::run(setup, data); }),
+            "estimator.start: moving needs wheels, or cameras and an update that takes their "
+            "tracks - choose standstill or reference");
+}
+
 TEST(HeldGauge, BringsATruthOfAnotherFrameIntoTheOneThatTheEstimateHolds) {
   const RunSetup setup = inertia_and_wheels();
   const WheelModel& model = *setup.model;

@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include "live_device.hpp"
 #include "sensors_in_memory.hpp"
 #include "simulated.hpp"
 #include "viwo/experiment/output.hpp"
@@ -21,45 +22,13 @@
 namespace viwo::experiment {
 namespace {
 
+using testing::Device;
 using testing::in_time_order;
 using testing::registry;
 using testing::routes_for;
-
-/// Gives what it was made with, then waits for stop(), or ends at once. What it yields is what the
-/// routes of a test say.
-class Device : public Sensor {
- public:
-  Device(std::vector<Measurement> measurements, bool waits)
-      : measurements_(std::move(measurements)), waits_(waits) {}
-  SampleTypes yields() const override { return {}; }
-  bool live() const override { return true; }
-  Status next(Measurement& out) override {
-    if (next_ < measurements_.size()) {
-      out = measurements_[next_++];
-      return Status::kOk;
-    }
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return stopped_ || !waits_; });
-    return Status::kEnd;
-  }
-  void stop() override {
-    {
-      const std::scoped_lock lock(mutex_);
-      stopped_ = true;
-    }
-    changed_.notify_all();
-  }
-  void estimate(const EstimateSample& estimate) override { estimates.push_back(estimate); }
-  std::vector<EstimateSample> estimates;
-
- private:
-  std::vector<Measurement> measurements_;
-  std::size_t next_ = 0;
-  bool waits_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool stopped_ = false;
-};
+using testing::routes_of_device;
+using testing::standing_then_driving;
+using testing::stream;
 
 /// A picture without pixels: what is behind it are the points of an image.
 struct Points final : ImageSource {
@@ -89,19 +58,6 @@ class Tracker final : public Sensor {
   Sensor* input_ = nullptr;
 };
 
-RunSetup standing_then_driving() {
-  const std::string robot = std::string("{type: four_wis_wid, ") + testing::kSwerve + "}";
-  const std::string cameras = VIWO_TEST_SOURCE_DIR "/configs/cameras/pinhole.yaml";
-  const config::Node run = config::parse(
-      "sensors: {sim: {type: simulator, motion: sweep_then_straight, duration_s: 4, features: 40, "
-      "cameras: " +
-          cameras + ", robot: " + robot + "}}\nkinematics: " + robot +
-          "\ncameras: {kalibr: " + cameras +
-          "}\nestimator: {start: moving}\nupdates: {visual_features: {}, wheel_odometry: {}}\n",
-      "run.yaml");
-  return read_run(run, registry(), 1);
-}
-
 /// What a filter takes of a recorded run as one sensor would give it, with pictures in the place of
 /// tracks.
 std::vector<Measurement> with_pictures(const RunData& data) {
@@ -114,25 +70,10 @@ std::vector<Measurement> with_pictures(const RunData& data) {
   return all;
 }
 
-/// Who gets what of a sensor 'device' that gives all that a filter takes, and of others.
-Routes routes_of_device(const RunSetup& setup, std::vector<SensorYield> others = {}) {
-  others.push_back({"device", sample_types<ImuSample, EncoderSample, FeatureSample>()});
-  return routes_for(setup, others);
-}
-
 /// The same of one that gives pictures, and of the sensor 'tracks' that works on them.
 Routes routes_of_pictures(const RunSetup& setup) {
   return routes_for(setup, {{"device", sample_types<ImuSample, EncoderSample, ImageSample>()},
                             {"tracks", sample_types<FeatureSample>()}});
-}
-
-SensorStream stream(const std::string& name, std::shared_ptr<Sensor> sensor,
-                    const std::string& input = "") {
-  SensorStream out;
-  out.name = name;
-  out.sensor = std::move(sensor);
-  out.input_name = input;
-  return out;
 }
 
 double distance(const RunResult& a, const RunResult& b) {
@@ -149,6 +90,7 @@ TEST(LiveFeed, GivesTheTrajectoryOfTheSameMeasurementsRecorded) {
   const RunResult expected = run_filter(setup, recorded);
   ASSERT_EQ(expected.status, RunStatus::kOk) << expected.cause;
   const auto device = std::make_shared<Device>(in_time_order(recorded.recorded), false);
+  setup = standing_then_driving();  // updates that have not learned anything yet
   setup.routes = routes_of_device(setup);
   RunData data;
   data.live.push_back(stream("device", device));

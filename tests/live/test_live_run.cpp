@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -79,20 +80,28 @@ class LiveRun : public testing::LiveTest {
   }
 
   /// What a robot would give, in a bag.
-  static void make_bag() {
-    run({VIWO_TEST_PROGRAM, "simulate", VIWO_TEST_SOURCE_DIR "/tests/live/simulate.yaml", "--out",
-         ros_->file("log")},
-        "simulate.log");
+  static void make_bag(const std::string& robot = VIWO_TEST_SOURCE_DIR
+                       "/tests/live/simulate.yaml") {
+    run({VIWO_TEST_PROGRAM, "simulate", robot, "--out", ros_->file("log")}, "simulate.log");
     if (HasFatalFailure()) return;
     run({VIWO_TEST_BAG_PROGRAM, ros_->file("log"), ros_->file("robot.bag")}, "bag.log");
+  }
+
+  static std::vector<std::string> run_words() {
+    return {VIWO_TEST_PROGRAM, "run", VIWO_TEST_SOURCE_DIR "/configs/runs/viwo_live.yaml", "--out",
+            ros_->file("out")};
+  }
+
+  /// Of a former run, what it has said included.
+  static void remove_outputs() {
+    std::filesystem::remove_all(ros_->file("out"));
+    std::filesystem::remove(ros_->file("viwo.log"));
   }
 
   static void play_to_a_run_that_is_interrupted() {
     Child recorder({VIWO_TEST_ROS_NODE, "record", ros_->file("heard.txt")},
                    ros_->file("recorder.log"));
-    Child viwo({VIWO_TEST_PROGRAM, "run", VIWO_TEST_SOURCE_DIR "/configs/runs/viwo_live.yaml",
-                "--out", ros_->file("out")},
-               ros_->file("viwo.log"));
+    Child viwo(run_words(), ros_->file("viwo.log"));
     ASSERT_TRUE(wait_for("listening", "viwo.log")) << text_of("viwo.log");
     run({VIWO_TEST_ROSBAG_PLAY, "--quiet", "-d", "2", ros_->file("robot.bag")}, "play.log");
     std::this_thread::sleep_for(1s);
@@ -148,6 +157,56 @@ TEST_F(LiveRun, FollowsARobotInRealTimeAndTellsItWhereItIs) {
             << " m\n";
   EXPECT_GT(latency.at("mean").get<double>(), 0.);
   EXPECT_LT(latency.at("mean").get<double>(), 250.);
+}
+
+TEST_F(LiveRun, HasItsResultsOnDiskAsTheyComeAlsoWhenItIsKilled) {
+  // The same robot in the dark.
+  std::ifstream all(VIWO_TEST_SOURCE_DIR "/tests/live/simulate.yaml");
+  std::ofstream dark(ros_->file("dark.yaml"));
+  for (std::string line; std::getline(all, line);) {
+    if (line.find("images0:") != std::string::npos) continue;
+    const std::size_t path = line.find("../../configs");
+    if (path != std::string::npos) line.replace(path, 5, VIWO_TEST_SOURCE_DIR);
+    dark << line << "\n";
+  }
+  dark.close();
+  make_bag(ros_->file("dark.yaml"));
+  if (HasFatalFailure()) return;
+  remove_outputs();
+  Child viwo(run_words(), ros_->file("viwo.log"));
+  ASSERT_TRUE(wait_for("listening", "viwo.log")) << text_of("viwo.log");
+  Child play({VIWO_TEST_ROSBAG_PLAY, "--quiet", "-d", "2", ros_->file("robot.bag")},
+             ros_->file("play.log"));
+  const auto n_poses = [] {
+    const std::string text = text_of("out/trajectory.tum");
+    return std::count(text.begin(), text.end(), '\n') - 1;
+  };
+  const auto deadline = std::chrono::steady_clock::now() + 60s;
+  while (n_poses() < 12 && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(20ms);
+  }
+  viwo.signal(SIGKILL);
+  viwo.wait(5s);
+  EXPECT_GE(n_poses(), 12) << text_of("viwo.log");
+  EXPECT_FALSE(std::filesystem::exists(ros_->file("out/summary.json")));
+  for (const char* file : {"out/trajectory.tum", "out/calibration.csv", "out/timing.csv"}) {
+    EXPECT_EQ(text_of(file).back(), '\n') << file << " ends within a line";
+  }
+  EXPECT_EQ(lines_with("", "out/timing.csv").size(), static_cast<std::size_t>(n_poses()) + 1);
+}
+
+TEST_F(LiveRun, EndsSoonByAnySignalAlsoWhileNothingComes) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+    remove_outputs();
+    Child viwo(run_words(), ros_->file("viwo.log"));
+    ASSERT_TRUE(wait_for("listening", "viwo.log")) << text_of("viwo.log");
+    const auto begin = std::chrono::steady_clock::now();
+    viwo.signal(number);
+    EXPECT_EQ(viwo.wait(20s), 1) << text_of("viwo.log");
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, 3s) << "with the writing of the results";
+    const json summary = json::parse(text_of("out/summary.json"));
+    EXPECT_EQ(summary.at("cause"), "nothing has come: no IMU sample arrived") << number;
+  }
 }
 
 }  // namespace

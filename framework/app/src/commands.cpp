@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "command_line.hpp"
+#include "viwo/config/yaml.hpp"
 #include "viwo/eval/accuracy.hpp"
 #include "viwo/experiment/calibrate.hpp"
 #include "viwo/experiment/experiment.hpp"
@@ -13,6 +14,7 @@
 #include "viwo/experiment/output.hpp"
 #include "viwo/experiment/pictures.hpp"
 #include "viwo/experiment/progress.hpp"
+#include "viwo/experiment/run_stream.hpp"
 #include "viwo/experiment/simulate.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/report/figures.hpp"
@@ -51,6 +53,34 @@ class Figures {
   std::filesystem::path folder_;
 };
 
+/// What a live run has beside others: signals end it, results are on disk as they come, and what is
+/// wrong is said when it is seen.
+class LiveOutput {
+ public:
+  LiveOutput(const RunSetup& setup, const std::filesystem::path& folder, RunHooks& hooks)
+      : stream_(folder) {
+    write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
+    hooks.interrupted = [this] { return interrupt_.raised(); };
+    hooks.on_epoch = [this, then = hooks.on_epoch](const RunResult& result) {
+      stream_.epoch(result);
+      if (then) then(result);
+    };
+    hooks.on_warning = [](double t_s, const std::string& text) {
+      std::cerr << "at " << significant(t_s, 6) << " s: " << text << std::endl;
+    };
+    std::cerr << setup.name << ": listening; ctrl-C ends the run and writes its results\n";
+  }
+  void finish(RunResult& result) {
+    const std::string failure = stream_.finish();
+    result.on_disk = failure.empty();
+    if (!failure.empty()) result.warnings.push_back(failure + "; what is there is thinned");
+  }
+
+ private:
+  InterruptSignal interrupt_;
+  RunStream stream_;
+};
+
 RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
   const config::Node configuration =
       resolve_placeholders(load_run_configuration(arguments.positional[0], arguments.assignments));
@@ -68,19 +98,16 @@ int run_command(const Arguments& arguments) {
   const auto folder = out_folder(arguments);
   make_folder(folder);  // whether results can be written shows before the work
   const Figures figures(arguments, folder);
+  std::optional<LiveOutput> output;  // here: signals are waited for until all is written
   RunResult result;
   {
     TimeProgress progress(setup.name);  // gone before anything else is printed
     RunHooks hooks;
     pictures.watch(hooks);
     hooks.progress = [&](double fraction) { progress.at(fraction); };
-    std::optional<InterruptSignal> interrupt;
-    if (!data.live.empty()) {
-      interrupt.emplace();
-      hooks.interrupted = [&interrupt] { return interrupt->raised(); };
-      std::cerr << setup.name << ": listening; ctrl-C ends the run and writes its results\n";
-    }
+    if (!data.live.empty()) output.emplace(setup, folder, hooks);
     result = experiment::run(setup, data, hooks);
+    if (output) output->finish(result);
   }
   const std::string picture_failure = pictures.finish(result);
   write_run(folder, setup, result);

@@ -1,10 +1,14 @@
 #include "viwo/experiment/experiment.hpp"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
+#include <mutex>
+#include <set>
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -72,7 +76,8 @@ void find_baseline(const Node& file, const std::string& name, ExperimentSetup& s
   setup.baseline = static_cast<std::size_t>(found - names.begin());
 }
 
-std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
+/// Variant, recording and seed.
+std::string title_of(const ExperimentSetup& setup, const ExperimentRun& run) {
   std::string line = setup.variants[run.variant].name;
   const Recording& recording = setup.recordings[run.recording];
   if (!recording.name.empty()) line += "  " + recording.name;
@@ -82,6 +87,11 @@ std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
     }
   }
   if (setup.seeds > 1) line += "  seed " + std::to_string(run.seed);
+  return line;
+}
+
+std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
+  std::string line = title_of(setup, run);
   line += std::string("  ") + name(run.result.status);
   if (!run.result.cause.empty()) line += ": " + run.result.cause;
   if (std::isfinite(run.result.nees.pose)) {
@@ -174,13 +184,17 @@ class Runner {
   }
 
   /// Runs a cell; false if that was interrupted.
-  bool run(ExperimentRun& run) {
+  bool run(ExperimentRun& run, Progress& progress) {
     if (stopped()) return false;
     try {
       RunSetup setup = read_run(configuration(run.variant, run.recording), plugins_, run.seed);
       RunHooks hooks;
       hooks.progress = [this](double) {
         if (stopped()) throw Stopped();
+      };
+      hooks.on_warning = [&](double t_s, const std::string& text) {
+        if (!is_new(run, text)) return;
+        progress.note(title_of(setup_, run) + ": at " + significant(t_s, 4) + " s: " + text);
       };
       run.result = experiment::run(setup, collect(setup), hooks);
       write_run_of(run, setup);
@@ -210,6 +224,15 @@ class Runner {
   struct Unwritable {
     std::string text;
   };
+
+  /// Whether a warning is the first of its kind, whatever its numbers, of a variant.
+  bool is_new(const ExperimentRun& run, const std::string& text) {
+    std::string kind = std::to_string(run.variant) + ":";
+    std::copy_if(text.begin(), text.end(), std::back_inserter(kind),
+                 [](char c) { return c < '0' || c > '9'; });
+    const std::scoped_lock lock(said_mutex_);
+    return said_.insert(kind).second;
+  }
 
   static void fail(ExperimentRun& run, const std::string& cause) {
     run.result = {};
@@ -251,6 +274,8 @@ class Runner {
   ExperimentResult& result_;
   std::vector<std::string> configurations_;  // by variant, recording
   std::atomic<int> finished_ = 0;
+  std::mutex said_mutex_;
+  std::set<std::string> said_;  ///< kinds of warnings
 };
 
 }  // namespace
@@ -305,7 +330,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
     runner.open_journal(progress);
     tbb::parallel_for(std::size_t{0}, result.runs.size(), [&](std::size_t i) {
       ExperimentRun& run = result.runs[i];
-      if (!run.taken_over && runner.run(run)) progress.done(line_of(setup, run));
+      if (!run.taken_over && runner.run(run, progress)) progress.done(line_of(setup, run));
     });
   }
   if (runner.finished() < static_cast<int>(result.runs.size())) {

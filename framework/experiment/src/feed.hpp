@@ -1,8 +1,9 @@
-// Hands what the sensors of a run give to the estimator.
+// Hands what the sensors of a run give to the estimator, and to the check of their plausibility.
 #pragma once
 
 #include <memory>
 
+#include "plausibility.hpp"
 #include "viwo/experiment/run.hpp"
 
 namespace viwo::experiment {
@@ -13,6 +14,8 @@ class Feed {
   /// Gives the estimator the next measurement; false when there is none left. Throws InputError
   /// when a sensor is broken.
   virtual bool next(Estimator& estimator) = 0;
+  /// Whether what has been given is not to be waited for any more.
+  virtual bool is_over() { return false; }
   /// An epoch is done.
   virtual void on_epoch(const Estimator& /*estimator*/) {}
   /// Ends what still runs, and records what the sensors took, dropped and gave as reference.
@@ -20,9 +23,11 @@ class Feed {
 };
 
 /// All measurements in the order of their stamps: the same in every run.
-std::unique_ptr<Feed> feed_recorded(const RunSetup& setup, const RunData& data);
+std::unique_ptr<Feed> feed_recorded(const RunSetup& setup, const RunData& data,
+                                    Plausibility& plausibility);
 
 /// Measurements as they come. hooks.interrupted is asked now and then whether that is to end.
-std::unique_ptr<Feed> feed_live(const RunSetup& setup, const RunData& data, const RunHooks& hooks);
+std::unique_ptr<Feed> feed_live(const RunSetup& setup, const RunData& data, const RunHooks& hooks,
+                                Plausibility& plausibility);
 
 }  // namespace viwo::experiment

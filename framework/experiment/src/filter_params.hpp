@@ -92,18 +92,30 @@ inline constexpr std::array kEstimatorParams{
               .type = ParamType::kBool,
               .fallback = "false",
               .help = "such directions get no correction and keep their variance (needs monitor)"},
-    ParamSpec{.name = "start",
+    ParamSpec{
+        .name = "start",
+        .type = ParamType::kString,
+        .fallback = "reference",
+        .choices = "reference|standstill|moving",
+        .help =
+            "first state: of the reference, from a rest (vibration does not matter where images "
+            "or wheels see it), or from the motion: by wheels and IMU or, without wheels, "
+            "by cameras and IMU (or from a rest, whichever comes first)"},
+    ParamSpec{.name = "restart",
               .type = ParamType::kString,
-              .fallback = "reference",
-              .choices = "reference|standstill|moving",
-              .help = "first state: of the reference, from a rest, or from wheels and IMU"},
+              .fallback = "live",
+              .choices = "never|live|always",
+              .help = "a filter that has diverged is started again, where it was and with the "
+                      "calibration of before: in live runs, always (also of recordings), or never"},
     ParamSpec{.name = "start_window_s",
               .type = ParamType::kNumber,
               .unit = "s",
               .fallback = "1",
               .min = 0.1,
               .max = 60.,
-              .help = "how much data a start without reference looks at"},
+              .help =
+                  "how much data a start without reference looks at; from cameras in motion up to "
+                  "twice that, where this is too short to tell the scale"},
     ParamSpec{.name = "sigma_start_orientation_rad",
               .type = ParamType::kNumber,
               .unit = "rad",
@@ -126,7 +138,7 @@ inline constexpr std::array kEstimatorParams{
               .min = 0.,
               .min_exclusive = true,
               .help = "prior of the first velocity; start: moving: what slip adds to that of the "
-                      "wheels; start: standstill: not used"},
+                      "wheels; start: standstill, or without wheels: not used"},
     ParamSpec{.name = "sigma_start_gyro_bias_rad_per_s",
               .type = ParamType::kNumber,
               .unit = "rad/s",

@@ -55,6 +55,9 @@ void read_estimator(const ParamSet& p, FilterSetup& setup) {
   setup.options.monitor.window_s = p.number("monitor_window_s");
   setup.options.monitor.min_information = p.number("monitor_min_information");
   setup.options.monitor.hold = p.flag("hold_unexcited");
+  setup.restart = p.text("restart") == "always"  ? Restart::kAlways
+                  : p.text("restart") == "never" ? Restart::kNever
+                                                 : Restart::kLive;
   StartSetup& start = setup.start;
   start.mode = p.text("start") == "standstill" ? StartMode::kStandstill
                : p.text("start") == "moving"   ? StartMode::kMoving

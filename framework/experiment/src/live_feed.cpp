@@ -1,6 +1,10 @@
 // Sensors that give measurements as they happen. Each has a thread, and so has each sensor that
 // works on what another one gives; all of them put what they give into one queue, from which the
 // estimator takes it in the order of arrival.
+//
+// Nothing grows without bound when the estimator is slower than what happens: who finds the queue
+// full waits. A sensor that works on images then gets too many of them, of which the oldest go, and
+// there is less to do; a sensor that still gets too much drops by itself, and counts.
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -11,14 +15,17 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "bounded_series.hpp"
 #include "channels.hpp"
 #include "feed.hpp"
+#include "live_input.hpp"
 #include "viwo/math/arrays.hpp"
 
 namespace viwo::experiment {
@@ -26,97 +33,49 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Images that may wait for a sensor that works on them; more than these are old news.
-constexpr std::size_t kMaxWaitingImages = 8;
+/// Measurements that may wait for the estimator: those of some seconds.
+constexpr std::size_t kMaxArrivals = 1000;
+/// After an interruption, the time for what waits, and for sensors to end, each.
+constexpr std::chrono::milliseconds kRestTime(1000);
+constexpr std::chrono::milliseconds kEndTime(3000);
+/// Poses of a reference that are kept of a run without end.
+constexpr std::size_t kMostReference = 16'384;
 constexpr std::chrono::milliseconds kPollPeriod(50);
 /// Clocks of cameras are nearer to that of the IMU than this.
 constexpr std::int64_t kMaxClockOffsetNs = 50'000'000;
 
-double milliseconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-}
-
-/// What a live sensor gives, as the input of another one: next() waits for it.
-class LiveInput final : public Sensor {
+/// What threads of sensors and the estimator share. A sensor that does not end when it is asked to
+/// keeps it, and itself, alive.
+class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
  public:
-  SampleTypes yields() const override { return sample_types<ImageSample>(); }
-  void push(const ImageSample& image) {
-    {
-      const std::scoped_lock lock(mutex_);
-      if (images_.size() == kMaxWaitingImages) {
-        // All images of the oldest instant: one of a stereo pair alone is of little use.
-        const std::int64_t oldest_ns = images_.front().t_ns;
-        while (!images_.empty() && images_.front().t_ns <= oldest_ns + kSameInstantNs) {
-          if (dropped_++ == 0) first_dropped_ns_ = oldest_ns;
-          images_.pop_front();
-        }
-      }
-      images_.push_back(image);
-    }
-    changed_.notify_all();
-  }
-  void end() {
-    {
-      const std::scoped_lock lock(mutex_);
-      ended_ = true;
-    }
-    changed_.notify_all();
-  }
-  Status next(Measurement& out) override {
-    const auto begin = Clock::now();
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return ended_ || !images_.empty(); });
-    waited_ms_ += milliseconds_since(begin);
-    if (images_.empty()) return Status::kEnd;
-    out = std::move(images_.front());
-    images_.pop_front();
-    return Status::kOk;
-  }
-  /// How long the reader has waited so far. In its thread.
-  double waited_ms() const { return waited_ms_; }
-  void rejections(std::vector<RejectionCount>& out) const override {
-    const std::scoped_lock lock(mutex_);
-    if (dropped_ == 0) return;
-    out.push_back({"image dropped: it came faster than images can be worked on", dropped_,
-                   "stamp " + std::to_string(first_dropped_ns_) + " ns"});
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<ImageSample> images_;
-  bool ended_ = false;
-  double waited_ms_ = 0.;
-  std::int64_t dropped_ = 0;
-  std::int64_t first_dropped_ns_ = 0;
-};
-
-class LiveFeed final : public Feed {
- public:
-  LiveFeed(const RunSetup& setup, const RunData& data, const RunHooks& hooks)
-      : setup_(setup), data_(data), hooks_(hooks) {
+  LiveFeed(const RunSetup& setup, const RunData& data, const RunHooks& hooks,
+           Plausibility& plausibility)
+      : setup_(setup), hooks_(hooks), plausibility_(plausibility), live_(data.live) {
     for (const SensorStream& stream : data.streams) {
-      workers_.push_back({&stream, std::make_unique<LiveInput>(), {}});
+      workers_.push_back({stream, std::make_unique<LiveInput>(), {}});
       LiveInput& input = *workers_.back().input;
       guarded(stream.info, "connect", [&] { stream.sensor->connect(input); });
     }
-    running_ = data.live.size() + workers_.size();
-    for (const SensorStream& stream : data.live) {
-      threads_.emplace_back([this, &stream] { listen(stream); });
-    }
-    for (Worker& worker : workers_) threads_.emplace_back([this, &worker] { work(worker); });
   }
-  ~LiveFeed() override { stop(); }
 
-  bool next(Estimator& estimator) override {
+  void begin() {
+    const auto self = shared_from_this();
+    for (const SensorStream& stream : live_) {
+      add_thread(stream.name, [self, &stream] { self->listen(stream); });
+    }
+    for (Worker& worker : workers_) {
+      add_thread(worker.stream.name, [self, &worker] { self->work(worker); });
+    }
+  }
+
+  bool next(Estimator& estimator) {
     Arrival arrival;
     {
       std::unique_lock lock(mutex_);
       while (!changed_.wait_for(lock, kPollPeriod,
-                                [this] { return !arrivals_.empty() || running_ == 0; })) {
-        if (!interrupted()) continue;
+                                [this] { return !arrivals_.empty() || running_.empty(); })) {
         lock.unlock();
-        stop_sensors();
+        if (is_over()) return false;
         lock.lock();
       }
       if (arrivals_.empty()) {
@@ -126,12 +85,22 @@ class LiveFeed final : public Feed {
       arrival = std::move(arrivals_.front());
       arrivals_.pop_front();
     }
-    if (interrupted()) stop_sensors();
+    room_.notify_all();
+    if (is_over()) return false;
     give(*arrival.sensor, arrival.measurement.view(), estimator);
     return true;
   }
 
-  void on_epoch(const Estimator& estimator) override {
+  bool is_over() {
+    if (!hooks_.interrupted || !hooks_.interrupted()) return false;
+    if (!interrupted_at_) {
+      interrupted_at_ = Clock::now();
+      stop_sensors();
+    }
+    return Clock::now() - *interrupted_at_ > kRestTime;
+  }
+
+  void on_epoch(const Estimator& estimator) {
     const Filter& filter = estimator.filter();
     EstimateSample sample = sample_of(filter);
     sample.calibration_names = calibration_names(filter);
@@ -140,32 +109,57 @@ class LiveFeed final : public Feed {
       sample.calibration_sigma.push_back(estimate.sigma);
     }
     sample.latency_s = latency_s(filter.t_ns());
-    if (sample.latency_s > 0.) latency_ms_.push_back(1e3 * sample.latency_s);
-    for (const SensorStream& stream : data_.live) {
+    if (sample.latency_s > 0.) latency_ms_.add(1e3 * sample.latency_s);
+    for (const SensorStream& stream : live_) {
       guarded(stream.info, "estimate", [&] { stream.sensor->estimate(sample); });
     }
   }
 
-  void finish(RunResult& result) override {
-    stop();
-    result.reference = std::move(reference_);
+  void finish(RunResult& result) {
+    const std::vector<std::string> left = stop();
+    for (const std::string& name : left) {
+      result.warnings.push_back("sensor '" + name + "' did not end when it was asked to");
+    }
+    const auto has_ended = [&](const std::string& name) {
+      return std::find(left.begin(), left.end(), name) == left.end();
+    };
+    result.reference = reference_.points();
     if (!has_imu_ && result.cause.empty()) {
       result.cause = "nothing has come: no IMU sample arrived";
     }
     for (const Worker& worker : workers_) {
-      result.stages.emplace_back("sensor " + worker.stream->name, stage_time(worker.ms_per_stamp));
+      if (!has_ended(worker.stream.name)) continue;
+      result.stages.emplace_back("sensor " + worker.stream.name, worker.ms_per_stamp.stage());
     }
-    result.stages.emplace_back("latency from image to pose", stage_time(latency_ms_));
+    result.stages.emplace_back("latency from image to pose", latency_ms_.stage());
     const auto add = [&](const std::string& name, const Sensor& sensor) {
       std::vector<RejectionCount> all;
-      sensor.rejections(all);
+      if (has_ended(name)) sensor.rejections(all);
       for (RejectionCount& rejection : all) result.rejections.emplace_back(name, rejection);
     };
-    for (const SensorStream& stream : data_.live) add(stream.name, *stream.sensor);
+    for (const SensorStream& stream : live_) add(stream.name, *stream.sensor);
     for (const Worker& worker : workers_) {
-      add(worker.stream->name, *worker.stream->sensor);
-      add(worker.stream->input_name, *worker.input);
+      add(worker.stream.name, *worker.stream.sensor);
+      add(worker.stream.input_name, *worker.input);
     }
+  }
+
+  /// Ends all threads; the names of the sensors whose threads do not.
+  std::vector<std::string> stop() {
+    if (threads_.empty()) return {};
+    stop_sensors();
+    for (const Worker& worker : workers_) worker.input->end();
+    std::vector<std::string> left;
+    {
+      std::unique_lock lock(mutex_);
+      ended_ = true;
+      room_.notify_all();
+      changed_.wait_for(lock, kEndTime, [this] { return running_.empty(); });
+      left = running_;
+    }
+    for (std::thread& thread : threads_) left.empty() ? thread.join() : thread.detach();
+    threads_.clear();
+    return left;
   }
 
  private:
@@ -176,10 +170,19 @@ class LiveFeed final : public Feed {
 
   /// A sensor that works on what a live one gives.
   struct Worker {
-    const SensorStream* stream = nullptr;
+    SensorStream stream;
     std::unique_ptr<LiveInput> input;
-    std::vector<double> ms_per_stamp;  ///< without the waiting
+    TimeStatistics ms_per_stamp;  ///< without the waiting
   };
+
+  template <class Work>
+  void add_thread(const std::string& sensor, Work work) {
+    {
+      const std::scoped_lock lock(mutex_);
+      running_.push_back(sensor);
+    }
+    threads_.emplace_back(std::move(work));
+  }
 
   void listen(const SensorStream& stream) {
     run_thread(stream, [&](const Measurement& measurement) {
@@ -191,29 +194,31 @@ class LiveFeed final : public Feed {
         if (seen_.size() > 64) seen_.pop_front();
       }
       for (const Worker& worker : workers_) {
-        if (worker.stream->input_name == stream.name) worker.input->push(*image);
+        if (worker.stream.input_name == stream.name) worker.input->push(*image);
       }
       if (hooks_.on_live_image) hooks_.on_live_image(*image);
       return is_taken(stream.name, sample_type<ImageSample>());
     });
     for (const Worker& worker : workers_) {
-      if (worker.stream->input_name == stream.name) worker.input->end();
+      if (worker.stream.input_name == stream.name) worker.input->end();
     }
   }
 
   void work(Worker& worker) {
     auto begin = Clock::now();
-    double waited_ms = 0.;
-    std::int64_t stamp = 0;
-    run_thread(*worker.stream, [&](const Measurement& measurement) {
-      std::vector<double>& spent = worker.ms_per_stamp;
-      if (spent.empty() || stamp_ns(measurement) != stamp) spent.push_back(0.);
-      spent.back() += milliseconds_since(begin) - (worker.input->waited_ms() - waited_ms);
+    double waited_ms = 0., spent_ms = 0.;
+    std::optional<std::int64_t> stamp;
+    run_thread(worker.stream, [&](const Measurement& measurement) {
+      if (stamp && stamp_ns(measurement) != *stamp) {
+        worker.ms_per_stamp.add(std::exchange(spent_ms, 0.));
+      }
+      spent_ms += milliseconds_since(begin) - (worker.input->waited_ms() - waited_ms);
       stamp = stamp_ns(measurement);
       waited_ms = worker.input->waited_ms();
       begin = Clock::now();
       return true;
     });
+    if (stamp) worker.ms_per_stamp.add(spent_ms);
   }
 
   /// Reads a sensor to its end; `wanted` says whether the estimator is to have a measurement.
@@ -223,9 +228,12 @@ class LiveFeed final : public Feed {
       Measurement measurement;
       while (guarded(stream.info, "next", [&] { return stream.sensor->next(measurement); }) ==
              Status::kOk) {
+        if (has_ended()) break;
         if (!wanted(measurement)) continue;
         {
-          const std::scoped_lock lock(mutex_);
+          std::unique_lock lock(mutex_);
+          room_.wait(lock, [this] { return ended_ || arrivals_.size() < kMaxArrivals; });
+          if (ended_) break;
           arrivals_.push_back({&stream.name, std::move(measurement)});
         }
         changed_.notify_all();
@@ -239,7 +247,7 @@ class LiveFeed final : public Feed {
     }
     {
       const std::scoped_lock lock(mutex_);
-      --running_;
+      running_.erase(std::find(running_.begin(), running_.end(), stream.name));
     }
     changed_.notify_all();
   }
@@ -252,19 +260,15 @@ class LiveFeed final : public Feed {
     });
   }
 
-  bool interrupted() const { return hooks_.interrupted && hooks_.interrupted(); }
-
-  void stop_sensors() {
-    for (const SensorStream& stream : data_.live) {
-      guarded(stream.info, "stop", [&] { stream.sensor->stop(); });
-    }
+  bool has_ended() {
+    const std::scoped_lock lock(mutex_);
+    return ended_;
   }
 
-  void stop() {
-    if (threads_.empty()) return;
-    stop_sensors();
-    for (std::thread& thread : threads_) thread.join();
-    threads_.clear();
+  void stop_sensors() {
+    for (const SensorStream& stream : live_) {
+      guarded(stream.info, "stop", [&] { stream.sensor->stop(); });
+    }
   }
 
   void give(const std::string& sensor, SampleView sample, Estimator& estimator) {
@@ -272,6 +276,7 @@ class LiveFeed final : public Feed {
     if (wheels != nullptr && checked_.insert(sensor).second) {
       require_channels(setup_, sensor, *wheels);
     }
+    plausibility_.add(sensor, sample);
     setup_.routes.dispatch(sensor, sample.type(), [&](const Route& route) {
       switch (route.consumer) {
         case Consumer::kImu:
@@ -291,7 +296,7 @@ class LiveFeed final : public Feed {
   }
 
   void add_reference(const PoseSample& pose) {
-    reference_.push_back(
+    reference_.add(
         {pose.t_ns, to_vector(pose.p_BinW_m), to_quaternion(pose.q_BtoW_xyzw).normalized()});
   }
 
@@ -325,28 +330,50 @@ class LiveFeed final : public Feed {
     return latency;
   }
 
-  const RunSetup& setup_;
-  const RunData& data_;
+  const RunSetup& setup_;  // setup and hooks: not after stop()
   const RunHooks& hooks_;
+  Plausibility& plausibility_;  // neither
+  const std::vector<SensorStream> live_;
   std::vector<Worker> workers_;
   bool has_imu_ = false;
   std::set<std::string> checked_;  ///< sensors whose encoder channels have been looked at
-  Trajectory reference_;
-  std::vector<double> latency_ms_;
+  BoundedSeries<StampedPose> reference_{kMostReference};
+  TimeStatistics latency_ms_;
+  std::optional<Clock::time_point> interrupted_at_;
 
   std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable changed_;  ///< something has arrived, or a thread has ended
+  std::condition_variable room_;     ///< something was taken
+  bool ended_ = false;
   std::deque<Arrival> arrivals_;
   std::deque<std::pair<std::int64_t, Clock::time_point>> seen_;  ///< images: stamp and arrival
-  std::size_t running_ = 0;
+  std::vector<std::string> running_;  ///< sensors whose threads have not ended
   std::exception_ptr error_;
   std::vector<std::thread> threads_;
 };
 
+/// Ends it, whatever its threads do.
+class LiveFeedOwner final : public Feed {
+ public:
+  explicit LiveFeedOwner(std::shared_ptr<LiveFeed> feed) : feed_(std::move(feed)) {
+    feed_->begin();
+  }
+  ~LiveFeedOwner() override { feed_->stop(); }
+  bool next(Estimator& estimator) override { return feed_->next(estimator); }
+  bool is_over() override { return feed_->is_over(); }
+  void on_epoch(const Estimator& estimator) override { feed_->on_epoch(estimator); }
+  void finish(RunResult& result) override { feed_->finish(result); }
+
+ private:
+  std::shared_ptr<LiveFeed> feed_;
+};
+
 }  // namespace
 
-std::unique_ptr<Feed> feed_live(const RunSetup& setup, const RunData& data, const RunHooks& hooks) {
-  return std::make_unique<LiveFeed>(setup, data, hooks);
+std::unique_ptr<Feed> feed_live(const RunSetup& setup, const RunData& data, const RunHooks& hooks,
+                                Plausibility& plausibility) {
+  return std::make_unique<LiveFeedOwner>(
+      std::make_shared<LiveFeed>(setup, data, hooks, plausibility));
 }
 
 }  // namespace viwo::experiment

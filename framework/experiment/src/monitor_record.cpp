@@ -20,7 +20,9 @@ void record_monitors(const Estimator& estimator, double t_s, MonitorTrack& track
       track.sigma_ratio[row].push_back(monitor.sigma_ratio()[i]);
     }
     for (const ExcitationWarning& warning : monitor.warnings()) {
+      constexpr std::size_t kMostWarnings = 1000;
       if (warning.t_ns != estimator.filter().t_ns()) continue;
+      if (track.warnings.size() == kMostWarnings) continue;
       track.warnings.push_back({t_s, warning.text, warning.parameters});
     }
   }

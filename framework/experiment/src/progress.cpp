@@ -48,6 +48,12 @@ void Progress::done(const std::string& line) {
   show(line);
 }
 
+void Progress::note(const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  std::fprintf(stderr, terminal_ ? "\r\033[K%s\n" : "%s\n", line.c_str());
+  if (terminal_) draw();
+}
+
 void Progress::show(const std::string& line) const {
   if (!terminal_) {
     std::fprintf(stderr, "[%d/%d] %s\n", count_, total_, line.c_str());

@@ -12,7 +12,8 @@ namespace {
 
 class RecordedFeed final : public Feed {
  public:
-  RecordedFeed(const RunSetup& setup, const RunData& data) : setup_(setup), data_(data) {
+  RecordedFeed(const RunSetup& setup, const RunData& data, Plausibility& plausibility)
+      : setup_(setup), data_(data), plausibility_(plausibility) {
     for (const Recorded::Track& track : data.recorded.tracks()) {
       Head head{&track, {}, 0, kFirst};
       setup.routes.dispatch(track.sensor, track.samples->type(), [&](const Route& route) {
@@ -45,6 +46,7 @@ class RecordedFeed final : public Feed {
     }
     if (first == nullptr) return false;
     const SampleView sample = first->track->samples->view(first->next++);
+    plausibility_.add(first->track->sensor, sample);
     for (const Route& route : first->routes) give(route, sample, estimator);
     return true;
   }
@@ -98,6 +100,7 @@ class RecordedFeed final : public Feed {
 
   void give_streamed(Prefetch& stream, Estimator& estimator) {
     const SampleView sample = stream.head()->view();
+    plausibility_.add(stream.name(), sample);
     setup_.routes.dispatch(stream.name(), sample.type(),
                            [&](const Route& route) { give(route, sample, estimator); });
     stream.pop();
@@ -105,14 +108,16 @@ class RecordedFeed final : public Feed {
 
   const RunSetup& setup_;
   const RunData& data_;
+  Plausibility& plausibility_;
   std::vector<Head> heads_;  // by rank
   std::vector<std::unique_ptr<Prefetch>> streams_;
 };
 
 }  // namespace
 
-std::unique_ptr<Feed> feed_recorded(const RunSetup& setup, const RunData& data) {
-  return std::make_unique<RecordedFeed>(setup, data);
+std::unique_ptr<Feed> feed_recorded(const RunSetup& setup, const RunData& data,
+                                    Plausibility& plausibility) {
+  return std::make_unique<RecordedFeed>(setup, data, plausibility);
 }
 
 }  // namespace viwo::experiment

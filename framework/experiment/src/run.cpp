@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 
 #include "viwo/eval/consistency.hpp"
+#include "viwo/experiment/output.hpp"
 #include "viwo/math/se2.hpp"
 
 namespace viwo::experiment {
@@ -90,17 +91,57 @@ StageTime stage_time(std::vector<double> ms) {
 }
 
 std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates) {
-  // Gates reject five percent (gate_probability) of what is good: that more than half of twenty
-  // are, has a probability below 1e-9. Fewer would report the first seconds of a start that is off.
-  constexpr std::int64_t kFewest = 20;
+  // Gates reject five percent at most (gate_probability) of what is good: that more than a third of
+  // forty are, has a probability below 1e-8. Fewer would report the first seconds of a start that
+  // is off.
+  constexpr std::int64_t kFewest = 40;
   std::vector<std::string> lines;
   for (const UpdateTrack& update : updates) {
     const auto& [applied, rejected] = update.total;
-    if (applied + rejected < kFewest || rejected <= applied) continue;
+    if (applied + rejected < kFewest || 2 * rejected <= applied) continue;
     lines.push_back(update.name + ": " + std::to_string(rejected) + " of " +
                     std::to_string(applied + rejected) +
                     " rejected: what it measures and the rest contradict each other - check "
                     "calibration and axes of cameras and IMU, order of the joints, kinematics");
+  }
+  return lines;
+}
+
+std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
+                                    std::span<const NoiseFound> noises) {
+  constexpr std::int64_t kFewest = 20;
+  constexpr double kMostFactor = 3.;  // between a guess and what is found
+  std::vector<std::string> lines;
+  for (const RejectionCount& r : rejections) {
+    if (r.count < kFewest || 5 * r.count < r.of) continue;
+    if (r.of == 0) continue;
+    lines.push_back(r.reason + " - " + std::to_string(r.count) + " of " + std::to_string(r.of) +
+                    ", " + r.first + ": check its cable, sign, unit, and the order of the joints");
+  }
+  for (const NoiseFound& noise : noises) {
+    const double factor = noise.found / noise.configured;
+    if (noise.count < kFewest || factor < kMostFactor) continue;
+    lines.push_back(noise.name + ": " + significant(noise.found, 2) +
+                    (noise.unit.empty() ? "" : " ") + noise.unit + " was found, " +
+                    significant(noise.configured, 2) +
+                    " is configured - what it measures is worse than thought, or calibration, "
+                    "axes, units, signs, order or clock are wrong");
+  }
+  return lines;
+}
+
+std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration) {
+  constexpr double kFar = 5.;
+  std::vector<std::string> lines;
+  for (const CalibrationTrack& track : calibration) {
+    if (track.estimate.empty() || !(track.sigma.front() > 0.)) continue;
+    const double sigmas =
+        std::abs(track.estimate.back() - track.estimate.front()) / track.sigma.front();
+    if (!(sigmas > kFar)) continue;
+    lines.push_back(track.name + ": " + significant(track.estimate.back(), 4) + " " + track.unit +
+                    " was found, " + significant(sigmas, 2) + " prior sigmas from " +
+                    significant(track.estimate.front(), 4) +
+                    ": its configuration is wrong, or what is next to it");
   }
   return lines;
 }

@@ -6,6 +6,7 @@
 
 #include "viwo/config/yaml.hpp"
 #include "viwo/experiment/output.hpp"
+#include "viwo/experiment/run_stream.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/report/html.hpp"
 
@@ -22,26 +23,41 @@ nlohmann::json stage_json(const StageTime& stage) {
   return {{"mean", stage.mean_ms}, {"p95", stage.p95_ms}, {"max", stage.max_ms}};
 }
 
-std::string calibration_csv(const RunResult& result) {
-  std::ostringstream csv;
-  csv.precision(17);
-  csv << "time_s,name,estimate,sigma,truth\n";
-  for (std::size_t k = 0; k < result.epoch_t_s.size(); ++k) {
-    for (const CalibrationTrack& track : result.calibration) {
-      csv << result.epoch_t_s[k] << ',' << track.name << ',' << track.estimate[k] << ','
-          << track.sigma[k] << ',';
-      if (std::isfinite(track.truth)) csv << track.truth;
-      csv << '\n';
-    }
-  }
-  return csv.str();
+void write_calibration(const std::filesystem::path& file, const RunResult& result) {
+  log::TextWriter out(file);
+  write_calibration_head(out);
+  for (std::size_t k = 0; k < result.epoch_t_s.size(); ++k) write_calibration_rows(out, result, k);
+  out.close();
 }
 
-std::string timing_csv(const RunResult& result) {
-  std::ostringstream csv;
-  csv << "time_s,epoch_ms\n";
-  for (const auto& [t_s, ms] : result.epoch_ms) csv << t_s << ',' << ms << '\n';
-  return csv.str();
+void write_timing(const std::filesystem::path& file, const RunResult& result) {
+  log::TextWriter out(file);
+  write_timing_head(out);
+  for (std::size_t k = 0; k < result.epoch_ms.size(); ++k) write_timing_row(out, result, k);
+  out.close();
+}
+
+/// The trajectory of each piece of a run that has several.
+void write_pieces(const std::filesystem::path& folder, const RunResult& result) {
+  remove_piece_files(folder);
+  if (result.pieces.size() < 2) return;
+  auto pose = result.estimate.begin();
+  for (std::size_t k = 0; k < result.pieces.size(); ++k) {
+    const auto end = pose + result.pieces[k].epochs;
+    log::write_tum(piece_file(folder, k), Trajectory(pose, end));
+    pose = end;
+  }
+}
+
+nlohmann::json pieces_json(const std::vector<RunPiece>& pieces) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const RunPiece& piece : pieces) {
+    all.push_back({{"begin_s", 1e-9 * static_cast<double>(piece.begin_ns)},
+                   {"end_s", 1e-9 * static_cast<double>(piece.end_ns)},
+                   {"epochs", piece.epochs},
+                   {"failure", piece.failure}});
+  }
+  return all;
 }
 
 nlohmann::json calibration_json(const RunResult& result) {
@@ -102,6 +118,13 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
     rejected[source].push_back(
         {{"reason", rejection.reason}, {"count", rejection.count}, {"first", rejection.first}});
   }
+  json noises = json::object();
+  for (const NoiseFound& noise : result.noises) {
+    noises[noise.name] = {{"unit", noise.unit},
+                          {"configured", noise.configured},
+                          {"found", noise.found},
+                          {"count", noise.count}};
+  }
   json updates = json::object();
   for (const UpdateTrack& update : result.updates) {
     updates[update.name] = {{"applied", update.total.applied},
@@ -118,11 +141,13 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
       {"status", name(result.status)},
       {"cause", result.cause},
       {"warnings", result.warnings},
+      {"noises", noises},
       {"name", setup.name},
       {"seed", setup.seed},
       {"epochs", result.epochs},
       {"duration_s", result.duration_s},
       {"wall_s", result.wall_s},
+      {"pieces", pieces_json(result.pieces)},
       {"accuracy", accuracy},
       {"calibration", calibration_json(result)},
       {"updates", updates},
@@ -140,10 +165,13 @@ void write_run(const std::filesystem::path& folder, const RunSetup& setup,
                const RunResult& result) {
   make_folder(folder);
   write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
-  log::write_tum(folder / "trajectory.tum", result.estimate);
+  if (!result.on_disk) {
+    log::write_tum(folder / "trajectory.tum", result.estimate);
+    write_pieces(folder, result);
+    write_calibration(folder / "calibration.csv", result);
+    write_timing(folder / "timing.csv", result);
+  }
   if (!result.reference.empty()) log::write_tum(folder / "reference.tum", result.reference);
-  write_text(folder / "calibration.csv", calibration_csv(result));
-  write_text(folder / "timing.csv", timing_csv(result));
   write_text(folder / "summary.json", summary_of(setup, result).dump(2) + "\n");
   report::write_html(folder / "report.html", report_of(setup, result));
 }
@@ -189,6 +217,11 @@ std::string describe(const RunResult& result) {
     out << "NEES of the pose " << significant(result.nees.pose, 3) << " (6 is consistent); epoch "
         << significant(result.total_ms.mean_ms, 3) << " ms mean, "
         << significant(result.total_ms.p95_ms, 3) << " ms p95\n";
+  }
+  for (const NoiseFound& noise : result.noises) {
+    out << "noise " << noise.name << ": " << significant(noise.found, 3) << " " << noise.unit
+        << (noise.unit.empty() ? "" : " ") << "found, " << significant(noise.configured, 3)
+        << " configured\n";
   }
   for (const MonitorWarning& warning : result.monitor.warnings) {
     out << "at " << significant(warning.t_s, 4) << " s: " << warning.text << "\n";

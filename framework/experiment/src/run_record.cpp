@@ -16,6 +16,7 @@ struct adl_serializer<Eigen::Vector3d> {
 namespace viwo {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RejectionCount, reason, count, first)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(NoiseFound, name, unit, configured, found, count)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateCounts, applied, rejected)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateFailures, count, disabled, cause)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PreintegratedPose, g, duration_s, path_length_m, bridged_s,
@@ -58,11 +59,12 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PoseError, t_s, position_m, position_sigma_m,
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateTrack, name, total, failures, applied, rejected)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MonitorWarning, t_s, text, parameters)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MonitorTrack, t_s, parameters, sigma_ratio, held, warnings)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunPiece, begin_ns, end_ns, epochs, failure)
 // `accuracy` is optional: see below.
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunResult, status, cause, epochs, duration_s, wall_s, estimate,
                                    reference, nees_planar, total, epoch_ms, stages, total_ms,
-                                   rejections, warnings, nees, errors, epoch_t_s, calibration,
-                                   updates, monitor)
+                                   rejections, noises, warnings, nees, errors, epoch_t_s,
+                                   calibration, updates, monitor, pieces)
 
 namespace {
 
@@ -104,6 +106,13 @@ class Thinner {
 
 }  // namespace
 
+void thin(MonitorTrack& monitor, std::size_t max_points) {
+  const Thinner thinner(max_points);
+  thinner.keep(monitor.t_s);
+  thinner.keep(monitor.held);
+  for (auto& ratios : monitor.sigma_ratio) thinner.keep(ratios);
+}
+
 void thin(RunResult& run, std::size_t max_points) {
   const Thinner thinner(max_points);
   thinner.keep(run.estimate);
@@ -127,12 +136,26 @@ void thin(RunResult& run, std::size_t max_points) {
     thinner.sum(track.applied);
     thinner.sum(track.rejected);
   }
-  thinner.keep(run.monitor.t_s);
-  thinner.keep(run.monitor.held);
-  for (auto& ratios : run.monitor.sigma_ratio) thinner.keep(ratios);
+  thin(run.monitor, max_points);
   run.total.J_g_WI = {};
   run.total.P_g.setZero();
   run.total.parity = {};
+}
+
+void drop_last_point(RunResult& run) {
+  run.estimate.pop_back();
+  run.epoch_t_s.pop_back();
+  run.epoch_ms.pop_back();
+  for (CalibrationTrack& track : run.calibration) {
+    track.estimate.pop_back();
+    track.sigma.pop_back();
+  }
+  for (UpdateTrack& track : run.updates) {
+    track.total.applied -= track.applied.back();
+    track.total.rejected -= track.rejected.back();
+    track.applied.pop_back();
+    track.rejected.pop_back();
+  }
 }
 
 nlohmann::json to_record(const RunResult& run) {

@@ -14,6 +14,13 @@ inline constexpr std::size_t kRecordPoints = 150;
 /// summed over what is left out. Matrices of the run's odometry are dropped.
 void thin(RunResult& run, std::size_t max_points = kRecordPoints);
 
+/// The series of the monitor alone.
+void thin(MonitorTrack& monitor, std::size_t max_points);
+
+/// Takes the newest epoch out of the series; the totals of the updates are then those before it.
+/// There must be one, and no reference in the frame of the estimate.
+void drop_last_point(RunResult& run);
+
 /// All that thin() leaves. Numbers that are not finite stay what they are.
 nlohmann::json to_record(const RunResult& run);
 

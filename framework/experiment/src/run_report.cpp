@@ -75,6 +75,21 @@ Table accuracy_table(const eval::Accuracy& accuracy) {
   return table;
 }
 
+/// A run that was started anew.
+Table pieces_table(const RunResult& result) {
+  Table table;
+  table.caption = "Pieces: after each failure but the last the filter began anew";
+  table.columns = {{"piece"}, {"begins at [s]"}, {"length [s]"}, {"epochs"}, {"ended by"}};
+  const std::int64_t begin_ns = result.pieces.front().begin_ns;
+  for (std::size_t k = 0; k < result.pieces.size(); ++k) {
+    const RunPiece& piece = result.pieces[k];
+    table.rows.push_back({std::to_string(k + 1), seconds_between(begin_ns, piece.begin_ns),
+                          seconds_between(piece.begin_ns, piece.end_ns), piece.epochs,
+                          piece.failure.empty() ? "the end of the run" : piece.failure});
+  }
+  return table;
+}
+
 void add_result_section(const RunSetup& setup, const RunResult& result, Document& document) {
   Section section{"Result", {}};
   if (result.status != RunStatus::kOk) {
@@ -85,6 +100,7 @@ void add_result_section(const RunSetup& setup, const RunResult& result, Document
     section.blocks.emplace_back(Paragraph{line, Paragraph::Tone::kWarning});
   }
   section.blocks.emplace_back(facts_of(setup, result));
+  if (result.pieces.size() > 1) section.blocks.emplace_back(pieces_table(result));
   if (result.accuracy) {
     section.blocks.emplace_back(accuracy_table(*result.accuracy));
   } else if (result.reference.empty()) {
@@ -182,6 +198,7 @@ Document report_of(const RunSetup& setup, const RunResult& result) {
   add_picture_section(result, document);
   add_error_section(result, document);
   add_calibration_section(result, document);
+  add_noise_section(result, document);
   add_excitation_section(result, document);
   add_measurements_section(result, document);
   add_time_section(result, document);

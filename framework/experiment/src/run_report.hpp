@@ -21,6 +21,7 @@ void add_calibration_section(const RunResult& result, report::Document& document
 
 /// What the monitor found about the motion.
 void add_excitation_section(const RunResult& result, report::Document& document);
+void add_noise_section(const RunResult& result, report::Document& document);
 
 /// What updates and gates took and refused, and what sensors and estimator did not use.
 void add_measurements_section(const RunResult& result, report::Document& document);

@@ -285,6 +285,18 @@ void add_calibration_section(const RunResult& result, Document& document) {
   document.sections.push_back(std::move(section));
 }
 
+void add_noise_section(const RunResult& result, Document& document) {
+  if (result.noises.empty()) return;
+  Table table;
+  table.caption = "Noise as it was found while the filter ran";
+  table.columns = {{"parameter"}, {"unit"}, {"configured"}, {"found"}, {"measurements"}};
+  for (const NoiseFound& noise : result.noises) {
+    table.rows.push_back(
+        {noise.name, noise.unit, noise.configured, noise.found, static_cast<double>(noise.count)});
+  }
+  document.sections.push_back({"Noise", {std::move(table)}});
+}
+
 void add_excitation_section(const RunResult& result, Document& document) {
   const MonitorTrack& monitor = result.monitor;
   if (monitor.t_s.empty() && monitor.warnings.empty()) return;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "filter_start.hpp"
 #include "viwo/config/suggest.hpp"
 
 namespace viwo::experiment {
@@ -29,21 +30,6 @@ UpdateEntry as_entry(const FilterSetup::Entry& entry) {
   return {entry.name, entry.update.object, entry.rig, entry.sensor};
 }
 
-/// Starts without a reference want to know how the wheels turn.
-std::vector<ExtraStream> start_streams(const FilterSetup& setup) {
-  std::vector<ExtraStream> streams;
-  if (setup.start.mode == StartMode::kReference) return streams;
-  for (const WheelSet& set : setup.wheels) {
-    StreamSpec spec;
-    spec.type = &sample_type<EncoderSample>();
-    spec.sensor = set.prior.sensor;
-    spec.given = Given::kSinceOldestClone;
-    spec.optional = setup.start.mode == StartMode::kStandstill;
-    streams.push_back({spec, "estimator.start"});
-  }
-  return streams;
-}
-
 /// Whether the estimator can work with the updates as they are configured: tried with instances of
 /// their own, because an update declares and starts once. Finds out what streams there will be.
 void try_updates(FilterSetup& setup, const std::vector<FilterSetup::Entry>& trial,
@@ -57,7 +43,7 @@ void try_updates(FilterSetup& setup, const std::vector<FilterSetup::Entry>& tria
   }
   if (!all_well) return;
   try {
-    for (const ExtraStream& stream : start_streams(setup)) {
+    for (const ExtraStream& stream : start_streams(setup, declared.streams())) {
       declared.add_stream(stream.spec, stream.taker);
     }
     declared.finish();
@@ -102,6 +88,8 @@ bool read_enabled(const Node& section, const std::string& path, Errors& errors) 
   return false;
 }
 
+constexpr std::string_view kUpdateHostKeys[] = {"enabled", "sensor"};
+
 /// Makes updates from their sections.
 class UpdateReader {
  public:
@@ -136,9 +124,22 @@ class UpdateReader {
  private:
   /// `name`: of the instance, which has a seed of its own.
   Loaded<Update> make(const Node& section, const std::string& path, const std::string& name) {
-    constexpr std::string_view kHostKeys[] = {"enabled", "sensor"};
     const std::uint64_t seed = instance_seed(context_.seed, "update", "updates." + name);
-    return context_.plugins.make_update(section, path, seed, errors_, kHostKeys, context_.exact);
+    return context_.plugins.make_update(section, path, seed, errors_, kUpdateHostKeys,
+                                        context_.exact);
+  }
+
+  /// make(), for when the section has been read.
+  std::function<Loaded<Update>()> maker(const Node& section, const std::string& path,
+                                        const std::string& name) {
+    return [plugins = &context_.plugins, exact = context_.exact, section, path,
+            seed = instance_seed(context_.seed, "update", "updates." + name)] {
+      Errors errors;
+      Loaded<Update> loaded =
+          plugins->make_update(section, path, seed, errors, kUpdateHostKeys, exact);
+      errors.throw_if_any();
+      return loaded;
+    };
   }
 
   void read_one(const std::string& name, const config::Mark& mark, const Node& section,
@@ -215,6 +216,7 @@ class UpdateReader {
       FilterSetup::Entry trial = instance;
       trial.update = make(section, path, instance.name);
       trial.rig = rig_with(for_wheels ? &sets[i] : nullptr);
+      instance.make_again = maker(section, path, instance.name);
       trial_.push_back(std::move(trial));
       setup_.updates.push_back(std::move(instance));
     }
@@ -257,7 +259,7 @@ Estimator make_estimator(const FilterSetup& setup, bool live) {
   if (live) options.schedule.max_instant_wait_s = 0.05;
   std::vector<UpdateEntry> updates;
   for (const FilterSetup::Entry& entry : setup.updates) updates.push_back(as_entry(entry));
-  return {options, std::move(updates), start_streams(setup)};
+  return {options, std::move(updates), start_streams(setup, setup.streams)};
 }
 
 }  // namespace viwo::experiment

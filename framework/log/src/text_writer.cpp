@@ -30,6 +30,7 @@ void TextWriter::flush() {
   errno = 0;
   stream_.write(pending_.data(), static_cast<std::streamsize>(pending_.size()));
   pending_.clear();
+  stream_.flush();
   check();
 }
 

@@ -10,7 +10,6 @@
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_reader.hpp"
-#include "viwo/log/text_writer.hpp"
 
 namespace viwo::log {
 namespace {
@@ -87,15 +86,20 @@ Trajectory read_tum(const std::filesystem::path& file) {
   return trajectory;
 }
 
+TumWriter::TumWriter(const std::filesystem::path& file) : out_(file) {
+  out_ << "# t[s] x[m] y[m] z[m] qx qy qz qw\n";
+}
+
+void TumWriter::add(const StampedPose& pose) {
+  out_ << seconds_text(pose.t_ns);
+  for (const double value : pose.p_BinW) out_ << " " << value;
+  for (const double value : pose.q_BtoW.coeffs()) out_ << " " << value;  // stored as x y z w
+  out_ << "\n";
+}
+
 void write_tum(const std::filesystem::path& file, const Trajectory& trajectory) {
-  TextWriter out(file);
-  out << "# t[s] x[m] y[m] z[m] qx qy qz qw\n";
-  for (const StampedPose& pose : trajectory) {
-    out << seconds_text(pose.t_ns);
-    for (const double value : pose.p_BinW) out << " " << value;
-    for (const double value : pose.q_BtoW.coeffs()) out << " " << value;  // stored as x y z w
-    out << "\n";
-  }
+  TumWriter out(file);
+  for (const StampedPose& pose : trajectory) out.add(pose);
   out.close();
 }
 

@@ -1,6 +1,7 @@
 // The filter's part of a run configuration: estimator, IMU, cameras, wheels, updates.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -17,7 +18,7 @@ namespace viwo::experiment {
 enum class StartMode {
   kReference,   ///< the first state that the reference gives
   kStandstill,  ///< gravity and gyro bias from a rest
-  kMoving,      ///< from wheels and IMU
+  kMoving,      ///< from wheels and IMU; without wheels from cameras and IMU, or from a rest
 };
 
 /// How the filter begins, and how wrong it is made to begin.
@@ -32,6 +33,9 @@ struct StartSetup {
   double state_error_scale = 0.;  ///< start at the reference plus this times a draw of the prior
 };
 
+/// Whether a filter that has diverged is started anew.
+enum class Restart { kNever, kLive, kAlways };
+
 /// A wheel set of the run: its model and its prior.
 struct WheelSet {
   std::shared_ptr<const WheelModel> model;
@@ -41,6 +45,7 @@ struct WheelSet {
 struct FilterSetup {
   EstimatorOptions options;
   StartSetup start;
+  Restart restart = Restart::kLive;
   std::vector<CameraPrior> cameras;
   std::vector<WheelSet> wheels;
   struct Entry {
@@ -49,6 +54,8 @@ struct FilterSetup {
     std::shared_ptr<Rig> rig;  ///< with its wheel set, if it is for one
     std::string sensor;        ///< `sensor: NAME`
     config::Mark mark;
+    /// Another instance of it, for another estimator; empty: there is none.
+    std::function<Loaded<Update>()> make_again = {};
   };
   std::vector<Entry> updates;
   /// Sensors of which updates take poses, also updates that are turned off: those are measurements

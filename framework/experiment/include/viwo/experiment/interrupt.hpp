@@ -1,12 +1,14 @@
-// Ctrl-C while something long runs: asked for, instead of ending the process in the middle.
+// Signals that ask something long to end: remembered, instead of ending the process in the middle.
 #pragma once
 
+#include <array>
 #include <csignal>
 
 namespace viwo::experiment {
 
-/// While it lives, the first SIGINT is only remembered; a second one ends the process as usual.
-/// What was done about SIGINT before is put back afterwards. At most one object at a time.
+/// While it lives, the first SIGINT (ctrl-C), SIGTERM or SIGHUP is only remembered; the next one
+/// ends the process as usual. A SIGHUP that is ignored (nohup) stays ignored. What was done about
+/// them before is put back afterwards. At most one object at a time.
 class InterruptSignal {
  public:
   InterruptSignal();
@@ -14,11 +16,11 @@ class InterruptSignal {
   InterruptSignal(const InterruptSignal&) = delete;
   InterruptSignal& operator=(const InterruptSignal&) = delete;
 
-  /// Whether a SIGINT has come. From any thread.
+  /// Whether one of them has come. From any thread.
   bool raised() const;
 
  private:
-  struct sigaction before_ {};
+  std::array<struct sigaction, 3> before_{};
 };
 
 }  // namespace viwo::experiment

@@ -21,6 +21,9 @@ class Progress {
   /// One more piece is done; `line` says what came out (shown above the bar, or as a line).
   void done(const std::string& line);
 
+  /// Something that is to be known now.
+  void note(const std::string& line);
+
  private:
   void draw() const;
   void show(const std::string& line) const;

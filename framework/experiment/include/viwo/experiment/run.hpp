@@ -168,6 +168,13 @@ struct RunPicture {
   std::string png;  ///< the bytes of the file
 };
 
+/// What the filter estimated without starting anew.
+struct RunPiece {
+  std::int64_t begin_ns = 0, end_ns = 0;  ///< stamps of the first and the last epoch
+  std::int64_t epochs = 0;
+  std::string failure;  ///< why it ended; "" for one that came to the end of the run
+};
+
 struct RunResult {
   RunStatus status = RunStatus::kOk;
   std::string cause;  ///< of a run that is not ok
@@ -185,6 +192,7 @@ struct RunResult {
   std::vector<std::pair<std::string, StageTime>> stages;  ///< without the total
   StageTime total_ms;                                     ///< of an epoch
   std::vector<std::pair<std::string, RejectionCount>> rejections;
+  std::vector<NoiseFound> noises;     ///< "UPDATE.NAME", by updates that look for them
   std::vector<std::string> warnings;  ///< what is suspicious of the run as a whole
 
   // Of the filter.
@@ -194,6 +202,10 @@ struct RunResult {
   std::vector<CalibrationTrack> calibration;
   std::vector<UpdateTrack> updates;
   MonitorTrack monitor;
+  /// More than one: it diverged and was started again. Those without an epoch are not here.
+  std::vector<RunPiece> pieces;
+  /// Whether a RunStream has written trajectory, calibration and times; here they are thinned.
+  bool on_disk = false;
   std::vector<RunPicture> pictures;  ///< for the page, in time order
 };
 
@@ -216,6 +228,8 @@ struct RunHooks {
   /// is none of the epoch's.
   std::function<void(const RunResult&)> on_epoch;
   std::function<bool()> interrupted;  ///< whether live sensors are to stop
+  /// Something is wrong with the run, said when it is first seen: time since the start [s], what.
+  std::function<void(double, const std::string&)> on_warning;
   /// A live sensor has given an image, which is still to be worked on. In another thread.
   std::function<void(const ImageSample&)> on_live_image;
 };
@@ -224,8 +238,16 @@ struct RunHooks {
 /// model that throws, ends the run with the epoch and the cause.
 RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks& hooks = {});
 
-/// Warnings of updates most of whose factors were rejected.
+/// Warnings of updates that had more than a third of their factors rejected.
 std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates);
+
+/// Warnings of what a fifth of the samples was left out for, and of noises far above what is
+/// configured.
+std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
+                                    std::span<const NoiseFound> noises);
+
+/// Warnings of calibration that has gone where its prior does not reach.
+std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration);
 
 /// What the configuration asks for.
 inline RunResult run(const RunSetup& setup, const RunData& data, const RunHooks& hooks = {}) {

@@ -20,11 +20,12 @@ class TextWriter {
   TextWriter& operator<<(double value);
   TextWriter& operator<<(std::int64_t value);
 
-  /// Writes what is left and closes the file.
+  /// Writes what is left: it is in the file also if the process is killed.
+  void flush();
+  /// The same, and closes the file.
   void close();
 
  private:
-  void flush();
   void check() const;
 
   std::filesystem::path file_;

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "viwo/log/text_writer.hpp"
 #include "viwo/math/trajectory.hpp"
 
 namespace viwo::log {
@@ -13,8 +14,22 @@ namespace viwo::log {
 /// previous one, a quaternion that is not of unit norm (to 1e-3; it is normalised), no pose at all.
 Trajectory read_tum(const std::filesystem::path& file);
 
-/// Writes seconds with nine decimals and shortest numbers that read back to the same bits.
-/// std::runtime_error when that fails.
+/// Writes a trajectory pose by pose. std::runtime_error when that fails.
+class TumWriter {
+ public:
+  explicit TumWriter(const std::filesystem::path& file);
+  /// Seconds with nine decimals and shortest numbers that read back to the same bits.
+  void add(const StampedPose& pose);
+  /// What was added is in the file.
+  void flush() { out_.flush(); }
+  /// To be called at the end.
+  void close() { out_.close(); }
+
+ private:
+  TextWriter out_;
+};
+
+/// All of it.
 void write_tum(const std::filesystem::path& file, const Trajectory& trajectory);
 
 }  // namespace viwo::log
