@@ -13,6 +13,16 @@
 
 namespace viwo::testing {
 
+/// Of both spellings that the library has had.
+template <class Run>
+bool failed(const Run& run) {
+  if constexpr (requires { run.error_occurred; }) {
+    return run.error_occurred;
+  } else {
+    return static_cast<bool>(run.skipped);
+  }
+}
+
 /// The least time of each benchmark counts: disturbances only add.
 class RatioReporter final : public benchmark::ConsoleReporter {
  public:
@@ -23,7 +33,7 @@ class RatioReporter final : public benchmark::ConsoleReporter {
   void ReportRuns(const std::vector<Run>& runs) override {
     ConsoleReporter::ReportRuns(runs);
     for (const Run& run : runs) {
-      if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
+      if (run.run_type != Run::RT_Iteration || failed(run)) continue;
       const auto counter = run.counters.find(time_counter_);
       const double seconds = counter != run.counters.end()
                                  ? counter->second.value

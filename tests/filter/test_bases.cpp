@@ -31,6 +31,7 @@ struct Base {
 std::vector<std::string> with_open_gates(std::vector<std::string> assignments) {
   for (const char* update : {"wheel_odometry", "wheel_parity"}) {
     assignments.push_back(std::string("updates.") + update + ".gate_probability=0");
+    assignments.push_back(std::string("updates.") + update + ".find_noise=false");
   }
   return assignments;
 }

@@ -58,7 +58,8 @@ TEST(FilterConsistency, PoseIsConsistentWithTheTrueCalibrationHeld) {
 
 TEST(FilterConsistency, CheckSeesPixelsThatAreTwiceAsNoisyAsTheFilterThinks) {
   EXPECT_NE(inconsistency(testing::paper_runs("bad_init_calib_on", kSeeds,
-                                              with({"updates.visual_features.sigma_px=0.5"}))),
+                                              with({"updates.visual_features.sigma_px=0.5",
+                                                    "updates.visual_features.find_noise=false"}))),
             "");
 }
 
