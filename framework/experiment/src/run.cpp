@@ -113,8 +113,7 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
   constexpr double kMostFactor = 3.;  // between a guess and what is found
   std::vector<std::string> lines;
   for (const RejectionCount& r : rejections) {
-    if (r.count < kFewest || 5 * r.count < r.of) continue;
-    if (r.of == 0) continue;
+    if (r.of == 0 || r.count < kFewest || 5 * r.count < r.of) continue;
     lines.push_back(r.reason + " - " + std::to_string(r.count) + " of " + std::to_string(r.of) +
                     ", " + r.first + ": check its cable, sign, unit, and the order of the joints");
   }

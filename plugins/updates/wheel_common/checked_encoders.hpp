@@ -40,7 +40,6 @@ class CheckedEncoders {
     return samples_;
   }
 
-  const NoiseScale& noise() const { return check_->noise(); }
   void append_rejections(std::vector<RejectionCount>& out) const { check_->rejections(out); }
 
  private:

@@ -206,11 +206,14 @@ class WheelParity final : public Update {
     return gain;
   }
 
+  /// Of the parity information, which is that of the encoders' own noise.
+  double parity_weight() const { return 1. / (noise_scale_ * noise_scale_ * noise_.variance()); }
+
   /// (WP-1), (WP-2), (WP-3): the parity information at x as a cost of errors about x0, in units
   /// of sigma.
   void linearise(const Intrinsics& x0, const Intrinsics& x) {
     const ParityInformation& parity = pose_.parity;
-    const double weight = 1. / (noise_scale_ * noise_scale_ * noise_.variance());
+    const double weight = parity_weight();
     Lambda_.resize(n_free_, n_free_);
     eta_.resize(n_free_);
     Intrinsics back(n_free_);
@@ -235,7 +238,7 @@ class WheelParity final : public Update {
     const Square L =
         eigen_.eigenvectors() * eigen_.eigenvalues().cwiseMax(0.).cwiseSqrt().asDiagonal();
     Square M(n_free_, n_free_);
-    const double weight = 1. / (noise_scale_ * noise_scale_ * noise_.variance());
+    const double weight = parity_weight();
     Square noise = Square::Zero(n_free_, n_free_);
     Intrinsics mean = Intrinsics::Zero(n_free_);
     for (int i = 0; i < n_free_; ++i) {
