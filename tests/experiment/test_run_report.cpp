@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -79,11 +80,11 @@ std::vector<const Plot*> plots_of(const Document& document) {
   return plots;
 }
 
-const Plot& plot_named(const Document& document, const std::string& title) {
+const Plot& plot_named(const Document& document, std::string_view title) {
   for (const Plot* plot : plots_of(document)) {
     if (plot->title == title) return *plot;
   }
-  throw std::runtime_error("no plot '" + title + "'");
+  throw std::runtime_error("no plot '" + std::string(title) + "'");
 }
 
 int estimated_parameters(const RunResult& result) {

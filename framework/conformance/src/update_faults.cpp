@@ -64,7 +64,8 @@ std::string fault_of(const InformationFactor& factor, int state_size, bool numbe
   if (!Lambda.allFinite()) return "Lambda has entries that are not finite";
   if (!factor.eta.head(n).allFinite()) return "eta has entries that are not finite";
   const auto values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Lambda).eigenvalues();
-  if (values[0] < -1e-9 * std::max(values[n - 1], 1e-12)) {
+  // What is left of a Schur complement has half of the digits.
+  if (values[0] < -1e-8 * std::max(values[n - 1], 1e-12)) {
     return "Lambda is not positive semidefinite (eigenvalue " + number(values[0]) + ")";
   }
   return "";

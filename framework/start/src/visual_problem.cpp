@@ -139,8 +139,9 @@ void VisualProblem::add_imu(const VisualEstimate& x, std::size_t k, VisualNormal
   r.segment<3>(kVelocityColumn) = key.v_IinG - p.state.v_IinG;
   r.segment<3>(kGyroBiasColumn) = key.gyro_bias - p.state.gyro_bias;
   r.segment<3>(kAccelBiasColumn) = key.accel_bias - p.state.accel_bias;
-  // An IMU that is said to have no noise has rounding errors.
-  ImuMatrix Q = p.transition.Q;
+  // An IMU that is said to have no noise has rounding errors. Of dynamic size: GCC 14 warns of a
+  // loop in Eigen's factorisation of a fixed one.
+  Eigen::MatrixXd Q = p.transition.Q;
   Q.diagonal().array() += 1e-16;
   const ImuMatrix W = Q.llt().solve(ImuMatrix::Identity());
   const ImuMatrix PhiW = p.transition.Phi.transpose() * W;
