@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -168,6 +169,19 @@ TEST(SimulateResult, IsDescribedByWhatThereIs) {
   result.left_out["gnss fixes"] = 15;  // there is no table for them
   EXPECT_EQ(describe(result),
             "1 IMU sample; not written, as there is no table for them: 15 gnss fixes");
+}
+
+TEST(Suspicions, HaveTimesSinceTheStartOfTheRun) {
+  const auto place = [](const std::string& first) {
+    const RejectionCount count{"what", 30, first, 100};
+    const std::string line = suspicions({&count, 1}, {}, 1'400'000'000'500'000'000).at(0);
+    return line.substr(0, line.find(": check"));
+  };
+  EXPECT_EQ(place("stamp 1400000003000000000 ns"), "what - 30 of 100, t = 2.500 s");
+  EXPECT_EQ(place("t = 1400000003.000 s .. t = 1400000010.125 s"),
+            "what - 30 of 100, t = 2.500 s .. t = 9.625 s");
+  EXPECT_EQ(place("t = 0.25"), "what - 30 of 100, t = -1400000000.250 s");
+  EXPECT_EQ(place("data.csv:17"), "what - 30 of 100, data.csv:17");
 }
 
 TEST(TimeProgress, IsSilentForASecondAndThenSaysEveryTenPercent) {

@@ -86,7 +86,8 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
     result.warnings.push_back(std::move(line));
   }
   const std::vector<RejectionCount> rejections = estimator.rejections();
-  for (std::string& line : suspicions(rejections, result.noises)) {
+  const std::int64_t begin_ns = result.pieces.empty() ? 0 : result.pieces.front().begin_ns;
+  for (std::string& line : suspicions(rejections, result.noises, begin_ns)) {
     result.warnings.push_back(std::move(line));
   }
   for (std::string& line : far_from_prior(result.calibration)) {

@@ -62,7 +62,7 @@ class LiveInput final : public Sensor {
     const std::scoped_lock lock(mutex_);
     if (dropped_ == 0) return;
     out.push_back({"image dropped: it came faster than images can be worked on", dropped_,
-                   "stamp " + std::to_string(first_dropped_ns_) + " ns"});
+                   stamp_text(first_dropped_ns_)});
   }
 
  private:

@@ -14,6 +14,7 @@
 #include "viwo/eval/consistency.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/time_text.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -117,7 +118,7 @@ void Recorder::finish(const Estimator& estimator) {
   result_.noises = estimator.noises();
   if (loosened_ > 0) {
     result_.warnings.push_back("all updates contradicted the estimate, first at " +
-                               stamp_text(first_loosened_ns_) + "; it was loosened " +
+                               time_text(first_loosened_ns_ - begin_ns_) + "; it was loosened " +
                                std::to_string(loosened_) +
                                " times - look for faults of the IMU there");
   }

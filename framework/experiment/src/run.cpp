@@ -2,14 +2,19 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cinttypes>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <numeric>
+#include <string>
 
 #include <Eigen/Dense>
 
 #include "viwo/eval/consistency.hpp"
 #include "viwo/experiment/output.hpp"
 #include "viwo/math/se2.hpp"
+#include "viwo/math/time_text.hpp"
 
 namespace viwo::experiment {
 
@@ -78,6 +83,24 @@ class PlanarNees {
   int count_ = 0;
 };
 
+/// A place of the estimator's, "stamp 5000000 ns" or "t = 5.000 s .. t = 7.000 s", in times since
+/// `begin_ns`.
+std::string since(std::int64_t begin_ns, const std::string& place) {
+  std::int64_t stamp_ns = 0;
+  if (std::sscanf(place.c_str(), "stamp %" SCNd64 " ns", &stamp_ns) == 1) {
+    return time_text(stamp_ns - begin_ns);
+  }
+  std::string text;
+  std::size_t done = 0;
+  for (std::size_t at = 0; (at = place.find("t = ", done)) != std::string::npos;) {
+    char* end = nullptr;
+    const double t_s = std::strtod(place.c_str() + at + 4, &end);
+    text += place.substr(done, at - done) + time_text(std::llround(1e9 * t_s) - begin_ns);
+    done = std::min(place.size(), static_cast<std::size_t>(end - place.c_str()) + 2);
+  }
+  return text + place.substr(done);
+}
+
 }  // namespace
 
 StageTime stage_time(std::vector<double> ms) {
@@ -108,14 +131,15 @@ std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates)
 }
 
 std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
-                                    std::span<const NoiseFound> noises) {
+                                    std::span<const NoiseFound> noises, std::int64_t begin_ns) {
   constexpr std::int64_t kFewest = 20;
   constexpr double kMostFactor = 3.;  // between a guess and what is found
   std::vector<std::string> lines;
   for (const RejectionCount& r : rejections) {
     if (r.of == 0 || r.count < kFewest || 5 * r.count < r.of) continue;
     lines.push_back(r.reason + " - " + std::to_string(r.count) + " of " + std::to_string(r.of) +
-                    ", " + r.first + ": check its cable, sign, unit, and the order of the joints");
+                    ", " + since(begin_ns, r.first) +
+                    ": check its cable, sign, unit, and the order of the joints");
   }
   for (const NoiseFound& noise : noises) {
     const double factor = noise.found / noise.configured;

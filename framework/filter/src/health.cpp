@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <string>
 #include <utility>
 
 namespace viwo {
@@ -80,7 +81,9 @@ std::string Contact::epoch(std::span<const UpdateCounts> counts, Filter& filter)
   ++lost_periods_;
   if (balance_++ == 0) lost_since_ns_ = begin_ns;
   if (balance_ == kMostPeriods) {
-    return "all updates contradict the estimate since " + stamp_text(lost_since_ns_) +
+    char text[24];
+    std::snprintf(text, sizeof text, "%.1f s", seconds_between(lost_since_ns_, t_ns));
+    return std::string("all updates have contradicted the estimate for ") + text +
            ": check units, axes and clock of the IMU, then calibration and noise of the other "
            "sensors";
   }

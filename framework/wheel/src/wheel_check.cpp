@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <string>
 #include <utility>
@@ -11,6 +10,7 @@
 #include <Eigen/LU>
 
 #include "viwo/math/chi2.hpp"
+#include "viwo/math/time_text.hpp"
 
 namespace viwo {
 namespace {
@@ -33,12 +33,6 @@ TwistOptions options() {
 
 void mark(NoiseKind kind, int channel, EncoderSample& y) {
   (kind == NoiseKind::kDrive ? y.bad_drives : y.bad_steers) |= 1u << static_cast<unsigned>(channel);
-}
-
-std::string seconds_text(std::int64_t t_ns) {
-  char text[48];
-  std::snprintf(text, sizeof text, "t = %.3f s", 1e-9 * static_cast<double>(t_ns));
-  return text;
 }
 
 }  // namespace
@@ -184,12 +178,11 @@ void WheelCheck::rejections(std::vector<RejectionCount>& out) const {
     out.push_back({kind + std::to_string(suspect.channel + 1) +
                        " left out of a sample: the other wheels contradict it",
                    suspect.left_out,
-                   seconds_text(suspect.first_ns) + " .. " + seconds_text(suspect.last_ns),
-                   samples_});
+                   time_text(suspect.first_ns) + " .. " + time_text(suspect.last_ns), samples_});
   }
   if (contradicting_ > 0) {
     out.push_back({"sample whose wheels contradict each other, none of them in particular (used)",
-                   contradicting_, seconds_text(first_contradicting_ns_), samples_});
+                   contradicting_, time_text(first_contradicting_ns_), samples_});
   }
 }
 

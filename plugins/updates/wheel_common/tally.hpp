@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
-#include <string>
 #include <vector>
 
 #include "viwo/api/sensor.hpp"
+#include "viwo/math/time_text.hpp"
 
 namespace viwo {
 
@@ -26,9 +25,7 @@ struct Tally {
   /// Appends itself to `out` if it happened at all.
   void append_to(std::vector<RejectionCount>& out) const {
     if (count == 0) return;
-    char where[48];
-    std::snprintf(where, sizeof where, "t = %.3f s", 1e-9 * static_cast<double>(first_ns));
-    out.push_back({reason, count, where});
+    out.push_back({reason, count, time_text(first_ns)});
   }
 };
 

@@ -242,9 +242,9 @@ RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks&
 std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates);
 
 /// Warnings of what a fifth of the samples was left out for, and of noises far above what is
-/// configured.
+/// configured. Stamps become times since `begin_ns`.
 std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
-                                    std::span<const NoiseFound> noises);
+                                    std::span<const NoiseFound> noises, std::int64_t begin_ns);
 
 /// Warnings of calibration that has gone where its prior does not reach.
 std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration);
