@@ -1,7 +1,13 @@
 // The filter as a user meets it: what its sections may say, how a run of it ends, and that a log
 // plays back to the same bits.
+#include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <thread>
 
+#include "../live/child.hpp"
 #include "support.hpp"
 
 namespace viwo {
@@ -297,6 +303,33 @@ TEST_F(FilterTest, RunsFromALogToTheSameBits) {
     EXPECT_EQ(read(std::string("direct") + file), read(std::string("from_log") + file)) << file;
   }
   EXPECT_EQ(summary("direct").at("updates"), summary("from_log").at("updates"));
+}
+
+/// The first sign of its progress is after a second.
+TEST_F(FilterTest, WritesWhatItHasWhenItIsInterrupted) {
+  const std::string printed = at("printed").string();
+  testing::Child viwo({VIWO_TEST_PROGRAM, "run", kConfigs + "runs/viwo_swerve.yaml", "--set",
+                       "sensors.simulator0.duration_s=600", "--out", at("out").string()},
+                      printed);
+  write("printed", "");
+  for (int i = 0; i < 6000 && read("printed").find(" %\n") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  viwo.signal(SIGINT);
+  ASSERT_EQ(viwo.wait(std::chrono::seconds(60)), 0) << read("printed");
+  const nlohmann::json json = summary();
+  EXPECT_EQ(json.at("status"), "ok");
+  const double duration_s = json.at("duration_s").get<double>();
+  EXPECT_GT(duration_s, 50.);
+  EXPECT_LT(duration_s, 599.);
+  char said[120];
+  std::snprintf(said, sizeof said,
+                "interrupted at t = %.3f s: the rest of the recording was not used", duration_s);
+  EXPECT_EQ(json.at("warnings").front(), said);
+  const std::string trajectory = read("out/trajectory.tum");
+  EXPECT_EQ(std::count(trajectory.begin(), trajectory.end(), '\n'),
+            1 + json.at("epochs").get<int>())
+      << "a line for each, and the names of the columns";
 }
 
 TEST_F(FilterTest, IsListedAndDescribedWithItsUpdates) {

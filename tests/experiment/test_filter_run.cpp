@@ -1,6 +1,7 @@
 // Runs of the filter: their progress, and what is written of what their sensors give.
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -12,9 +13,11 @@
 #include "held_gauge.hpp"
 #include "sensors_in_memory.hpp"
 #include "simulated.hpp"
+#include "viwo/experiment/interrupt.hpp"
 #include "viwo/experiment/progress.hpp"
 #include "viwo/experiment/simulate.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/time_text.hpp"
 
 namespace viwo {
 namespace {
@@ -66,6 +69,29 @@ TEST(FilterRun, TellsTheErrorOfTheCalibrationFromItsFirstEpochOn) {
   EXPECT_EQ(result.calibration.size(), 23U);
   EXPECT_EQ(epochs, result.epochs);
   EXPECT_GT(epochs, 30);
+}
+
+TEST(FilterRun, EndsWithItsResultsWhenASignalAsksForIt) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    RunSetup setup = inertia_and_wheels();
+    const RunData data = collect(setup);
+    const InterruptSignal interrupt;
+    RunHooks hooks;
+    hooks.interrupted = [&] { return interrupt.raised(); };
+    hooks.on_epoch = [&](const RunResult& result) {
+      if (result.epochs == 20) std::raise(signal);
+    };
+    const RunResult result = experiment::run(setup, data, hooks);
+    EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
+    EXPECT_EQ(result.epochs, 20);
+    EXPECT_EQ(result.estimate.size(), 20U);
+    EXPECT_TRUE(result.accuracy);
+    ASSERT_EQ(result.warnings.size(), 1U);
+    EXPECT_EQ(result.warnings[0],
+              "interrupted at " +
+                  time_text(result.estimate.back().t_ns - result.estimate.front().t_ns) +
+                  ": the rest of the recording was not used");
+  }
 }
 
 TEST(FilterRun, RefusesASensorThatGivesNothingOfWhatAnUpdateNeeds) {

@@ -53,14 +53,12 @@ class Figures {
   std::filesystem::path folder_;
 };
 
-/// What a live run has beside others: signals end it, results are on disk as they come, and what is
-/// wrong is said when it is seen.
+/// What a live run has beside others: results are on disk as they come, and what is wrong is said
+/// when it is seen.
 class LiveOutput {
  public:
   LiveOutput(const RunSetup& setup, const std::filesystem::path& folder, RunHooks& hooks)
       : stream_(folder) {
-    write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
-    hooks.interrupted = [this] { return interrupt_.raised(); };
     hooks.on_epoch = [this, then = hooks.on_epoch](const RunResult& result) {
       stream_.epoch(result);
       if (then) then(result);
@@ -77,7 +75,6 @@ class LiveOutput {
   }
 
  private:
-  InterruptSignal interrupt_;
   RunStream stream_;
 };
 
@@ -98,13 +95,18 @@ int run_command(const Arguments& arguments) {
   const auto folder = out_folder(arguments);
   make_folder(folder);  // whether results can be written shows before the work
   const Figures figures(arguments, folder);
-  std::optional<LiveOutput> output;  // here: signals are waited for until all is written
+  write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
+  // Until all is written. What has no filter is done in no time.
+  std::optional<InterruptSignal> interrupt;
+  if (setup.filter) interrupt.emplace();
+  std::optional<LiveOutput> output;
   RunResult result;
   {
     TimeProgress progress(setup.name);  // gone before anything else is printed
     RunHooks hooks;
     pictures.watch(hooks);
     hooks.progress = [&](double fraction) { progress.at(fraction); };
+    hooks.interrupted = [&] { return interrupt && interrupt->raised(); };
     if (!data.live.empty()) output.emplace(setup, folder, hooks);
     result = experiment::run(setup, data, hooks);
     if (output) output->finish(result);

@@ -1,6 +1,7 @@
 // A run of the filter: feed, record, evaluate.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "restart.hpp"
 #include "running_warnings.hpp"
 #include "viwo/experiment/run.hpp"
+#include "viwo/math/time_text.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -120,7 +122,7 @@ class FilterRun {
   RunResult run() {
     const auto begin = Clock::now();
     bool more = true;
-    while (more && result_.cause.empty()) {
+    while (more && result_.cause.empty() && !is_interrupted()) {
       more = next(*feed_, *estimator_, result_.cause);
       if (!more) estimator_->finish();
       make_epochs();
@@ -153,6 +155,14 @@ class FilterRun {
   bool restarts() const {
     const Restart restart = setup_.filter->restart;
     return restart == Restart::kAlways || (restart == Restart::kLive && live_);
+  }
+
+  /// A live run is ended by its feed.
+  bool is_interrupted() {
+    if (live_ || !hooks_.interrupted || !hooks_.interrupted()) return false;
+    result_.warnings.push_back("interrupted at " + time_text(std::llround(1e9 * now_s())) +
+                               ": the rest of the recording was not used");
+    return true;
   }
 
   void make_epochs() {

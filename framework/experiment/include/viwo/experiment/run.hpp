@@ -227,7 +227,7 @@ struct RunHooks {
   /// An epoch is done, and recorded in the result, which is not complete yet. The time this takes
   /// is none of the epoch's.
   std::function<void(const RunResult&)> on_epoch;
-  std::function<bool()> interrupted;  ///< whether live sensors are to stop
+  std::function<bool()> interrupted;  ///< whether the run is to end now, with what it has
   /// Something is wrong with the run, said when it is first seen: time since the start [s], what.
   std::function<void(double, const std::string&)> on_warning;
   /// A live sensor has given an image, which is still to be worked on. In another thread.
