@@ -104,7 +104,11 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
 class FilterRun {
  public:
   FilterRun(const RunSetup& setup, const RunData& data, const RunHooks& hooks)
-      : setup_(setup), data_(data), hooks_(hooks), live_(!data.live.empty()), plausibility_(setup) {
+      : setup_(setup),
+        data_(data),
+        hooks_(hooks),
+        live_(!data.live.empty()),
+        plausibility_(setup, live_) {
     result_.rejections = data.rejections;
     result_.warnings = setup.warnings;
     result_.live = live_;
@@ -126,6 +130,7 @@ class FilterRun {
       more = next(*feed_, *estimator_, result_.cause);
       if (!more) estimator_->finish();
       make_epochs();
+      warnings_.say(now_s(), plausibility_.findings(), hooks_);
       if (!estimator_->failure().empty() && !begin_anew(more)) break;
     }
     feed_->finish(result_);
@@ -173,7 +178,8 @@ class FilterRun {
       if (!stepped) break;
       recorder_->record(*estimator_);
       if (healthy_) healthy_->epoch(*estimator_);
-      warnings_.epoch(result_, *estimator_, plausibility_.findings(), hooks_);
+      if (result_.epochs == 1) plausibility_.begin_at(result_.pieces.front().begin_ns);
+      warnings_.epoch(result_, *estimator_, hooks_);
       feed_->on_epoch(*estimator_);
       if (hooks_.on_epoch) hooks_.on_epoch(result_);
       tell_progress();

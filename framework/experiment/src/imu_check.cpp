@@ -5,6 +5,7 @@
 
 #include "viwo/experiment/output.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/time_text.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -115,8 +116,8 @@ void ImuCheck::watch_stuck(const ImuSample& sample, bool moves) {
   stuck_to_ns_ = sample.t_ns;
 }
 
-void ImuCheck::findings(Findings& out) const {
-  find_stuck(out);
+void ImuCheck::findings(std::int64_t zero_ns, Findings& out) const {
+  find_stuck(zero_ns, out);
   if (count_ < kFewest || seconds_between(begin_ns_, last_.t_ns) < kShortest_s) return;
   find_gravity(out);
   find_saturated(out);
@@ -144,12 +145,11 @@ void ImuCheck::find_gravity(Findings& out) const {
   out.push_back({name_ + " gravity", text});
 }
 
-void ImuCheck::find_stuck(Findings& out) const {
+void ImuCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {
   if (stuck_ == 0) return;
   out.push_back({name_ + " stuck",
-                 name_ + ": the same six numbers " + std::to_string(stuck_) + " times from t = " +
-                     significant(seconds_between(begin_ns_, stuck_from_ns_), 4) +
-                     " s on: it was stuck for " +
+                 name_ + ": the same six numbers " + std::to_string(stuck_) + " times from " +
+                     time_text(stuck_from_ns_ - zero_ns) + " on: it was stuck for " +
                      significant(seconds_between(stuck_from_ns_, stuck_to_ns_), 3) + " s"});
 }
 

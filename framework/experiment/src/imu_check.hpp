@@ -32,7 +32,8 @@ class ImuCheck {
 
   /// Readings in time order. `moves`: the wheels turn.
   void add(const ImuSample& sample, bool moves);
-  void findings(Findings& out) const;
+  /// Times in texts count from `zero_ns`.
+  void findings(std::int64_t zero_ns, Findings& out) const;
 
   /// Mean direction of the specific force in I, of length 1 where it never changed; zero as long
   /// as there are too few readings.
@@ -56,7 +57,7 @@ class ImuCheck {
   bool is_noise() const;
   void watch_stuck(const ImuSample& sample, bool moves);
   void find_gravity(Findings& out) const;
-  void find_stuck(Findings& out) const;
+  void find_stuck(std::int64_t zero_ns, Findings& out) const;
   void find_saturated(Findings& out) const;
   void find_spikes(Findings& out) const;
 

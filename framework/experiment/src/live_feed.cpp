@@ -41,6 +41,8 @@ constexpr std::chrono::milliseconds kEndTime(3000);
 /// Poses of a reference that are kept of a run without end.
 constexpr std::size_t kMostReference = 16'384;
 constexpr std::chrono::milliseconds kPollPeriod(50);
+/// When nothing comes at all, time passes by the clock of this machine.
+constexpr std::chrono::milliseconds kIdleTime(1000);
 /// Clocks of cameras are nearer to that of the IMU than this.
 constexpr std::int64_t kMaxClockOffsetNs = 50'000'000;
 
@@ -71,11 +73,16 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   bool next(Estimator& estimator) {
     Arrival arrival;
     {
+      const auto begin = Clock::now();
       std::unique_lock lock(mutex_);
       while (!changed_.wait_for(lock, kPollPeriod,
                                 [this] { return !arrivals_.empty() || running_.empty(); })) {
         lock.unlock();
         if (is_over()) return false;
+        if (const auto waited = Clock::now() - begin; waited > kIdleTime) {
+          plausibility_.wait(std::chrono::duration<double>(waited).count());
+          return true;
+        }
         lock.lock();
       }
       if (arrivals_.empty()) {

@@ -1,10 +1,12 @@
 #include "plausibility.hpp"
 
-#include <optional>
+#include <algorithm>
+#include <cmath>
 
 #include "encoder_check.hpp"
 #include "imu_check.hpp"
 #include "stereo_check.hpp"
+#include "stream_watch.hpp"
 #include "twist_check.hpp"
 
 namespace viwo::experiment {
@@ -18,10 +20,18 @@ struct Plausibility::Checks {
     bool has_failed = false;  ///< what its model throws is told by those who need it
   };
 
+  /// What the estimator takes of a sensor.
+  struct Watched {
+    std::string sensor;
+    const SampleType* type;
+    StreamWatch watch;
+  };
+
   std::string imu_name;
   ImuCheck imu;
   std::vector<WheelsCheck> wheels;
   StereoCheck stereo;
+  std::vector<Watched> streams;
   bool moves = false;  ///< the wheels turn
 
   void add(WheelsCheck& check, const EncoderSample& sample) {
@@ -36,7 +46,28 @@ struct Plausibility::Checks {
   }
 };
 
-Plausibility::Plausibility(const RunSetup& setup) {
+namespace {
+
+/// What the filter goes on without for a while: the IMU carries it as far as its biases are known,
+/// and nothing carries it without the IMU (F-27). What only corrects it now and then, such as a
+/// fix, may well be absent.
+double least_gap_s(const Route& route, const FilterSetup& filter) {
+  if (route.consumer == Consumer::kImu) return 0.2;
+  const StreamSpec& spec = filter.streams[route.stream].spec;
+  return spec.awaited || spec.ends_epochs ? 1. : 10.;
+}
+
+/// The sensor whose measurements those of `name` are made of.
+std::string source_of(const std::string& name, const std::vector<SensorEntry>& sensors) {
+  for (const SensorEntry& entry : sensors) {
+    if (entry.name == name && !entry.input.empty()) return source_of(entry.input, sensors);
+  }
+  return name;
+}
+
+}  // namespace
+
+Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
   if (!setup.filter) return;
   const FilterSetup& filter = *setup.filter;
   const std::string imu = setup.routes.sensor_of(Consumer::kImu);
@@ -50,7 +81,9 @@ Plausibility::Plausibility(const RunSetup& setup) {
       Checks{imu,
              ImuCheck(told(imu, "imu"), filter.options.filter.gravity_m_per_s2),
              {},
-             StereoCheck(filter.cameras)});
+             StereoCheck(filter.cameras),
+             {}});
+  watch_streams(setup);
   for (const WheelSet& set : filter.wheels) {
     std::string sensor = set.prior.sensor;
     if (sensor.empty()) sensor = setup.routes.sensor_of(Consumer::kWheels);
@@ -64,6 +97,27 @@ Plausibility::Plausibility(const RunSetup& setup) {
   }
 }
 
+/// One watch for each kind of each sensor that the estimator takes something from.
+void Plausibility::watch_streams(const RunSetup& setup) {
+  std::vector<const Route*> taken;
+  for (const Route& route : setup.routes.all()) {
+    if (route.consumer != Consumer::kImu && route.consumer != Consumer::kStream) continue;
+    const bool is_known = std::any_of(taken.begin(), taken.end(), [&](const Route* other) {
+      return other->sensor == route.sensor && *other->type == *route.type;
+    });
+    if (!is_known) taken.push_back(&route);
+  }
+  for (const Route* route : taken) {
+    std::string name = source_of(route->sensor, setup.sensors);
+    const auto of_it = std::count_if(taken.begin(), taken.end(), [&](const Route* other) {
+      return source_of(other->sensor, setup.sensors) == name;
+    });
+    if (of_it > 1) name = std::string(route->type->name) + " of " + name;
+    checks_->streams.push_back(
+        {route->sensor, route->type, StreamWatch(name, least_gap_s(*route, *setup.filter))});
+  }
+}
+
 Plausibility::~Plausibility() = default;
 
 void Plausibility::add(const std::string& sensor, SampleView sample) {
@@ -71,10 +125,6 @@ void Plausibility::add(const std::string& sensor, SampleView sample) {
   if (const auto* imu = sample.get_if<ImuSample>(); imu != nullptr && sensor == checks_->imu_name) {
     checks_->imu.add(*imu, checks_->moves);
     for (auto& wheels : checks_->wheels) wheels.twist.add_imu(*imu);
-    constexpr std::int64_t kPeriodNs = 1'000'000'000;
-    if (imu->t_ns < next_look_ns_ && imu->t_ns > next_look_ns_ - 2 * kPeriodNs) return;
-    next_look_ns_ = imu->t_ns + kPeriodNs;
-    look();
   } else if (const auto* encoders = sample.get_if<EncoderSample>()) {
     for (auto& wheels : checks_->wheels) {
       if (wheels.sensor == sensor && !wheels.has_failed) checks_->add(wheels, *encoders);
@@ -82,15 +132,45 @@ void Plausibility::add(const std::string& sensor, SampleView sample) {
   } else if (const auto* features = sample.get_if<FeatureSample>()) {
     checks_->stereo.add(sensor, *features);
   }
+  watch(sensor, sample);
+}
+
+void Plausibility::watch(const std::string& sensor, SampleView sample) {
+  for (Checks::Watched& stream : checks_->streams) {
+    if (stream.sensor != sensor || !(*stream.type == sample.type())) continue;
+    const std::int64_t t_ns = sample.t_ns();
+    if (!now_ns_) now_ns_ = next_look_ns_ = t_ns;
+    if (!zero_ns_) zero_ns_ = now_ns_;
+    stream.watch.add(t_ns, sample.type().channel(sample.data()), *now_ns_);
+    if (stream.watch.has_begun()) now_ns_ = std::max(*now_ns_, stream.watch.newest_ns());
+    waited_ns_ = 0;
+    look_now_and_then();
+    return;
+  }
+}
+
+void Plausibility::wait(double seconds) {
+  if (!checks_ || !now_ns_) return;
+  waited_ns_ += std::llround(1e9 * seconds);
+  look_now_and_then();
+}
+
+void Plausibility::look_now_and_then() {
+  constexpr std::int64_t kPeriodNs = 1'000'000'000;
+  const std::int64_t now_ns = *now_ns_ + waited_ns_;
+  if (now_ns < next_look_ns_ && now_ns > next_look_ns_ - 2 * kPeriodNs) return;
+  next_look_ns_ = now_ns + kPeriodNs;
+  look(false);
 }
 
 void Plausibility::finish() {
-  if (checks_) look();
+  if (checks_) look(true);
 }
 
-void Plausibility::look() {
+void Plausibility::look(bool at_end) {
   findings_.clear();
-  checks_->imu.findings(findings_);
+  if (!now_ns_) return;
+  checks_->imu.findings(*zero_ns_, findings_);
   for (const auto& wheels : checks_->wheels) {
     const std::size_t before = findings_.size();
     wheels.encoders.findings(findings_);
@@ -98,6 +178,13 @@ void Plausibility::look() {
     if (findings_.size() == before) wheels.twist.findings(checks_->imu.up(), findings_);
   }
   checks_->stereo.findings(findings_);
+  for (const auto& stream : checks_->streams) {
+    if (at_end) {
+      stream.watch.findings(*now_ns_, *zero_ns_, live_ ? "run" : "recording", findings_);
+    } else {
+      stream.watch.findings(*now_ns_ + waited_ns_, *zero_ns_, findings_);
+    }
+  }
 }
 
 }  // namespace viwo::experiment

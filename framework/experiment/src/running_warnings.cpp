@@ -2,14 +2,20 @@
 
 namespace viwo::experiment {
 
+void RunningWarnings::say(double now_s, const Findings& findings, const RunHooks& hooks) {
+  if (!hooks.on_warning) return;
+  for (const Finding& finding : findings) {
+    if (said_.insert(finding.key).second) hooks.on_warning(now_s, finding.text);
+  }
+}
+
 void RunningWarnings::epoch(const RunResult& result, const Estimator& estimator,
-                            const Findings& findings, const RunHooks& hooks) {
+                            const RunHooks& hooks) {
   if (!hooks.on_warning) return;
   const auto say = [&](const std::string& key, double t_s, const std::string& text) {
     if (said_.insert(key).second) hooks.on_warning(t_s, text);
   };
   const double now_s = result.epoch_t_s.back();
-  for (const Finding& finding : findings) say(finding.key, now_s, finding.text);
   for (; monitor_seen_ < result.monitor.warnings.size(); ++monitor_seen_) {
     const MonitorWarning& warning = result.monitor.warnings[monitor_seen_];
     say(warning.text, warning.t_s, warning.text);
