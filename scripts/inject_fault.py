@@ -58,6 +58,8 @@ FAULTS = {
                        field(ACCEL, 0, text('1000')), True),
     'imu_spike_huge': Fault(IMU, ACCURATE, 'one sample of 1e20 m/s^2',
                             field(ACCEL, 1, text('1e20')), True),
+    'imu_spike_in_range': Fault(IMU, ACCURATE, 'one sample of 150 m/s^2',
+                                field(ACCEL, 0, text('150')), True),
     'imu_burst': Fault(IMU, EITHER, '5 % of the samples off by 50 m/s^2 and 5 rad/s', spoilt(0.05)),
     'imu_stuck_2s': Fault(IMU, EITHER, 'the same values for 2 s', stuck(during(2))),
     'imu_saturated': Fault(IMU, EITHER, 'gyro clipped at 0.3 rad/s, accelerometer at 10.2 m/s^2',

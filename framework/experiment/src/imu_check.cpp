@@ -39,19 +39,13 @@ double LogMedian::value() const {
   return kLeast * std::exp(kStep * (static_cast<double>(i) + 0.5));
 }
 
-/// A spike is a reading that departs from the one before and is gone with the next.
-void ImuCheck::Axis::add(double value, double least_spike) {
+void ImuCheck::Axis::add(double value, double spike) {
   const double now = value - last;
   if (now != 0.) finest = finest == 0. ? std::abs(now) : std::min(finest, std::abs(now));
-  const double lesser = std::min(std::abs(now), std::abs(change));
-  if (now * change < 0. && lesser > std::max(least_spike, 10. * typical_change)) {
+  if (spike > 0.) {
     ++spikes;
-    spike_sum += lesser;
+    spike_sum += spike;
   }
-  // Bounded, so that spikes do not become typical.
-  const double bound = std::max(3. * typical_change, 0.01 * least_spike);
-  typical_change += 0.01 * (std::min(std::abs(now), bound) - typical_change);
-  change = now;
   last = value;
   least = std::min(least, value);
   most = std::max(most, value);
@@ -63,25 +57,16 @@ void ImuCheck::Axis::add(double value, double least_spike) {
 void ImuCheck::add(const ImuSample& sample, bool moves) {
   if (sample.fault() != nullptr || (count_ > 0 && sample.t_ns <= last_.t_ns)) return;
   const Eigen::Vector3d f = to_vector(sample.accel_m_per_s2);
-  if (count_ == 0) {
-    begin_ns_ = equal_from_ns_ = sample.t_ns;
-    for (std::size_t i = 0; i < 3; ++i) {
-      axes_[i].last = axes_[i].least = axes_[i].most = sample.gyro_rad_per_s[i];
-      axes_[i + 3].last = axes_[i + 3].least = axes_[i + 3].most = f[static_cast<int>(i)];
-    }
-  }
-  const double before = axes_[2].change;
-  for (std::size_t i = 0; i < 3; ++i) {
-    axes_[i].add(sample.gyro_rad_per_s[i], 1.);
-    axes_[i + 3].add(sample.accel_m_per_s2[i], 5.);
-  }
-  if (axes_[2].change != 0.) {
-    ++changes_;
-    if (axes_[2].change * before < 0.) ++turns_back_;
+  const ImuWatch::Values values = ImuWatch::values_of(sample);
+  watch_.add(sample);
+  if (count_ == 0) begin_ns_ = equal_from_ns_ = sample.t_ns;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (count_ == 0) axes_[i].last = axes_[i].least = axes_[i].most = values[i];
+    axes_[i].add(values[i], watch_.spike()[i]);
   }
   force_.add(f.norm());
   if (f.norm() > 0.) direction_sum_ += f.normalized();
-  if (count_ > 0) watch_stuck(sample, moves);
+  watch_stuck(sample, moves);
   last_ = sample;
   ++count_;
 }
@@ -93,25 +78,19 @@ Eigen::Vector3d ImuCheck::up() const {
   return direction_sum_ / static_cast<double>(count_);
 }
 
-/// Changes of white noise turn back two times of three, those of a motion that is sampled often
-/// enough hardly ever. What has no noise may well repeat itself.
-bool ImuCheck::is_noise() const { return changes_ >= 50 && 3 * turns_back_ > changes_; }
-
 void ImuCheck::watch_stuck(const ImuSample& sample, bool moves) {
-  if (sample.gyro_rad_per_s != last_.gyro_rad_per_s ||
-      sample.accel_m_per_s2 != last_.accel_m_per_s2) {
-    equal_ = 0;
+  const int equal = watch_.n_repeated() + 1;
+  if (equal == 1) {
     moves_ = false;
     equal_from_ns_ = sample.t_ns;
     return;
   }
-  ++equal_;
   moves_ = moves_ || moves;
   // Coarse numbers of an IMU at rest repeat themselves.
   const bool rests = to_vector(sample.gyro_rad_per_s).norm() < 0.05 && !moves_;
-  if (rests || !is_noise() || equal_ + 1 <= std::max(stuck_, 20)) return;
+  if (rests || !watch_.is_stuck() || equal <= std::max(stuck_, 20)) return;
   if (seconds_between(equal_from_ns_, sample.t_ns) <= 0.1) return;
-  stuck_ = equal_ + 1;
+  stuck_ = equal;
   stuck_from_ns_ = equal_from_ns_;
   stuck_to_ns_ = sample.t_ns;
 }
@@ -156,7 +135,7 @@ void ImuCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {
 /// A value that is cut off where its range ends comes again and again, to the last bit; noise
 /// reaches its largest value once, unless it has next to no steps.
 void ImuCheck::find_saturated(Findings& out) const {
-  if (!is_noise()) return;
+  if (!watch_.is_noise()) return;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const Axis& axis = axes_[i];
     const double share = static_cast<double>(axis.at_largest) / static_cast<double>(count_);

@@ -11,6 +11,7 @@
 
 #include "finding.hpp"
 #include "viwo/api/measurement.hpp"
+#include "viwo/filter/imu_watch.hpp"
 
 namespace viwo::experiment {
 
@@ -43,18 +44,15 @@ class ImuCheck {
   /// One of the six numbers of a reading.
   struct Axis {
     double last = 0.;
-    double change = 0.;  ///< the last one
     double least = 0., most = 0.;
     double finest = 0.;           ///< smallest change
     double largest = 0.;          ///< |value|
     std::int64_t at_largest = 0;  ///< readings with it
     std::int64_t spikes = 0;
-    double typical_change = 0.;  ///< of the last hundred readings
     double spike_sum = 0.;
-    void add(double value, double least_spike);
+    void add(double value, double spike);
   };
 
-  bool is_noise() const;
   void watch_stuck(const ImuSample& sample, bool moves);
   void find_gravity(Findings& out) const;
   void find_stuck(std::int64_t zero_ns, Findings& out) const;
@@ -69,10 +67,8 @@ class ImuCheck {
   std::array<Axis, 6> axes_;  ///< of the gyro, then of the accelerometer
   LogMedian force_;           ///< m/s^2
   Eigen::Vector3d direction_sum_ = Eigen::Vector3d::Zero();
-  std::int64_t turns_back_ = 0;  ///< changes of the gyro's z against the change before
-  std::int64_t changes_ = 0;
+  ImuWatch watch_;
   // Readings with the same six numbers: those at hand, and the longest that cannot be true.
-  int equal_ = 0;
   bool moves_ = false;
   std::int64_t equal_from_ns_ = 0;
   int stuck_ = 0;

@@ -9,6 +9,8 @@
 namespace viwo {
 namespace {
 
+constexpr const char* kSpike = "imu: spike, gone with the next reading";
+
 bool is_within(const std::array<double, 3>& values, double most) {
   return std::all_of(values.begin(), values.end(),
                      [most](double value) { return std::abs(value) <= most; });
@@ -23,31 +25,17 @@ double ImuBuffer::gap_s(const ImuSample& before, const ImuSample& after) const {
 
 bool ImuBuffer::is_after_the_last(std::int64_t t_ns) {
   constexpr double kLongS = 1.;
-  if (empty() || t_ns > newest_ns()) {
+  const std::int64_t last_ns = in_doubt_ ? in_doubt_->t_ns : empty() ? t_ns - 1 : newest_ns();
+  if (t_ns > last_ns) {
     n_behind_ = 0;
     return true;
   }
-  const double behind_s = seconds_between(t_ns, newest_ns());
+  const double behind_s = seconds_between(t_ns, last_ns);
   const bool follows = n_behind_ == 0 || t_ns > last_behind_ns_;
   n_behind_ = behind_s <= kLongS ? 0 : follows ? n_behind_ + 1 : 1;
   last_behind_ns_ = t_ns;
   if (n_behind_ == 1) behind_s_ = behind_s;
   return false;
-}
-
-bool ImuBuffer::is_stuck(const ImuSample& sample) {
-  constexpr int kMostRepeated = 10;
-  constexpr int kAlive = 100;
-  if (empty()) return false;
-  const ImuSample& last = samples().back();
-  if (sample.gyro_rad_per_s != last.gyro_rad_per_s ||
-      sample.accel_m_per_s2 != last.accel_m_per_s2) {
-    n_changes_ = std::min(n_changes_ + 1, kAlive);
-    n_repeated_ = 0;
-    return false;
-  }
-  ++n_repeated_;
-  return n_changes_ == kAlive && n_repeated_ > kMostRepeated;
 }
 
 void ImuBuffer::add(const ImuSample& sample, Rejections& rejections) {
@@ -68,10 +56,30 @@ void ImuBuffer::add(const ImuSample& sample, Rejections& rejections) {
     rejections.add("imu: stamp far ahead of the last", sample.t_ns);
     return;
   }
-  if (is_stuck(sample)) {
-    rejections.add("imu: stuck, the same reading again and again", sample.t_ns);
-    return;
+  watch_.add(sample);
+  if (in_doubt_) {
+    if (watch_.was_spike()) {
+      rejections.add(kSpike, in_doubt_->t_ns);
+    } else {
+      push(*in_doubt_, rejections);
+    }
+    in_doubt_.reset();
   }
+  if (watch_.is_stuck()) {
+    rejections.add("imu: stuck, the same reading again and again", sample.t_ns);
+  } else if (watch_.is_in_doubt()) {
+    in_doubt_ = sample;
+  } else {
+    push(sample, rejections);
+  }
+}
+
+void ImuBuffer::finish(Rejections& rejections) {
+  if (in_doubt_) rejections.add(kSpike, in_doubt_->t_ns);
+  in_doubt_.reset();
+}
+
+void ImuBuffer::push(const ImuSample& sample, Rejections& rejections) {
   if (!empty() && gap_s(samples().back(), sample) > 0.) {
     rejections.add("imu: gap bridged", sample.t_ns);
   }

@@ -57,21 +57,28 @@ TEST(ImuBuffer, RefusesReadingsThatAreNotFiniteOrNotLater) {
 
 TEST(ImuBuffer, LeavesOutAnImuThatIsStuck) {
   ImuBench bench({});
+  testing::Random random(1);
+  const auto noisy_at = [&random](std::int64_t t_ms) {
+    ImuSample sample = imu_at(kStart + t_ms * kMs);
+    sample.gyro_rad_per_s[2] += 0.01 * random.normal();
+    return sample;
+  };
   std::int64_t t = 0;
-  for (; t < 600; t += 5) bench.buffer.add(imu_at(kStart + t * kMs), bench.rejections);
-  ImuSample stuck = imu_at(kStart + t * kMs);
+  for (; t < 600; t += 5) bench.buffer.add(noisy_at(t), bench.rejections);
+  ImuSample stuck = noisy_at(t);
   for (; t < 1000; t += 5) {
     stuck.t_ns = kStart + t * kMs;
     bench.buffer.add(stuck, bench.rejections);
   }
   // Eleven readings are believed of the 80, then what is left out is a gap.
   EXPECT_EQ(bench.buffer.newest_ns(), kStart + 650 * kMs);
-  bench.buffer.add(imu_at(kStart + t * kMs), bench.rejections);
+  bench.buffer.add(noisy_at(t), bench.rejections);
   EXPECT_EQ(bench.rejected(), (Counts{{"imu: stuck, the same reading again and again", 69},
                                       {"imu: gap bridged", 1}}));
-  // One without noise may say the same for ever.
+  // One without noise may say the same for ever, also after a motion.
   ImuBench noiseless({});
-  for (t = 0; t < 1000; t += 5) {
+  for (t = 0; t < 600; t += 5) noiseless.buffer.add(imu_at(kStart + t * kMs), noiseless.rejections);
+  for (; t < 1000; t += 5) {
     stuck.t_ns = kStart + t * kMs;
     noiseless.buffer.add(stuck, noiseless.rejections);
   }

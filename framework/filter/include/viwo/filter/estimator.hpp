@@ -87,7 +87,10 @@ class Estimator {
   void add(const ImuSample& sample) { imu_.add(sample, rejections_); }
   void add(std::size_t stream, SampleView sample);
   /// No further measurement will come: what waits for others is done without them.
-  void finish() { finished_ = true; }
+  void finish() {
+    finished_ = true;
+    imu_.finish(rejections_);
+  }
 
   /// Runs one epoch when the measurements suffice, else returns false. Throws what a kinematic
   /// model has thrown (PluginFailure): without its wheels there is nothing to go on with. What an

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/rejections.hpp"
+#include "viwo/filter/imu_watch.hpp"
 #include "viwo/math/stamp_jump.hpp"
 
 namespace viwo {
@@ -24,8 +26,11 @@ class ImuBuffer {
 
   /// A reading that is not finite or out of range, not after the last or more than a second ahead
   /// of it (StampJump) is dropped and counted; so are those of an IMU that had noise and now
-  /// repeats the same six numbers.
+  /// repeats the same six numbers. One far from the one before (ImuWatch) is held back until the
+  /// next one confirms it, or makes it a spike, which is dropped and counted, too.
   void add(const ImuSample& sample, Rejections& rejections);
+  /// Nothing more is to come: what is held back has not been confirmed.
+  void finish(Rejections& rejections);
   /// By how much the clock of the IMU was set back, s: its readings follow each other, all of them
   /// long before one that came earlier. 0: it was not.
   double set_back_s() const { return n_behind_ < kMostBehind ? 0. : behind_s_; }
@@ -48,7 +53,7 @@ class ImuBuffer {
 
   double gap_s(const ImuSample& before, const ImuSample& after) const;
   bool is_after_the_last(std::int64_t t_ns);
-  bool is_stuck(const ImuSample& sample);
+  void push(const ImuSample& sample, Rejections& rejections);
 
   ImuLimits limits_;
   // An IMU has no pauses of a second; that one is in doubt costs one reading more.
@@ -56,8 +61,8 @@ class ImuBuffer {
   std::int64_t last_behind_ns_ = 0;
   int n_behind_ = 0;  ///< readings without a break that are long before the newest
   double behind_s_ = 0.;
-  int n_changes_ = 0;   ///< from one reading to the next, as far as they matter
-  int n_repeated_ = 0;  ///< of the last reading
+  ImuWatch watch_;
+  std::optional<ImuSample> in_doubt_;
   TypedBuffer<ImuSample> buffer_;
   std::vector<ImuSample> cut_;
   std::vector<double> gaps_s_;
