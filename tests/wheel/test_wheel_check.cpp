@@ -89,7 +89,8 @@ TEST(WheelCheck, LeavesOutTheWheelThatLiesForAsLongAsItDoes) {
     EXPECT_EQ(Checked::count(checked.outside, 0, 0), 1000);
     ASSERT_EQ(checked.rejections.size(), 1u);
     EXPECT_EQ(checked.rejections[0].reason,
-              "drive 3 left out of a sample: the other wheels contradict it");
+              "drive 3 left out of a sample: the other wheels contradict it (its cable, sign, "
+              "unit, or the order of the joints)");
     EXPECT_EQ(checked.rejections[0].first, "t = 10.010 s .. t = 19.990 s");
     EXPECT_NEAR(checked.check.noise().found(), 1., 0.05);
   }

@@ -138,8 +138,7 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
   for (const RejectionCount& r : rejections) {
     if (r.of == 0 || r.count < kFewest || 5 * r.count < r.of) continue;
     lines.push_back(r.reason + " - " + std::to_string(r.count) + " of " + std::to_string(r.of) +
-                    ", " + since(begin_ns, r.first) +
-                    ": check its cable, sign, unit, and the order of the joints");
+                    ", " + since(begin_ns, r.first));
   }
   for (const NoiseFound& noise : noises) {
     const double factor = noise.found / noise.configured;

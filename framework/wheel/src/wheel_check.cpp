@@ -176,7 +176,8 @@ void WheelCheck::rejections(std::vector<RejectionCount>& out) const {
     if (suspect.left_out == 0) continue;
     const char* kind = suspect.kind == NoiseKind::kDrive ? "drive " : "steering ";
     out.push_back({kind + std::to_string(suspect.channel + 1) +
-                       " left out of a sample: the other wheels contradict it",
+                       " left out of a sample: the other wheels contradict it (its cable, sign, "
+                       "unit, or the order of the joints)",
                    suspect.left_out,
                    time_text(suspect.first_ns) + " .. " + time_text(suspect.last_ns), samples_});
   }

@@ -5,8 +5,6 @@
 
 #include <Eigen/Cholesky>
 
-#include "cholesky3.hpp"
-
 namespace viwo::visual {
 
 void Chi2Gate::start(int max_clones, int n_cameras) {
@@ -22,7 +20,7 @@ void Chi2Gate::start(int max_clones, int n_cameras) {
   S_.setZero(2 * max_sights, 2 * max_sights);
   T_.setZero(2 * max_clones, kCalibrationRows);
   M_.setZero(2 * max_clones, 2 * max_clones);
-  rhs_.setZero(2 * max_sights, 4);
+  rhs_.setZero(2 * max_sights, 7);
   L_inverse_.setZero(2 * max_sights, 2 * max_sights);
   S_inverse_.setZero(2 * max_sights, 2 * max_sights);
   PHt_.setZero(kPoseSize * max_clones, 2);
@@ -38,8 +36,9 @@ double Chi2Gate::chi2(const Feature& feature, Window& window) {
   }
   for (int i = 0; i < n; ++i) {
     const LinearSight& sight = sights[static_cast<std::size_t>(i)];
-    rhs_.block<2, 1>(2 * i, 0) = sight.residual;
-    rhs_.block<2, 3>(2 * i, 1) = sight.H_f;
+    rhs_.block<2, 3>(2 * i, 0) = sight.H_f;
+    rhs_.block<2, 3>(2 * i, 3) = sight.t_s * sight.H_f;
+    rhs_.block<2, 1>(2 * i, 6) = sight.residual;
   }
   auto S = S_.topLeftCorner(2 * n, 2 * n);
   Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);
@@ -47,24 +46,23 @@ double Chi2Gate::chi2(const Feature& feature, Window& window) {
   auto rhs = rhs_.topRows(2 * n);
   llt.matrixL().solveInPlace(rhs);
   // (VF-9), minimised as (VF-10)
-  const Eigen::Matrix4d G = rhs.transpose().lazyProduct(rhs);
-  if (!cholesky(G.bottomRightCorner<3, 3>(), L_f_)) return std::numeric_limits<double>::infinity();
-  y_f_ = L_f_.triangularView<Eigen::Lower>().solve(Eigen::Vector3d(G.bottomLeftCorner<3, 1>()));
+  const TrackSums sums = rhs.transpose().lazyProduct(rhs);
   n_rows_ = 2 * n;
-  return std::max(0., G(0, 0) - y_f_.squaredNorm());
+  return fit_.solve(sums) ? fit_.chi2 : std::numeric_limits<double>::infinity();
 }
 
 void Chi2Gate::tell(NoiseScale& noise) {
+  constexpr int kExplained = 6;  // by the point and its velocity
   const auto L = S_.topLeftCorner(n_rows_, n_rows_).triangularView<Eigen::Lower>();
   auto rhs = rhs_.topRows(n_rows_);
-  // M = S^-1 - Q Q^T, what is outside of what the point explains: M r, tr M and tr M^2.
-  const Eigen::Vector3d by_point = L_f_.transpose().triangularView<Eigen::Upper>().solve(y_f_);
-  rhs.col(0) -= rhs.rightCols<3>().lazyProduct(by_point);
+  // M = S^-1 - Q Q^T, what is outside of that: M r, tr M and tr M^2. Columns of Q one after the
+  // other, each taken off the residual.
   L.transpose().solveInPlace(rhs);
-  auto Q = rhs.rightCols<3>();
-  for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < k; ++i) Q.col(k) -= L_f_(k, i) * Q.col(i);
-    Q.col(k) /= L_f_(k, k);
+  auto Q = rhs.leftCols<kExplained>();
+  for (int k = 0; k < kExplained; ++k) {
+    for (int i = 0; i < k; ++i) Q.col(k) -= fit_.L(k, i) * Q.col(i);
+    Q.col(k) /= fit_.L(k, k);
+    rhs.col(kExplained) -= fit_.L(kExplained, k) * Q.col(k);
   }
   auto L_inverse = L_inverse_.topLeftCorner(n_rows_, n_rows_);
   L_inverse.setIdentity();
@@ -74,8 +72,8 @@ void Chi2Gate::tell(NoiseScale& noise) {
   M.noalias() -= Q.lazyProduct(Q.transpose());
   const double information = M.squaredNorm();
   const double variance = noise.variance();
-  noise.add(variance * (1. + (rhs.col(0).squaredNorm() - M.trace()) / information),
-            information / static_cast<double>(n_rows_ - 3));
+  noise.add(variance * (1. + (rhs.col(kExplained).squaredNorm() - M.trace()) / information),
+            information / static_cast<double>(n_rows_ - kExplained));
 }
 
 void Chi2Gate::add_poses(const Feature& feature, Window& window) {

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "feature.hpp"
+#include "point_fit.hpp"
 #include "viwo/api/noise_scale.hpp"
 #include "window.hpp"
 
@@ -22,6 +23,8 @@ class Chi2Gate {
   /// Of the residual of a linearised feature outside of what its point explains. Infinity when the
   /// covariance is not positive definite.
   double chi2(const Feature& feature, Window& window);
+  /// The part of it that a velocity of the point explains. After chi2(), when that was finite.
+  double chi2_of_motion() const { return fit_.chi2_of_motion; }
   /// Tells what the residual of a feature, that chi2() was asked for last and was finite, says of
   /// the noise (VF-21).
   void tell(NoiseScale& noise);
@@ -48,10 +51,9 @@ class Chi2Gate {
   bool has_covariance_ = false;
   Eigen::Matrix<double, Eigen::Dynamic, kCalibrationRows> T_;
   Eigen::MatrixXd S_, M_;
-  Eigen::Matrix<double, Eigen::Dynamic, 4> rhs_;       ///< residual, H_f, whitened
-  int n_rows_ = 0;                                     ///< of the feature asked for last
-  Eigen::Matrix3d L_f_ = Eigen::Matrix3d::Identity();  ///< of whitened H_f^T H_f
-  Eigen::Vector3d y_f_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, Eigen::Dynamic, 7> rhs_;  ///< H_f, t H_f, residual, whitened
+  int n_rows_ = 0;                                ///< of the feature asked for last
+  PointFit fit_;                                  ///< of the same
   Eigen::MatrixXd L_inverse_, S_inverse_;
   Eigen::Matrix<double, Eigen::Dynamic, 2> PHt_;
 };

@@ -54,6 +54,7 @@ bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vect
   row.clone = sight.clone;
   row.column = clone.column;
   row.camera = sight.camera;
+  row.t_s = seconds_between(window.clone(0).t_ns, clone.t_ns);
   const Eigen::Vector3d p_C = pose.R_GtoC_fej * (p_FinG_fej - pose.p_CinG_fej);
   Eigen::Vector2d uv;
   PixelJacobian J;

@@ -37,6 +37,7 @@ struct LinearSight {
   int clone = 0;
   int column = 0;  ///< of the clone, in the factor
   int camera = 0;
+  double t_s = 0.;                  ///< of the clone, from any instant on
   Eigen::Vector2d residual;         ///< measured - predicted, at the estimates
   Eigen::Matrix<double, 2, 3> H_f;  ///< by p_FinG
   Eigen::Matrix<double, 2, 6> H_x;  ///< by dtheta, dp of the clone

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cholesky3.hpp"
-
 namespace viwo::visual {
 namespace {
 
@@ -26,18 +24,18 @@ void NormalEquations::start(int max_clones, int n_cameras) {
 }
 
 bool NormalEquations::prepare(const Feature& feature) {
-  Eigen::Matrix3d A_ff = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b_f = Eigen::Vector3d::Zero();
-  double rr = 0.;
+  TrackSums sums = TrackSums::Zero();
   for (const LinearSight& row : feature.linear()) {
-    A_ff.noalias() += row.H_f.transpose() * row.H_f;
-    b_f.noalias() += row.H_f.transpose() * row.residual;
-    rr += row.residual.squaredNorm();
+    const Eigen::Matrix3d A = row.H_f.transpose() * row.H_f;
+    const Eigen::Vector3d b = row.H_f.transpose() * row.residual;
+    sums.block<3, 3>(0, 0) += A;
+    sums.block<3, 3>(3, 0) += row.t_s * A;
+    sums.block<3, 3>(3, 3) += row.t_s * row.t_s * A;
+    sums.block<1, 3>(6, 0) += b.transpose();
+    sums.block<1, 3>(6, 3) += row.t_s * b.transpose();
+    sums(6, 6) += row.residual.squaredNorm();
   }
-  if (!cholesky(A_ff, L_ff_)) return false;
-  y_f_ = L_ff_.triangularView<Eigen::Lower>().solve(b_f);
-  chi2_bound_ = std::max(0., rr - y_f_.squaredNorm());  // (VF-11)
-  return std::isfinite(rr) && y_f_.allFinite();
+  return fit_.solve(sums) && fit_.L.allFinite() && std::isfinite(fit_.chi2);  // (VF-11)
 }
 
 void NormalEquations::begin(const Window& window, InformationFactor& factor) {
@@ -61,10 +59,11 @@ void NormalEquations::add(const Feature& feature, const Window& window, Informat
   }
   if (window.calibration_columns() > 0) calibration_.add(feature, window, W);
   // W = A_xf L^-T, column after column.
-  W.col(0) /= L_ff_(0, 0);
-  W.col(1) = (W.col(1) - L_ff_(1, 0) * W.col(0)) / L_ff_(1, 1);
-  W.col(2) = (W.col(2) - L_ff_(2, 0) * W.col(0) - L_ff_(2, 1) * W.col(1)) / L_ff_(2, 2);
-  y_.segment<kPointSize>(n_waiting_) = y_f_;
+  const TrackSums& L = fit_.L;
+  W.col(0) /= L(0, 0);
+  W.col(1) = (W.col(1) - L(1, 0) * W.col(0)) / L(1, 1);
+  W.col(2) = (W.col(2) - L(2, 0) * W.col(0) - L(2, 1) * W.col(1)) / L(2, 2);
+  y_.segment<kPointSize>(n_waiting_) = fit_.y_f();
   n_waiting_ += kPointSize;
 }
 

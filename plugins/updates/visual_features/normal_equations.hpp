@@ -5,6 +5,7 @@
 
 #include "calibration_sums.hpp"
 #include "feature.hpp"
+#include "point_fit.hpp"
 #include "viwo/api/update.hpp"
 #include "window.hpp"
 
@@ -22,7 +23,9 @@ class NormalEquations {
 
   /// Chi-square of the prepared feature if the window were known exactly: an upper bound of that
   /// of the gate (chi2_gate.hpp).
-  double chi2_bound() const { return chi2_bound_; }
+  double chi2_bound() const { return fit_.chi2; }
+  /// The same of the part of it that a velocity of the point explains.
+  double motion_bound() const { return fit_.chi2_of_motion; }
 
   /// Starts a factor: `factor.columns` of the window, zero Lambda and eta.
   void begin(const Window& window, InformationFactor& factor);
@@ -35,10 +38,7 @@ class NormalEquations {
   static constexpr int kPointSize = 3;
   void subtract_waiting(int size, InformationFactor& factor);
 
-  // Of the prepared feature.
-  Eigen::Matrix3d L_ff_ = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d y_f_ = Eigen::Vector3d::Zero();
-  double chi2_bound_ = 0.;
+  PointFit fit_;  ///< of the prepared feature
 
   CalibrationSums calibration_;
   // Points waiting to be subtracted: Lambda -= W W^T, eta -= W y. Many at once are one matrix

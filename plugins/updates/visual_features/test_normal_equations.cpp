@@ -52,8 +52,8 @@ struct Batch {
            feature.linearize(window) == FeatureStatus::kOk;
   }
 
-  /// Rows of the feature at hand without the point: N^T H_x, N^T r.
-  void project_out(Eigen::MatrixXd& H, Eigen::VectorXd& r) const {
+  /// Rows of the feature at hand without the point: N^T H_x, N^T r; and by its velocity.
+  void project_out(Eigen::MatrixXd& H, Eigen::VectorXd& r, Eigen::MatrixXd* H_v = nullptr) const {
     const auto& rows = feature.linear();
     const int n = 2 * static_cast<int>(rows.size());
     Eigen::MatrixXd H_x = Eigen::MatrixXd::Zero(n, truth.P.cols()), H_f(n, 3);
@@ -74,6 +74,14 @@ struct Batch {
       residual.segment<2>(2 * i) = row.residual;
     }
     const Eigen::MatrixXd Q = H_f.householderQr().householderQ();
+    if (H_v != nullptr) {
+      for (int i = 0; i < n / 2; ++i) {
+        const WindowClone& clone =
+            window.clone(feature.sights()[static_cast<std::size_t>(i)].clone);
+        H_f.middleRows<2>(2 * i) *= 1e-9 * static_cast<double>(clone.t_ns);
+      }
+      *H_v = Q.rightCols(n - 3).transpose() * H_f;
+    }
     H = Q.rightCols(n - 3).transpose() * H_x;
     r = Q.rightCols(n - 3).transpose() * residual;
   }
@@ -168,13 +176,19 @@ TEST(NormalEquations, Chi2IsThatOfTheProjectedResidualAndItsBoundHolds) {
     NormalEquations equations = equations_for(options);
     Chi2Gate gate;
     gate.start(options.n_clones, options.n_cameras);
-    Eigen::MatrixXd H;
+    Eigen::MatrixXd H, H_v;
     Eigen::VectorXd r;
     int used = 0;
+    // What a velocity takes off r^T W r; in each direction 10 m/s is a sigma of it.
+    const auto by_velocity = [&](const Eigen::MatrixXd& W) -> double {
+      const Eigen::Vector3d b = H_v.transpose() * W * r;
+      const Eigen::Matrix3d A = H_v.transpose() * W * H_v + 0.01 * Eigen::Matrix3d::Identity();
+      return b.dot(A.ldlt().solve(b));
+    };
     for (const int track : batch.store.active()) {
       if (!batch.linearize(track)) continue;
       ASSERT_TRUE(equations.prepare(batch.feature));
-      batch.project_out(H, r);
+      batch.project_out(H, r, &H_v);
       const Eigen::MatrixXd S =
           H * batch.truth.P * H.transpose() + Eigen::MatrixXd::Identity(r.size(), r.size());
       const double expected = r.dot(S.llt().solve(r));
@@ -182,6 +196,9 @@ TEST(NormalEquations, Chi2IsThatOfTheProjectedResidualAndItsBoundHolds) {
       EXPECT_NEAR(chi2, expected, 1e-8 * expected);
       EXPECT_NEAR(equations.chi2_bound(), r.squaredNorm(), 1e-8 * r.squaredNorm());
       EXPECT_LE(chi2, equations.chi2_bound());
+      EXPECT_NEAR(gate.chi2_of_motion(), by_velocity(S.inverse()), 1e-7 * expected);
+      EXPECT_NEAR(equations.motion_bound(),
+                  by_velocity(Eigen::MatrixXd::Identity(r.size(), r.size())), 1e-7 * expected);
       ++used;
     }
     EXPECT_GT(used, 30);

@@ -122,6 +122,44 @@ TEST(VisualFeatures, DropsTracksByTheGateAtTheRateThatItPromises) {
   EXPECT_LT(static_cast<double>(wild_applied), 0.05 * n);
 }
 
+/// Tracks of both cameras through eight clones, of points that move.
+std::vector<RejectionCount> tracks_of_moving_points(const Eigen::Vector3d& v, std::int64_t& applied,
+                                                    std::int64_t& rejected) {
+  Random random(24);
+  Scene scene = testing::make_scene(
+      {.n_clones = 8, .n_cameras = 2, .sigma_theta = 1e-5, .sigma_p = 1e-5}, 100, random);
+  VisualFeatures update = update_with({{"min_observations", 16.}});
+  FactorSink sink = sink_for(scene);
+  scene.start(update);
+  for (std::size_t k = 0; k < 8; ++k) {
+    testing::epoch(update, scene, k + 1, testing::images(scene, k, 1., random), sink);
+    for (Eigen::Vector3d& p_FinG : scene.landmarks) p_FinG += 0.1 * v;
+  }
+  testing::epoch(update, scene, 8, testing::empty_images(scene, 7), sink);
+  applied = sink.applied();
+  rejected = sink.rejected();
+  std::vector<RejectionCount> counts;
+  update.rejections(counts);
+  std::erase_if(counts, [](const RejectionCount& count) {
+    return !count.reason.starts_with("track dropped: its point moves");
+  });
+  return counts;
+}
+
+TEST(VisualFeatures, DropsTracksOfPointsThatMove) {
+  std::int64_t applied = 0, rejected = 0;
+  EXPECT_TRUE(tracks_of_moving_points({0., 0., 0.}, applied, rejected).empty());
+  EXPECT_GT(applied, 30);
+  // 0.2 m/s across the way of the cameras: 14 cm from the first image to the last, 9 px and more.
+  // Scattered evenly over sixteen sights that is a chi-square of about 130 where 18 is the limit.
+  const auto counts = tracks_of_moving_points({-0.06, 0.19, 0.}, applied, rejected);
+  EXPECT_EQ(applied, 0);
+  EXPECT_GT(rejected, 30);
+  ASSERT_EQ(counts.size(), 1u);
+  EXPECT_EQ(counts[0].count, rejected);
+  EXPECT_EQ(counts[0].of, rejected);
+}
+
 TEST(VisualFeatures, UsesLostTracksAndThoseOfALeavingCloneOnce) {
   Random random(23);
   Scene scene = testing::make_scene({.n_clones = 5}, 0, random);

@@ -23,10 +23,14 @@ constexpr const char* kParallax = "track with too little parallax (max_condition
 constexpr const char* kNotVisible = "point out of the sight of one of its cameras";
 constexpr const char* kDistance = "point too near or too far";
 constexpr const char* kGate = "track dropped by the chi-square gate";
+constexpr const char* kMoves =
+    "track dropped: its point moves (much of the view does, or calibration or clock of the cameras "
+    "is off)";
 constexpr const char* kStray = "observation left out: the others of its track see another point";
-constexpr std::size_t kReasons = 12;
+constexpr std::size_t kReasons = 13;
 /// In an epoch: their covariance is worked out, which most others do not need.
 constexpr int kTracksThatTellNoise = 2;
+constexpr int kMotionDof = 3;  ///< of a velocity
 
 const char* reason_of(FeatureStatus status) {
   switch (status) {
@@ -91,15 +95,19 @@ void VisualFeatures::start(const UpdateSetup& setup) {
   gate_.start(setup.max_clones, n_cameras);
   candidates_.reserve(static_cast<std::size_t>(max_tracks_));
   seen_epoch_.assign(static_cast<std::size_t>(max_tracks_), -1);
-  thresholds_.clear();
-  for (int dof = 0; dof <= 2 * max_sights && gate_probability_ > 0.; ++dof) {
-    thresholds_.push_back(dof == 0 ? 0. : chi2_quantile(1. - gate_probability_, dof));
-  }
+  const auto thresholds = [&](double probability) {
+    std::vector<double> of_dof;
+    for (int dof = 0; dof <= 2 * max_sights && probability > 0.; ++dof) {
+      of_dof.push_back(dof == 0 ? 0. : chi2_quantile(1. - probability, dof));
+    }
+    return of_dof;
+  };
+  thresholds_ = thresholds(gate_probability_ / 2.);
   landmarks_.start({.most = max_landmarks_,
                     .sigma_px = sigma_px_,
                     .min_distance_m = limits_.min_distance_m,
                     .max_distance_m = limits_.max_distance_m},
-                   room_, max_tracks_, setup.max_clones, blocks_, thresholds_);
+                   room_, max_tracks_, setup.max_clones, blocks_, thresholds(gate_probability_));
 }
 
 void VisualFeatures::reject(const char* reason, std::int64_t id, std::int64_t count) {
@@ -114,7 +122,8 @@ void VisualFeatures::rejections(std::vector<RejectionCount>& out) const {
     const bool of_camera = dropped.reason == kBadCamera || dropped.reason == kNoClone;
     out.push_back({dropped.reason, dropped.count,
                    (of_camera ? "camera " : "id ") + std::to_string(dropped.first_id) + " at " +
-                       std::to_string(dropped.first_ns) + " ns"});
+                       std::to_string(dropped.first_ns) + " ns",
+                   dropped.reason == kMoves ? tried_ : 0});
   }
 }
 
@@ -228,19 +237,27 @@ void VisualFeatures::select(const FilterView& filter) {
 }
 
 bool VisualFeatures::passes_gate() {
+  moves_ = false;
+  if (thresholds_.empty() && !noise_.enabled()) return true;
+  const int dof = 2 * static_cast<int>(feature_.linear().size()) - 3;
+  const int dof_of_noise = dof - kMotionDof;
   // The longest tracks of an epoch tell the noise.
-  const bool tells_noise = noise_.enabled() && weighed_ < kTracksThatTellNoise;
-  const std::size_t dof = 2 * feature_.linear().size() - 3;
-  const double threshold =
-      thresholds_.empty() ? std::numeric_limits<double>::infinity() : thresholds_[dof];
-  if (!tells_noise && equations_.chi2_bound() <= threshold) return true;
+  const bool tells_noise = noise_.enabled() && weighed_ < kTracksThatTellNoise && dof_of_noise > 0;
+  const bool may_move = equations_.motion_bound() > threshold(kMotionDof);
+  if (!tells_noise && !may_move && equations_.chi2_bound() <= threshold(dof)) return true;
   const double chi2 = gate_.chi2(feature_, window_);
-  const bool passes = chi2 <= threshold;
-  if (!tells_noise) return passes;
-  ++weighed_;
-  if (passes && std::isfinite(chi2)) gate_.tell(noise_);
-  if (!passes) noise_.add_beyond(threshold / static_cast<double>(dof));
-  return passes;
+  if (!std::isfinite(chi2)) return false;
+  moves_ = may_move && gate_.chi2_of_motion() > threshold(kMotionDof);
+  if (tells_noise) {
+    ++weighed_;
+    const double most = threshold(dof_of_noise);
+    if (chi2 - gate_.chi2_of_motion() <= most) {
+      gate_.tell(noise_);
+    } else {
+      noise_.add_beyond(most / dof_of_noise);
+    }
+  }
+  return !moves_ && chi2 <= threshold(dof);
 }
 
 /// Triangulates and linearises the sights of the feature, and asks the gate.
@@ -274,12 +291,13 @@ void VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
     }
   }
   if (status != FeatureStatus::kOk) return refuse(reason_of(status));
+  ++tried_;
   if (passes) {
     if (landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) return;
     equations_.add(feature_, window_, factor(sink));
     sink.count(1, 0);
   } else {
-    reject(kGate, candidate.id);
+    reject(moves_ ? kMoves : kGate, candidate.id);
     sink.count(0, 1);
   }
   tracks_.remove(candidate.track);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -55,6 +56,11 @@ class VisualFeatures final : public Update {
   void select(const FilterView& filter);
   void use(const Candidate& candidate, FactorSink& sink);
   bool passes_gate();
+  /// Of the gate.
+  double threshold(int dof) const {
+    return thresholds_.empty() ? std::numeric_limits<double>::infinity()
+                               : thresholds_[static_cast<std::size_t>(dof)];
+  }
   FeatureStatus try_feature(bool& passes);
   /// The factor of this epoch, with the columns of the window.
   InformationFactor& factor(FactorSink& sink);
@@ -83,10 +89,12 @@ class VisualFeatures final : public Update {
   InformationFactor* factor_ = nullptr;  ///< of this epoch, once there is a feature
   std::vector<Candidate> candidates_;
   std::vector<std::int64_t> seen_epoch_;  ///< per track
-  std::vector<double> thresholds_;        ///< of the gate, per degree of freedom
+  std::vector<double> thresholds_;        ///< of each of the two tests of a track, per dof
   std::int64_t epoch_ = 0;
   std::uint64_t images_now_ = 0;  ///< bit of each camera that has an image in this epoch
   std::int64_t now_ns_ = 0;
+  std::int64_t tried_ = 0;        ///< tracks that had a point
+  bool moves_ = false;            ///< the point of the track that passes_gate() was asked for
   std::vector<Dropped> dropped_;  ///< in the order of their first times; room for all reasons
 };
 
