@@ -79,16 +79,6 @@ TEST_F(ImuFaults, SingleSpikesWithinTheRangeAreLeftOut) {
   }));
 }
 
-/// What two readings say may be a shock: it is believed.
-TEST_F(ImuFaults, OfOneOfTwoReadingsTheFilterRecovers) {
-  const RunResult result = run([](ImuSample& reading, double after_s) {
-    if (after_s >= 0. && after_s < 0.01) reading.accel_m_per_s2[0] = 75.;
-  });
-  EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
-  EXPECT_LT(ate_m(result), 0.2);
-  EXPECT_TRUE(is_flagged(result) || ate_m(result) < 0.02);
-}
-
 TEST_F(ImuFaults, ThatLastAreNotSilent) {
   const std::vector<std::pair<const char*, Fault>> faults{
       {"clock ahead",
