@@ -153,6 +153,23 @@ TEST_F(OneInterval, HasTheDerivativesOfItsResidualWithAndWithoutFirstEstimates) 
   EXPECT_LT((no_fej.H - fej.H).rightCols(7).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+TEST_F(OneInterval, DoesNotIterateAwayWhereFirstEstimatesSayOtherwise) {
+  // Where the robot is and looks to is not known, how it moved is; a correction between the two
+  // first estimates makes it seem that the interval tells of the yaw.
+  testing::SmallFilter lost = truth_;
+  VectorXd together = VectorXd::Zero(lost.P.rows());
+  for (const CloneView& clone : lost.clones) {
+    together.segment<3>(clone.column) = clone.R_GtoI.col(2);
+    together.segment<3>(clone.column + 3) = Eigen::Vector3d::UnitZ().cross(clone.p_IinG);
+  }
+  lost.P += 0.3 * 0.3 * together * together.transpose();
+  lost.clones[1].p_IinG_fej += Eigen::Vector3d(0.4, -0.5, 0.2);
+  lost.clones[1].p_IinG += Eigen::Vector3d(0.01, 0.005, 0.);
+  const double once = factor(lost, ", max_iterations: 1").residual.norm();
+  EXPECT_GT(once, 0.005);
+  EXPECT_LT(factor(lost).residual.norm(), 1.5 * once);
+}
+
 TEST_F(OneInterval, CannotTellWhereOIsOnTheBaseThoughItTilts) {
   // O rolls and pitches on the side; the intrinsics do not know (WO-14).
   testing::SmallFilter tilted = truth_;

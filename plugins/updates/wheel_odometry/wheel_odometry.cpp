@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -39,6 +40,8 @@ constexpr std::int64_t kShiftNs = 50'000'000;
 
 /// What the last linearisation may be off by, squared, in units of the noise (chi-square of 3).
 constexpr double kConverged = 0.01;
+/// What a linearisation must be off by less than the one before, squared, to be taken.
+constexpr double kCloser = 0.25;
 
 /// Where a factor is linearised.
 struct Point {
@@ -257,17 +260,24 @@ class WheelOdometry final : public Update {
       if (!next.allFinite()) break;
       const PreintegratedPose before = pose_;
       const Point from = at_;
+      const double missed_before = missed;
       move(next);
-      if (!measure(encoders, interval, at_) || !pose_.g.allFinite() || !pose_.P_g.allFinite()) {
+      if (measure(encoders, interval, at_) && pose_.g.allFinite() && pose_.P_g.allFinite()) {
+        linearise();
+        const Eigen::Vector3d off = residual_ - predicted;
+        missed = off.dot(R_.llt().solve(off));
+      } else {
+        missed = std::numeric_limits<double>::infinity();
+      }
+      if (!(missed < std::max(kConverged, kCloser * missed_before))) {  // leads astray
         pose_ = before;
         at_ = from;
+        linearise();
         break;
       }
       step = next;
-      linearise();
       moved_back = residual_ + H_ * step;
-      const Eigen::Vector3d missed = residual_ - predicted;
-      if (missed.dot(R_.llt().solve(missed)) < kConverged) break;
+      if (missed < kConverged) break;
     }
     if (second_order_noise_) add_second_order_noise(wheels);
     factor.set_rows(3);
