@@ -27,22 +27,12 @@ constexpr double kParityRankTolerance = 1e-6;
 class OuterProducts {
  public:
   void add(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
-    column0_ += b[0] * a;
-    column1_ += b[1] * a;
-    column2_ += b[2] * a;
+    for (int k = 0; k < 3; ++k) sum_.col(k) += b[k] * a;
   }
-  Eigen::Matrix3d sum() const {
-    Eigen::Matrix3d sum;
-    sum.col(0) = column0_.head<3>();
-    sum.col(1) = column1_.head<3>();
-    sum.col(2) = column2_.head<3>();
-    return sum;
-  }
+  Eigen::Matrix3d sum() const { return sum_.topRows<3>(); }
 
  private:
-  Eigen::Vector4d column0_ = Eigen::Vector4d::Zero();
-  Eigen::Vector4d column1_ = Eigen::Vector4d::Zero();
-  Eigen::Vector4d column2_ = Eigen::Vector4d::Zero();
+  Eigen::Matrix<double, 4, 3> sum_ = Eigen::Matrix<double, 4, 3>::Zero();
 };
 
 /// A noise block: of a size known at compile time, or within bounds.
@@ -96,6 +86,7 @@ TwistSolver::TwistSolver(std::shared_ptr<const WheelModel> model, const TwistOpt
   }
   A_plus_.setZero(4, m);
   We_.setZero(m);
+  no_residual_.setZero(m);
   by_x_.J.setZero(m, n);
   by_x_.DtE.setZero(3, n);
   by_n_.J.setZero(m, q);
@@ -155,13 +146,9 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   out.e = fit.e;
   out.rank_deficient = fit.rank < 3;
   // With weights, W e takes the place of e in (W-4).
-  if (options_.fitted_jacobian) {
-    no_residual_.setZero(fit.e.size());
-    model.intrinsic_derivatives(y, x_WI_, rows_, fit.b, fit.xi, no_residual_, by_x_);
-  } else {
-    model.intrinsic_derivatives(y, x_WI_, rows_, rows_.b, fit.xi,
-                                options_.noise_weighted ? We_ : fit.e, by_x_);
-  }
+  const bool fitted = options_.fitted_jacobian;
+  const RowVector& e = fitted ? no_residual_ : options_.noise_weighted ? We_ : fit.e;
+  model.intrinsic_derivatives(y, x_WI_, rows_, fitted ? fit.b : rows_.b, fit.xi, e, by_x_);
   clear_left_out(by_x_.J);
   with_block_size(model_->description().noise_block, [&](auto size) {
     constexpr int kSize = decltype(size)::value;
@@ -206,7 +193,7 @@ void TwistSolver::fit_plain() {
     factor(rows_.A.transpose() * rows_.A, options_.rank_tolerance, plain_);
     set_gain(plain_);
     A_is_current_ = model_->description().constant_A && n_left_out_ == 0;
-    if (A_is_current_ && plain_.rank < 3 && n_left_out_ == 0) {
+    if (A_is_current_ && plain_.rank < 3) {
       throw InputError(
           "kinematic model: its rows cannot tell the body twist, whatever the encoders read "
           "(are all wheels at one place?)");
