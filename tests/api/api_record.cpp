@@ -186,6 +186,7 @@ void kinematics() {
   MEMBER(NoiseSpec, channel);
   MEMBER(NoiseSpec, sigma);
   MEMBER(NoiseSpec, rows);
+  MEMBER(NoiseSpec, parameter);
   RECORD(ModelDescription);
   MEMBER(ModelDescription, n_drive);
   MEMBER(ModelDescription, n_steer);

@@ -97,10 +97,7 @@ void Recorder::end_piece(const Estimator& estimator, const std::string& failure)
   for (const UpdateTrack& update : result_.updates) {
     ended_.push_back({update.name, update.total, {}, {}, update.failures});
   }
-  for (const RejectionCount& r : estimator.rejections()) {
-    rejections_.add(
-        r.reason, [&] { return r.first; }, r.count);
-  }
+  for (const RejectionCount& part : estimator.rejections()) rejections_.add(part);
   const Contact& contact = estimator.contact();
   if (contact.loosened() > 0 && loosened_ == 0) first_loosened_ns_ = contact.first_ns();
   loosened_ += contact.loosened();

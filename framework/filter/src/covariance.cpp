@@ -169,7 +169,9 @@ FactorResult Covariance::apply(const ResidualFactor& factor, Eigen::VectorXd& dx
   if (innovation.chi2() <= threshold) {
     if (factor.noise != nullptr) innovation.tell(*factor.noise);
   } else {
-    if (factor.noise != nullptr) factor.noise->add_beyond(threshold / static_cast<double>(rows));
+    if (factor.noise != nullptr) {
+      factor.noise->add_beyond_in_turn(threshold / static_cast<double>(rows));
+    }
     if (!factor.heavy_tailed || !innovation.weaken(threshold)) return FactorResult::kGated;
     result = FactorResult::kWeakened;
   }

@@ -37,12 +37,18 @@ class Walk {
   Walk(const Walk&) = delete;
 
   ResidualFactor& factor() { return factor_; }
+  void set_true_scale(double scale) { true_scale_ = scale; }
+  void set_heavy_tailed() { heavy_tailed_ = true; }
 
   FactorResult step(const Vector3d& outlier = Vector3d::Zero()) {
     for (int i = 0; i < 3; ++i) truth_[i] += walk_m_ * gauss_(rng_);
     covariance_.propagate(walk_);
     Vector3d noise;
     for (int i = 0; i < 3; ++i) noise[i] = true_scale_ * kSigma * gauss_(rng_);
+    if (heavy_tailed_) {  // Student's t with three degrees of freedom
+      std::chi_squared_distribution<double> chi2(3.);
+      noise *= std::sqrt(3. / chi2(rng_));
+    }
     factor_.residual = truth_ + noise + outlier - estimate_;
     const FactorResult result = covariance_.apply(factor_, dx_);
     estimate_ += dx_.segment<3>(kPositionColumn);
@@ -59,6 +65,7 @@ class Walk {
   std::mt19937_64 rng_;
   std::normal_distribution<double> gauss_;
   double true_scale_, walk_m_;
+  bool heavy_tailed_ = false;
   Covariance covariance_{kImuSize};
   ImuTransition walk_{ImuMatrix::Identity(), ImuMatrix::Zero()};
   ResidualFactor factor_;
@@ -139,6 +146,72 @@ TEST(NoiseScale, LetsMeasurementsInAgainThatAreTenTimesWorseThanWasThought) {
   weakened = 0;
   for (int i = 0; i < 1000; ++i) weakened += without.step() == FactorResult::kWeakened;
   EXPECT_GT(weakened, 300);
+}
+
+/// Fraction of 4000 measurements beyond the gate, of a noise that is `true_scale(i)`.
+template <class Scale>
+double beyond(NoiseScale& noise, Walk& walk, const Scale& true_scale) {
+  constexpr int kSteps = 4000;
+  walk.factor().noise = &noise;
+  int weakened = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    walk.set_true_scale(true_scale(i));
+    weakened += walk.step() == FactorResult::kWeakened;
+  }
+  return weakened / static_cast<double>(kSteps);
+}
+
+TEST(NoiseScale, FollowsANoiseThatComesAndGoes) {
+  for (const double loud : {5., 15., 40.}) {
+    NoiseScale noise(10., 60., 100.);
+    Walk walk(13, 1.);
+    // The scale has to be found again after 320 quiet measurements: e^(-320/60) is left of it.
+    EXPECT_LT(beyond(noise, walk, [&](int i) { return i % 400 < 320 ? 1. : loud; }), 0.05);
+  }
+}
+
+TEST(NoiseScale, LeavesFewBeyondTheGateThatAreHeavyTailed) {
+  NoiseScale noise(10., 60., 100.);
+  Walk walk(17, 1.);
+  walk.set_heavy_tailed();
+  const double fraction = beyond(noise, walk, [](int) { return 3.; });
+  // More than the thousandth that a Gaussian has, and less than one in twenty.
+  EXPECT_GT(fraction, 0.002);
+  EXPECT_LT(fraction, 0.05);
+}
+
+TEST(NoiseScale, StaysAsConfiguredWhereThatIsRight) {
+  NoiseScale noise(10., 60., 100.);
+  Walk walk(19, 1.);
+  double mean = 0.;
+  EXPECT_LT(beyond(noise, walk,
+                   [&](int) {
+                     mean += noise.scale() / 4000.;
+                     return 1.;
+                   }),
+            0.002);
+  // Of 60 measurements: off by 1 / sqrt(6 N) at one sigma, and never below 1.
+  EXPECT_LT(mean, 1. + 2. / std::sqrt(6. * 60.));
+}
+
+TEST(NoiseScale, BelievesTwoInARowAndNotOneAlone) {
+  NoiseScale noise(10., 60., 100.);
+  noise.add_beyond_in_turn(5.);
+  const double one = (59. / 60. * 10. + 5.) / (59. / 60. * 10. + 1.);
+  EXPECT_NEAR(noise.variance(), one, 1e-12);
+  noise.add_beyond_in_turn(5.);
+  EXPECT_NEAR(noise.variance(), 0.25 * (2. * one + 5. + 5. * one), 1e-12);
+  // Little else is remembered: as soon gone as come.
+  for (int i = 0; i < 20; ++i) noise.add(1.);
+  EXPECT_LT(noise.variance(), 1.6);
+  NoiseScale between(10., 60., 100.);
+  between.add_beyond_in_turn(5.);
+  between.add(1.);
+  between.add_beyond_in_turn(5.);
+  EXPECT_LT(between.variance(), 2.);
+  noise.reset();
+  EXPECT_EQ(noise.variance(), 1.);
+  EXPECT_EQ(noise.count(), 0);
 }
 
 TEST(NoiseScale, StaysWithinItsBoundsAndCountsNothingThatIsNotFinite) {

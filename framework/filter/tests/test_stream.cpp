@@ -328,5 +328,15 @@ TEST(Stream, ForgetsBeforeAStartWhatNoneLooksAt) {
   }
 }
 
+TEST(Rejections, AddUpOverThePartsOfARunWithOutOfHowMany) {
+  Rejections all;
+  all.add({"drive 3 left out", 5, "t = 1.0 s", 100});
+  all.add({"drive 3 left out", 40, "t = 11.0 s", 60});
+  ASSERT_EQ(all.counts().size(), 1u);
+  EXPECT_EQ(all.counts()[0].count, 45);
+  EXPECT_EQ(all.counts()[0].of, 160);
+  EXPECT_EQ(all.counts()[0].first, "t = 1.0 s");
+}
+
 }  // namespace
 }  // namespace viwo

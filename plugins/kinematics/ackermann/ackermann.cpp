@@ -77,16 +77,25 @@ class Ackermann final : public KinematicModel {
       add(offsets[k], "rad", prior_sigma_steer_offset_rad_, rows_of_channel(k));
     }
     for (int i = 0; i < n_drive_; ++i) {
-      out.noises.push_back({NoiseKind::kDrive, i, sigma_drive_rad_per_s_, {row_of_drive(i), 1}});
+      out.noises.push_back({NoiseKind::kDrive,
+                            i,
+                            sigma_drive_rad_per_s_,
+                            {row_of_drive(i), 1},
+                            "sigma_drive_rad_per_s"});
     }
     for (int k = 0; k < n_steer_; ++k) {
-      out.noises.push_back({NoiseKind::kSteer, k, sigma_steer_rad_, rows_of_channel(k)});
+      out.noises.push_back(
+          {NoiseKind::kSteer, k, sigma_steer_rad_, rows_of_channel(k), "sigma_steer_rad"});
     }
-    out.noises.push_back({NoiseKind::kSlip, 0, sigma_lateral_m_per_s_, {2, 1}});
+    out.noises.push_back(
+        {NoiseKind::kSlip, 0, sigma_lateral_m_per_s_, {2, 1}, "sigma_lateral_m_per_s"});
     for (const FrontRow& f : front_) {
       if (f.drive >= 0) continue;
-      out.noises.push_back(
-          {NoiseKind::kSlip, 1 + f.steer, sigma_front_lateral_m_per_s_, {f.row, 1}});
+      out.noises.push_back({NoiseKind::kSlip,
+                            1 + f.steer,
+                            sigma_front_lateral_m_per_s_,
+                            {f.row, 1},
+                            "sigma_front_lateral_m_per_s"});
     }
   }
 

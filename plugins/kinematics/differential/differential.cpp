@@ -111,9 +111,11 @@ class Differential final : public KinematicModel {
         {"baseline", "m", nominal_[2], prior_sigma_baseline_m_, false, {0, n}}};
     for (int i = 0; i < n; ++i) {
       const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
-      out.noises.push_back({NoiseKind::kDrive, channel, sigma_drive_rad_per_s_, {i, 1}});
+      out.noises.push_back(
+          {NoiseKind::kDrive, channel, sigma_drive_rad_per_s_, {i, 1}, "sigma_drive_rad_per_s"});
     }
-    out.noises.push_back({NoiseKind::kSlip, 0, sigma_lateral_m_per_s_, {n, 1}});
+    out.noises.push_back(
+        {NoiseKind::kSlip, 0, sigma_lateral_m_per_s_, {n, 1}, "sigma_lateral_m_per_s"});
   }
 
   Status rows(const EncoderSample& sample, const Intrinsics& x_WI, bool A_is_current,

@@ -137,10 +137,12 @@ class Mecanum final : public KinematicModel {
       }
     }
     for (int j = 0; j < n_; ++j) {
-      out.noises.push_back({NoiseKind::kDrive, j, sigma_drive_rad_per_s_, {j, 1}});
+      out.noises.push_back(
+          {NoiseKind::kDrive, j, sigma_drive_rad_per_s_, {j, 1}, "sigma_drive_rad_per_s"});
     }
     for (int j = 0; j < n_; ++j) {
-      out.noises.push_back({NoiseKind::kSlip, j, sigma_slip_m_per_s_, {j, 1}});
+      out.noises.push_back(
+          {NoiseKind::kSlip, j, sigma_slip_m_per_s_, {j, 1}, "sigma_slip_m_per_s"});
     }
   }
 

@@ -137,13 +137,16 @@ class SkidSteer final : public KinematicModel {
         {"x_icr", "m", nominal_[kX], prior_sigma_icr_m_, hold_frame_, {n, 1}}};
     for (int i = 0; i < n; ++i) {
       const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
-      out.noises.push_back({NoiseKind::kDrive, channel, sigma_drive_rad_per_s_, {i, 1}});
+      out.noises.push_back(
+          {NoiseKind::kDrive, channel, sigma_drive_rad_per_s_, {i, 1}, "sigma_drive_rad_per_s"});
     }
     for (int i = 0; i < n; ++i) {
       const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
-      out.noises.push_back({NoiseKind::kSlip, channel, sigma_slip_m_per_s_, {i, 1}});
+      out.noises.push_back(
+          {NoiseKind::kSlip, channel, sigma_slip_m_per_s_, {i, 1}, "sigma_slip_m_per_s"});
     }
-    out.noises.push_back({NoiseKind::kSlip, n, sigma_lateral_m_per_s_, {n, 1}});
+    out.noises.push_back(
+        {NoiseKind::kSlip, n, sigma_lateral_m_per_s_, {n, 1}, "sigma_lateral_m_per_s"});
   }
 
   Status rows(const EncoderSample& sample, const Intrinsics& x_WI, bool A_is_current,

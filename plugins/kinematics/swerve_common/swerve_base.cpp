@@ -74,14 +74,16 @@ void SwerveBase::describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& 
     }
   }
   for (int j = 0; j < n_; ++j) {
-    out.noises.push_back({NoiseKind::kDrive, j, sigma_drive_rad_per_s_, {k * j, k}});
+    out.noises.push_back(
+        {NoiseKind::kDrive, j, sigma_drive_rad_per_s_, {k * j, k}, "sigma_drive_rad_per_s"});
   }
   for (int j = 0; j < n_; ++j) {
-    out.noises.push_back({NoiseKind::kSteer, j, sigma_steer_rad_, {k * j, k}});
+    out.noises.push_back({NoiseKind::kSteer, j, sigma_steer_rad_, {k * j, k}, "sigma_steer_rad"});
   }
   if (rows_per_wheel == RowsPerWheel::kDriveOnly) return;
   for (int j = 0; j < n_; ++j) {
-    out.noises.push_back({NoiseKind::kSlip, j, sigma_lateral_m_per_s_, {k * j, k}});
+    out.noises.push_back(
+        {NoiseKind::kSlip, j, sigma_lateral_m_per_s_, {k * j, k}, "sigma_lateral_m_per_s"});
   }
 }
 

@@ -128,8 +128,7 @@ void VisualFeatures::rejections(std::vector<RejectionCount>& out) const {
 }
 
 void VisualFeatures::noises(std::vector<NoiseFound>& out) const {
-  if (noise_.count() == 0) return;
-  out.push_back({"sigma_px", "px", sigma_px_, sigma_px_ * noise_.found(), noise_.count()});
+  noise_.append_to("sigma_px", "px", sigma_px_, out);
 }
 
 void VisualFeatures::update(const FilterView& filter, const EpochData& data, FactorSink& sink) {

@@ -13,6 +13,15 @@ inline constexpr ParamSpec kIntervalGateParam{
     .max = 0.5,
     .help = "intervals less likely than this are left out; 0: none"};
 
+inline constexpr ParamSpec kSampleGateParam{
+    .name = "sample_gate_probability",
+    .type = ParamType::kNumber,
+    .fallback = "0",
+    .min = 0.,
+    .max = 0.5,
+    .help = "samples whose wheels contradict each other more than this are bridged; only for "
+            "calibrated wheels; 0: none"};
+
 inline constexpr ParamSpec kWheelCheckParam{
     .name = "wheel_check_probability",
     .type = ParamType::kNumber,

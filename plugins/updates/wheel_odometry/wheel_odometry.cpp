@@ -76,6 +76,7 @@ class WheelOdometry final : public Update {
   }
 
   void start(const UpdateSetup& /*setup*/) override {
+    noise_.reset();
     checked_.start(wheel_model_of(blocks_), wheel_check_probability_);
     preintegrator_.emplace(wheel_model_of(blocks_), options_);
     shifted_preintegrator_.emplace(wheel_model_of(blocks_), options_);
@@ -117,8 +118,7 @@ class WheelOdometry final : public Update {
   }
 
   void noises(std::vector<NoiseFound>& out) const override {
-    if (noise_.count() == 0) return;
-    out.push_back({"noise_scale", "", noise_scale_, noise_scale_ * noise_.found(), noise_.count()});
+    noise_.append_to("noise_scale", "", noise_scale_, out);
   }
 
  private:
@@ -251,6 +251,7 @@ class WheelOdometry final : public Update {
     linearise();
     Step step = Step::Zero(P_.cols());
     Eigen::Vector3d moved_back = residual_;
+    double missed = residual_.dot(R_.llt().solve(residual_));
     for (int i = 1; i < max_iterations_; ++i) {
       const Jacobian HP = H_ * P_;
       Eigen::Matrix3d S = R_;
@@ -354,7 +355,7 @@ class WheelOdometry final : public Update {
   EncoderIntervals intervals_;
   CheckedEncoders checked_;
   // Slip comes and goes within seconds.
-  NoiseScale noise_{10., 30., 30.};
+  NoiseScale noise_{10., 30., 100.};
   SampleTallies tallies_;
   Tally bridged_{"interval left out: too long without believable encoder samples"};
   std::optional<Preintegrator> preintegrator_, shifted_preintegrator_;

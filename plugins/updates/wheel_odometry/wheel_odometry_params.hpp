@@ -16,13 +16,7 @@ inline constexpr std::array kParams{
               .help = "least squares of the wheel rows: plain, or weighted by their noise (then "
                       "independent of the parity residual)"},
     kIntervalGateParam,
-    ParamSpec{.name = "sample_gate_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0",
-              .min = 0.,
-              .max = 0.5,
-              .help = "samples whose wheels contradict each other more than this are bridged; only "
-                      "for calibrated wheels; 0: none"},
+    kSampleGateParam,
     ParamSpec{.name = "noise_scale",
               .type = ParamType::kNumber,
               .fallback = "1",

@@ -16,6 +16,7 @@
 #include "encoders.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/chi2.hpp"
+#include "viwo/wheel/wheel_noise.hpp"
 #include "wheel_params.hpp"
 
 namespace viwo {
@@ -23,13 +24,7 @@ namespace {
 
 constexpr std::array kParams{
     kIntervalGateParam,
-    ParamSpec{.name = "sample_gate_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0",
-              .min = 0.,
-              .max = 0.5,
-              .help = "samples less likely than this at the present intrinsics are left out; only "
-                      "for calibrated wheels; 0: none"},
+    kSampleGateParam,
     ParamSpec{.name = "noise_scale",
               .type = ParamType::kNumber,
               .fallback = "1",
@@ -101,8 +96,10 @@ class WheelParity final : public Update {
   }
 
   void start(const UpdateSetup& /*setup*/) override {
+    noise_.reset();
     checked_.start(wheel_model_of(blocks_), wheel_check_probability_);
     preintegrator_.emplace(wheel_model_of(blocks_), options_);
+    if (noise_.enabled()) wheel_noise_.emplace(wheel_model_of(blocks_));
   }
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
@@ -117,6 +114,11 @@ class WheelParity final : public Update {
       return;
     }
     const auto encoders = checked_.next(samples, wheels, filter.P());
+    if (wheel_noise_.has_value()) {
+      for (const EncoderSample& y : encoders.last(checked_.n_new())) {
+        wheel_noise_->add(y, wheels.x_WI, checked_.P_x());
+      }
+    }
     find_free(wheels, filter.P());
     if (n_free_ == 0) return;
     const double gain = iterate(wheels.x_WI, encoders, *interval);
@@ -152,8 +154,8 @@ class WheelParity final : public Update {
   }
 
   void noises(std::vector<NoiseFound>& out) const override {
-    if (noise_.count() == 0) return;
-    out.push_back({"noise_scale", "", noise_scale_, noise_scale_ * noise_.found(), noise_.count()});
+    noise_.append_to("noise_scale", "", noise_scale_, out);
+    if (wheel_noise_.has_value()) wheel_noise_->append_to(out);
   }
 
  private:
@@ -328,6 +330,7 @@ class WheelParity final : public Update {
   EncoderIntervals intervals_;
   CheckedEncoders checked_;
   NoiseScale noise_{kBelievedIntervals, kRememberedIntervals, kMostNoise};
+  std::optional<WheelNoise> wheel_noise_;
   SampleTallies tallies_;
   Tally gated_{"interval dropped by the chi-square gate"};
   std::optional<Preintegrator> preintegrator_;

@@ -61,6 +61,9 @@ struct NoiseSpec {
   int channel = 0;    ///< drive or steering channel; wheel index for slip
   double sigma = 0.;  ///< rad/s, rad, m/s; > 0
   RowRange rows{};    ///< rows it enters
+  /// The model's parameter that says sigma, e.g. "sigma_drive_rad_per_s"; sources of one parameter
+  /// are one kind of noise. Empty: what was found of it is not reported.
+  std::string parameter{};
 };
 
 /// What never changes about a model; filled once by describe().

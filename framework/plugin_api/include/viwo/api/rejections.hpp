@@ -39,6 +39,12 @@ class VIWO_API Rejections {
   bool add(std::string_view reason, std::int64_t t_ns) {
     return add(reason, [t_ns] { return stamp_text(t_ns); });
   }
+  /// What another part of a run has counted.
+  void add(const RejectionCount& part) {
+    add(
+        part.reason, [&part] { return part.first; }, part.count);
+    find(part.reason)->of += part.of;
+  }
 
   const std::vector<RejectionCount>& counts() const { return counts_; }
   void append_to(std::vector<RejectionCount>& out) const {

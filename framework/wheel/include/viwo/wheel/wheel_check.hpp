@@ -17,6 +17,9 @@ class WheelCheck {
   /// Samples whose parity residual is less likely than `probability` are looked into; 0: none.
   WheelCheck(std::shared_ptr<const WheelModel> model, double probability);
 
+  /// Whether there is anything to look into: a probability, and enough rows.
+  bool is_on() const { return !gates_.empty(); }
+
   /// The intrinsics and their covariance, for the samples to come.
   void set_calibration(const Intrinsics& x_WI, const IntrinsicMatrix& P);
 
