@@ -185,5 +185,51 @@ TEST(TrueCalibration, OfCamerasThatStartWrongIsKnownInARun) {
   }
 }
 
+/// How far calibration starts from what the configuration says, in prior sigmas, without what the
+/// gauge holds.
+std::vector<double> start_errors(const std::string& estimator, std::uint64_t seed) {
+  const auto start = [&](const std::string& section) {
+    return read_run(config::parse(testing::swerve_with_camera(0) + "estimator: {" + section +
+                                      "}\nupdates: {wheel_odometry: {}}\n",
+                                  "run.yaml"),
+                    registry(), seed)
+        .filter->wheels.front()
+        .prior;
+  };
+  const WheelsPrior wrong = start(estimator), right = start("");
+  std::vector<double> errors;
+  for (Eigen::Index i = 0; i < wrong.wheels.x_WI.size(); ++i) {
+    if (wrong.sigma_intrinsics[i] == 0.) continue;
+    errors.push_back((wrong.wheels.x_WI[i] - right.wheels.x_WI[i]) / wrong.sigma_intrinsics[i]);
+  }
+  errors.push_back((wrong.wheels.t_OtoI_s - right.wheels.t_OtoI_s) / wrong.sigma_time_offset_s);
+  const Vector3d turn = log_so3(wrong.wheels.R_ItoO * right.wheels.R_ItoO.transpose());
+  const Vector3d shift = wrong.wheels.p_IinO - right.wheels.p_IinO;
+  for (int i = 0; i < 3; ++i) {
+    errors.push_back(turn[i] / wrong.sigma_extrinsics[i]);
+    errors.push_back(shift[i] / wrong.sigma_extrinsics[3 + i]);
+  }
+  return errors;
+}
+
+TEST(CalibrationError, IsDrawnOrOneSigmaOfEveryParameterUpOrByChance) {
+  const std::vector<double> plus =
+      start_errors("calibration_error_scale: 2, calibration_error: plus", 1);
+  ASSERT_EQ(plus.size(), 13U + 7U);
+  for (const double error : plus) EXPECT_NEAR(error, 2., 1e-9);
+  EXPECT_EQ(plus, start_errors("calibration_error_scale: 2, calibration_error: plus", 2));
+
+  const std::vector<double> sign =
+      start_errors("calibration_error_scale: 1, calibration_error: sign", 1);
+  for (const double error : sign) EXPECT_NEAR(std::abs(error), 1., 1e-9);
+  EXPECT_NE(sign, start_errors("calibration_error_scale: 1, calibration_error: sign", 2));
+  // The sign is that of the draw.
+  const std::vector<double> drawn = start_errors("calibration_error_scale: 1", 1);
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    EXPECT_EQ(std::signbit(drawn[i]), std::signbit(sign[i]));
+    EXPECT_GT(std::abs(std::abs(drawn[i]) - 1.), 1e-6);
+  }
+}
+
 }  // namespace
 }  // namespace viwo::experiment

@@ -165,6 +165,12 @@ inline constexpr std::array kEstimatorParams{
               .min = 0.,
               .help = "simulation: every calibration parameter that the gauge does not hold starts "
                       "wrong by this times a draw from its prior"},
+    ParamSpec{.name = "calibration_error",
+              .type = ParamType::kString,
+              .fallback = "gaussian",
+              .choices = "gaussian|sign|plus",
+              .help = "what that draw is: gaussian, one prior sigma up or down by chance, or one "
+                      "prior sigma up for all of them and in every run"},
 };
 
 inline constexpr std::array kImuParams{

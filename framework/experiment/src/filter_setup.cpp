@@ -1,6 +1,8 @@
 #include "viwo/experiment/filter_setup.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "filter_params.hpp"
@@ -113,22 +115,47 @@ void read_imu(ParamSet p, const Node& section, FilterSetup& setup, Node& resolve
   setup.options.imu.max_accel_m_per_s2 = p.number("range_accel_m_per_s2");
 }
 
+/// How wrong calibration starts, in prior sigmas.
+struct CalibrationError {
+  enum class Draw { kGaussian, kSign, kPlus };
+  double scale = 0.;
+  Draw draw = Draw::kGaussian;
+};
+
+CalibrationError read_calibration_error(const ParamSet& p) {
+  using Draw = CalibrationError::Draw;
+  const std::string_view draw = p.text("calibration_error");
+  return {p.number("calibration_error_scale"), draw == "plus"   ? Draw::kPlus
+                                               : draw == "sign" ? Draw::kSign
+                                                                : Draw::kGaussian};
+}
+
 /// Draws how wrong calibration starts: the same whether it is then calibrated or not.
 class WrongStart {
  public:
-  WrongStart(double scale, std::uint64_t seed, std::uint64_t index)
-      : scale_(scale), random_(seed, sim::Stream::kCalibrationError, index) {}
-  double draw(double sigma) { return scale_ * sigma * random_.gaussian(); }
+  WrongStart(CalibrationError error, std::uint64_t seed, std::uint64_t index)
+      : error_(error), random_(seed, sim::Stream::kCalibrationError, index) {}
+  double draw(double sigma) {
+    const double gaussian = random_.gaussian();
+    switch (error_.draw) {
+      case CalibrationError::Draw::kSign:
+        return std::copysign(error_.scale * sigma, gaussian);
+      case CalibrationError::Draw::kPlus:
+        return error_.scale * sigma;
+      default:
+        return error_.scale * sigma * gaussian;
+    }
+  }
   /// Each axis.
   Vector3d draw(const Vector3d& sigma) {
     Vector3d errors;
     for (int i = 0; i < 3; ++i) errors[i] = draw(sigma[i]);
     return errors;
   }
-  bool is_wrong() const { return scale_ > 0.; }
+  bool is_wrong() const { return error_.scale > 0.; }
 
  private:
-  double scale_;
+  CalibrationError error_;
   sim::RandomStream random_;
 };
 
@@ -155,8 +182,8 @@ void make_wrong(CameraPrior& prior, std::size_t index, WrongStart& wrong,
   for (int i = 0; i < 8; ++i) camera.intrinsics[i] += wrong.draw(prior.sigma_intrinsics[i]);
 }
 
-void read_cameras(const ParamSet& p, const Node& section, double error_scale, std::uint64_t seed,
-                  FilterSetup& setup, Errors& errors) {
+void read_cameras(const ParamSet& p, const Node& section, CalibrationError error,
+                  std::uint64_t seed, FilterSetup& setup, Errors& errors) {
   auto cameras = from_kalibr(p, section, "cameras", log::read_kalibr_cameras, errors);
   if (!cameras) return;
   const auto use = static_cast<std::size_t>(p.integer("use"));
@@ -168,8 +195,8 @@ void read_cameras(const ParamSet& p, const Node& section, double error_scale, st
   }
   if (use > 0) cameras->resize(use);
   const bool calibrates = p.flag("calibrate");
-  if (!calibrates) error_scale = 0.;
-  WrongStart clock(error_scale, seed, kFirstCameraDraw);
+  if (!calibrates) error.scale = 0.;
+  WrongStart clock(error, seed, kFirstCameraDraw);
   const double later_s = clock.draw(p.number("sigma_t_CtoI_s"));
   for (const CameraView& camera : *cameras) {
     const std::size_t index = setup.cameras.size();
@@ -181,7 +208,7 @@ void read_cameras(const ParamSet& p, const Node& section, double error_scale, st
     prior.sigma_intrinsics.head<4>().setConstant(p.number("sigma_focal_px"));
     prior.sigma_intrinsics.tail<4>().setConstant(p.number("sigma_distortion"));
     prior.sigma_clock_s = p.number("sigma_t_CtoI_s");
-    WrongStart wrong(error_scale, seed, kFirstCameraDraw + 1 + index);
+    WrongStart wrong(error, seed, kFirstCameraDraw + 1 + index);
     make_wrong(prior, index, wrong, setup.drawn_from);
     const double own_s = wrong.draw(prior.sigma_clock_s);
     if (wrong.is_wrong()) prior.camera.t_CtoI_s += prior.shares_clock ? later_s : own_s;
@@ -193,7 +220,7 @@ void read_cameras(const ParamSet& p, const Node& section, double error_scale, st
 }
 
 /// A wheel set from its section `wheels`; the intrinsics and their sigmas are those of its model.
-void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double error_scale,
+void read_wheels(const ParamSet& p, const Node& section, WheelSet set, CalibrationError error,
                  std::uint64_t seed, FilterSetup& setup, Errors& errors) {
   const auto p_IinO = three(p, "p_IinO_m", section, errors);
   const auto rpy = three(p, "rpy_ItoO_rad", section, errors);
@@ -215,7 +242,7 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double er
     }
   }
 
-  WrongStart wrong(error_scale, seed, setup.wheels.size());
+  WrongStart wrong(error, seed, setup.wheels.size());
   const Vector3d turn = wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()));
   const Vector3d shift = wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
   const double later = wrong.draw(prior.sigma_time_offset_s);
@@ -235,7 +262,7 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, double er
 }
 
 /// Further wheel sets: NAME: {kinematics: {...}, wheels: {...}}.
-void read_wheel_sets(const Node& run, double error_scale, const ReadContext& context,
+void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext& context,
                      FilterSetup& setup, Node& resolved, Errors& errors) {
   const Node* sets = run.find("wheel_sets");
   if (sets == nullptr) return;
@@ -271,7 +298,7 @@ void read_wheel_sets(const Node& run, double error_scale, const ReadContext& con
                         [&] { return std::make_shared<const WheelModel>(model.object); });
     set.prior.wheels.x_WI = set.model->nominal();
     set.prior.sigma_intrinsics = set.model->prior_sigma();
-    read_wheels(*params, section, std::move(set), error_scale, context.seed, setup, errors);
+    read_wheels(*params, section, std::move(set), error, context.seed, setup, errors);
     Node resolved_set = Node::empty_map();
     resolved_set.set("kinematics", model.resolved);
     resolved_set.set("wheels", resolved_wheels);
@@ -326,14 +353,14 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
     if (params) resolved.set(key, section);
     return params;
   };
-  double error_scale = 0.;
+  CalibrationError error;
   if (const auto params = read("estimator", kEstimatorParams)) {
     read_estimator(*params, setup);
     if (setup.options.monitor.hold && !setup.options.monitor.enabled) {
       errors.add(run.find("estimator")->mark(),
                  "estimator.hold_unexcited needs estimator.monitor: true");
     }
-    error_scale = context.exact ? 0. : params->number("calibration_error_scale");
+    if (!context.exact) error = read_calibration_error(*params);
     if (context.exact) setup.start.state_error_scale = 0.;
   }
   if (const auto params = read("imu", kImuParams)) {
@@ -341,7 +368,7 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
   }
   if (run.find("cameras") != nullptr) {
     if (const auto params = read("cameras", kCamerasParams)) {
-      read_cameras(*params, *run.find("cameras"), error_scale, context.seed, setup, errors);
+      read_cameras(*params, *run.find("cameras"), error, context.seed, setup, errors);
     }
   }
   if (model != nullptr) {
@@ -350,11 +377,11 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
       set.model = model;
       set.prior.wheels.x_WI = x_WI;
       set.prior.sigma_intrinsics = sigma;
-      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error_scale,
-                  context.seed, setup, errors);
+      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error, context.seed,
+                  setup, errors);
     }
   }
-  read_wheel_sets(run, error_scale, context, setup, resolved, errors);
+  read_wheel_sets(run, error, context, setup, resolved, errors);
   check_wheel_sensors(run, setup, errors);
   read_updates(run, context, setup, resolved, errors);
   return setup;
