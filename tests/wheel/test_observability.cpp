@@ -140,6 +140,10 @@ TEST(Observability, NoiseIsNoInformationWhenTheTwistIsDifferentiatedAtItsOwnSign
   EXPECT_EQ(null_dimension_with_noise(swerve("four_wis_wid_drive_only"), true), 4);
   EXPECT_LT(null_dimension_with_noise(swerve("four_wis_wid"), false), 9);
   EXPECT_LT(null_dimension_with_noise(swerve("four_wis_wid_drive_only"), false), 4);
+  // The steering angle as it was read, not as the twist predicts it, brings the noise back.
+  EXPECT_LT(null_dimension_with_noise(
+                swerve("four_wis_wid_drive_only", ", offset_derivative: measured"), true),
+            4);
 }
 
 /// x_WI of the same robot with O moved to `o` = [theta, x, y], given in the old O.

@@ -1,5 +1,7 @@
 // Reduced model of a base with N >= 2 steered and driven wheels: the rolling row of every wheel
 // only. Equations: model.md beside this file.
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "swerve_base.hpp"
@@ -8,10 +10,24 @@
 namespace viwo {
 namespace {
 
+constexpr auto kParams = [] {
+  std::array<ParamSpec, swerve::kParams.size() + 1> params;
+  std::copy(swerve::kParams.begin(), swerve::kParams.end(), params.begin());
+  params.back() = {.name = "offset_derivative",
+                   .type = ParamType::kString,
+                   .fallback = "predicted",
+                   .choices = "predicted|measured",
+                   .help =
+                       "at the signal that the twist predicts, the derivative by a steering "
+                       "offset is taken where the wheel points as the twist predicts (zero: "
+                       "rolling rows do not tell offsets), or as it was read"};
+  return params;
+}();
+
 class FourWisWidDriveOnly final : public swerve::SwerveBase {
  public:
   FourWisWidDriveOnly(const ParamSet& params, const HostServices& /*services*/)
-      : SwerveBase(params) {}
+      : SwerveBase(params), points_as_predicted_(params.text("offset_derivative") == "predicted") {}
 
   void describe(ModelDescription& out) const override {
     describe_wheels(swerve::RowsPerWheel::kDriveOnly, out);
@@ -35,9 +51,9 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
                              const RowSystem& rows, const RowVector& b, const Twist& xi,
                              const RowVector& e, IntrinsicDerivatives& out) const override {
     // A wheel that had measured what the twist predicts would point along its contact velocity: at
-    // the fitted signal nothing moves with the offset. The measured direction would leave v n_delta
-    // there, noise, and with it information about offsets that rolling rows do not have (W-9).
-    const bool fitted = &b != &rows.b;
+    // the fitted signal nothing moves with the offset (D-8). The measured direction would leave
+    // v n_delta there, noise, and with it information about offsets that rolling rows do not have.
+    const bool no_slip = points_as_predicted_ && &b != &rows.b;
     for (int j = 0; j < n(); ++j) {
       const double c = rows.A(j, 0);
       const double s = rows.A(j, 1);
@@ -45,8 +61,8 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
       out.J(j, r(j)) = b[j] / x_WI[r(j)];  // (D-3)
       out.J(j, x(j)) = -xi.z() * s;        // (D-4)
       out.J(j, y(j)) = xi.z() * c;
-      out.J(j, delta_o(j)) = fitted ? 0. : turned.dot(xi);  // (D-5)
-      out.DtE.col(r(j)).setZero();                          // (D-7)
+      out.J(j, delta_o(j)) = no_slip ? 0. : turned.dot(xi);  // (D-5)
+      out.DtE.col(r(j)).setZero();                           // (D-7)
       out.DtE.col(x(j)) << 0., 0., s * e[j];
       out.DtE.col(y(j)) << 0., 0., -c * e[j];
       out.DtE.col(delta_o(j)) = -turned * e[j];
@@ -71,6 +87,8 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
   }
 
  private:
+  bool points_as_predicted_;
+
   /// dA_j/d delta_j (D-2): the rolling row turned by a quarter.
   static Eigen::Vector3d turned_row(const RowSystem& rows, int j) {
     return {-rows.A(j, 1), rows.A(j, 0), rows.kept[static_cast<std::size_t>(j)]};
@@ -79,7 +97,7 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
 
 VIWO_REGISTER(KinematicModel, FourWisWidDriveOnly, "four_wis_wid_drive_only", "1.0.0",
               "N >= 2 steered and driven wheels (swerve), rolling rows only", "Apache-2.0",
-              swerve::kParams);
+              kParams);
 
 }  // namespace
 }  // namespace viwo
