@@ -1,0 +1,203 @@
+// The wheel measurement of the paper as it is published: the preintegrated relative pose between
+// consecutive clones, linearised once and at the measured readings. Equations: model.md beside this
+// file. What the paper does not say is a parameter; wheel_odometry is what to use on a robot.
+#include <array>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "encoder_intervals.hpp"
+#include "encoders.hpp"
+#include "increment.hpp"
+#include "prediction.hpp"
+#include "tally.hpp"
+#include "viwo/api/plugin.hpp"
+
+namespace viwo {
+namespace {
+
+using namespace wheel_relative_pose;
+
+constexpr std::array kParams{
+    ParamSpec{.name = "gate_probability",
+              .type = ParamType::kNumber,
+              .fallback = "0.05",
+              .min = 0.,
+              .max = 0.5,
+              .help = "intervals less likely than this are left out (the paper's alpha, which it "
+                      "does not give); 0: none"},
+    ParamSpec{.name = "residual_gate_m_per_s",
+              .type = ParamType::kNumber,
+              .unit = "m/s",
+              .fallback = "0",
+              .min = 0.,
+              .help = "readings with a larger |e_perp| are replaced by the one before (the paper "
+                      "gives no threshold); 0: none"},
+    ParamSpec{.name = "sigma_floor_yaw_rad",
+              .type = ParamType::kNumber,
+              .unit = "rad",
+              .fallback = "0",
+              .min = 0.,
+              .help = "yaw noise of each interval on top of the encoders' (the paper has one of "
+                      "a size that it does not give)"},
+    ParamSpec{.name = "sigma_floor_position_m",
+              .type = ParamType::kNumber,
+              .unit = "m",
+              .fallback = "0",
+              .min = 0.,
+              .help = "position noise of each interval on top of the encoders', per axis (as "
+                      "sigma_floor_yaw_rad)"},
+    ParamSpec{.name = "reading",
+              .type = ParamType::kString,
+              .fallback = "from_stamp",
+              .choices = "from_stamp|cell",
+              .help = "how long a reading holds: from its stamp to the next, as published; or over "
+                      "the time around the stamp that it stands for"},
+    ParamSpec{.name = "jacobian_at",
+              .type = ParamType::kString,
+              .fallback = "measured",
+              .choices = "measured|fitted",
+              .help = "the readings at which the twist is differentiated: the measured ones, as "
+                      "published; or those that the twist predicts"},
+    ParamSpec{.name = "rank_tolerance",
+              .type = ParamType::kNumber,
+              .fallback = "0",
+              .min = 0.,
+              .max = 0.5,
+              .help = "twists that the rows do not tell are taken as zero with 0.1 m/s, see "
+                      "docs/math/wheel_odometry.md, W-3; 0: the plain inverse, as published"},
+    ParamSpec{.name = "max_hold_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0.05",
+              .min = 0.,
+              .help = "intervals in which one reading would have to do for longer are left out"},
+};
+
+IncrementOptions read_options(const ParamSet& params, bool exact) {
+  IncrementOptions options;
+  options.twist.fitted_jacobian = params.text("jacobian_at") == "fitted";
+  options.twist.rank_tolerance = params.number("rank_tolerance");
+  options.holds_from_stamp = params.text("reading") == "from_stamp";
+  options.residual_gate_m_per_s = exact ? 0. : params.number("residual_gate_m_per_s");
+  return options;
+}
+
+class WheelRelativePose final : public Update {
+ public:
+  WheelRelativePose(const ParamSet& params, const HostServices& services)
+      : options_(read_options(params, services.exact)),
+        gate_probability_(params.number("gate_probability")),
+        sigma_floor_yaw_rad_(params.number("sigma_floor_yaw_rad")),
+        sigma_floor_position_m_(params.number("sigma_floor_position_m")),
+        max_hold_s_(params.number("max_hold_s")) {}
+
+  void declare(Declarations& host) override {
+    blocks_ = declare_wheels(host);
+    encoders_ = declare_encoders(host, blocks_);
+  }
+
+  void start(const UpdateSetup& /*setup*/) override {
+    integrator_.emplace(wheel_model_of(blocks_), options_);
+  }
+
+  void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
+    if (filter.clones.size() < 2) return;
+    const CloneView& first = filter.clones[filter.clones.size() - 2];
+    const CloneView& last = filter.clones.back();
+    const WheelsView wheels = blocks_.view(filter);
+    const auto encoders = data.samples<EncoderSample>(encoders_);
+    if (!encoders.empty() && !has_channels(integrator_->model().description(), encoders.back())) {
+      other_channels_.add(1, last.t_ns);
+      return;
+    }
+    if (!measure(wheels, first, last, encoders)) return;
+    add_factor(wheels, first, last, sink.add_residual());
+  }
+
+  void rejections(std::vector<RejectionCount>& out) const override {
+    for (const Tally* tally : {&other_channels_, &uncovered_, &held_, &refused_, &gated_}) {
+      tally->append_to(out);
+    }
+  }
+
+ private:
+  /// g between two clones, at the present estimate of calibration and clock (RP-1).
+  bool measure(const WheelsView& wheels, const CloneView& first, const CloneView& last,
+               std::span<const EncoderSample> encoders) {
+    const std::int64_t offset_ns = std::llround(1e9 * wheels.t_OtoI_s);
+    integrator_->set_intrinsics(wheels.x_WI);
+    if (!integrator_->integrate(encoders, first.t_ns - offset_ns, last.t_ns - offset_ns,
+                                increment_)) {
+      uncovered_.add(1, last.t_ns);
+      return false;
+    }
+    refused_.add(increment_.refused, last.t_ns);
+    gated_.add(increment_.gated, last.t_ns);
+    if (!(increment_.longest_hold_s <= max_hold_s_) || !increment_.g.allFinite() ||
+        !increment_.P_g.allFinite()) {
+      held_.add(1, last.t_ns);
+      return false;
+    }
+    return true;
+  }
+
+  /// (RP-9)
+  void add_factor(const WheelsView& wheels, const CloneView& first, const CloneView& last,
+                  ResidualFactor& factor) {
+    const Mount mount{wheels.R_ItoO, wheels.p_IinO};
+    const auto pose = [](const CloneView& clone) {
+      return ClonePose{clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.v_IinG};
+    };
+    const auto pose_fej = [](const CloneView& clone) {
+      return ClonePose{clone.R_GtoI_fej, clone.p_IinG_fej, clone.w_IinI, clone.v_IinG};
+    };
+    const PredictionJacobian by_state = prediction_jacobian(pose_fej(first), pose_fej(last), mount);
+    factor.columns.add(first.column, kPoseSize);
+    factor.columns.add(last.column, kPoseSize);
+    if (wheels.extrinsics_column >= 0) factor.columns.add(wheels.extrinsics_column, kPoseSize);
+    if (wheels.time_offset_column >= 0) factor.columns.add(wheels.time_offset_column, 1);
+    const auto n = increment_.J_g_WI.cols();
+    if (wheels.intrinsics_column >= 0) {
+      factor.columns.add(wheels.intrinsics_column, static_cast<int>(n));
+    }
+    factor.set_rows(3);
+    factor.H.leftCols<kMountTheta>() = by_state.leftCols<kMountTheta>();
+    Eigen::Index column = kMountTheta;
+    if (wheels.extrinsics_column >= 0) {
+      factor.H.middleCols<kPoseSize>(column) = by_state.middleCols<kPoseSize>(kMountTheta);
+      column += kPoseSize;
+    }
+    if (wheels.time_offset_column >= 0) factor.H.col(column) = by_state.col(kTimeOffset);
+    if (wheels.intrinsics_column >= 0) factor.H.rightCols(n) = -increment_.J_g_WI;
+
+    factor.residual = increment_.g - predict(pose(first), pose(last), mount);
+    factor.residual[0] = std::remainder(factor.residual[0], 2. * M_PI);
+    const Eigen::Vector3d floor(sigma_floor_yaw_rad_, sigma_floor_position_m_,
+                                sigma_floor_position_m_);
+    factor.R = increment_.P_g;
+    factor.R += floor.cwiseAbs2().asDiagonal();
+    factor.gate_probability = gate_probability_;  // (RP-10)
+  }
+
+  IncrementOptions options_;
+  double gate_probability_, sigma_floor_yaw_rad_, sigma_floor_position_m_, max_hold_s_;
+
+  WheelsBlocks blocks_;
+  StreamId encoders_;
+  std::optional<IncrementIntegrator> integrator_;
+  Increment increment_;
+
+  Tally other_channels_{"interval left out: encoder samples without the channels of the model"};
+  Tally uncovered_{"interval left out: the encoder samples do not reach over it"};
+  Tally held_{"interval left out: one encoder sample would have to do for too long"};
+  Tally refused_{"encoder sample without a twist (replaced by the one before)"};
+  Tally gated_{"encoder sample beyond residual_gate_m_per_s (replaced by the one before)"};
+};
+
+VIWO_REGISTER(Update, WheelRelativePose, "wheel_relative_pose", "1.0.0",
+              "the wheel measurement of the paper as published: relative pose between clones",
+              "Apache-2.0", kParams);
+
+}  // namespace
+}  // namespace viwo
