@@ -207,6 +207,9 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfTheFilter) {
   expect_done({"experiment", kConfigFolder + "experiments/drive_only_twist_full.yaml", "--seeds",
                "1", "--out", "lateral", "--set", shorter});
   EXPECT_TRUE(summary("lateral").at("by").at("motion").contains("figure_eight"));
+  expect_done({"experiment", kConfigFolder + "experiments/paper_exact.yaml", "--seeds", "1",
+               "--out", "exact", "--set", "sensors.simulator0.duration_s=2"});
+  EXPECT_EQ(summary("exact").at("variants").at("drive_only").at("runs"), 6);
   const nlohmann::json variants = summary("paper").at("variants");
   for (const char* variant : {"true_init_calib_on", "true_init_calib_off", "bad_init_calib_on",
                               "bad_init_calib_off", "bad_init_twist_only", "bad_init_drive_only"}) {
@@ -338,6 +341,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                                           "experiments/nominal_dead_reckoning.yaml",
                                           "experiments/openvins_cameras.yaml",
                                           "experiments/paper_accuracy.yaml",
+                                          "experiments/paper_exact.yaml",
                                           "experiments/plane_and_gnss.yaml",
                                           "experiments/simulated_dead_reckoning.yaml",
                                           "experiments/three_models.yaml",
