@@ -58,7 +58,8 @@ Eigen::Matrix3d rotation_from_euler(double yaw, double pitch, double roll) {
 }
 
 BodyTrajectory BodyTrajectory::drive(const PlanarMotion& motion, const Ground& ground,
-                                     double begin_s, double end_s, double knot_spacing_s) {
+                                     double begin_s, double end_s, double knot_spacing_s,
+                                     const SidewaysVelocity& sideways) {
   if (!(begin_s <= 0.) || !(end_s >= 0.) || !(end_s > begin_s) || !(knot_spacing_s > 0.)) {
     throw std::invalid_argument("a trajectory must contain the time 0 and have a knot spacing");
   }
@@ -68,10 +69,18 @@ BodyTrajectory BodyTrajectory::drive(const PlanarMotion& motion, const Ground& g
       static_cast<Eigen::Index>(std::ceil(kOversampling * (end_s - begin_s) / knot_spacing_s));
   std::vector<double> times_s;
   Eigen::Matrix<double, 6, Eigen::Dynamic> values(6, n + 1);
+  Eigen::Vector2d slid = Eigen::Vector2d::Zero(), v_before = slid;
   for (Eigen::Index k = 0; k <= n; ++k) {
     const double t_s = begin_s + static_cast<double>(k) * knot_spacing_s / kOversampling;
     times_s.push_back(t_s);
-    values.col(k) = raise(between(at_zero, integrator.advance_to(t_s)), ground);
+    Vector3d g = between(at_zero, integrator.advance_to(t_s));
+    if (sideways) {
+      const Eigen::Vector2d v = sideways(t_s) * R2(g[0]).col(1);
+      if (k > 0) slid += 0.5 * (v_before + v) * knot_spacing_s / kOversampling;
+      v_before = v;
+      g.tail<2>() += slid;
+    }
+    values.col(k) = raise(g, ground);
   }
   return {QuinticSpline::fit(times_s, values, {begin_s, times_s.back(), knot_spacing_s, 0.}),
           end_s};

@@ -12,6 +12,7 @@
 #include "viwo/log/recording.hpp"
 #include "viwo/log/sensor_params.hpp"
 #include "viwo/sim/body_trajectory.hpp"
+#include "viwo/sim/drive_params.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/rig_simulator.hpp"
 #include "viwo/sim/true_cameras.hpp"
@@ -19,8 +20,6 @@
 namespace viwo {
 namespace {
 
-/// The trajectory goes on before and after the run, so that the ends of its spline do not matter.
-constexpr double kMargin = 0.5;  // s
 /// A base that cannot move sideways slides by what the spline deviates from its motion, m/s.
 constexpr double kSliding = 1e-4;
 
@@ -31,29 +30,6 @@ constexpr std::array kBaseParams{
     ParamSpec{.name = "true_intrinsics_scale", .type = ParamType::kNumber, .fallback = "0",
               .min = 0.,
               .help = "0: the nominal intrinsics are true; s: nominal + s * prior sigma * gaussian"},
-    ParamSpec{.name = "motion", .type = ParamType::kString, .fallback = "icr_sweep",
-              .choices = "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
-                         "spin|constant_steering|pivot|sweep_then_straight",
-              .help = "how the base moves"},
-    ParamSpec{.name = "duration_s", .type = ParamType::kNumber, .unit = "s", .fallback = "60",
-              .min = 0., .max = 7200., .min_exclusive = true, .help = "how long"},
-    ParamSpec{.name = "speed_m_per_s", .type = ParamType::kNumber, .unit = "m/s",
-              .fallback = "0.5", .min = -20., .max = 20., .help = "speed of the motion"},
-    ParamSpec{.name = "yaw_rate_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
-              .fallback = "0.6", .min = -6., .max = 6.,
-              .help = "constant or peak yaw rate of the motions that turn"},
-    ParamSpec{.name = "pivot_m", .type = ParamType::kNumbers, .unit = "m", .fallback = "[0, 0]",
-              .help = "point of the base that motion pivot turns about"},
-    ParamSpec{.name = "ramp_s", .type = ParamType::kNumber, .unit = "s", .fallback = "1", .min = 0.,
-              .max = 3600., .help = "smooth start from rest; 0: at speed from the beginning"},
-    ParamSpec{.name = "ground", .type = ParamType::kString, .fallback = "flat",
-              .choices = "flat|uneven", .help = "what the base drives on"},
-    ParamSpec{.name = "ground_amplitude_m", .type = ParamType::kNumber, .unit = "m",
-              .fallback = "0.05", .min = 0., .max = 10., .help = "of the waves of uneven ground"},
-    ParamSpec{.name = "ground_wavelength_m", .type = ParamType::kNumber, .unit = "m",
-              .fallback = "3", .min = 0.1, .max = 1000., .help = "of the waves of uneven ground"},
-    ParamSpec{.name = "start_ns", .type = ParamType::kInt, .unit = "ns", .fallback = "0",
-              .min = 0., .max = 4e18, .help = "stamp at which the motion starts"},
     ParamSpec{.name = "wheel_set", .type = ParamType::kString, .fallback = "''",
               .help = "for a second simulator, the wheel set (wheel_sets.NAME) that it stands for: "
                       "its truth is told as NAME.r_1 and so on, true states are left to the first"},
@@ -82,8 +58,8 @@ constexpr std::array kBaseParams{
 };
 // clang-format on
 
-constexpr auto kParams =
-    log::joined(kBaseParams, kPoseParams, sim::kRigParams, sim::kTrueCameraParams);
+constexpr auto kParams = log::joined(kBaseParams, sim::kDriveParams, kPoseParams, sim::kRigParams,
+                                     sim::kTrueCameraParams);
 
 sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
                                                const ModelDescription& robot) {
@@ -108,21 +84,6 @@ sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
   out.drive_resolution_rad_per_s = params.number("drive_resolution_rad_per_s");
   out.sliding_m_per_s = kSliding;
   return out;
-}
-
-sim::BodyTrajectory trajectory_from(const ParamSet& params, const sim::RigSimulation& rig) {
-  const auto pivot = params.numbers("pivot_m");
-  if (pivot.size() != 2) throw ParamError("pivot_m", "needs two numbers");
-  const sim::PlanarMotion motion(params.text("motion"), {params.number("speed_m_per_s"),
-                                                         params.number("yaw_rate_rad_per_s"),
-                                                         params.number("ramp_s"),
-                                                         {pivot[0], pivot[1]}});
-  const bool uneven = params.text("ground") == "uneven";
-  const sim::Ground ground = uneven ? sim::Ground::uneven(params.number("ground_amplitude_m"),
-                                                          params.number("ground_wavelength_m"))
-                                    : sim::Ground();
-  const double margin = kMargin + std::abs(params.number("t_OtoI_s"));
-  return sim::BodyTrajectory::drive(motion, ground, -margin, sim::rig_end_s(rig) + margin);
 }
 
 std::vector<CalibrationSample> calibration_truth(const ModelDescription& robot,
@@ -150,7 +111,8 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
       sim::rig_from(params, params.number("duration_s"), start_ns, services);
   sim::EncoderSimulation wheels = encoder_simulation_from(params, description);
   if (services.exact) wheels.make_exact();
-  const sim::BodyTrajectory trajectory = trajectory_from(params, rig);
+  const sim::BodyTrajectory trajectory =
+      sim::drive_from(params, sim::rig_end_s(rig), std::abs(params.number("t_OtoI_s")));
   const double scale = services.exact ? 0. : params.number("true_intrinsics_scale");
   const Intrinsics x_WI = sim::perturbed_intrinsics(description, scale, services.seed);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -30,6 +31,9 @@ struct Mounting {
   Eigen::Vector3d p_IinO = Eigen::Vector3d::Zero();
 };
 
+/// What is added to the v_y of a motion at a time, m/s: how its base slides. Empty: nothing.
+using SidewaysVelocity = std::function<double(double t_s)>;
+
 /// R_OtoG of yaw, pitch and roll: Rz(yaw) Ry(pitch) Rx(roll).
 Eigen::Matrix3d rotation_from_euler(double yaw, double pitch, double roll);
 
@@ -40,9 +44,11 @@ class BodyTrajectory {
   /// A motion whose horizontal path is driven on `ground`: O is on the ground, its z axis normal
   /// to it, its x axis above the heading. The pose is over the origin with heading zero at t = 0.
   /// Between begin_s <= 0 and end_s >= 0 of the motion. The spline follows the motion closely
-  /// (below 1e-6 m with the default) and is the truth from then on.
+  /// (below 1e-6 m with the default) and is the truth from then on. What the base has slid before
+  /// t = 0 is left in the pose.
   static BodyTrajectory drive(const PlanarMotion& motion, const Ground& ground, double begin_s,
-                              double end_s, double knot_spacing_s = 0.05);
+                              double end_s, double knot_spacing_s = 0.05,
+                              const SidewaysVelocity& sideways = {});
 
   /// Least squares through poses at their stamps; time 0 is `origin_ns`. `planar`: only x, y and
   /// yaw are used, z, pitch and roll are zero. Its derivatives are poor within one knot spacing of
