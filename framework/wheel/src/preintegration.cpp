@@ -129,6 +129,7 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   if (begin_ns != reached_ns_) has_believed_ = false;
   const auto after_begin = [&](const EncoderSample& sample) { return sample.end_ns <= begin_ns; };
   const auto first = std::partition_point(samples.begin(), samples.end(), after_begin);
+  find_motion(samples.subspan(static_cast<std::size_t>(first - samples.begin())), end_ns);
   std::int64_t reached_ns = begin_ns;
   bool covered = true;
   double previous_own = 0.;  // how much of its own sample went into the piece before
@@ -171,6 +172,28 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   if (reached_ns < end_ns && k > 0 && k < samples.size()) bridge_hole(k, end_ns);
   reached_ns_ = reached_ns;
   return covered && reached_ns >= end_ns;
+}
+
+/// (W-14): which components of the twist the mean of the samples before end_ns shows.
+void Preintegrator::find_motion(std::span<const EncoderSample> samples, std::int64_t end_ns) {
+  const double sigmas = options_.twist.motion_sigmas;
+  if (sigmas <= 0.) return;
+  std::array<bool, 3> moves{};
+  const auto end = std::find_if(samples.begin(), samples.end(),
+                                [end_ns](const EncoderSample& y) { return y.begin_ns >= end_ns; });
+  if (end != samples.begin()) {
+    EncoderSample mean = samples.front();
+    double n = 0.;
+    for (auto y = samples.begin(); y != end; ++y) mean = blend(mean, *y, 1. / ++n);
+    TwistSolution& solution = solutions_[1 - believed_];
+    if (solver_.solve(mean, solution) == Status::kOk) {
+      for (int i = 0; i < 3; ++i) {
+        moves[static_cast<std::size_t>(i)] =
+            !is_noise(solution.xi[i], solution.P_xi(i, i) / n, sigmas);
+      }
+    }
+  }
+  solver_.set_moving(moves);
 }
 
 void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise noise,

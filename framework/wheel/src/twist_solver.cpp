@@ -74,11 +74,10 @@ TwistSolver::TwistSolver(std::shared_ptr<const WheelModel> model, const TwistOpt
   const int m = d.n_rows;
   const int n = model_->n_intrinsics();
   const int q = model_->n_noises();
-  for (RowSystem* rows : {&rows_, &nominal_rows_}) {
+  for (RowSystem* rows : {&rows_, &weight_rows_}) {
     rows->A.setZero(m, 3);
     rows->b.setZero(m);
   }
-  nominal_ = model_->nominal();
   for (Fit* fit : {&plain_, &weighted_}) {
     fit->WA.setZero(4, m);
     fit->b.setZero(m);
@@ -110,12 +109,18 @@ TwistSolver::TwistSolver(std::shared_ptr<const WheelModel> model, const TwistOpt
       block_noises_[static_cast<std::size_t>(b)].push_back(k);
     }
   }
-  set_intrinsics(nominal_);
+  set_intrinsics(model_->nominal());
+  set_weights_at(model_->nominal());
 }
 
 void TwistSolver::set_intrinsics(const Intrinsics& x_WI) {
   x_WI_ = x_WI;
   A_is_current_ = false;
+}
+
+void TwistSolver::set_weights_at(const Intrinsics& x_WI) {
+  weights_at_ = x_WI;
+  weight_A_is_current_ = false;
 }
 
 Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
@@ -127,13 +132,12 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   clear_left_out(rows_.b);
   fit_plain();
   if (options_.noise_weighted) {
-    // The weights are those of the nominal intrinsics: they do not move with x_WI, so that the
-    // master identity below is the whole derivative.
-    model.rows(y, nominal_, nominal_A_is_current_, nominal_rows_);
-    clear_left_out(nominal_rows_.A);
-    clear_left_out(nominal_rows_.b);
-    nominal_A_is_current_ = model_->description().constant_A && n_left_out_ == 0;
-    model.noise_derivatives(y, nominal_, nominal_rows_, nominal_rows_.b, nominal_twist(), plain_.e,
+    // The weights do not move with x_WI, so that the master identity below is the whole derivative.
+    model.rows(y, weights_at_, weight_A_is_current_, weight_rows_);
+    clear_left_out(weight_rows_.A);
+    clear_left_out(weight_rows_.b);
+    weight_A_is_current_ = model_->description().constant_A && n_left_out_ == 0;
+    model.noise_derivatives(y, weights_at_, weight_rows_, weight_rows_.b, weight_twist(), plain_.e,
                             by_n_);
     fit_weighted(options_.rank_tolerance);
     set_gain(weighted_);
@@ -145,18 +149,23 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   out.xi = fit.xi;
   out.e = fit.e;
   out.rank_deficient = fit.rank < 3;
-  // With weights, W e takes the place of e in (W-4).
-  const bool fitted = options_.fitted_jacobian;
-  const RowVector& e = fitted ? no_residual_ : options_.noise_weighted ? We_ : fit.e;
-  model.intrinsic_derivatives(y, x_WI_, rows_, fitted ? fit.b : rows_.b, fit.xi, e, by_x_);
-  clear_left_out(by_x_.J);
-  with_block_size(model_->description().noise_block, [&](auto size) {
-    constexpr int kSize = decltype(size)::value;
-    twist_jacobian<kSize>(fit, out.J_xi_WI);
-    if (!options_.noise_weighted) twist_covariance<kSize>(fit, out.P_xi);
-  });
   // (W-5) with A+ = (A^T W A)^-1 A^T W and R = W^-1.
-  if (options_.noise_weighted) out.P_xi = fit.M_inv.topRows<3>();
+  if (options_.noise_weighted) {
+    out.P_xi = fit.M_inv.topRows<3>();
+  } else {
+    with_block_size(model_->description().noise_block,
+                    [&](auto size) { twist_covariance<decltype(size)::value>(fit, out.P_xi); });
+  }
+  // With weights, W e takes the place of e in (W-4).
+  if (options_.fitted_jacobian) {
+    differentiate_fitted(fit.xi, out.P_xi, no_residual_);
+  } else {
+    model.intrinsic_derivatives(y, x_WI_, rows_, rows_.b, fit.xi,
+                                options_.noise_weighted ? We_ : fit.e, by_x_);
+    clear_left_out(by_x_.J);
+  }
+  with_block_size(model_->description().noise_block,
+                  [&](auto size) { twist_jacobian<decltype(size)::value>(fit, out.J_xi_WI); });
   if (out.rank_deficient) {
     const double sigma = options_.unobserved_sigma_m_per_s;
     out.P_xi += sigma * sigma * fit.missing;
@@ -164,10 +173,25 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   return Status::kOk;
 }
 
+/// Derivatives by the intrinsics at what the rows would read at a twist, without those of its
+/// components that its noise P alone explains (W-14).
+void TwistSolver::differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P,
+                                       const RowVector& e) {
+  Twist moving = xi;
+  for (int i = 0; i < 3; ++i) {
+    if (!moves_[static_cast<std::size_t>(i)] && is_noise(xi[i], P(i, i), options_.motion_sigmas)) {
+      moving[i] = 0.;
+    }
+  }
+  const RowVector b = rows_.A * moving;
+  model_->model().intrinsic_derivatives(*y_, x_WI_, rows_, b, moving, e, by_x_);
+  clear_left_out(by_x_.J);
+}
+
 /// The rows that bad channels enter; A is then that of this sample alone.
 void TwistSolver::find_left_out(const EncoderSample& y) {
   if (y.bad_drives == 0 && y.bad_steers == 0 && n_left_out_ == 0) return;
-  A_is_current_ = nominal_A_is_current_ = false;
+  A_is_current_ = weight_A_is_current_ = false;
   left_out_.fill(false);
   const std::vector<NoiseSpec>& noises = model_->description().noises;
   for (std::size_t k = 0; k < noises.size(); ++k) {
@@ -202,12 +226,12 @@ void TwistSolver::fit_plain() {
   solve(plain_);
 }
 
-/// Plain twist at the nominal intrinsics, on which the noise of some models depends; noise through
-/// a constant A does not.
-Twist TwistSolver::nominal_twist() const {
+/// Plain twist at the intrinsics of the weights, on which the noise of some models depends; noise
+/// through a constant A does not.
+Twist TwistSolver::weight_twist() const {
   if (model_->description().constant_A) return plain_.xi;
-  const RowMatrix& A = nominal_rows_.A;
-  const Eigen::Vector3d Atb = A.transpose() * nominal_rows_.b;
+  const RowMatrix& A = weight_rows_.A;
+  const Eigen::Vector3d Atb = A.transpose() * weight_rows_.b;
   return invert_normal_matrix(A.transpose() * A, options_.rank_tolerance).inverse * Atb;
 }
 
@@ -328,9 +352,7 @@ double TwistSolver::parity_chi2() {
 }
 
 void TwistSolver::add_parity(double weight, ParityInformation& out) {
-  model_->model().intrinsic_derivatives(*y_, x_WI_, rows_, weighted_.b, weighted_.xi, weighted_.e,
-                                        by_x_);
-  clear_left_out(by_x_.J);
+  differentiate_fitted(weighted_.xi, weighted_.M_inv.topRows<3>(), weighted_.e);
   with_block_size(model_->description().noise_block, [&](auto size) {
     constexpr int kSize = decltype(size)::value;
     weigh_jacobian<kSize>();

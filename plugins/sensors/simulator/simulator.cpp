@@ -11,9 +11,11 @@
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
 #include "viwo/log/sensor_params.hpp"
+#include "viwo/math/so3.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/drive_params.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
+#include "viwo/sim/random.hpp"
 #include "viwo/sim/rig_simulator.hpp"
 #include "viwo/sim/true_cameras.hpp"
 
@@ -30,6 +32,12 @@ constexpr std::array kBaseParams{
     ParamSpec{.name = "true_intrinsics_scale", .type = ParamType::kNumber, .fallback = "0",
               .min = 0.,
               .help = "0: the nominal intrinsics are true; s: nominal + s * prior sigma * gaussian"},
+    ParamSpec{.name = "true_sigma_p_IinO_m", .type = ParamType::kNumbers, .unit = "m",
+              .fallback = "[0, 0, 0]", .help = "the true mount is p_IinO_m + a draw of these sigmas"},
+    ParamSpec{.name = "true_sigma_R_ItoO_rad", .type = ParamType::kNumbers, .unit = "rad",
+              .fallback = "[0, 0, 0]", .help = "and turned by a draw of these"},
+    ParamSpec{.name = "true_sigma_t_OtoI_s", .type = ParamType::kNumber, .unit = "s",
+              .fallback = "0", .min = 0., .help = "the true clock is t_OtoI_s + a draw of this sigma"},
     ParamSpec{.name = "wheel_set", .type = ParamType::kString, .fallback = "''",
               .help = "for a second simulator, the wheel set (wheel_sets.NAME) that it stands for: "
                       "its truth is told as NAME.r_1 and so on, true states are left to the first"},
@@ -86,6 +94,22 @@ sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
   return out;
 }
 
+/// What is written, moved by a draw: the truth that nobody knows.
+void draw_mount(const ParamSet& params, std::uint64_t seed, sim::Mounting& mounting,
+                double& t_OtoI_s) {
+  sim::RandomStream random(seed, sim::Stream::kTrueMount);
+  const auto draw = [&](const char* key) {
+    const auto sigma = params.numbers(key);
+    if (sigma.size() != 3) throw ParamError(key, "needs three numbers");
+    Eigen::Vector3d out;
+    for (int i = 0; i < 3; ++i) out[i] = sigma[static_cast<std::size_t>(i)] * random.gaussian();
+    return out;
+  };
+  mounting.p_IinO += draw("true_sigma_p_IinO_m");
+  mounting.R_ItoO = exp_so3(draw("true_sigma_R_ItoO_rad")) * mounting.R_ItoO;
+  t_OtoI_s += params.number("true_sigma_t_OtoI_s") * random.gaussian();
+}
+
 std::vector<CalibrationSample> calibration_truth(const ModelDescription& robot,
                                                  const Intrinsics& x_WI,
                                                  const sim::Mounting& mounting, double t_OtoI_s,
@@ -107,19 +131,22 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
   ModelDescription description;
   robot.describe(description);
   const std::int64_t start_ns = params.integer("start_ns");
-  const sim::RigSimulation rig =
-      sim::rig_from(params, params.number("duration_s"), start_ns, services);
+  sim::RigSimulation rig = sim::rig_from(params, params.number("duration_s"), start_ns, services);
   sim::EncoderSimulation wheels = encoder_simulation_from(params, description);
-  if (services.exact) wheels.make_exact();
+  if (services.exact) {
+    wheels.make_exact();
+  } else {
+    draw_mount(params, services.seed, rig.mounting, wheels.time_offset_s);
+  }
   const sim::BodyTrajectory trajectory =
-      sim::drive_from(params, sim::rig_end_s(rig), std::abs(params.number("t_OtoI_s")));
+      sim::drive_from(params, sim::rig_end_s(rig), std::abs(wheels.time_offset_s));
   const double scale = services.exact ? 0. : params.number("true_intrinsics_scale");
   const Intrinsics x_WI = sim::perturbed_intrinsics(description, scale, services.seed);
 
   log::Recording<Measurement> out;
   const std::string& wheel_set = params.text("wheel_set");
   for (CalibrationSample truth :
-       calibration_truth(description, x_WI, rig.mounting, params.number("t_OtoI_s"), start_ns)) {
+       calibration_truth(description, x_WI, rig.mounting, wheels.time_offset_s, start_ns)) {
     if (!wheel_set.empty()) truth.name = wheel_set + "." + truth.name;
     out.samples.emplace_back(std::move(truth));
   }

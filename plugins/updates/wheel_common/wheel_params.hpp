@@ -19,8 +19,19 @@ inline constexpr ParamSpec kSampleGateParam{
     .fallback = "0",
     .min = 0.,
     .max = 0.5,
-    .help = "samples whose wheels contradict each other more than this are bridged; only for "
-            "calibrated wheels; 0: none"};
+    .help =
+        "samples whose wheels contradict each other more than this are bridged; only for "
+        "calibrated wheels; 0: none"};
+
+inline constexpr ParamSpec kMotionParam{
+    .name = "motion_sigmas",
+    .type = ParamType::kNumber,
+    .fallback = "5",
+    .min = 0.,
+    .max = 100.,
+    .help =
+        "a component of the motion within so many of its own sigmas teaches nothing about the "
+        "calibration; 0: all that is measured is motion, noise too"};
 
 inline constexpr ParamSpec kWheelCheckParam{
     .name = "wheel_check_probability",

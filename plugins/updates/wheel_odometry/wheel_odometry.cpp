@@ -30,6 +30,9 @@ using Jacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kM
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxColumns,
                              kMaxColumns>;
 using GeometryMatrix = Eigen::Matrix<double, kGeometrySize, kGeometrySize>;
+constexpr int kCalibrationSize = kGeometrySize - kMountTheta;
+using CalibrationJacobian = Eigen::Matrix<double, 3, kCalibrationSize>;
+using CalibrationCovariance = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
 
 /// Steps for the second derivatives, of the mount (rad, m) and the time offset (s). The Jacobian is
 /// nearly quadratic in them, so that they may be large.
@@ -42,6 +45,10 @@ constexpr std::int64_t kShiftNs = 50'000'000;
 constexpr double kConverged = 0.01;
 /// What a linearisation must be off by less than the one before, squared, to be taken.
 constexpr double kCloser = 0.25;
+
+/// What the mount may make of a turn is one number for the whole run, and no noise: three sigmas of
+/// it where noise has five.
+constexpr double kMountShare = 0.6;
 
 /// Where a factor is linearised.
 struct Point {
@@ -68,6 +75,7 @@ class WheelOdometry final : public Update {
     options_.parity_gate_probability = params.number("sample_gate_probability");
     options_.parity = false;
     options_.twist.fitted_jacobian = true;
+    options_.twist.motion_sigmas = services.exact ? 0. : params.number("motion_sigmas");
   }
 
   void declare(Declarations& host) override {
@@ -141,6 +149,8 @@ class WheelOdometry final : public Update {
     first_fej_ = moving(first, interval.begin_ns, true);
     last_fej_ = moving(last, interval.end_ns, true);
     at_ = start_;
+    preintegrator_->set_weights_at(wheels.x_WI);
+    shifted_preintegrator_->set_weights_at(wheels.x_WI);
   }
 
   bool measure(std::span<const EncoderSample> encoders, const EncoderInterval& interval,
@@ -155,7 +165,8 @@ class WheelOdometry final : public Update {
     shifted_preintegrator_->set_intrinsics(at_.x_WI);
     const bool covered = shifted_preintegrator_->integrate(encoders, interval.begin_ns - kShiftNs,
                                                            interval.end_ns - kShiftNs, shifted_);
-    g_rate_ = covered && shifted_.g.allFinite() && shifted_.bridged_s == 0.
+    rate_is_wheels_ = covered && shifted_.g.allFinite() && shifted_.bridged_s == 0.;
+    g_rate_ = rate_is_wheels_
                   ? Eigen::Vector3d((pose_.g - shifted_.g) / (1e-9 * kShiftNs))
                   : Eigen::Vector3d(
                         relative_pose_jacobian(at_.first, at_.last, at_.mount).col(kTimeOffset));
@@ -204,29 +215,98 @@ class WheelOdometry final : public Update {
     first.after_s = at_.first.after_s;
     last.after_s = at_.last.after_s;
     geometry_jacobian_ = relative_pose_jacobian(first, last, at_.mount);
-    // What the mount shows is proportional to the motion. Taken at the noisy first estimates it
-    // would count their noise as motion, and so as information: it is taken at the motion that the
-    // wheels measured, with the tilt of the iterate (WO-12).
-    geometry_jacobian_.middleCols<6>(kMountTheta) = mount_jacobian(motion, at_.mount.p_IinO);
-    // Where O is on the base cannot be told: exactly so, as the intrinsics do not know of tilts
-    // (WO-14).
-    const Eigen::Matrix<double, 3, 6> planar =
-        mount_jacobian(complete_motion(pose_.g, Eigen::Vector2d::Zero()), at_.mount.p_IinO);
-    for (const int k : {2, 3, 4}) geometry_jacobian_.col(kMountTheta + k) = planar.col(k);
-    geometry_jacobian_.col(kTimeOffset) = g_rate_;
+    set_noise();
+    const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt, g_rate_);
+    const CalibrationJacobian moving = calibration_jacobian(
+        moving_part(pose_.g, Eigen::Vector3d(R_.diagonal())),
+        moving_part(tilt, tilt_variance(motion.M)),
+        rate_is_wheels_ ? moving_part(g_rate_, rate_variance()) : unmeasured_rate());
+    geometry_jacobian_.rightCols<kCalibrationSize>() = moving;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
       H_.col(k) = geometry_jacobian_.col(geometry_[static_cast<std::size_t>(k)]);
     }
     const auto n = P_.cols() - n_geometry_;
     if (n > 0) H_.rightCols(n) = -pose_.J_g_WI;
+    if (measured != moving) consider(measured - moving);
+  }
+
+  /// (WO-9)
+  void set_noise() {
     const double path = pose_.path_length_m;
     const auto square = [](double x) { return x * x; };
-    R_ = square(noise_scale_) * pose_.P_g;  // (WO-9)
+    R_ = square(noise_scale_) * pose_.P_g;
     R_(0, 0) += square(sigma_floor_yaw_rad_) + path * square(sigma_yaw_rad_per_sqrt_m_);
     for (int i = 1; i < 3; ++i) {
       R_(i, i) += square(sigma_floor_position_m_) + path * square(sigma_position_m_per_sqrt_m_);
     }
+  }
+
+  /// The columns of mount and clock. What the mount shows is proportional to the motion. Taken at
+  /// the noisy first estimates it would count their noise as motion, and so as information: it is
+  /// taken at the motion that the wheels measured, with the tilt of the iterate (WO-12).
+  CalibrationJacobian calibration_jacobian(const Eigen::Vector3d& g, const Eigen::Vector2d& tilt,
+                                           const Eigen::Vector3d& g_rate) const {
+    const Eigen::Vector3d& p_IinO = at_.mount.p_IinO;
+    CalibrationJacobian J;
+    J.leftCols<6>() = mount_jacobian(complete_motion(g, tilt), p_IinO);
+    // Where O is on the base cannot be told: exactly so, as the intrinsics do not know of tilts
+    // (WO-14).
+    J.middleCols<3>(2) =
+        mount_jacobian(complete_motion(g, Eigen::Vector2d::Zero()), p_IinO).middleCols<3>(2);
+    J.col(6) = g_rate;
+    return J;
+  }
+
+  /// (WO-15): without the components that their noise alone explains.
+  template <class Vector>
+  Vector moving_part(Vector measured, const Vector& variance) const {
+    for (Eigen::Index i = 0; i < measured.size(); ++i) {
+      if (is_noise(measured[i], variance[i], options_.twist.motion_sigmas)) measured[i] = 0.;
+    }
+    return measured;
+  }
+
+  /// Of the roll and the pitch of O from one clone to the other: what the clones turned, and what
+  /// a mount that is off makes of it (WO-6).
+  Eigen::Vector2d tilt_variance(const Eigen::Matrix3d& M) const {
+    const Eigen::Matrix3d& C = at_.mount.R_ItoO;
+    Eigen::Matrix<double, 3, kGeometrySize> turn = Eigen::Matrix<double, 3, kGeometrySize>::Zero();
+    turn.middleCols<3>(kFirstTheta) = -C * at_.last.R_GtoI * at_.first.R_GtoI.transpose();
+    turn.middleCols<3>(kLastTheta) = C;
+    turn.middleCols<3>(kMountTheta) = kMountShare * (Eigen::Matrix3d::Identity() - M);
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, kMaxColumns> tilt =
+        Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, kMaxColumns>::Zero(
+            2, n_geometry_);
+    for (int k = 0; k < n_geometry_; ++k) {
+      tilt.col(k) = turn.col(geometry_[static_cast<std::size_t>(k)]).head<2>();
+    }
+    return (tilt * P_.topLeftCorner(n_geometry_, n_geometry_) * tilt.transpose()).diagonal();
+  }
+
+  /// Of g_rate_: two intervals that share all but the shift at both ends.
+  Eigen::Vector3d rate_variance() const {
+    const double shift_s = 1e-9 * kShiftNs;
+    const double apart = std::min(shift_s / pose_.duration_s, 1.);
+    return 2. * apart / (shift_s * shift_s) * R_.diagonal();
+  }
+
+  /// The rates of the IMU are too noisy to teach anything.
+  Eigen::Vector3d unmeasured_rate() const {
+    return options_.twist.motion_sigmas > 0. ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : g_rate_;
+  }
+
+  /// What the calibration may be off by, through columns that are not in the Jacobian, is noise.
+  void consider(const CalibrationJacobian& columns) {
+    CalibrationCovariance P = CalibrationCovariance::Zero();
+    for (int i = 0; i < n_geometry_; ++i) {
+      for (int k = 0; k < n_geometry_; ++k) {
+        const int row = geometry_[static_cast<std::size_t>(i)] - kMountTheta;
+        const int col = geometry_[static_cast<std::size_t>(k)] - kMountTheta;
+        if (row >= 0 && col >= 0) P(row, col) = P_(i, k);
+      }
+    }
+    R_ += columns * P * columns.transpose();
   }
 
   /// at_ = start_ (+) step.
@@ -363,6 +443,7 @@ class WheelOdometry final : public Update {
   // Of the interval at hand.
   PreintegratedPose pose_, shifted_;
   Eigen::Vector3d g_rate_ = Eigen::Vector3d::Zero();  // rad/s, m/s
+  bool rate_is_wheels_ = false;                       // else it is that of the IMU
   Point start_, at_;
   MovingPose first_fej_, last_fej_;
   std::array<int, kGeometrySize> geometry_{};  // the factor's leading columns in a PoseJacobian

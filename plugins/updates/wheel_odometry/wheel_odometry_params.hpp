@@ -58,6 +58,7 @@ inline constexpr std::array kParams{
               .max = 20,
               .help = "linearisations per interval at most; 1: a plain EKF update"},
     kSecondOrderNoiseParam,
+    kMotionParam,
     kWheelCheckParam,
     kFindNoiseParam,
     ParamSpec{.name = "max_bridged_s",

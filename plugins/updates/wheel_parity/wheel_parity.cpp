@@ -41,11 +41,12 @@ constexpr std::array kParams{
                       "epoch by itself"},
     ParamSpec{.name = "max_iterations",
               .type = ParamType::kInt,
-              .fallback = "6",
+              .fallback = "20",
               .min = 1,
-              .max = 20,
+              .max = 100,
               .help = "linearisations per interval at most; 1: a plain EKF update"},
     kSecondOrderNoiseParam,
+    kMotionParam,
     kWheelCheckParam,
     kFindNoiseParam,
 };
@@ -86,6 +87,7 @@ class WheelParity final : public Update {
         wheel_check_probability_(services.exact ? 0. : params.number("wheel_check_probability")) {
     noise_.set_enabled(!services.exact && params.flag("find_noise"));
     options_.twist.noise_weighted = true;
+    options_.twist.motion_sigmas = services.exact ? 0. : params.number("motion_sigmas");
     options_.parity_gate_probability = params.number("sample_gate_probability");
     options_.parity = true;
   }
@@ -188,6 +190,7 @@ class WheelParity final : public Update {
     double gain = std::numeric_limits<double>::quiet_NaN();
     for (int i = 0; i < max_iterations_; ++i) {
       preintegrator_->set_intrinsics(x);
+      preintegrator_->set_weights_at(x);
       preintegrator_->integrate(encoders, interval.begin_ns, interval.end_ns, pose_);
       if (pose_.parity.dof == 0 || !pose_.parity.eta.allFinite()) break;
       linearise(x0, x);

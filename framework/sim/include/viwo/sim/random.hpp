@@ -29,6 +29,7 @@ enum class Stream : std::uint64_t {
   kPoseNoise,
   kPoseOutliers,
   kTrueCameras,
+  kTrueMount,
 };
 
 /// A stream of independent numbers; equal seed, purpose and index give equal numbers. `index`

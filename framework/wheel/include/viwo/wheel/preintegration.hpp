@@ -53,6 +53,7 @@ class Preintegrator {
   Preintegrator(std::shared_ptr<const WheelModel> model, const PreintegrationOptions& options);
 
   void set_intrinsics(const Intrinsics& x_WI) { solver_.set_intrinsics(x_WI); }
+  void set_weights_at(const Intrinsics& x_WI) { solver_.set_weights_at(x_WI); }
   const Intrinsics& intrinsics() const { return solver_.intrinsics(); }
   const WheelModel& model() const { return solver_.model(); }
 
@@ -70,6 +71,7 @@ class Preintegrator {
     double variance = 1.;
     double with_previous = 0.;
   };
+  void find_motion(std::span<const EncoderSample> samples, std::int64_t end_ns);
   void add_piece(const EncoderSample& y, double dt, PieceNoise noise, PreintegratedPose& out);
   void bridge(double dt, const TwistSolution* unbelieved, PreintegratedPose& out);
   void step(const TwistSolution& solution, double dt, PieceNoise noise, PreintegratedPose& out);

@@ -27,6 +27,9 @@ struct TwistOptions {
   /// that sums up thousands of samples, and counted as information about directions that the twist
   /// cannot show.
   bool fitted_jacobian = false;
+  /// A component of the twist that is within so many of its own sigmas counts as none in the
+  /// sensitivities at the fitted signal (W-14). 0: all that is measured is motion.
+  double motion_sigmas = 0.;
   /// Smallest ratio of the singular values of A (yaw rate scaled to the size of the velocities)
   /// that counts as full rank. For rolling rows it is about the spread of the wheel directions in
   /// rad; below it the velocity that the rows cannot tell is taken as zero.
@@ -34,6 +37,11 @@ struct TwistOptions {
   /// Standard deviation of what the rows cannot tell, per unit of the scaled twist [m/s].
   double unobserved_sigma_m_per_s = 0.1;
 };
+
+/// Whether a measured component of a motion may be none (W-14).
+inline bool is_noise(double value, double variance, double motion_sigmas) {
+  return value * value <= motion_sigmas * motion_sigmas * variance;
+}
 
 /// What the solver finds for one sample.
 struct TwistSolution {
@@ -69,6 +77,15 @@ class TwistSolver {
   /// A lose rank for good (all wheels at one place).
   void set_intrinsics(const Intrinsics& x_WI);
 
+  /// Where the noise of the rows is taken, of which their weights are the inverse; the nominal
+  /// intrinsics until told otherwise. They do not move with set_intrinsics(): what changes by the
+  /// weights is not what the rows say.
+  void set_weights_at(const Intrinsics& x_WI);
+
+  /// Which components of the twist [v_x, v_y, omega] are motion for sure in the samples that follow
+  /// (W-14), although a sample alone may not show it.
+  void set_moving(const std::array<bool, 3>& moves) { moves_ = moves; }
+
   /// Twist, residual, sensitivity and covariance. kRejected: the model refuses the sample or the
   /// result is not finite. Channels that `y` calls bad are left out, with all rows of their noise
   /// blocks. Keeps a reference to `y` for the calls about the sample last solved.
@@ -99,12 +116,13 @@ class TwistSolver {
     RowVector b, e;  // A xi, and what it leaves of the measured b
   };
 
+  void differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P, const RowVector& e);
   void find_left_out(const EncoderSample& y);
   template <class Rows>
   void clear_left_out(Rows& rows) const;
   void fit_plain();
+  Twist weight_twist() const;
   void fit_weighted(double rank_tolerance);
-  Twist nominal_twist() const;
   template <int kSize>
   Eigen::Matrix3d weigh_rows();
   void factor(const Eigen::Matrix3d& M, double rank_tolerance, Fit& fit) const;
@@ -147,14 +165,15 @@ class TwistSolver {
   Intrinsics x_WI_;
   bool A_is_current_ = false;  // A in rows_, and the gain of the plain fit, are those of x_WI_
 
-  Intrinsics nominal_;
-  bool nominal_A_is_current_ = false;  // A in nominal_rows_ is that of nominal_
+  Intrinsics weights_at_;
+  bool weight_A_is_current_ = false;  // A in weight_rows_ is that of weights_at_
 
+  std::array<bool, 3> moves_{};
   std::array<bool, kMaxRows> left_out_{};  // rows of the sample at hand
   int n_left_out_ = 0;
 
   const EncoderSample* y_ = nullptr;
-  RowSystem rows_, nominal_rows_;
+  RowSystem rows_, weight_rows_;
   Fit plain_, weighted_;
   RowLanes A_plus_;                              // column i: what row i gives to the twist
   Eigen::Matrix<double, kMaxRows, kMaxRows> W_;  // block by block: rows i.. begin at (0, i)
