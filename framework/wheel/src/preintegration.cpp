@@ -174,7 +174,7 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   return covered && reached_ns >= end_ns;
 }
 
-/// (W-14): which components of the twist the mean of the samples before end_ns shows.
+/// (W-16): which components of the twist the mean of the samples before end_ns shows.
 void Preintegrator::find_motion(std::span<const EncoderSample> samples, std::int64_t end_ns) {
   const double sigmas = options_.twist.motion_sigmas;
   if (sigmas <= 0.) return;

@@ -174,7 +174,7 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
 }
 
 /// Derivatives by the intrinsics at what the rows would read at a twist, without those of its
-/// components that its noise P alone explains (W-14).
+/// components that its noise P alone explains (W-16).
 void TwistSolver::differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P,
                                        const RowVector& e) {
   Twist moving = xi;

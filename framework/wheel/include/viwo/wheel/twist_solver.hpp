@@ -28,7 +28,7 @@ struct TwistOptions {
   /// cannot show.
   bool fitted_jacobian = false;
   /// A component of the twist that is within so many of its own sigmas counts as none in the
-  /// sensitivities at the fitted signal (W-14). 0: all that is measured is motion.
+  /// sensitivities at the fitted signal (W-16). 0: all that is measured is motion.
   double motion_sigmas = 0.;
   /// Smallest ratio of the singular values of A (yaw rate scaled to the size of the velocities)
   /// that counts as full rank. For rolling rows it is about the spread of the wheel directions in
@@ -38,7 +38,7 @@ struct TwistOptions {
   double unobserved_sigma_m_per_s = 0.1;
 };
 
-/// Whether a measured component of a motion may be none (W-14).
+/// Whether a measured component of a motion may be none (W-16).
 inline bool is_noise(double value, double variance, double motion_sigmas) {
   return value * value <= motion_sigmas * motion_sigmas * variance;
 }
@@ -83,7 +83,7 @@ class TwistSolver {
   void set_weights_at(const Intrinsics& x_WI);
 
   /// Which components of the twist [v_x, v_y, omega] are motion for sure in the samples that follow
-  /// (W-14), although a sample alone may not show it.
+  /// (W-16), although a sample alone may not show it.
   void set_moving(const std::array<bool, 3>& moves) { moves_ = moves; }
 
   /// Twist, residual, sensitivity and covariance. kRejected: the model refuses the sample or the
