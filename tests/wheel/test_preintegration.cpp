@@ -412,7 +412,7 @@ TEST(Preintegration, CountsSamplesThatAreNotFinite) {
 PreintegratedPose with_noise_of(const Twist& xi, double motion_sigmas) {
   const auto model = load_model(swerve("four_wis_wid"));
   const auto clean = sample_motion(
-      *model, [&](double) { return xi; }, 10., 0.01);
+      *model, [&](double) { return xi; }, 10., 100.);
   std::mt19937_64 rng(3);
   std::vector<EncoderSample> samples;
   for (const EncoderSample& y : clean) {
