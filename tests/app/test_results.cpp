@@ -257,6 +257,17 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsWithAPoseReference) {
   EXPECT_TRUE(summary("experiment").at("variants").contains("wheels_plane_gnss"));
 }
 
+TEST_F(ResultsTest, OfTheDeliveredConfigurationsWithTyres) {
+  const std::string shorter = "sensors.simulator0.duration_s=5";
+  expect_done({"run", kConfigFolder + "runs/viwo_contact.yaml", "--out", "run", "--set", shorter});
+  EXPECT_EQ(summary("run").at("status"), "ok");
+  expect_done({"experiment", kConfigFolder + "experiments/contact_physics.yaml", "--seeds", "1",
+               "--out", "experiment", "--set", shorter});
+  const nlohmann::json variants = summary("experiment").at("variants");
+  EXPECT_EQ(variants.size(), 15U);
+  for (const auto& variant : variants) EXPECT_EQ(variant.at("runs"), 1);
+}
+
 TEST_F(ResultsTest, OfTheDeliveredConfigurationForOpenVinsMeasurements) {
   const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/openvins_sim";
   if (!fs::exists(data)) GTEST_SKIP() << "the measurements are not here";
@@ -335,6 +346,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                                           "experiments/calibrate_mecanum.yaml",
                                           "experiments/calibrate_skid_steer.yaml",
                                           "experiments/calibrate_swerve.yaml",
+                                          "experiments/contact_physics.yaml",
                                           "experiments/drive_only_twist_full.yaml",
                                           "experiments/hybrid.yaml",
                                           "experiments/images.yaml",
@@ -364,6 +376,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                                           "runs/ucsd_skid_steer.yaml",
                                           "runs/viwo_ackermann.yaml",
                                           "runs/viwo_bag.yaml",
+                                          "runs/viwo_contact.yaml",
                                           "runs/viwo_gnss.yaml",
                                           "runs/viwo_images.yaml",
                                           "runs/viwo_images_log.yaml",
