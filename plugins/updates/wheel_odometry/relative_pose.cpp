@@ -88,4 +88,26 @@ Eigen::Matrix<double, 3, 6> mount_jacobian(const Motion& motion, const Vector3d&
   return J;
 }
 
+CalibrationJacobian calibration_jacobian(const Vector3d& g, const Eigen::Vector2d& tilt,
+                                         const Vector3d& g_rate, const Vector3d& p_IinO) {
+  CalibrationJacobian J;
+  J.leftCols<6>() = mount_jacobian(complete_motion(g, tilt), p_IinO);
+  // Where O is on the base cannot be told: exactly so, as the intrinsics do not know of tilts.
+  J.middleCols<3>(2) =
+      mount_jacobian(complete_motion(g, Eigen::Vector2d::Zero()), p_IinO).middleCols<3>(2);
+  J.col(6) = g_rate;
+  return J;
+}
+
+Eigen::Matrix<double, 2, kGeometrySize> tilt_jacobian(const MovingPose& first,
+                                                      const MovingPose& last, const Mount& mount,
+                                                      const Matrix3d& M) {
+  const Matrix3d& C = mount.R_ItoO;
+  Eigen::Matrix<double, 2, kGeometrySize> J = Eigen::Matrix<double, 2, kGeometrySize>::Zero();
+  J.middleCols<3>(kFirstTheta) = -(C * last.R_GtoI * first.R_GtoI.transpose()).topRows<2>();
+  J.middleCols<3>(kLastTheta) = C.topRows<2>();
+  J.middleCols<3>(kMountTheta) = (Matrix3d::Identity() - M).topRows<2>();
+  return J;
+}
+
 }  // namespace viwo::wheel_odometry

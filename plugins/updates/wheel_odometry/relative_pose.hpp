@@ -56,4 +56,20 @@ Motion complete_motion(const Eigen::Vector3d& g, const Eigen::Vector2d& tilt);
 /// The columns of the mount in relative_pose_jacobian(), for a given motion of O.
 Eigen::Matrix<double, 3, 6> mount_jacobian(const Motion& motion, const Eigen::Vector3d& p_IinO);
 
+/// Columns of mount and time offset alone.
+inline constexpr int kCalibrationSize = kGeometrySize - kMountTheta;
+using CalibrationJacobian = Eigen::Matrix<double, 3, kCalibrationSize>;
+
+/// They for the motion `g` = [yaw, x, y] and `tilt` = [roll, pitch] of O, and the change of g when
+/// both instants move on, `g_rate` (rad/s, m/s): (WO-12), (WO-13), (WO-14).
+CalibrationJacobian calibration_jacobian(const Eigen::Vector3d& g, const Eigen::Vector2d& tilt,
+                                         const Eigen::Vector3d& g_rate,
+                                         const Eigen::Vector3d& p_IinO);
+
+/// Derivative of [roll, pitch] that O turns by from one clone to the other, where it turns little,
+/// by the errors of both clones and of the mount (WO-6). M: the turn of O.
+Eigen::Matrix<double, 2, kGeometrySize> tilt_jacobian(const MovingPose& first,
+                                                      const MovingPose& last, const Mount& mount,
+                                                      const Eigen::Matrix3d& M);
+
 }  // namespace viwo::wheel_odometry

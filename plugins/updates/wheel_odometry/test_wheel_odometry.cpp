@@ -52,6 +52,32 @@ TEST(RelativePose, HasTheDerivativesOfCentralDifferencesAtRandomStates) {
   }
 }
 
+TEST(RelativePose, HasTheDerivativesOfItsTiltWhereItTurnsLittle) {
+  std::mt19937_64 rng(8);
+  for (int trial = 0; trial < 20; ++trial) {
+    const VectorXd n = testing::gaussian(12, rng);
+    MovingPose first, last;
+    first.R_GtoI = exp_so3(n.segment<3>(0));
+    last.R_GtoI = exp_so3(1e-4 * n.segment<3>(3)) * first.R_GtoI;
+    const Mount mount{exp_so3(n.segment<3>(6)), n.segment<3>(9)};
+    const auto predict = [&](const VectorXd& d) -> VectorXd {
+      MovingPose a = first, b = last;
+      a.R_GtoI = exp_so3(-d.segment<3>(kFirstTheta)) * a.R_GtoI;
+      b.R_GtoI = exp_so3(-d.segment<3>(kLastTheta)) * b.R_GtoI;
+      const Mount m{exp_so3(-d.segment<3>(kMountTheta)) * mount.R_ItoO, mount.p_IinO};
+      Eigen::Vector2d tilt;
+      relative_pose(a, b, m, &tilt);
+      return tilt;
+    };
+    const Eigen::Matrix3d M =
+        mount.R_ItoO * last.R_GtoI * first.R_GtoI.transpose() * mount.R_ItoO.transpose();
+    EXPECT_EQ(testing::jacobian_mismatch(
+                  tilt_jacobian(first, last, mount, M),
+                  testing::central_difference(predict, VectorXd::Zero(kGeometrySize)), {}, 1e-3),
+              "");
+  }
+}
+
 /// A circle driven over a tilted plane, and a filter with two clones 0.1 s apart.
 class OneInterval : public ::testing::Test {
  protected:

@@ -30,9 +30,6 @@ using Jacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kM
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxColumns,
                              kMaxColumns>;
 using GeometryMatrix = Eigen::Matrix<double, kGeometrySize, kGeometrySize>;
-constexpr int kCalibrationSize = kGeometrySize - kMountTheta;
-using CalibrationJacobian = Eigen::Matrix<double, 3, kCalibrationSize>;
-using CalibrationCovariance = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
 
 /// Steps for the second derivatives, of the mount (rad, m) and the time offset (s). The Jacobian is
 /// nearly quadratic in them, so that they may be large.
@@ -201,6 +198,13 @@ class WheelOdometry final : public Update {
       }
       row += rows.count;
     }
+    geometry_P_.setZero();
+    for (int i = 0; i < n_geometry_; ++i) {
+      for (int k = 0; k < n_geometry_; ++k) {
+        geometry_P_(geometry_[static_cast<std::size_t>(i)],
+                    geometry_[static_cast<std::size_t>(k)]) = P_(i, k);
+      }
+    }
   }
 
   /// (WO-8): residual and Jacobian at at_, and the noise of pose_.
@@ -216,11 +220,14 @@ class WheelOdometry final : public Update {
     last.after_s = at_.last.after_s;
     geometry_jacobian_ = relative_pose_jacobian(first, last, at_.mount);
     set_noise();
-    const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt, g_rate_);
-    const CalibrationJacobian moving = calibration_jacobian(
-        moving_part(pose_.g, Eigen::Vector3d(R_.diagonal())),
-        moving_part(tilt, tilt_variance(motion.M)),
-        rate_is_wheels_ ? moving_part(g_rate_, rate_variance()) : unmeasured_rate());
+    // What the mount shows is proportional to the motion. Taken at the noisy first estimates it
+    // would count their noise as motion, and so as information: it is taken at the motion that the
+    // wheels measured, with the tilt of the iterate.
+    const Eigen::Vector3d& p_IinO = at_.mount.p_IinO;
+    const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt, g_rate_, p_IinO);
+    const CalibrationJacobian moving =
+        calibration_jacobian(moving_part(pose_.g, R_.diagonal()),
+                             moving_part(tilt, tilt_variance(motion.M)), moving_rate(), p_IinO);
     geometry_jacobian_.rightCols<kCalibrationSize>() = moving;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
@@ -228,7 +235,10 @@ class WheelOdometry final : public Update {
     }
     const auto n = P_.cols() - n_geometry_;
     if (n > 0) H_.rightCols(n) = -pose_.J_g_WI;
-    if (measured != moving) consider(measured - moving);
+    // What the calibration may be off by, through columns that are not in the Jacobian, is noise.
+    if (measured == moving) return;
+    const CalibrationJacobian D = measured - moving;
+    R_ += D * geometry_P_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() * D.transpose();
   }
 
   /// (WO-9)
@@ -242,25 +252,9 @@ class WheelOdometry final : public Update {
     }
   }
 
-  /// The columns of mount and clock. What the mount shows is proportional to the motion. Taken at
-  /// the noisy first estimates it would count their noise as motion, and so as information: it is
-  /// taken at the motion that the wheels measured, with the tilt of the iterate (WO-12).
-  CalibrationJacobian calibration_jacobian(const Eigen::Vector3d& g, const Eigen::Vector2d& tilt,
-                                           const Eigen::Vector3d& g_rate) const {
-    const Eigen::Vector3d& p_IinO = at_.mount.p_IinO;
-    CalibrationJacobian J;
-    J.leftCols<6>() = mount_jacobian(complete_motion(g, tilt), p_IinO);
-    // Where O is on the base cannot be told: exactly so, as the intrinsics do not know of tilts
-    // (WO-14).
-    J.middleCols<3>(2) =
-        mount_jacobian(complete_motion(g, Eigen::Vector2d::Zero()), p_IinO).middleCols<3>(2);
-    J.col(6) = g_rate;
-    return J;
-  }
-
   /// (WO-15): without the components that their noise alone explains.
-  template <class Vector>
-  Vector moving_part(Vector measured, const Vector& variance) const {
+  template <class Vector, class Variance>
+  Vector moving_part(Vector measured, const Variance& variance) const {
     for (Eigen::Index i = 0; i < measured.size(); ++i) {
       if (is_noise(measured[i], variance[i], options_.twist.motion_sigmas)) measured[i] = 0.;
     }
@@ -268,45 +262,21 @@ class WheelOdometry final : public Update {
   }
 
   /// Of the roll and the pitch of O from one clone to the other: what the clones turned, and what
-  /// a mount that is off makes of it (WO-6).
+  /// a mount that is off makes of a turn.
   Eigen::Vector2d tilt_variance(const Eigen::Matrix3d& M) const {
-    const Eigen::Matrix3d& C = at_.mount.R_ItoO;
-    Eigen::Matrix<double, 3, kGeometrySize> turn = Eigen::Matrix<double, 3, kGeometrySize>::Zero();
-    turn.middleCols<3>(kFirstTheta) = -C * at_.last.R_GtoI * at_.first.R_GtoI.transpose();
-    turn.middleCols<3>(kLastTheta) = C;
-    turn.middleCols<3>(kMountTheta) = kMountShare * (Eigen::Matrix3d::Identity() - M);
-    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, kMaxColumns> tilt =
-        Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, kMaxColumns>::Zero(
-            2, n_geometry_);
-    for (int k = 0; k < n_geometry_; ++k) {
-      tilt.col(k) = turn.col(geometry_[static_cast<std::size_t>(k)]).head<2>();
-    }
-    return (tilt * P_.topLeftCorner(n_geometry_, n_geometry_) * tilt.transpose()).diagonal();
+    Eigen::Matrix<double, 2, kGeometrySize> J = tilt_jacobian(at_.first, at_.last, at_.mount, M);
+    J.middleCols<3>(kMountTheta) *= kMountShare;
+    return (J * geometry_P_ * J.transpose()).diagonal();
   }
 
-  /// Of g_rate_: two intervals that share all but the shift at both ends.
-  Eigen::Vector3d rate_variance() const {
+  /// Of the rates of the encoders: two intervals that share all but the shift at both ends. Those
+  /// of the IMU are too noisy to teach anything.
+  Eigen::Vector3d moving_rate() const {
+    if (options_.twist.motion_sigmas <= 0.) return g_rate_;
+    if (!rate_is_wheels_) return Eigen::Vector3d::Zero();
     const double shift_s = 1e-9 * kShiftNs;
     const double apart = std::min(shift_s / pose_.duration_s, 1.);
-    return 2. * apart / (shift_s * shift_s) * R_.diagonal();
-  }
-
-  /// The rates of the IMU are too noisy to teach anything.
-  Eigen::Vector3d unmeasured_rate() const {
-    return options_.twist.motion_sigmas > 0. ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : g_rate_;
-  }
-
-  /// What the calibration may be off by, through columns that are not in the Jacobian, is noise.
-  void consider(const CalibrationJacobian& columns) {
-    CalibrationCovariance P = CalibrationCovariance::Zero();
-    for (int i = 0; i < n_geometry_; ++i) {
-      for (int k = 0; k < n_geometry_; ++k) {
-        const int row = geometry_[static_cast<std::size_t>(i)] - kMountTheta;
-        const int col = geometry_[static_cast<std::size_t>(k)] - kMountTheta;
-        if (row >= 0 && col >= 0) P(row, col) = P_(i, k);
-      }
-    }
-    R_ += columns * P * columns.transpose();
+    return moving_part(g_rate_, Eigen::Vector3d(2. * apart / (shift_s * shift_s) * R_.diagonal()));
   }
 
   /// at_ = start_ (+) step.
@@ -400,15 +370,7 @@ class WheelOdometry final : public Update {
         D.col(k) = change.row(a).transpose();
       }
     }
-    // The prior of the geometry, zero where something is held.
-    GeometryMatrix P = GeometryMatrix::Zero();
-    for (int i = 0; i < n_geometry_; ++i) {
-      for (int k = 0; k < n_geometry_; ++k) {
-        P(geometry_[static_cast<std::size_t>(i)], geometry_[static_cast<std::size_t>(k)]) =
-            P_(i, k);
-      }
-    }
-    for (GeometryMatrix& D : second) D = (D * P).eval();
+    for (GeometryMatrix& D : second) D = (D * geometry_P_).eval();
     for (int a = 0; a < 3; ++a) {
       for (int b = 0; b <= a; ++b) {
         const double trace = second[static_cast<std::size_t>(a)]
@@ -449,6 +411,7 @@ class WheelOdometry final : public Update {
   std::array<int, kGeometrySize> geometry_{};  // the factor's leading columns in a PoseJacobian
   int n_geometry_ = 0;
   Square P_;
+  GeometryMatrix geometry_P_ = GeometryMatrix::Zero();  // of the geometry, zero where held
   Eigen::Vector3d residual_ = Eigen::Vector3d::Zero();
   PoseJacobian geometry_jacobian_ = PoseJacobian::Zero();
   Jacobian H_;

@@ -1,0 +1,86 @@
+// What the parity residual of a sample tells about the intrinsics: the second half of TwistSolver.
+#include <array>
+
+#include "pieces.hpp"
+#include "viwo/wheel/twist_solver.hpp"
+
+namespace viwo {
+namespace {
+
+/// For the parity residual only directions that A cannot tell at all are left out.
+constexpr double kParityRankTolerance = 1e-6;
+
+}  // namespace
+
+double TwistSolver::parity_chi2() {
+  if (!options_.noise_weighted || weighted_.rank < 3) fit_weighted(kParityRankTolerance);
+  return weighted_chi2_;
+}
+
+void TwistSolver::add_parity(double weight, ParityInformation& out) {
+  differentiate_fitted(weighted_.xi, weighted_.M_inv.topRows<3>(), weighted_.e);
+  with_block_size(model_->description().noise_block, [&](auto size) {
+    constexpr int kSize = decltype(size)::value;
+    weigh_jacobian<kSize>();
+    add_information<kSize>(weight, out);
+  });
+  out.chi2 += weight * weighted_chi2_;
+  out.dof += parity_dof();
+}
+
+/// W J: of each column the rows of the noise blocks that it touches.
+template <int kSize>
+void TwistSolver::weigh_jacobian() {
+  const int size = block_size<kSize>();
+  const int n = model_->n_intrinsics();
+  for (int k = 0; k < n; ++k) {
+    const RowRange rows = intrinsic_rows_[static_cast<std::size_t>(k)];
+    const double* J = by_x_.J.col(k).data();
+    for (int i0 = rows.first; i0 < rows.first + rows.count; i0 += size) {
+      for (int i = i0; i < i0 + size; ++i) {
+        double WJ = 0.;
+        for (int l = 0; l < size; ++l) WJ += W_(l, i) * J[i0 + l];
+        WJ_(i, k) = WJ;
+      }
+    }
+  }
+}
+
+/// (W-10) as Lambda += J^T G with G = W J - W A (A^T W A)^-1 V, V = A^T W J; eta += J^T W e.
+template <int kSize>
+void TwistSolver::add_information(double weight, ParityInformation& out) const {
+  const int size = block_size<kSize>();
+  const int m = model_->n_rows();
+  const int n = model_->n_intrinsics();
+  Eigen::Matrix<double, 4, kMaxRows> U;  // (A^T W A)^-1 A^T W
+  for (int i = 0; i < m; ++i) U.col(i) = weighted_.M_inv * weighted_.WA.col(i).head<3>();
+  in_pieces(n, [&](int first, auto width) {
+    constexpr int kWidth = decltype(width)::value;
+    using Piece = Eigen::Matrix<double, kWidth, 1>;
+    Piece v0 = Piece::Zero(), v1 = Piece::Zero(), v2 = Piece::Zero(), eta = Piece::Zero();
+    for (int i = 0; i < m; ++i) {
+      const Piece WJ = weight * WJ_.row(i).segment<kWidth>(first);
+      v0 += rows_.A(i, 0) * WJ;
+      v1 += rows_.A(i, 1) * WJ;
+      v2 += rows_.A(i, 2) * WJ;
+      eta += weighted_.e[i] * WJ;
+    }
+    out.eta.segment<kWidth>(first) += eta;
+    std::array<Piece, kMaxRows> G;  // its rows, of these columns
+    for (int i = 0; i < m; ++i) {
+      G[static_cast<std::size_t>(i)] = weight * WJ_.row(i).segment<kWidth>(first).transpose() -
+                                       (U(0, i) * v0 + U(1, i) * v1 + U(2, i) * v2);
+    }
+    for (int k = 0; k < n; ++k) {
+      const RowRange rows = intrinsic_rows_[static_cast<std::size_t>(k)];
+      const double* J = by_x_.J.col(k).data();
+      Piece sum = out.Lambda.col(k).segment<kWidth>(first);
+      for (int i0 = rows.first; i0 < rows.first + rows.count; i0 += size) {
+        for (int i = i0; i < i0 + size; ++i) sum += J[i] * G[static_cast<std::size_t>(i)];
+      }
+      out.Lambda.col(k).segment<kWidth>(first) = sum;
+    }
+  });
+}
+
+}  // namespace viwo
