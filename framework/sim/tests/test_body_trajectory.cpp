@@ -243,5 +243,18 @@ TEST(BodyTrajectory, FitsTheRealRecordingsToWellBelowAMillimetre) {
   EXPECT_LT(worst_rms_rad, 2e-3);
 }
 
+TEST(BodyTrajectory, ABaseThatSlidesKeepsItsHeadingAndMovesSidewaysAsWell) {
+  const PlanarMotion motion("circle");
+  const auto sideways = [](double t_s) { return 0.02 * std::sin(t_s); };
+  const auto straight = BodyTrajectory::drive(motion, Ground(), -0.5, 20.);
+  const auto sliding = BodyTrajectory::drive(motion, Ground(), -0.5, 20., 0.05, sideways);
+  for (double t_s = 2.; t_s < 19.; t_s += 0.31) {
+    const Twist xi = sliding.twist(t_s);
+    EXPECT_NEAR(xi[0], 0.5, 1e-6) << t_s;
+    EXPECT_NEAR(xi[1], sideways(t_s), 1e-6) << t_s;
+    EXPECT_EQ(sliding.body(t_s).R_BtoG, straight.body(t_s).R_BtoG) << t_s;
+  }
+}
+
 }  // namespace
 }  // namespace viwo::sim

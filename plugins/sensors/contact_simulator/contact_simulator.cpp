@@ -41,10 +41,10 @@ Vehicle vehicle_from(const ParamSet& params, const HostServices& services) {
   const contact::TrueBaseErrors sigma = contact::true_base_errors_from(params);
   Vehicle out;
   out.truth = services.exact ? nominal : draw_base(nominal, sigma, services.seed);
-  out.controller = params.text("controller_knows") == "truth" ? out.truth : nominal;
+  const bool knows = services.exact || params.text("controller_knows") == "truth";
+  out.controller = knows ? out.truth : nominal;
   out.physics = contact::physics_from(params, ideal);
   out.errors = contact::encoder_errors_from(params, ideal, params.flag("noise") && !services.exact);
-  const bool knows = params.text("controller_knows") == "truth";
   if (!out.physics.slips() && !knows) {
     throw ParamError("controller_knows", "a base whose controller is wrong must slip");
   }

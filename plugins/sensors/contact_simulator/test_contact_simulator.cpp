@@ -153,7 +153,7 @@ TEST(ContactSimulator, TruthIsWhatTheWheelsRollWithUnderTheirLoad) {
 }
 
 TEST(ContactSimulator, IsExactWhenThatIsAskedForWhateverItsParametersSay) {
-  const std::string rest = "duration_s: 3, sigma_true_radius_m: 1e-4";
+  const std::string rest = "duration_s: 3, sigma_true_radius_m: 1e-4, controller_knows: nominal";
   const auto sensor = make_sensor(section(rest), 1, true);
   EXPECT_TRUE(sensor->can_be_exact());
   const auto exact = play(*sensor);
