@@ -116,7 +116,7 @@ TEST_F(Registry, SearchesCommandLineThenEnvironmentThenInstallation) {
   EXPECT_EQ(folders[1], "/env/a");
   EXPECT_EQ(folders[2], "/env/b");
   EXPECT_EQ(folders[3],
-            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v4");
+            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v5");
   EXPECT_EQ(error_of([] { PluginRegistry::default_search_path({"/no/such"}); }),
             "--plugin-path /no/such: no such folder");
 }
@@ -343,7 +343,7 @@ TEST_F(Registry, RefusesAShortDescriptor) {
 
 TEST_F(Registry, RefusesAnotherApiInTheDescriptor) {
   EXPECT_EQ(reason(bad("wrong_api")),
-            "is for version 7 of the plugin API, this host has version 4 - rebuild it against this "
+            "is for version 7 of the plugin API, this host has version 5 - rebuild it against this "
             "viwo");
 }
 
