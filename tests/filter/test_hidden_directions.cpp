@@ -20,8 +20,7 @@ constexpr double kErrorProbability = 0.001;
 
 std::vector<experiment::RunResult> runs(const std::string& motion, const std::string& ground,
                                         const std::vector<std::string>& more) {
-  std::vector<std::string> all{"estimator.calibration_error_scale=0",
-                               "sensors.simulator0.true_intrinsics_scale=1",
+  std::vector<std::string> all{"sensors.simulator0.true_intrinsics_scale=1",
                                "sensors.simulator0.true_sigma_p_IinO_m=[0.1, 0.1, 0.1]",
                                "sensors.simulator0.true_sigma_R_ItoO_rad=[0.01, 0.01, 0.01]",
                                "sensors.simulator0.true_sigma_t_OtoI_s=0.01",
@@ -29,7 +28,8 @@ std::vector<experiment::RunResult> runs(const std::string& motion, const std::st
                                "sensors.simulator0.motion=" + motion,
                                "sensors.simulator0.ground=" + ground};
   all.insert(all.end(), more.begin(), more.end());
-  return testing::paper_runs("bad_init_calib_on", kSeeds, all);
+  // The variant that starts from what is configured, here not the truth.
+  return testing::paper_runs("true_init_calib_on", kSeeds, all);
 }
 
 /// Empty when all parameters are consistent and the hidden ones, called by how their names begin,
@@ -41,6 +41,7 @@ std::string faults(const std::vector<experiment::RunResult>& runs,
   const auto bounds =
       eval::mean_nees_bounds(1, kSeeds, 1. - kErrorProbability / static_cast<double>(parameters));
   for (std::size_t i = 0; i < parameters; ++i) {
+    if (runs.front().calibration[i].sigma.front() == 0.) continue;  // held
     double nees = 0., kept = 1e9;
     for (const experiment::RunResult& run : runs) {
       const experiment::CalibrationTrack& track = run.calibration[i];
@@ -58,15 +59,8 @@ std::string faults(const std::vector<experiment::RunResult>& runs,
   return out.str();
 }
 
-const std::vector<std::string> kTilt{"theta_ItoO_x", "theta_ItoO_y", "p_IinO_z"};
 const std::vector<std::string> kAllNoiseIsMotion{"updates.wheel_odometry.motion_sigmas=0",
                                                  "updates.wheel_parity.motion_sigmas=0"};
-
-TEST(HiddenDirections, OfFlatGroundAreTiltAndHeightOfTheImu) {
-  EXPECT_EQ(faults(runs("icr_sweep", "flat", {}), kTilt), "");
-  EXPECT_EQ(faults(runs("figure_eight", "flat", {}), kTilt), "");
-  EXPECT_NE(faults(runs("icr_sweep", "flat", kAllNoiseIsMotion), kTilt), "");
-}
 
 TEST(HiddenDirections, OfAStraightLineAreWhatTurnsShow) {
   EXPECT_EQ(faults(runs("straight", "flat", {}),

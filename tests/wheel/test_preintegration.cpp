@@ -415,8 +415,15 @@ PreintegratedPose with_noise_of(const Twist& xi, double motion_sigmas) {
       *model, [&](double) { return xi; }, 10., 100.);
   std::mt19937_64 rng(3);
   std::vector<EncoderSample> samples;
-  for (const EncoderSample& y : clean) {
-    samples.push_back(testing::with_noise(*model, xi, y, 1., rng));
+  std::normal_distribution<double> gauss;
+  for (EncoderSample y : clean) {
+    for (const NoiseSpec& noise : model->description().noises) {
+      const auto channel = static_cast<std::size_t>(noise.channel);
+      const double n = noise.sigma * gauss(rng);
+      if (noise.kind == NoiseKind::kDrive) y.drive_rad_per_s[channel] += n;
+      if (noise.kind == NoiseKind::kSteer) y.steer_rad[channel] += n;
+    }
+    samples.push_back(y);
   }
   PreintegrationOptions options;
   options.twist = {.noise_weighted = true, .fitted_jacobian = true, .motion_sigmas = motion_sigmas};

@@ -122,11 +122,11 @@ WheelNoise::Kinds WheelNoise::by_parameter() const {
   for (int k = 0; k < q(); ++k) {
     const NoiseSpec& noise = noises[static_cast<std::size_t>(k)];
     std::size_t g = 0;
-    while (g < kinds.first.size() && noises[kinds.first[g]].parameter != noise.parameter) ++g;
-    if (g == kinds.first.size()) kinds.first.push_back(static_cast<std::size_t>(k));
+    while (g < kinds.size && noises[kinds.first[g]].parameter != noise.parameter) ++g;
+    if (g == kinds.size) kinds.first[kinds.size++] = static_cast<std::size_t>(k);
     kinds.members(k, static_cast<int>(g)) = noise.sigma * noise.sigma / variance_[k];
   }
-  kinds.members.conservativeResize(q(), static_cast<int>(kinds.first.size()));
+  kinds.members.conservativeResize(q(), static_cast<int>(kinds.size));
   return kinds;
 }
 
@@ -145,7 +145,7 @@ std::vector<WheelNoise::Part> WheelNoise::parts() const {
   const Kinds kinds = by_parameter();
   const Estimate of_kind = estimate(kinds.members);
   const Estimate of_source = estimate(Square::Identity(q(), q()));
-  for (std::size_t g = 0; g < kinds.first.size(); ++g) {
+  for (std::size_t g = 0; g < kinds.size; ++g) {
     const auto column = static_cast<int>(g);
     const double variance = of_kind.factor[column];
     if (of_kind.sigma[column] > kMostUncertain * variance) continue;

@@ -100,13 +100,11 @@ CalibrationJacobian calibration_jacobian(const Vector3d& g, const Eigen::Vector2
 }
 
 Eigen::Matrix<double, 2, kGeometrySize> tilt_jacobian(const MovingPose& first,
-                                                      const MovingPose& last, const Mount& mount,
-                                                      const Matrix3d& M) {
+                                                      const MovingPose& last, const Mount& mount) {
   const Matrix3d& C = mount.R_ItoO;
   Eigen::Matrix<double, 2, kGeometrySize> J = Eigen::Matrix<double, 2, kGeometrySize>::Zero();
   J.middleCols<3>(kFirstTheta) = -(C * last.R_GtoI * first.R_GtoI.transpose()).topRows<2>();
   J.middleCols<3>(kLastTheta) = C.topRows<2>();
-  J.middleCols<3>(kMountTheta) = (Matrix3d::Identity() - M).topRows<2>();
   return J;
 }
 

@@ -67,9 +67,8 @@ CalibrationJacobian calibration_jacobian(const Eigen::Vector3d& g, const Eigen::
                                          const Eigen::Vector3d& p_IinO);
 
 /// Derivative of [roll, pitch] that O turns by from one clone to the other, where it turns little,
-/// by the errors of both clones and of the mount (WO-6). M: the turn of O.
+/// by the errors of both clones (WO-6).
 Eigen::Matrix<double, 2, kGeometrySize> tilt_jacobian(const MovingPose& first,
-                                                      const MovingPose& last, const Mount& mount,
-                                                      const Eigen::Matrix3d& M);
+                                                      const MovingPose& last, const Mount& mount);
 
 }  // namespace viwo::wheel_odometry

@@ -43,10 +43,6 @@ constexpr double kConverged = 0.01;
 /// What a linearisation must be off by less than the one before, squared, to be taken.
 constexpr double kCloser = 0.25;
 
-/// What the mount may make of a turn is one number for the whole run, and no noise: three sigmas of
-/// it where noise has five.
-constexpr double kMountShare = 0.6;
-
 /// Where a factor is linearised.
 struct Point {
   MovingPose first, last;
@@ -227,7 +223,7 @@ class WheelOdometry final : public Update {
     const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt, g_rate_, p_IinO);
     const CalibrationJacobian moving =
         calibration_jacobian(moving_part(pose_.g, R_.diagonal()),
-                             moving_part(tilt, tilt_variance(motion.M)), moving_rate(), p_IinO);
+                             moving_part(tilt, tilt_variance()), moving_rate(), p_IinO);
     geometry_jacobian_.rightCols<kCalibrationSize>() = moving;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
@@ -261,11 +257,9 @@ class WheelOdometry final : public Update {
     return measured;
   }
 
-  /// Of the roll and the pitch of O from one clone to the other: what the clones turned, and what
-  /// a mount that is off makes of a turn.
-  Eigen::Vector2d tilt_variance(const Eigen::Matrix3d& M) const {
-    Eigen::Matrix<double, 2, kGeometrySize> J = tilt_jacobian(at_.first, at_.last, at_.mount, M);
-    J.middleCols<3>(kMountTheta) *= kMountShare;
+  /// Of the roll and the pitch of O from one clone to the other.
+  Eigen::Vector2d tilt_variance() const {
+    const Eigen::Matrix<double, 2, kGeometrySize> J = tilt_jacobian(at_.first, at_.last, at_.mount);
     return (J * geometry_P_ * J.transpose()).diagonal();
   }
 

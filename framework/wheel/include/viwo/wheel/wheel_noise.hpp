@@ -2,6 +2,7 @@
 // other tells. Equations: docs/math/wheel_odometry.md, W-14, W-15.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -37,8 +38,9 @@ class WheelNoise {
   using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxNoises,
                                kMaxNoises>;
   struct Kinds {
-    std::vector<std::size_t> first;  ///< source of each kind
-    Square members;                  ///< q x kinds: variance of a source per factor of its kind
+    std::array<std::size_t, kMaxNoises> first{};  ///< source of each kind
+    std::size_t size = 0;                         ///< how many kinds
+    Square members;  ///< q x size: variance of a source per factor of its kind
   };
   /// Factors on variances, and their standard deviations.
   struct Estimate {
