@@ -224,10 +224,13 @@ TEST_F(Registry, RefusesALibraryWithoutARecord) {
 }
 
 TEST_F(Registry, RefusesAnotherApiInTheRecord) {
-  EXPECT_EQ(reason(doctored("{api=4;", "{api=0;")),
+  const std::string version = std::to_string(kApiVersion);
+  EXPECT_EQ(reason(doctored("{api=" + version + ";", "{api=0;")),
             "is built differently from this host\n"
-            "  api: host 4, plugin 0\n"
-            "  -> it is for another version of the plugin API: rebuild it against this viwo");
+            "  api: host " +
+                version +
+                ", plugin 0\n"
+                "  -> it is for another version of the plugin API: rebuild it against this viwo");
 }
 
 TEST_F(Registry, RefusesAnotherAlignment) {
@@ -342,9 +345,9 @@ TEST_F(Registry, RefusesAShortDescriptor) {
 }
 
 TEST_F(Registry, RefusesAnotherApiInTheDescriptor) {
-  EXPECT_EQ(reason(bad("wrong_api")),
-            "is for version 7 of the plugin API, this host has version 5 - rebuild it against this "
-            "viwo");
+  EXPECT_EQ(reason(bad("wrong_api")), "is for version 7 of the plugin API, this host has version " +
+                                          std::to_string(kApiVersion) +
+                                          " - rebuild it against this viwo");
 }
 
 TEST_F(Registry, RefusesNullPointersInTheDescriptor) {
