@@ -433,16 +433,6 @@ PreintegratedPose with_noise_of(const Twist& xi, double motion_sigmas) {
   return pose;
 }
 
-double of_positions(const PreintegratedPose& pose) {
-  const auto model = load_model(swerve("four_wis_wid"));
-  double most = 0.;
-  for (int i = 0; i < model->n_intrinsics(); ++i) {
-    const std::string& name = model->description().intrinsics[static_cast<std::size_t>(i)].name;
-    if (name[0] == 'x' || name[0] == 'y') most = std::max(most, pose.parity.Lambda(i, i));
-  }
-  return most;
-}
-
 TEST(Preintegration, OfABaseAtRestTeachesNothingAboutItsWheels) {
   const PreintegratedPose parked = with_noise_of(Twist::Zero(), 5.);
   EXPECT_TRUE(parked.J_g_WI.isZero());
@@ -457,19 +447,11 @@ TEST(Preintegration, OfABaseAtRestTeachesNothingAboutItsWheels) {
   EXPECT_EQ(parked.P_g, misled.P_g);
 }
 
-TEST(Preintegration, OfAStraightLineTeachesNothingAboutPositions) {
-  const Twist forwards(0.5, 0., 0.);
-  EXPECT_EQ(of_positions(with_noise_of(forwards, 5.)), 0.);
-  EXPECT_GT(of_positions(with_noise_of(forwards, 0.)), 0.);
-  EXPECT_GT(with_noise_of(forwards, 5.).parity.Lambda.trace(), 0.);  // offsets
-}
-
 TEST(Preintegration, TakesAMotionThatOnlyTheMeanOfTheSamplesShowsForMotion) {
-  // A twentieth of what one sample tells apart from noise, a thousand samples.
   const PreintegratedPose parked = with_noise_of(Twist::Zero(), 5.);
   const double sigma = std::sqrt(parked.P_g(0, 0) / 10. / 0.01);  // rad/s, of a sample
-  const Twist creeping(0.5, 0., sigma);
-  EXPECT_GT(of_positions(with_noise_of(creeping, 5.)), 0.);
+  const Twist creeping(0., 0., sigma);                            // a thousand samples show it
+  EXPECT_GT(with_noise_of(creeping, 5.).parity.Lambda.trace(), 0.);
 }
 
 TEST(Preintegration, OfAGeneralMotionIsTheSameWithAndWithoutALimitOnMotion) {

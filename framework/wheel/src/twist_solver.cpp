@@ -161,16 +161,13 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   return Status::kOk;
 }
 
-/// Derivatives by the intrinsics at what the rows would read at a twist, without those of its
-/// components that its noise P alone explains (W-16).
+/// Derivatives by the intrinsics at what the rows would read at a twist, or at rest if its noise P
+/// alone explains it (W-16).
 void TwistSolver::differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P,
                                        const RowVector& e) {
-  Twist moving = xi;
-  for (int i = 0; i < 3; ++i) {
-    if (!moves_[static_cast<std::size_t>(i)] && is_noise(xi[i], P(i, i), options_.motion_sigmas)) {
-      moving[i] = 0.;
-    }
-  }
+  bool moves = moves_;
+  for (int i = 0; i < 3; ++i) moves |= !is_noise(xi[i], P(i, i), options_.motion_sigmas);
+  const Twist moving = moves ? xi : Twist::Zero();
   const RowVector b = rows_.A * moving;
   model_->model().intrinsic_derivatives(*y_, x_WI_, rows_, b, moving, e, by_x_);
   clear_left_out(by_x_.J);

@@ -30,7 +30,8 @@ inline constexpr ParamSpec kMotionParam{
     .min = 0.,
     .max = 100.,
     .help =
-        "a component of the motion within so many of its own sigmas teaches nothing about the "
+        "what the wheels show of a motion within so many of its own sigmas teaches nothing about "
+        "the "
         "calibration; 0: all that is measured is motion, noise too"};
 
 inline constexpr ParamSpec kWheelCheckParam{

@@ -27,7 +27,7 @@ struct TwistOptions {
   /// that sums up thousands of samples, and counted as information about directions that the twist
   /// cannot show.
   bool fitted_jacobian = false;
-  /// A component of the twist that is within so many of its own sigmas counts as none in the
+  /// A twist whose components are all within so many of their own sigmas counts as rest in the
   /// sensitivities at the fitted signal (W-16). 0: all that is measured is motion.
   double motion_sigmas = 0.;
   /// Smallest ratio of the singular values of A (yaw rate scaled to the size of the velocities)
@@ -82,9 +82,9 @@ class TwistSolver {
   /// weights is not what the rows say.
   void set_weights_at(const Intrinsics& x_WI);
 
-  /// Which components of the twist [v_x, v_y, omega] are motion for sure in the samples that follow
-  /// (W-16), although a sample alone may not show it.
-  void set_moving(const std::array<bool, 3>& moves) { moves_ = moves; }
+  /// Whether the base moves for sure in the samples that follow (W-16), although a sample alone may
+  /// not show it.
+  void set_moving(bool moves) { moves_ = moves; }
 
   /// Twist, residual, sensitivity and covariance. kRejected: the model refuses the sample or the
   /// result is not finite. Channels that `y` calls bad are left out, with all rows of their noise
@@ -168,7 +168,7 @@ class TwistSolver {
   Intrinsics weights_at_;
   bool weight_A_is_current_ = false;  // A in weight_rows_ is that of weights_at_
 
-  std::array<bool, 3> moves_{};
+  bool moves_ = false;
   std::array<bool, kMaxRows> left_out_{};  // rows of the sample at hand
   int n_left_out_ = 0;
 
