@@ -22,7 +22,8 @@
 namespace viwo {
 namespace {
 
-using namespace wheel_odometry;
+using namespace wheel_motion;
+using wheel_odometry::kParams;
 
 constexpr int kMaxColumns = kGeometrySize + kMaxIntrinsics;
 using Step = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxColumns, 1>;

@@ -5,7 +5,6 @@
 
 #include "allocations.hpp"
 #include "filter_fixture.hpp"
-#include "prediction.hpp"
 #include "viwo/math/chi2.hpp"
 #include "viwo/testing/jacobian.hpp"
 
@@ -76,42 +75,6 @@ class Sweep : public ::testing::Test {
   sim::PlanarMotion motion_;
   testing::SmallFilter truth_;
 };
-
-TEST_F(Sweep, PredictsWithTheDerivativesOfCentralDifferencesAtRandomStates) {
-  using namespace wheel_relative_pose;
-  std::mt19937_64 rng(7);
-  for (int trial = 0; trial < 50; ++trial) {
-    const VectorXd n = testing::gaussian(30, rng);
-    ClonePose first, last;
-    first.R_GtoI = exp_so3(n.segment<3>(0));
-    last.R_GtoI = exp_so3(0.3 * n.segment<3>(3)) * first.R_GtoI;
-    first.p_IinG = n.segment<3>(6);
-    last.p_IinG = first.p_IinG + 0.3 * n.segment<3>(9);
-    first.w_IinI = n.segment<3>(12);
-    last.w_IinI = n.segment<3>(15);
-    first.v_IinG = n.segment<3>(18);
-    last.v_IinG = n.segment<3>(21);
-    const Mount mount{exp_so3(n.segment<3>(24)), n.segment<3>(27)};
-    const auto predicted = [&](const VectorXd& d) -> VectorXd {
-      const auto moved = [&](ClonePose pose, int column) {
-        // Moved on by the time offset as the IMU moved, then by the error.
-        pose.R_GtoI = exp_so3(-d[kTimeOffset] * pose.w_IinI) * pose.R_GtoI;
-        pose.p_IinG += d[kTimeOffset] * pose.v_IinG;
-        pose.R_GtoI = exp_so3(-d.segment<3>(column)) * pose.R_GtoI;
-        pose.p_IinG += d.segment<3>(column + 3);
-        return pose;
-      };
-      const Mount m{exp_so3(-d.segment<3>(kMountTheta)) * mount.R_ItoO,
-                    mount.p_IinO + d.segment<3>(kMountPosition)};
-      return predict(moved(first, kFirstTheta), moved(last, kLastTheta), m);
-    };
-    EXPECT_EQ(
-        testing::jacobian_mismatch(
-            prediction_jacobian(first, last, mount),
-            testing::central_difference(predicted, VectorXd::Zero(kPredictionSize)), {}, 1e-6),
-        "");
-  }
-}
 
 TEST_F(Sweep, HasTheDerivativesOfItsResidualThroughTheRetractionAtTheMeasuredReadings) {
   // Noisy readings and wrong intrinsics: the wheels contradict each other.

@@ -9,13 +9,14 @@
 #include "encoder_intervals.hpp"
 #include "encoders.hpp"
 #include "increment.hpp"
-#include "prediction.hpp"
+#include "relative_pose.hpp"
 #include "tally.hpp"
 #include "viwo/api/plugin.hpp"
 
 namespace viwo {
 namespace {
 
+using namespace wheel_motion;
 using namespace wheel_relative_pose;
 
 constexpr std::array kParams{
@@ -147,12 +148,14 @@ class WheelRelativePose final : public Update {
                   ResidualFactor& factor) {
     const Mount mount{wheels.R_ItoO, wheels.p_IinO};
     const auto pose = [](const CloneView& clone) {
-      return ClonePose{clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.v_IinG};
+      return MovingPose{clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.R_GtoI * clone.v_IinG};
     };
     const auto pose_fej = [](const CloneView& clone) {
-      return ClonePose{clone.R_GtoI_fej, clone.p_IinG_fej, clone.w_IinI, clone.v_IinG};
+      const auto& R_GtoI = clone.R_GtoI_fej;
+      return MovingPose{R_GtoI, clone.p_IinG_fej, clone.w_IinI, R_GtoI * clone.v_IinG};
     };
-    const PredictionJacobian by_state = prediction_jacobian(pose_fej(first), pose_fej(last), mount);
+    const PoseJacobian by_state =
+        relative_pose_jacobian(pose_fej(first), pose_fej(last), mount);  // (RP-8)
     factor.columns.add(first.column, kPoseSize);
     factor.columns.add(last.column, kPoseSize);
     if (wheels.extrinsics_column >= 0) factor.columns.add(wheels.extrinsics_column, kPoseSize);
@@ -171,7 +174,7 @@ class WheelRelativePose final : public Update {
     if (wheels.time_offset_column >= 0) factor.H.col(column) = by_state.col(kTimeOffset);
     if (wheels.intrinsics_column >= 0) factor.H.rightCols(n) = -increment_.J_g_WI;
 
-    factor.residual = increment_.g - predict(pose(first), pose(last), mount);
+    factor.residual = increment_.g - relative_pose(pose(first), pose(last), mount);  // (RP-7)
     factor.residual[0] = std::remainder(factor.residual[0], 2. * M_PI);
     const Eigen::Vector3d floor(sigma_floor_yaw_rad_, sigma_floor_position_m_,
                                 sigma_floor_position_m_);

@@ -3,7 +3,7 @@
 #include "viwo/math/se2.hpp"
 #include "viwo/math/so3.hpp"
 
-namespace viwo::wheel_odometry {
+namespace viwo::wheel_motion {
 namespace {
 
 using Eigen::Matrix3d;
@@ -108,4 +108,4 @@ Eigen::Matrix<double, 2, kGeometrySize> tilt_jacobian(const MovingPose& first,
   return J;
 }
 
-}  // namespace viwo::wheel_odometry
+}  // namespace viwo::wheel_motion

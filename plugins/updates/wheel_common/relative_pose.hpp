@@ -1,10 +1,10 @@
 // Planar pose of the odometry frame O between two instants, predicted from two poses of the IMU,
-// with its derivatives. Equations: model.md beside this file.
+// with its derivatives. Equations: model.md of wheel_odometry.
 #pragma once
 
 #include <Eigen/Core>
 
-namespace viwo::wheel_odometry {
+namespace viwo::wheel_motion {
 
 /// Pose of the IMU at a clone, and how it moved there; wanted `after_s` later.
 struct MovingPose {
@@ -71,4 +71,4 @@ CalibrationJacobian calibration_jacobian(const Eigen::Vector3d& g, const Eigen::
 Eigen::Matrix<double, 2, kGeometrySize> tilt_jacobian(const MovingPose& first,
                                                       const MovingPose& last, const Mount& mount);
 
-}  // namespace viwo::wheel_odometry
+}  // namespace viwo::wheel_motion
