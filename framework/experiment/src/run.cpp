@@ -114,16 +114,20 @@ StageTime stage_time(std::vector<double> ms) {
 }
 
 std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates) {
-  // Gates reject five percent at most (gate_probability) of what is good: that more than a third of
-  // forty are, has a probability below 1e-8. Fewer would report the first seconds of a start that
-  // is off.
+  // Gates reject five percent at most (gate_probability) of what is good. A fifth, and seven sigmas
+  // of the count more than that, is not by chance; of less than forty it may be the first seconds of
+  // a start that is off.
   constexpr std::int64_t kFewest = 40;
+  constexpr double kGated = 0.05, kSigmas = 7.;
   std::vector<std::string> lines;
   for (const UpdateTrack& update : updates) {
     const auto& [applied, rejected] = update.total;
-    if (applied + rejected < kFewest || 2 * rejected <= applied) continue;
+    const std::int64_t of = applied + rejected;
+    const double n = static_cast<double>(of);
+    const double chance = kGated * n + kSigmas * std::sqrt(kGated * (1. - kGated) * n);
+    if (of < kFewest || 5 * rejected <= of || static_cast<double>(rejected) <= chance) continue;
     lines.push_back(update.name + ": " + std::to_string(rejected) + " of " +
-                    std::to_string(applied + rejected) +
+                    std::to_string(of) +
                     " rejected: what it measures and the rest contradict each other - check "
                     "calibration and axes of cameras and IMU, order of the joints, kinematics");
   }
