@@ -15,8 +15,10 @@ import sys
 
 from bench import Bench
 
-# What warnings of a sensor begin with; what all updates contradict is the IMU's.
-NAMES = {'imu0': r'(the )?(all updates|imu|gyro|accel)', 'wheels0': r'(the )?(wheel|drive|steer)',
+# What warnings of a sensor begin with. What all updates contradict is the IMU's, or the wheels' where
+# nothing else is measured.
+NAMES = {'imu0': r'(the )?(all updates|imu|gyro|accel)', 'wheels0': r'(the )?(wheel|drive|steer)|'
+         r'all updates .* measured by wheel_\w+(, wheel_\w+)*$',
          'features0': r'(the )?(visual|cam|image|feature)'}
 WITHOUT_CAMERAS = ('updates.visual_features.enabled=false',)
 

@@ -114,10 +114,17 @@ void Recorder::finish(const Estimator& estimator) {
   }
   result_.noises = estimator.noises();
   if (loosened_ > 0) {
+    std::string updates;
+    for (const UpdateTrack& update : result_.updates) {
+      if (update.total.applied + update.total.rejected == 0) continue;
+      updates += (updates.empty() ? "" : ", ") + update.name;
+    }
     result_.warnings.push_back("all updates contradicted the estimate, first at " +
                                time_text(first_loosened_ns_ - begin_ns_) + "; it was loosened " +
                                std::to_string(loosened_) +
-                               " times - look for faults of the IMU there");
+                               " times - look for faults of the IMU there, or of all that is "
+                               "measured by " +
+                               updates);
   }
   if (n_nees_ > 0) {
     result_.nees.pose = sum_pose_ / n_nees_;

@@ -22,7 +22,8 @@ void RunningWarnings::epoch(const RunResult& result, const Estimator& estimator,
   }
   if (estimator.contact().loosened() > 0) {
     say("contact", now_s,
-        "all updates contradict the estimate: it is loosened - look for faults of the IMU");
+        "all updates contradict the estimate: it is loosened - look for faults of the IMU, or of "
+        "all that they measure");
   }
   for (const UpdateTrack& update : result.updates) {
     const std::string of = "update '" + update.name + "' ";
