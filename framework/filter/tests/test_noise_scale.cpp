@@ -194,7 +194,7 @@ TEST(NoiseScale, StaysAsConfiguredWhereThatIsRight) {
   EXPECT_LT(mean, 1. + 2. / std::sqrt(6. * 60.));
 }
 
-TEST(NoiseScale, BelievesTwoInARowAndNotOneAlone) {
+TEST(NoiseScale, BelievesTwoOfThreeInARowAndNotOneAlone) {
   NoiseScale noise(10., 60., 100.);
   noise.add_beyond_in_turn(5.);
   const double one = (59. / 60. * 10. + 5.) / (59. / 60. * 10. + 1.);
@@ -207,8 +207,15 @@ TEST(NoiseScale, BelievesTwoInARowAndNotOneAlone) {
   NoiseScale between(10., 60., 100.);
   between.add_beyond_in_turn(5.);
   between.add(1.);
+  const double before = between.variance();
   between.add_beyond_in_turn(5.);
-  EXPECT_LT(between.variance(), 2.);
+  EXPECT_NEAR(between.variance(), 0.25 * (2. * before + 5. + 5. * before), 1e-12);
+  NoiseScale apart(10., 60., 100.);
+  apart.add_beyond_in_turn(5.);
+  apart.add(1.);
+  apart.add(1.);
+  apart.add_beyond_in_turn(5.);
+  EXPECT_LT(apart.variance(), 2.);
   noise.reset();
   EXPECT_EQ(noise.variance(), 1.);
   EXPECT_EQ(noise.count(), 0);

@@ -20,18 +20,18 @@ void NoiseScale::add(double variance, double weight) {
   total_ += weight * variance;
   total_weight_ += weight;
   ++count_;
-  beyond_ = 0.;
+  beyond_ = beyond_ > 0. ? -beyond_ : 0.;
 }
 
 void NoiseScale::add_beyond_in_turn(double gate) {
   if (!enabled_) return;
   const double said = variance_ * gate;
-  const bool in_a_row = beyond_ > 0.;
-  if (in_a_row) {  // (F-39)
-    sum_ = 2. * variance_ + beyond_;
+  const bool is_second = beyond_ != 0.;
+  if (is_second) {  // (F-39)
+    sum_ = 2. * variance_ + std::abs(beyond_);
     weight_ = 3.;
   }
-  remember(said, 1., in_a_row ? 1. : 1. - 1. / memory_);
+  remember(said, 1., is_second ? 1. : 1. - 1. / memory_);
   // What is reported is not what a scale that was raised makes of outliers.
   total_ += std::min(said, gate * total_ / total_weight_);
   total_weight_ += 1.;

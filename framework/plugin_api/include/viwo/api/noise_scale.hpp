@@ -47,8 +47,8 @@ class VIWO_API NoiseScale {
   /// One measurement that was less likely than its gate, which is `gate` times what was expected of
   /// its square: counts as one at its gate, however far off it is (F-31).
   void add_beyond(double gate) { add(variance_ * gate); }
-  /// The same of measurements that come one after the other: two in a row are no outliers but
-  /// another noise, and little is remembered but them (F-39).
+  /// The same of measurements that come one after the other: two of three in a row are no outliers
+  /// but another noise, and little is remembered but them (F-39).
   void add_beyond_in_turn(double gate);
 
   /// Over all that was measured, without forgetting; where that says little, about 1.
@@ -68,7 +68,8 @@ class VIWO_API NoiseScale {
   double variance_ = 1.;
   double sum_ = 0., weight_ = 0.;  ///< remembered
   double total_ = 0., total_weight_ = 0.;
-  double beyond_ = 0.;  ///< s^2 that the measurement before said, if it was beyond its gate
+  double beyond_ = 0.;  ///< s^2 that the last one said, if it was beyond its gate; or, negative,
+                        ///< that the one before it said
   std::int64_t count_ = 0;
 };
 
