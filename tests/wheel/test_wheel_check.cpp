@@ -143,6 +143,24 @@ TEST(WheelCheck, FindsThatAllWheelsAreWorseThanConfigured) {
   EXPECT_NEAR(checked.check.noise().scale(), 20., 3.);
 }
 
+TEST(WheelCheck, LeavesOutASampleOfWhichNobodyIsToBlameIfItIsAlone) {
+  const Fault three_wheels = [](EncoderSample& y) {
+    y.drive_rad_per_s[0] += 5., y.drive_rad_per_s[1] -= 3., y.drive_rad_per_s[2] += 8.;
+  };
+  int n = 0;
+  const Checked alone(swerve("four_wis_wid"), [&](EncoderSample& y) {
+    if (n++ % 50 == 0) three_wheels(y);
+  });
+  EXPECT_EQ(Checked::count(alone.during, 0xf, 0xf), 10);
+  EXPECT_EQ(Checked::count(alone.during, 0, 0), 490);
+  ASSERT_EQ(alone.rejections.size(), 1u);
+  EXPECT_EQ(alone.rejections[0].count, 10);
+  // Where it goes on the noise is found, and nothing more is left out.
+  const Checked lasting(swerve("four_wis_wid"), three_wheels);
+  EXPECT_LT(Checked::count(lasting.during, 0xf, 0xf), 3);
+  EXPECT_GT(lasting.check.noise().found(), 20.);
+}
+
 TEST(WheelCheck, SaysNothingWhereNobodyCanTell) {
   // Four drives alone have one contradiction: it fits each of them.
   const Checked checked(swerve("four_wis_wid_drive_only"),

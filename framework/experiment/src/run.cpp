@@ -115,8 +115,8 @@ StageTime stage_time(std::vector<double> ms) {
 
 std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates) {
   // Gates reject five percent at most (gate_probability) of what is good. A fifth, and seven sigmas
-  // of the count more than that, is not by chance; of less than forty it may be the first seconds of
-  // a start that is off.
+  // of the count more than that, is not by chance; of less than forty it may be the first seconds
+  // of a start that is off.
   constexpr std::int64_t kFewest = 40;
   constexpr double kGated = 0.05, kSigmas = 7.;
   std::vector<std::string> lines;
@@ -126,8 +126,7 @@ std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates)
     const double n = static_cast<double>(of);
     const double chance = kGated * n + kSigmas * std::sqrt(kGated * (1. - kGated) * n);
     if (of < kFewest || 5 * rejected <= of || static_cast<double>(rejected) <= chance) continue;
-    lines.push_back(update.name + ": " + std::to_string(rejected) + " of " +
-                    std::to_string(of) +
+    lines.push_back(update.name + ": " + std::to_string(rejected) + " of " + std::to_string(of) +
                     " rejected: what it measures and the rest contradict each other - check "
                     "calibration and axes of cameras and IMU, order of the joints, kinematics");
   }

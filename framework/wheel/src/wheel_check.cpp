@@ -138,6 +138,7 @@ void WheelCheck::check(EncoderSample& y) {
   Verdict verdict = judge(y);
   if (verdict.dof < 1) return;
   const Suspect* const liar_before = std::exchange(liar_, nullptr);
+  const bool nobody_before = std::exchange(is_nobody_, false);
   if (agrees(verdict)) {
     noise_.add(noise_.variance() * verdict.chi2 / verdict.dof);
     return;
@@ -163,6 +164,10 @@ void WheelCheck::check(EncoderSample& y) {
   }
   if (!is_explained) {
     if (contradicting_++ == 0) first_contradicting_ns_ = y.t_ns;
+    is_nobody_ = true;
+    // Alone it is an outlier; two in a row are the noise, or the calibration.
+    if (nobody_before) return;
+    for (const Suspect& suspect : suspects_) mark(suspect.kind, suspect.channel, y);
     return;
   }
   for (std::size_t i = 0; i < n_liars; ++i) {
@@ -183,8 +188,10 @@ void WheelCheck::rejections(std::vector<RejectionCount>& out) const {
                    time_text(suspect.first_ns) + " .. " + time_text(suspect.last_ns), samples_});
   }
   if (contradicting_ > 0) {
-    out.push_back({"sample whose wheels contradict each other, none of them in particular (used)",
-                   contradicting_, time_text(first_contradicting_ns_), samples_});
+    out.push_back(
+        {"sample whose wheels contradict each other, none of them in particular (left "
+         "out where the one before is not such)",
+         contradicting_, time_text(first_contradicting_ns_), samples_});
   }
 }
 

@@ -58,6 +58,7 @@ class WheelCheck {
   NoiseScale noise_;
   std::int64_t samples_ = 0;
   const Suspect* liar_ = nullptr;   ///< of the sample before
+  bool is_nobody_ = false;          ///< the sample before was one without a wheel that explains it
   std::int64_t contradicting_ = 0;  ///< samples without a wheel that explains it
   std::int64_t first_contradicting_ns_ = 0;
   TwistSolution solution_;
