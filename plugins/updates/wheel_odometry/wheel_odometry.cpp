@@ -223,7 +223,7 @@ class WheelOdometry final : public Update {
     const Eigen::Vector3d& p_IinO = at_.mount.p_IinO;
     const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt, g_rate_, p_IinO);
     const CalibrationJacobian moving =
-        calibration_jacobian(moving_part(pose_.g, R_.diagonal()),
+        calibration_jacobian(planar_part(pose_.g, R_.diagonal()),
                              moving_part(tilt, tilt_variance()), moving_rate(), p_IinO);
     geometry_jacobian_.rightCols<kCalibrationSize>() = moving;
     H_.resize(3, P_.cols());
@@ -249,13 +249,22 @@ class WheelOdometry final : public Update {
     }
   }
 
-  /// (WO-15): without the components that their noise alone explains.
+  /// (WO-15): zero where its noise alone explains all of it.
   template <class Vector, class Variance>
-  Vector moving_part(Vector measured, const Variance& variance) const {
+  Vector moving_part(const Vector& measured, const Variance& variance) const {
     for (Eigen::Index i = 0; i < measured.size(); ++i) {
-      if (is_noise(measured[i], variance[i], options_.twist.motion_sigmas)) measured[i] = 0.;
+      if (!is_noise(measured[i], variance[i], options_.twist.motion_sigmas)) return measured;
     }
-    return measured;
+    return Vector::Zero();
+  }
+
+  /// Turning and moving of [yaw, x, y], each by itself.
+  Eigen::Vector3d planar_part(const Eigen::Vector3d& g, const Eigen::Vector3d& variance) const {
+    using Turn = Eigen::Matrix<double, 1, 1>;
+    Eigen::Vector3d part;
+    part << moving_part(Turn(g.head<1>()), variance),
+        moving_part(Eigen::Vector2d(g.tail<2>()), variance.tail<2>());
+    return part;
   }
 
   /// Of the roll and the pitch of O from one clone to the other.
@@ -271,7 +280,7 @@ class WheelOdometry final : public Update {
     if (!rate_is_wheels_) return Eigen::Vector3d::Zero();
     const double shift_s = 1e-9 * kShiftNs;
     const double apart = std::min(shift_s / pose_.duration_s, 1.);
-    return moving_part(g_rate_, Eigen::Vector3d(2. * apart / (shift_s * shift_s) * R_.diagonal()));
+    return planar_part(g_rate_, Eigen::Vector3d(2. * apart / (shift_s * shift_s) * R_.diagonal()));
   }
 
   /// at_ = start_ (+) step.
