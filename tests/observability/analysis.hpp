@@ -1,7 +1,9 @@
 // Analyses of delivered configurations, and what is looked up in them.
 #pragma once
 
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "registry.hpp"
@@ -18,24 +20,24 @@ inline experiment::ObservabilityReport analyse(const std::string& name,
 }
 
 inline const experiment::ObservabilityResult& find(const experiment::ObservabilityReport& report,
-                                                   const std::string& motion,
-                                                   const std::string& variant) {
+                                                   std::string_view motion,
+                                                   std::string_view variant) {
   for (const experiment::ObservabilityResult& result : report.results) {
     if (report.setup.recordings[result.motion].name == motion &&
         report.setup.variants[result.variant].name == variant) {
       return result;
     }
   }
-  throw std::invalid_argument("no " + motion + " " + variant);
+  throw std::invalid_argument("no " + std::string(motion) + " " + std::string(variant));
 }
 
 /// The named set, as it lies to the null space of a state.
 inline const experiment::ExplainedDirections& find(const experiment::Observability& state,
-                                                   const std::string& set) {
+                                                   std::string_view set) {
   for (const experiment::ExplainedDirections& explained : state.explained) {
     if (explained.name == set) return explained;
   }
-  throw std::invalid_argument("no " + set);
+  throw std::invalid_argument("no " + std::string(set));
 }
 
 }  // namespace viwo::testing
