@@ -14,6 +14,7 @@
 #include "checked_encoders.hpp"
 #include "encoder_intervals.hpp"
 #include "encoders.hpp"
+#include "ground_tilt.hpp"
 #include "relative_pose.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/so3.hpp"
@@ -79,6 +80,7 @@ class WheelOdometry final : public Update {
 
   void start(const UpdateSetup& /*setup*/) override {
     noise_.reset();
+    ground_tilt_ = wheel_odometry::GroundTilt(options_.twist.motion_sigmas);
     checked_.start(wheel_model_of(blocks_), wheel_check_probability_);
     preintegrator_.emplace(wheel_model_of(blocks_), options_);
     shifted_preintegrator_.emplace(wheel_model_of(blocks_), options_);
@@ -109,6 +111,7 @@ class WheelOdometry final : public Update {
     ResidualFactor& factor = sink.add_residual();
     set_columns(wheels, filter.P(), first, last, factor.columns);
     iterate(wheels, encoders, *interval, factor);
+    ground_tilt_.add(pose_.g[0], tilt_, tilt_variance());
   }
 
   void rejections(std::vector<RejectionCount>& out) const override {
@@ -206,9 +209,8 @@ class WheelOdometry final : public Update {
 
   /// (WO-8): residual and Jacobian at at_, and the noise of pose_.
   void linearise() {
-    Eigen::Vector2d tilt;
-    residual_ = pose_.g - relative_pose(at_.first, at_.last, at_.mount, &tilt);
-    const Motion motion = complete_motion(pose_.g, tilt);
+    residual_ = pose_.g - relative_pose(at_.first, at_.last, at_.mount, &tilt_);
+    const Motion motion = complete_motion(pose_.g, tilt_);
     residual_.tail<2>() += motion.d.head<2>() - pose_.g.tail<2>();
     residual_[0] = std::remainder(residual_[0], 2. * M_PI);
     MovingPose first = first_fej_;
@@ -221,10 +223,9 @@ class WheelOdometry final : public Update {
     // would count their noise as motion, and so as information: it is taken at the motion that the
     // wheels measured, with the tilt of the iterate.
     const Eigen::Vector3d& p_IinO = at_.mount.p_IinO;
-    const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt, g_rate_, p_IinO);
-    const CalibrationJacobian moving =
-        calibration_jacobian(planar_part(pose_.g, R_.diagonal()),
-                             moving_part(tilt, tilt_variance()), moving_rate(), p_IinO);
+    const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt_, g_rate_, p_IinO);
+    const CalibrationJacobian moving = calibration_jacobian(planar_part(pose_.g, R_.diagonal()),
+                                                            moving_tilt(), moving_rate(), p_IinO);
     geometry_jacobian_.rightCols<kCalibrationSize>() = moving;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
@@ -267,10 +268,15 @@ class WheelOdometry final : public Update {
     return part;
   }
 
-  /// Of the roll and the pitch of O from one clone to the other.
-  Eigen::Vector2d tilt_variance() const {
+  /// (WO-16)
+  Eigen::Vector2d moving_tilt() const {
+    return options_.twist.motion_sigmas > 0. ? ground_tilt_.share() * tilt_ : tilt_;
+  }
+
+  /// Of the roll, or the pitch, of O from one clone to the other.
+  double tilt_variance() const {
     const Eigen::Matrix<double, 2, kGeometrySize> J = tilt_jacobian(at_.first, at_.last, at_.mount);
-    return (J * geometry_P_ * J.transpose()).diagonal();
+    return 0.5 * (J * geometry_P_ * J.transpose()).trace();
   }
 
   /// Of the rates of the encoders: two intervals that share all but the shift at both ends. Those
@@ -417,6 +423,8 @@ class WheelOdometry final : public Update {
   Square P_;
   GeometryMatrix geometry_P_ = GeometryMatrix::Zero();  // of the geometry, zero where held
   Eigen::Vector3d residual_ = Eigen::Vector3d::Zero();
+  Eigen::Vector2d tilt_ = Eigen::Vector2d::Zero();  // [roll, pitch] of O over the interval
+  wheel_odometry::GroundTilt ground_tilt_;
   PoseJacobian geometry_jacobian_ = PoseJacobian::Zero();
   Jacobian H_;
   Eigen::Matrix3d R_ = Eigen::Matrix3d::Zero();
