@@ -224,14 +224,17 @@ class WheelOdometry final : public Update {
     // wheels measured, with the tilt of the iterate.
     const Eigen::Vector3d& p_IinO = at_.mount.p_IinO;
     const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt_, g_rate_, p_IinO);
-    const CalibrationJacobian moving = calibration_jacobian(planar_part(pose_.g, R_.diagonal()),
+    const auto n = P_.cols() - n_geometry_;
+    const Eigen::Vector3d noise =
+        R_.diagonal() +
+        (pose_.J_g_WI * P_.bottomRightCorner(n, n)).cwiseProduct(pose_.J_g_WI).rowwise().sum();
+    const CalibrationJacobian moving = calibration_jacobian(planar_part(pose_.g, noise),
                                                             moving_tilt(), moving_rate(), p_IinO);
     geometry_jacobian_.rightCols<kCalibrationSize>() = moving;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
       H_.col(k) = geometry_jacobian_.col(geometry_[static_cast<std::size_t>(k)]);
     }
-    const auto n = P_.cols() - n_geometry_;
     if (n > 0) H_.rightCols(n) = -pose_.J_g_WI;
     // What the calibration may be off by, through columns that are not in the Jacobian, is noise.
     if (measured == moving) return;
