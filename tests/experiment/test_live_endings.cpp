@@ -182,7 +182,8 @@ TEST(RecordedRun, StartsAnewOnRequestWithTheCalibrationOfBefore) {
     EXPECT_GT(track.sigma[second], 2. * track.sigma[kept]) << track.name << " is uncertain again";
   }
   // And it is right again: how far it came in its last ten seconds.
-  const std::size_t last = result.estimate.size() - 1;
+  std::size_t last = result.estimate.size() - 1;
+  while (result.estimate[last].t_ns > result.reference.back().t_ns) --last;
   const std::size_t begin = up_to(result.epoch_t_s, result.epoch_t_s[last] - 10.);
   ASSERT_GT(begin, second);
   const auto from = interpolate(result.reference, result.estimate[begin].t_ns, 0.2);

@@ -130,11 +130,11 @@ TEST(Excitation, HeldParametersStayPutAndConsistentInALongStraightOnUnevenGround
   }
   const auto free = outcomes("uneven", false);
   for (const char* name : {"x_2", "x_3", "x_4"}) {
-    EXPECT_LT(held.at(name).moved, 0.1) << name;
+    EXPECT_LT(held.at(name).moved, 0.2) << name;
     EXPECT_GT(free.at(name).moved, 5. * held.at(name).moved) << name;
   }
   // What a straight line tells is still learned.
-  EXPECT_GT(held.at("r_1").moved, 1.);
+  EXPECT_GT(held.at("r_1").moved, 0.5);
 }
 
 TEST(Excitation, HoldingKeepsTheFilterConsistentOnFlatGroundWhereNoiseLooksLikeATilt) {

@@ -228,8 +228,8 @@ class WheelOdometry final : public Update {
     const Eigen::Vector3d noise =
         R_.diagonal() +
         (pose_.J_g_WI * P_.bottomRightCorner(n, n)).cwiseProduct(pose_.J_g_WI).rowwise().sum();
-    const CalibrationJacobian moving = calibration_jacobian(planar_part(pose_.g, noise),
-                                                            moving_tilt(), moving_rate(), p_IinO);
+    const CalibrationJacobian moving =
+        calibration_jacobian(planar_part(pose_.g, noise), moving_tilt(), moving_rate(), p_IinO);
     geometry_jacobian_.rightCols<kCalibrationSize>() = moving;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
