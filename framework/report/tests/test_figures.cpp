@@ -223,7 +223,7 @@ std::string streams_of(const std::string& pdf) {
                    size) == Z_OK) {
       all.append(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(text_size));
     }
-    at += size;
+    at += size + end.size();  // behind it, or its "stream" would begin the next one
   }
   return all;
 }
