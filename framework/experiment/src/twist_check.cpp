@@ -326,8 +326,8 @@ void TwistCheck::find_lag(double rate_variance, Findings& out) const {
   }
   const double lag_s = kCell_s * (static_cast<double>(least) - kMostLag +
                                   0.5 * (left[least - 1] - left[least + 1]) / bend);
-  // What makes them differ, slopes of the ground, slip or geometry, lasts for some seconds.
-  constexpr double kSame = 1. / kCell_s;
+  // What makes them differ, slopes of the ground or slip, lasts for half a second.
+  constexpr double kSame = 0.5 / kCell_s;
   const double sigma_s = kCell_s * std::sqrt(2. * left[least] / (bend * n / kSame));
   constexpr double kLeastLag_s = 0.01;
   if (std::abs(lag_s) < kLeastLag_s + 3. * std::hypot(sigma_t_OtoI_s_, sigma_s)) return;
