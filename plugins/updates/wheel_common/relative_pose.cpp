@@ -35,6 +35,12 @@ struct Geometry {
 
 }  // namespace
 
+MovingPose moving_pose(const CloneView& clone, double after_s, bool first_estimate) {
+  return {first_estimate ? clone.R_GtoI_fej : clone.R_GtoI,
+          first_estimate ? clone.p_IinG_fej : clone.p_IinG, clone.w_IinI,
+          clone.R_GtoI_fej * clone.v_IinG, after_s};
+}
+
 Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last, const Mount& mount,
                               Eigen::Vector2d* tilt) {
   const Geometry g(first, last, mount);

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "viwo/api/filter_view.hpp"
+
 namespace viwo::wheel_motion {
 
 /// Pose of the IMU at a clone, and how it moved there; wanted `after_s` later.
@@ -14,6 +16,9 @@ struct MovingPose {
   Eigen::Vector3d v_IinI = Eigen::Vector3d::Zero();  ///< velocity relative to G, in I, m/s
   double after_s = 0.;                               ///< small
 };
+
+/// Of a clone, at its estimate or at its first estimate; its velocity is turned by the latter.
+MovingPose moving_pose(const CloneView& clone, double after_s, bool first_estimate);
 
 /// Where the IMU sits in O.
 struct Mount {

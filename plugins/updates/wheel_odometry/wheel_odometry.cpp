@@ -131,13 +131,8 @@ class WheelOdometry final : public Update {
   void set_start(const WheelsView& wheels, const CloneView& first, const CloneView& last,
                  const EncoderInterval& interval) {
     const auto moving = [&](const CloneView& clone, std::int64_t cut_ns, bool fej) {
-      MovingPose pose;
-      pose.R_GtoI = fej ? clone.R_GtoI_fej : clone.R_GtoI;
-      pose.p_IinG = fej ? clone.p_IinG_fej : clone.p_IinG;
-      pose.w_IinI = clone.w_IinI;
-      pose.v_IinI = clone.R_GtoI_fej * clone.v_IinG;
-      pose.after_s = seconds_between(clone.t_ns, cut_ns) + wheels.t_OtoI_s;  // (WO-2)
-      return pose;
+      const double after_s = seconds_between(clone.t_ns, cut_ns) + wheels.t_OtoI_s;  // (WO-2)
+      return moving_pose(clone, after_s, fej);
     };
     start_.first = moving(first, interval.begin_ns, false);
     start_.last = moving(last, interval.end_ns, false);

@@ -147,15 +147,8 @@ class WheelRelativePose final : public Update {
   void add_factor(const WheelsView& wheels, const CloneView& first, const CloneView& last,
                   ResidualFactor& factor) {
     const Mount mount{wheels.R_ItoO, wheels.p_IinO};
-    const auto pose = [](const CloneView& clone) {
-      return MovingPose{clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.R_GtoI * clone.v_IinG};
-    };
-    const auto pose_fej = [](const CloneView& clone) {
-      const auto& R_GtoI = clone.R_GtoI_fej;
-      return MovingPose{R_GtoI, clone.p_IinG_fej, clone.w_IinI, R_GtoI * clone.v_IinG};
-    };
-    const PoseJacobian by_state =
-        relative_pose_jacobian(pose_fej(first), pose_fej(last), mount);  // (RP-8)
+    const PoseJacobian by_state = relative_pose_jacobian(
+        moving_pose(first, 0., true), moving_pose(last, 0., true), mount);  // (RP-8)
     factor.columns.add(first.column, kPoseSize);
     factor.columns.add(last.column, kPoseSize);
     if (wheels.extrinsics_column >= 0) factor.columns.add(wheels.extrinsics_column, kPoseSize);
@@ -174,7 +167,8 @@ class WheelRelativePose final : public Update {
     if (wheels.time_offset_column >= 0) factor.H.col(column) = by_state.col(kTimeOffset);
     if (wheels.intrinsics_column >= 0) factor.H.rightCols(n) = -increment_.J_g_WI;
 
-    factor.residual = increment_.g - relative_pose(pose(first), pose(last), mount);  // (RP-7)
+    factor.residual = increment_.g - relative_pose(moving_pose(first, 0., false),
+                                                   moving_pose(last, 0., false), mount);  // (RP-7)
     factor.residual[0] = std::remainder(factor.residual[0], 2. * M_PI);
     const Eigen::Vector3d floor(sigma_floor_yaw_rad_, sigma_floor_position_m_,
                                 sigma_floor_position_m_);
