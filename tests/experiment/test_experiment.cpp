@@ -45,7 +45,7 @@ TEST(FilterExperiment, GivesTheSameBitsForAnyNumberOfJobsAndTwiceInARow) {
     ExperimentOptions options;
     options.jobs = jobs;
     options.seeds = 2;
-    options.assignments = {"sensors.simulator0.duration_s=5"};
+    options.assignments = {"sensors.simulator0.duration_s=12", "estimator.hold_unexcited=true"};
     results.push_back(run_experiment(
         read_experiment(VIWO_TEST_SOURCE_DIR "/configs/experiments/paper_accuracy.yaml", options),
         options, registry(), {}));

@@ -68,7 +68,8 @@ class InformationWindow {
   std::vector<Matrix> bins_;
   std::size_t bin_ = 0;
   Matrix measured_;
-  Eigen::SelfAdjointEigenSolver<Matrix> solver_;
+  // Of the size of the widest vectors: sums have the same bits only where they begin alike.
+  alignas(64) Eigen::SelfAdjointEigenSolver<Matrix> solver_;
 };
 
 }  // namespace viwo
