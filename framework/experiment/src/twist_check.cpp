@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
 #include "viwo/experiment/output.hpp"
 #include "viwo/math/arrays.hpp"
 
@@ -85,8 +87,8 @@ void TwistCheck::add_imu(const ImuSample& sample) {
   // Behind a gap, or a step back, the clock may be another one.
   if (last_ && std::abs(sample.t_ns - last_->t_ns) > CellMeans<6>::kLongestNs) {
     lag_cells_ = lag_count_ = 0;
-    lag_sums_.fill(0.);
-    lag_squares_.fill(0.);
+    lags_.fill({});
+    lag_products_.setZero();
   }
   if (last_) {
     imu_means_.add(last_->t_ns, sample.t_ns, 0.5 * (values(*last_) + values(sample)));
@@ -119,7 +121,7 @@ void TwistCheck::advance() {
 }
 
 void TwistCheck::add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi) {
-  add_to_lags(imu[2], xi[2]);
+  add_to_lags(imu[2], xi);
   // Of the IMU's place.
   const Eigen::Vector2d v(xi[0] - xi[2] * p_IinO_.y(), xi[1] + xi[2] * p_IinO_.x());
   Entries entries = Entries::Zero();
@@ -145,19 +147,22 @@ void TwistCheck::end_window() {
   before_ = std::exchange(window_, {});
 }
 
-/// Differences of a rate of the wheels and those of the gyro half a second before to after it.
-void TwistCheck::add_to_lags(double gyro, double wheels) {
+/// Differences of the gyro's rates, half a second before to after it, and one of the wheels.
+void TwistCheck::add_to_lags(double gyro, const Twist& xi) {
   const auto place = [](std::int64_t cell) { return static_cast<std::size_t>(cell % kLags); };
   gyro_[place(lag_cells_)] = gyro;
-  wheel_[place(lag_cells_)] = wheels;
+  wheel_[place(lag_cells_)] = xi;
   ++lag_cells_;
   if (lag_cells_ < kLags) return;
   const std::int64_t middle = lag_cells_ - 1 - kMostLag;
-  const double w = wheel_[place(middle)];
-  for (int lag = -kMostLag; lag <= kMostLag; ++lag) {
-    const double difference = w - gyro_[place(middle + lag)];
-    lag_sums_[static_cast<std::size_t>(lag + kMostLag)] += difference;
-    lag_squares_[static_cast<std::size_t>(lag + kMostLag)] += difference * difference;
+  const Twist& w = wheel_[place(middle)];
+  const Eigen::Vector4d by(1., w[0], w[1], w[2]);
+  lag_products_ += by * by.transpose();
+  for (int i = 0; i < kLags; ++i) {
+    const double difference = gyro_[place(middle + i - kMostLag)] - w[2];
+    Lag& lag = lags_[static_cast<std::size_t>(i)];
+    lag.products += difference * by;
+    lag.squares += difference * difference;
   }
   ++lag_count_;
 }
@@ -306,16 +311,34 @@ void TwistCheck::find_axes(const Eigen::MatrixXd& C, Findings& out) const {
                                      ": " + kMountings[best].text});
 }
 
+/// What is left of the squared differences, for each lag, `information` being what is known of the
+/// parts of [1, twist] in them.
+auto TwistCheck::left_by_lag(const Eigen::Vector4d& information) const
+    -> std::array<double, kLags> {
+  const Eigen::Matrix4d N = lag_products_ + Eigen::Matrix4d(information.asDiagonal());
+  const Eigen::LDLT<Eigen::Matrix4d> solver(N);
+  std::array<double, kLags> left{};
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    left[i] = lags_[i].squares - lags_[i].products.dot(solver.solve(lags_[i].products));
+    left[i] /= static_cast<double>(lag_count_);
+  }
+  return left;
+}
+
 /// By how much the wheels' rate is before the gyro's: where the two differ least, whatever the
-/// bias.
+/// bias, and whatever wheels that are not quite as configured make of the base's motion.
 void TwistCheck::find_lag(double rate_variance, Findings& out) const {
   constexpr double kCell_s = 1e-9 * CellMeans<6>::kCellNs;
+  // What makes them differ, slopes of the ground or slip, lasts for half a second.
+  constexpr double kSame = 0.5 / kCell_s;
+  constexpr double kPart = 0.05;  // of the turn; rad/m of the velocity
   const double n = static_cast<double>(lag_count_);
   if (n * kCell_s < 10.) return;
-  std::array<double, kLags> left{};  // variance of the difference
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    left[i] = lag_squares_[i] / n - lag_sums_[i] * lag_sums_[i] / (n * n);
-  }
+  std::array<double, kLags> left = left_by_lag(Eigen::Vector4d::Zero());
+  const double noise = *std::min_element(left.begin(), left.end());
+  Eigen::Vector4d information = Eigen::Vector4d::Constant(kSame * noise / (kPart * kPart));
+  information[0] = 0.;
+  left = left_by_lag(information);
   const auto least =
       static_cast<std::size_t>(std::min_element(left.begin(), left.end()) - left.begin());
   if (least == 0 || least + 1 == left.size()) return;
@@ -326,8 +349,6 @@ void TwistCheck::find_lag(double rate_variance, Findings& out) const {
   }
   const double lag_s = kCell_s * (static_cast<double>(least) - kMostLag +
                                   0.5 * (left[least - 1] - left[least + 1]) / bend);
-  // What makes them differ, slopes of the ground or slip, lasts for half a second.
-  constexpr double kSame = 0.5 / kCell_s;
   const double sigma_s = kCell_s * std::sqrt(2. * left[least] / (bend * n / kSame));
   constexpr double kLeastLag_s = 0.01;
   if (std::abs(lag_s) < kLeastLag_s + 3. * std::hypot(sigma_t_OtoI_s_, sigma_s)) return;

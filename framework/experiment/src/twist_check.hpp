@@ -70,11 +70,12 @@ class TwistCheck {
 
   void advance();
   void add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi);
-  void add_to_lags(double gyro, double wheels);
+  void add_to_lags(double gyro, const Twist& xi);
   void end_window();
   bool finds_gravity(const Eigen::Vector3d& up, double slope, Findings& out) const;
   void find_reversed(const Eigen::MatrixXd& C, Findings& out) const;
   void find_axes(const Eigen::MatrixXd& C, Findings& out) const;
+  std::array<double, kLags> left_by_lag(const Eigen::Vector4d& information) const;
   void find_lag(double rate_variance, Findings& out) const;
 
   std::string imu_, wheels_;
@@ -93,10 +94,18 @@ class TwistCheck {
   Eigen::Matrix<double, kEntries, kEntries> products_ =
       Eigen::Matrix<double, kEntries, kEntries>::Zero();
 
-  std::array<double, kLags> gyro_{}, wheel_{};  ///< of the last cells, in turn
-  std::int64_t lag_cells_ = 0;                  ///< without a break
+  // Gyro minus wheels by lag, and what a bias and wheels that are not as configured make of it:
+  // a part of the turn and of the velocity that they tell.
+  struct Lag {
+    Eigen::Vector4d products = Eigen::Vector4d::Zero();  ///< of the difference with [1, twist]
+    double squares = 0.;
+  };
+  std::array<double, kLags> gyro_{};  ///< of the last cells, in turn
+  std::array<Twist, kLags> wheel_;    ///< likewise
+  std::int64_t lag_cells_ = 0;        ///< without a break
   std::int64_t lag_count_ = 0;
-  std::array<double, kLags> lag_sums_{}, lag_squares_{};  ///< of wheels minus gyro, by lag
+  std::array<Lag, kLags> lags_;
+  Eigen::Matrix4d lag_products_ = Eigen::Matrix4d::Zero();  ///< of [1, twist] with itself
 };
 
 }  // namespace viwo::experiment
