@@ -85,6 +85,17 @@ TEST(LiveRun, TellsThatCamerasAndWheelsHaveEnded) {
                    MatchesRegex("tracks of device: ended 5\\.1 s before the end of the run .*")}));
 }
 
+TEST(LiveRun, TellsThatTheWheelsNeverGaveASample) {
+  SilentRobot robot;
+  robot.lose<EncoderSample>(-1., 100.);
+  robot.run();
+  EXPECT_THAT(robot.said, ElementsAre("encoders of device: no samples: look at its cable, driver "
+                                      "and bus"));
+  EXPECT_THAT(robot.result.warnings,
+              ::testing::Contains("encoders of device: no samples in all of the run: look at its "
+                                  "cable, driver and bus"));
+}
+
 TEST(LiveRun, TellsThatAllSensorsAreSilent) {
   SilentRobot robot;
   robot.run(true);

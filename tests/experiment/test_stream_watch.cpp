@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "stream_watch.hpp"
+#include "viwo/math/time_text.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -100,6 +101,34 @@ TEST(StreamWatch, JudgesByTheUsualPeriodWhateverTheOthersDo) {
     pair.give(t + 1, 1);
   }
   EXPECT_THAT(pair.at_end(10'000), IsEmpty());
+}
+
+TEST(StreamWatch, TellsThatOneOfTwoCamerasHasEnded) {
+  for (const std::int64_t apart_ms : {0, 1}) {
+    Bench pair;
+    for (std::int64_t t = 0; t < 20'000; t += 50) {
+      pair.give(t, 0);
+      if (t < 12'000) pair.give(t + apart_ms, 1);
+    }
+    const std::string since = time_text((11'950 + apart_ms) * kMs);
+    const std::string text = "imu0: none of camera 1 since " + since +
+                             ", others go on: look at its cable, driver and bus";
+    EXPECT_THAT(pair.at(12'300), IsEmpty());
+    EXPECT_THAT(pair.at(20'000), ElementsAre(text));
+    EXPECT_THAT(pair.at_end(20'000), ElementsAre(text));
+    pair.give(20'000, 1);
+    EXPECT_THAT(pair.at_end(20'000), IsEmpty());
+  }
+}
+
+TEST(StreamWatch, TellsThatNothingHasEverCome) {
+  const Bench bench;
+  EXPECT_THAT(bench.at(9'000), IsEmpty()) << "drivers take a while";
+  EXPECT_THAT(bench.at(10'100),
+              ElementsAre("imu0: no samples: look at its cable, driver and bus"));
+  EXPECT_THAT(bench.at_end(1'000), IsEmpty());
+  EXPECT_THAT(bench.at_end(12'000), ElementsAre("imu0: no samples in all of the recording: look "
+                                                "at its cable, driver and bus"));
 }
 
 TEST(StreamWatch, NamesSamplesThatAreHeldUp) {

@@ -17,6 +17,9 @@ constexpr std::int64_t kLongNs = 10 * kSecondNs;
 /// Who ends a recording stops its sensors one after the other.
 constexpr std::int64_t kEndNs = 2 * kSecondNs;
 constexpr std::int64_t kMostSaid = 10;  ///< gaps that are told one by one
+constexpr const char* kLook = ": look at its cable, driver and bus";
+
+void raise(std::int64_t& newest_ns, std::int64_t t_ns) { newest_ns = std::max(newest_ns, t_ns); }
 
 std::string seconds(std::int64_t ns) {
   return significant(1e-9 * static_cast<double>(ns), 2) + " s";
@@ -31,18 +34,21 @@ bool StreamWatch::is_set_back(std::int64_t t_ns) {
   return n_behind_ > kMostBehind;
 }
 
-void StreamWatch::add(std::int64_t stamp_ns, int channel, std::int64_t now_ns) {
+void StreamWatch::add(std::int64_t stamp_ns, int number, std::int64_t now_ns) {
   constexpr std::int64_t kMostStamp = 4'000'000'000'000'000'000;
   if (stamp_ns > kMostStamp || stamp_ns < -kMostStamp) return;
   if (!has_begun_) {
     // Of another clock.
     const std::int64_t off_ns = now_ns - stamp_ns;
     if (off_ns > kSecondNs / 2 || off_ns < -kSecondNs / 2) offset_ns_ = off_ns;
-    channel_ = channel;
   }
   std::int64_t t_ns = stamp_ns + offset_ns_;
   if (has_begun_ && t_ns <= newest_ns_) {
-    if (!is_set_back(t_ns)) return;
+    if (!is_set_back(t_ns)) {
+      // Of another camera at the same instant.
+      if (n_behind_ == 0) raise(channel(number).newest_ns, t_ns);
+      return;
+    }
     offset_ns_ += now_ns + 1 - t_ns;
     t_ns = now_ns + 1;
   }
@@ -61,11 +67,18 @@ void StreamWatch::add(std::int64_t stamp_ns, int channel, std::int64_t now_ns) {
       last_gap_ = gap;
       if (gap.length_ns > longest_gap_.length_ns) longest_gap_ = gap;
     }
-    if (channel == channel_) watch_period(t_ns - channel_ns_);
   }
-  if (channel == channel_) channel_ns_ = t_ns;
-  newest_ns_ = t_ns;
+  Channel& own = channel(number);
+  if (has_begun_ && &own == &channels_.front()) watch_period(t_ns - own.newest_ns);
+  newest_ns_ = own.newest_ns = t_ns;
   has_begun_ = true;
+}
+
+/// Allocates when one is seen for the first time.
+auto StreamWatch::channel(int number) -> Channel& {
+  const auto known = std::find_if(channels_.begin(), channels_.end(),
+                                  [number](const Channel& c) { return c.number == number; });
+  return known != channels_.end() ? *known : channels_.emplace_back(Channel{number, 0});
 }
 
 /// Steps up and down are equally many where it is the median; gaps are no more than others.
@@ -111,16 +124,34 @@ void StreamWatch::find_held_up(Findings& out) const {
                      "stamped when they arrive - stamp them when they are measured"});
 }
 
+/// Of several, while others go on.
+void StreamWatch::find_silent_channels(std::int64_t now_ns, std::int64_t zero_ns,
+                                       std::int64_t longest_ns, Findings& out) const {
+  for (const Channel& channel : channels_) {
+    if (now_ns - channel.newest_ns <= longest_ns) continue;
+    const std::string number = std::to_string(channel.number);
+    out.push_back({name_ + " channel " + number,
+                   name_ + ": none of camera " + number + " since " +
+                       time_text(channel.newest_ns - zero_ns) + ", others go on" + kLook});
+  }
+}
+
 void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, Findings& out) const {
-  if (!has_begun_) return;
+  if (!has_begun_) {
+    if (now_ns - zero_ns > kLongNs) out.push_back({name_ + " none", name_ + ": no samples" + kLook});
+    return;
+  }
   find_held_up(out);
   if (n_gaps_ > kMostSaid) return;
   const std::string number = std::to_string(n_gaps_);
   if (now_ns - newest_ns_ > longest_spacing_ns()) {
     out.push_back({name_ + " silent " + number, name_ + ": no samples since " +
                                                     time_text(newest_ns_ - zero_ns) +
-                                                    ": look at its cable, driver and bus"});
-  } else if (n_gaps_ > 0) {
+                                                    kLook});
+    return;
+  }
+  find_silent_channels(now_ns, zero_ns, longest_spacing_ns(), out);
+  if (n_gaps_ > 0) {
     out.push_back({name_ + " again " + number,
                    name_ + ": samples again, after " + seconds(last_gap_.length_ns) +
                        " without any from " + time_text(last_gap_.begin_ns - zero_ns) + " on"});
@@ -129,7 +160,11 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, Findings& 
 
 void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, const char* of_what,
                            Findings& out) const {
-  if (!has_begun_) return;
+  if (!has_begun_) {
+    if (now_ns - zero_ns <= kEndNs) return;
+    out.push_back({name_ + " none", name_ + ": no samples in all of the " + of_what + kLook});
+    return;
+  }
   find_held_up(out);
   if (n_gaps_ > 0) {
     const bool several = n_gaps_ > 1;
@@ -143,7 +178,8 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, const char
                        ": look at its cable, driver, bus and clock, or at what has recorded it"});
   }
   const std::int64_t silent_ns = now_ns - newest_ns_;
-  if (silent_ns <= std::max(longest_spacing_ns(), kEndNs)) return;
+  const std::int64_t longest_ns = std::max(longest_spacing_ns(), kEndNs);
+  if (silent_ns <= longest_ns) return find_silent_channels(now_ns, zero_ns, longest_ns, out);
   out.push_back({name_ + " end", name_ + ": ended " + seconds(silent_ns) +
                                      " before the end of the " + of_what + " (" +
                                      time_text(newest_ns_ - zero_ns) +

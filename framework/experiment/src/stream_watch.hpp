@@ -1,11 +1,12 @@
-// Whether a sensor goes on giving samples: gaps, an early end, samples that are held up and then
-// come all at once.
+// Whether a sensor goes on giving samples: none at all, gaps, an early end, of one of its cameras,
+// too, samples that are held up and then come all at once.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "finding.hpp"
 #include "viwo/math/stamp_jump.hpp"
@@ -21,8 +22,9 @@ class StreamWatch {
   StreamWatch(std::string name, double least_gap_s)
       : name_(std::move(name)), least_gap_ns_(static_cast<std::int64_t>(1e9 * least_gap_s)) {}
 
-  /// A sample has come. `now_ns`: the newest time of all streams, which begins with the first one.
-  void add(std::int64_t stamp_ns, int channel, std::int64_t now_ns);
+  /// A sample has come, of camera `number` if there are several. `now_ns`: the newest time of all
+  /// streams, which begins with the first one.
+  void add(std::int64_t stamp_ns, int number, std::int64_t now_ns);
   bool has_begun() const { return has_begun_; }
   /// Time of the newest sample.
   std::int64_t newest_ns() const { return newest_ns_; }
@@ -38,6 +40,8 @@ class StreamWatch {
     std::int64_t begin_ns = 0, length_ns = 0;
   };
   std::int64_t longest_spacing_ns() const;
+  void find_silent_channels(std::int64_t now_ns, std::int64_t zero_ns, std::int64_t longest_ns,
+                            Findings& out) const;
   bool is_set_back(std::int64_t t_ns);
   void watch_period(std::int64_t spacing_ns);
   void watch_bursts(std::int64_t spacing_ns);
@@ -51,9 +55,13 @@ class StreamWatch {
   std::int64_t newest_ns_ = 0;
   std::optional<std::int64_t> doubted_ns_;  ///< time of the last sample, if that is far ahead
   int n_behind_ = 0;  ///< samples without a break that are long before the newest
-  // The usual period, a running median, is that of one channel.
-  int channel_ = 0;
-  std::int64_t channel_ns_ = 0;  ///< its newest sample
+  struct Channel {
+    int number = 0;
+    std::int64_t newest_ns = 0;
+  };
+  Channel& channel(int number);
+  std::vector<Channel> channels_;
+  // The usual period, a running median, is that of the first channel.
   int n_spacings_ = 0;           ///< as far as they matter
   double period_ns_ = 0.;
   std::int64_t n_gaps_ = 0, gaps_ns_ = 0;
