@@ -105,9 +105,12 @@ TEST(LiveRun, StartsAnewWhenTheClocksWereSetBack) {
   std::vector<std::string> said;
   RunHooks hooks;
   hooks.on_warning = [&](double, const std::string& text) { said.push_back(text); };
-  const RunResult live = robot.live(all, hooks);
+  const auto device = std::make_shared<Device>(all, false);
+  const RunResult live = robot.live(device, hooks);
   EXPECT_EQ(live.status, RunStatus::kDiverged);
   ASSERT_EQ(live.pieces.size(), 2U);
+  EXPECT_EQ(device->estimates.front().piece, 0);
+  EXPECT_EQ(device->estimates.back().piece, 1);
   EXPECT_EQ(live.pieces[0].failure.substr(0, 39), "the clock of the IMU was set back by 99");
   EXPECT_EQ(live.pieces[1].failure, "");
   EXPECT_GT(live.pieces[1].epochs, 40);

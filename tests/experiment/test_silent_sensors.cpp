@@ -22,6 +22,7 @@ struct SilentRobot {
   std::vector<Measurement> measurements;
   std::vector<std::string> said;
   RunResult result;
+  std::shared_ptr<testing::Device> device;  ///< of the last run
 
   SilentRobot() {
     RunSetup setup = testing::standing_then_driving(12.);
@@ -41,8 +42,8 @@ struct SilentRobot {
     RunSetup setup = testing::standing_then_driving(12.);
     setup.routes = testing::routes_of_device(setup);
     RunData data;
-    data.live.push_back(
-        testing::stream("device", std::make_shared<testing::Device>(measurements, stays)));
+    device = std::make_shared<testing::Device>(measurements, stays);
+    data.live.push_back(testing::stream("device", device));
     RunHooks hooks;
     hooks.on_warning = [this](double, const std::string& text) {
       if (text.find("of device: ") != std::string::npos) said.push_back(text);
@@ -83,6 +84,11 @@ TEST(LiveRun, TellsThatCamerasAndWheelsHaveEnded) {
               ::testing::IsSupersetOf(
                   {MatchesRegex("encoders of device: ended 4 s before the end of the run .*"),
                    MatchesRegex("tracks of device: ended 5\\.1 s before the end of the run .*")}));
+  EXPECT_THAT(robot.device->estimates[20].warnings, ::testing::IsEmpty());
+  EXPECT_THAT(robot.device->estimates.back().warnings,
+              ::testing::IsSupersetOf({MatchesRegex("tracks of device: no samples since .*"),
+                                       MatchesRegex("encoders of device: no samples since .*")}))
+      << "while it lasts";
 }
 
 TEST(LiveRun, TellsThatTheWheelsNeverGaveASample) {
@@ -94,6 +100,33 @@ TEST(LiveRun, TellsThatTheWheelsNeverGaveASample) {
   EXPECT_THAT(robot.result.warnings,
               ::testing::Contains("encoders of device: no samples in all of the run: look at its "
                                   "cable, driver and bus"));
+}
+
+TEST(LiveRun, TellsTheDeviceWhichWheelIsLeftOutAndUntilWhen) {
+  SilentRobot robot;
+  const std::int64_t begin_ns = stamp_ns(robot.measurements.front());
+  for (Measurement& m : robot.measurements) {
+    const auto* encoders = m.get_if<EncoderSample>();
+    const double t_s = seconds_between(begin_ns, stamp_ns(m));
+    if (encoders == nullptr || t_s < 3. || t_s > 6.) continue;
+    EncoderSample slips = *encoders;
+    slips.drive_rad_per_s[1] *= 1.5;
+    m = slips;
+  }
+  robot.run();
+  const auto warnings_at = [&](double t_s) {
+    const auto& all = robot.device->estimates;
+    return std::find_if(all.begin(), all.end(), [&](const EstimateSample& estimate) {
+             return seconds_between(begin_ns, estimate.t_ns) > t_s;
+           })->warnings;
+  };
+  const auto left_out = ::testing::Contains(MatchesRegex(
+      "wheel_odometry: drive 2 left out of a sample: the other wheels contradict it .* - [0-9]+ of "
+      "[0-9]+ in the last second"));
+  EXPECT_THAT(warnings_at(2.5), ::testing::Not(left_out));
+  EXPECT_THAT(warnings_at(5.5), left_out);
+  EXPECT_THAT(robot.device->estimates.back().warnings, left_out) << "ten seconds are not over";
+  EXPECT_EQ(robot.result.status, RunStatus::kOk) << robot.result.cause;
 }
 
 TEST(LiveRun, TellsThatAllSensorsAreSilent) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "plausibility.hpp"
 #include "viwo/experiment/run.hpp"
@@ -16,8 +18,9 @@ class Feed {
   virtual bool next(Estimator& estimator) = 0;
   /// Whether what has been given is not to be waited for any more.
   virtual bool is_over() { return false; }
-  /// An epoch is done.
-  virtual void on_epoch(const Estimator& /*estimator*/) {}
+  /// An epoch of piece 0, 1, ... of a live run is done, and what is wrong by now.
+  virtual void on_epoch(const Estimator& /*estimator*/, int /*piece*/,
+                        const std::vector<std::string>& /*warnings*/) {}
   /// Ends what still runs, and records what the sensors took, dropped and gave as reference.
   virtual void finish(RunResult& result) = 0;
 };

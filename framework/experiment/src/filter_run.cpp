@@ -108,6 +108,7 @@ class FilterRun {
         data_(data),
         hooks_(hooks),
         live_(!data.live.empty()),
+        warnings_(hooks),
         plausibility_(setup, live_) {
     result_.rejections = data.rejections;
     result_.warnings = setup.warnings;
@@ -130,7 +131,7 @@ class FilterRun {
       more = next(*feed_, *estimator_, result_.cause);
       if (!more) estimator_->finish();
       make_epochs();
-      warnings_.say(now_s(), plausibility_.findings(), hooks_);
+      warnings_.say(now_s(), plausibility_.findings());
       if (!estimator_->failure().empty() && !begin_anew(more)) break;
     }
     feed_->finish(result_);
@@ -179,8 +180,11 @@ class FilterRun {
       recorder_->record(*estimator_);
       if (healthy_) healthy_->epoch(*estimator_);
       if (result_.epochs == 1) plausibility_.begin_at(result_.pieces.front().begin_ns);
-      warnings_.epoch(result_, *estimator_, hooks_);
-      feed_->on_epoch(*estimator_);
+      warnings_.epoch(result_, *estimator_);
+      if (live_) {
+        const int piece = static_cast<int>(result_.pieces.size()) - 1;
+        feed_->on_epoch(*estimator_, piece, warnings_.now(now_s()));
+      }
       if (hooks_.on_epoch) hooks_.on_epoch(result_);
       tell_progress();
     }
@@ -209,7 +213,7 @@ class FilterRun {
       result_.warnings.push_back(std::string("it could not be started anew: ") + error.what());
       return false;
     }
-    if (hooks_.on_warning) hooks_.on_warning(now_s(), failure + "; starting anew");
+    warnings_.tell(now_s(), failure + "; starting anew");
     recorder_->end_piece(*estimator_, failure);
     estimator_ = std::move(next);
     estimator_->observe(observer_);

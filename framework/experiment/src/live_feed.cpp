@@ -107,7 +107,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     return Clock::now() - *interrupted_at_ > kRestTime;
   }
 
-  void on_epoch(const Estimator& estimator) {
+  void on_epoch(const Estimator& estimator, int piece, const std::vector<std::string>& warnings) {
     const Filter& filter = estimator.filter();
     EstimateSample sample = sample_of(filter);
     sample.calibration_names = calibration_names(filter);
@@ -116,6 +116,8 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
       sample.calibration_sigma.push_back(estimate.sigma);
     }
     sample.latency_s = latency_s(filter.t_ns());
+    sample.piece = piece;
+    sample.warnings = warnings;
     if (sample.latency_s > 0.) latency_ms_.add(1e3 * sample.latency_s);
     for (const SensorStream& stream : live_) {
       guarded(stream.info, "estimate", [&] { stream.sensor->estimate(sample); });
@@ -368,7 +370,10 @@ class LiveFeedOwner final : public Feed {
   ~LiveFeedOwner() override { feed_->stop(); }
   bool next(Estimator& estimator) override { return feed_->next(estimator); }
   bool is_over() override { return feed_->is_over(); }
-  void on_epoch(const Estimator& estimator) override { feed_->on_epoch(estimator); }
+  void on_epoch(const Estimator& estimator, int piece,
+                const std::vector<std::string>& warnings) override {
+    feed_->on_epoch(estimator, piece, warnings);
+  }
   void finish(RunResult& result) override { feed_->finish(result); }
 
  private:

@@ -154,7 +154,8 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, Findings& 
   if (n_gaps_ > 0) {
     out.push_back({name_ + " again " + number,
                    name_ + ": samples again, after " + seconds(last_gap_.length_ns) +
-                       " without any from " + time_text(last_gap_.begin_ns - zero_ns) + " on"});
+                       " without any from " + time_text(last_gap_.begin_ns - zero_ns) + " on",
+                   true});
   }
 }
 

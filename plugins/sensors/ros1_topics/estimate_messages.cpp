@@ -123,10 +123,12 @@ msg::DiagnosticArray diagnostics_message(const EstimateSample& estimate, const H
       !std::all_of(estimate.p_IinG_m.begin(), estimate.p_IinG_m.end(), is_finite)) {
     warn("the estimate is not finite");
   }
+  for (const std::string& text : estimate.warnings) warn(text);
   status.level = trouble.empty() ? msg::DiagnosticStatus::OK : msg::DiagnosticStatus::WARN;
   status.message = trouble.empty() ? "ok" : trouble;
 
   add(status, "latency_s", estimate.latency_s);
+  add(status, "started anew", estimate.piece);
   add(status, "rejections", static_cast<double>(health.rejected));
   const auto sigma = [&estimate](std::size_t first) {
     double variance = 0.;

@@ -213,6 +213,13 @@ TEST_F(EstimateMessages, DiagnosticsWarnOfWhatIsOff) {
   message = diagnostics_message(estimate_, {});
   EXPECT_EQ(message.status[0].level, msg::DiagnosticStatus::WARN);
   EXPECT_EQ(message.status[0].message, "the estimate is not finite");
+  estimate_.covariance[7] = 0.;
+  estimate_.piece = 2;
+  estimate_.warnings = {"imu0: no samples since t = 5.000 s", "drive 2 left out"};
+  message = diagnostics_message(estimate_, {});
+  EXPECT_EQ(message.status[0].level, msg::DiagnosticStatus::WARN);
+  EXPECT_EQ(message.status[0].message, "imu0: no samples since t = 5.000 s; drive 2 left out");
+  EXPECT_EQ(value_of(message, "started anew"), "2");
 }
 
 }  // namespace
