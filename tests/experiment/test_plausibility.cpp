@@ -101,13 +101,13 @@ TEST(Plausibility, FindsNothingWhereTheStartOfTheCalibrationIsWrongAsFarAsItsPri
 
 TEST(Plausibility, FindsNothingWhereTheRobotIsOtherwiseAsFarAsItsPriorSays) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    RunSetup other = robot("viwo_swerve",
-                           {"sensors.simulator0.duration_s=12",
-                            "sensors.simulator0.true_intrinsics_scale=1",
-                            "sensors.simulator0.true_sigma_p_IinO_m=[0.1, 0.1, 0.1]",
-                            "sensors.simulator0.true_sigma_R_ItoO_rad=[0.01, 0.01, 0.01]",
-                            "sensors.simulator0.true_sigma_t_OtoI_s=0.01"},
-                           seed);
+    RunSetup other =
+        robot("viwo_swerve",
+              {"sensors.simulator0.duration_s=12", "sensors.simulator0.true_intrinsics_scale=1",
+               "sensors.simulator0.true_sigma_p_IinO_m=[0.1, 0.1, 0.1]",
+               "sensors.simulator0.true_sigma_R_ItoO_rad=[0.01, 0.01, 0.01]",
+               "sensors.simulator0.true_sigma_t_OtoI_s=0.01"},
+              seed);
     other.name += " " + std::to_string(seed);
     EXPECT_THAT(found(other, Fault{}), IsEmpty()) << seed;
   }

@@ -116,9 +116,11 @@ TEST(LiveRun, TellsTheDeviceWhichWheelIsLeftOutAndUntilWhen) {
   robot.run();
   const auto warnings_at = [&](double t_s) {
     const auto& all = robot.device->estimates;
-    return std::find_if(all.begin(), all.end(), [&](const EstimateSample& estimate) {
-             return seconds_between(begin_ns, estimate.t_ns) > t_s;
-           })->warnings;
+    return std::find_if(all.begin(), all.end(),
+                        [&](const EstimateSample& estimate) {
+                          return seconds_between(begin_ns, estimate.t_ns) > t_s;
+                        })
+        ->warnings;
   };
   const auto left_out = ::testing::Contains(MatchesRegex(
       "wheel_odometry: drive 2 left out of a sample: the other wheels contradict it .* - [0-9]+ of "

@@ -41,8 +41,8 @@ class RunningWarnings {
 
   const RunHooks& hooks_;
   std::set<std::string> said_;
-  std::size_t monitor_seen_ = 0;  ///< of the monitor's warnings
-  std::vector<Said> latest_;      ///< of the last ten seconds
+  std::size_t monitor_seen_ = 0;               ///< of the monitor's warnings
+  std::vector<Said> latest_;                   ///< of the last ten seconds
   std::vector<std::string> found_, left_out_;  ///< by now: in samples, by updates
   std::map<std::string, Counts> rejected_;     ///< by reason, at the last look
   double next_look_s_ = -std::numeric_limits<double>::infinity();

@@ -130,24 +130,24 @@ void StreamWatch::find_silent_channels(std::int64_t now_ns, std::int64_t zero_ns
   for (const Channel& channel : channels_) {
     if (now_ns - channel.newest_ns <= longest_ns) continue;
     const std::string number = std::to_string(channel.number);
-    out.push_back({name_ + " channel " + number,
-                   name_ + ": none of camera " + number + " since " +
-                       time_text(channel.newest_ns - zero_ns) + ", others go on" + kLook});
+    out.push_back({name_ + " channel " + number, name_ + ": none of camera " + number + " since " +
+                                                     time_text(channel.newest_ns - zero_ns) +
+                                                     ", others go on" + kLook});
   }
 }
 
 void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, Findings& out) const {
   if (!has_begun_) {
-    if (now_ns - zero_ns > kLongNs) out.push_back({name_ + " none", name_ + ": no samples" + kLook});
+    if (now_ns - zero_ns > kLongNs)
+      out.push_back({name_ + " none", name_ + ": no samples" + kLook});
     return;
   }
   find_held_up(out);
   if (n_gaps_ > kMostSaid) return;
   const std::string number = std::to_string(n_gaps_);
   if (now_ns - newest_ns_ > longest_spacing_ns()) {
-    out.push_back({name_ + " silent " + number, name_ + ": no samples since " +
-                                                    time_text(newest_ns_ - zero_ns) +
-                                                    kLook});
+    out.push_back({name_ + " silent " + number,
+                   name_ + ": no samples since " + time_text(newest_ns_ - zero_ns) + kLook});
     return;
   }
   find_silent_channels(now_ns, zero_ns, longest_spacing_ns(), out);

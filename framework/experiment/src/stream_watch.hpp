@@ -62,7 +62,7 @@ class StreamWatch {
   Channel& channel(int number);
   std::vector<Channel> channels_;
   // The usual period, a running median, is that of the first channel.
-  int n_spacings_ = 0;           ///< as far as they matter
+  int n_spacings_ = 0;  ///< as far as they matter
   double period_ns_ = 0.;
   std::int64_t n_gaps_ = 0, gaps_ns_ = 0;
   Pause last_gap_, longest_gap_;

@@ -27,7 +27,7 @@ struct EstimateSample {
   std::vector<std::string> calibration_names;
   std::vector<double> calibration;  ///< estimates, of the same order
   std::vector<double> calibration_sigma;
-  int piece = 0;                      ///< how often the filter was started anew: the pose has jumped
+  int piece = 0;  ///< how often the filter was started anew: the pose has jumped
   std::vector<std::string> warnings;  ///< what is wrong with sensors, updates and estimate by now
 };
 
