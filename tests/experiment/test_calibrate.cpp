@@ -2,6 +2,7 @@
 // cannot determine is named.
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 
 #include <Eigen/Dense>
 #include <gmock/gmock.h>
@@ -89,6 +90,21 @@ TEST(Calibrate, FindsTheTrueIntrinsicsWithHonestSigmas) {
   EXPECT_LT(sum / count, 4.);
 }
 
+TEST(Calibrate, FindsTheGainsOfTheSteeringWhereTheyAreAskedFor) {
+  const std::vector<std::string> with_gains{"kinematics.prior_sigma_steer_gain=0.02",
+                                            "sensors.simulator0.robot.prior_sigma_steer_gain=0.02"};
+  const auto setup = setup_of({"icr_sweep", "figure_eight"}, 1, with_gains);
+  const auto estimate = fit_all(setup);
+  const Intrinsics truth = truth_of(setup, 1);
+  ASSERT_EQ(truth.size(), 20);
+  EXPECT_GT(truth.tail(4).norm(), 0.01);
+  EXPECT_LT((estimate.x_WI - truth).tail(4).cwiseAbs().maxCoeff(), 0.002);
+  // A model without them takes the gains for something else.
+  const auto without = fit_all(setup_of({"icr_sweep", "figure_eight"}, 1, {with_gains[1]}));
+  EXPECT_EQ(without.x_WI.size(), 16);
+  EXPECT_GT(without.noise.parity_scale, 2. * estimate.noise.parity_scale);
+}
+
 TEST(Calibrate, FindsTheClockOffset) {
   auto setup = setup_of({"icr_sweep"}, 1, {"sensors.simulator0.time_offset_s=0.013"});
   setup.options.clock_offset_sigma_s = 0.05;
@@ -133,12 +149,22 @@ TEST(Calibrate, ReadsItsFileLeavesOutAndWritesACalibrationThatARunIncludes) {
       << config::to_yaml(simulated("'{motion}'", {"sensors.simulator0.true_intrinsics_scale=1"}));
   std::ofstream(folder / "calibration.yaml")
       << "calibration: test\nbase: run.yaml\nset: {odometry.twist: noise_weighted}\n"
-         "leave_out_by: motion\nreport_by: [motion]\nsegment_s: 2\nestimate_extrinsics: true\n"
+         "leave_out_by: [motion]\nreport_by: [motion]\nsegment_s: 2\nestimate_extrinsics: true\n"
          "motions: [icr_sweep, figure_eight]\n";
   const auto setup = read_calibration_setup(folder / "calibration.yaml", {}, registry());
-  const auto result = calibrate(setup);
-  ASSERT_EQ(result.left_out.size(), 2u);
-  for (const ValidationRun& run : result.left_out) {
+  EXPECT_EQ(count_fits(setup), 3);
+  std::set<std::string> told;
+  std::mutex mutex;
+  const auto result = calibrate(setup, [&](const std::string& line) {
+    const std::scoped_lock lock(mutex);
+    told.insert(line.substr(0, line.find(':')));
+  });
+  EXPECT_EQ(told, (std::set<std::string>{"all recordings", "without motion figure_eight",
+                                         "without motion icr_sweep"}));
+  ASSERT_EQ(result.left_out.size(), 1u);
+  EXPECT_EQ(result.left_out[0].by, "motion");
+  ASSERT_EQ(result.left_out[0].runs.size(), 2u);
+  for (const ValidationRun& run : result.left_out[0].runs) {
     EXPECT_LT(run.calibrated.accuracy->end_m, 0.1 * run.nominal.accuracy->end_m);
   }
   write_calibration(folder / "out", result);

@@ -39,20 +39,26 @@ TEST_F(Recordings, NominalDeadReckoningEndsWhereOthersMeasured) {
   }
 }
 
-TEST_F(Recordings, CalibrationPredictsTheRepetitionThatIsLeftOut) {
+TEST_F(Recordings, CalibrationPredictsTheRepetitionThatIsLeftOutAndHalfwaysTheMotion) {
   const auto setup =
       read_calibration_setup(kConfigs / "calibrations" / "recordings.yaml", {}, registry());
   ASSERT_EQ(setup.recordings.size(), 18u);
   const auto result = calibrate(setup);
   EXPECT_TRUE(result.all.converged);
-  double end_m = 0., yaw_rad = 0.;
-  for (const ValidationRun& run : result.left_out) {
-    end_m += run.calibrated.accuracy->end_m / 18.;
-    yaw_rad += std::abs(run.calibrated.accuracy->end_yaw_deg) * M_PI / 180. / 18.;
-  }
-  EXPECT_EQ(result.left_out.size(), 18u);
-  EXPECT_LT(end_m, 0.010);
-  EXPECT_LT(yaw_rad, 0.012);
+  const auto expect_below = [](const LeftOut& left_out, double most_m, double most_rad) {
+    double end_m = 0., yaw_rad = 0.;
+    for (const ValidationRun& run : left_out.runs) {
+      end_m += run.calibrated.accuracy->end_m / 18.;
+      yaw_rad += std::abs(run.calibrated.accuracy->end_yaw_deg) * M_PI / 180. / 18.;
+    }
+    EXPECT_EQ(left_out.runs.size(), 18u) << left_out.by;
+    EXPECT_LT(end_m, most_m) << left_out.by;
+    EXPECT_LT(yaw_rad, most_rad) << left_out.by;
+  };
+  ASSERT_EQ(result.left_out.size(), 2u);
+  expect_below(result.left_out[0], 0.010, 0.012);
+  // Without gains of the steering 65 mm, 0.040 rad; nominal 75 mm, 0.072 rad.
+  expect_below(result.left_out[1], 0.040, 0.035);
 }
 
 TEST_F(Recordings, ThreeModelsRunSideBySide) {

@@ -105,7 +105,9 @@ TEST(Preintegration, ConvergesWithTheSquareOfTheSamplePeriodAlsoAtCutEnds) {
 
 TEST(Preintegration, HasTheJacobianOfCentralDifferences) {
   for (const auto& yaml :
-       {swerve("four_wis_wid"), swerve("four_wis_wid_drive_only"), differential()}) {
+       {swerve("four_wis_wid"), swerve("four_wis_wid", ", prior_sigma_steer_gain: 0.02"),
+        swerve("four_wis_wid_drive_only"),
+        swerve("four_wis_wid_drive_only", ", prior_sigma_steer_gain: 0.02"), differential()}) {
     const auto model = load_model(yaml);
     const bool can_crab = model->description().n_steer > 0;
     const std::function<Twist(double)> motions[] = {

@@ -167,7 +167,10 @@ int calibrate_command(const Arguments& arguments) {
       read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
   const auto folder = out_folder(arguments);
   make_folder(folder);
-  const CalibrationResult result = calibrate(setup);
+  const CalibrationResult result = [&] {
+    Progress progress("fits", count_fits(setup));
+    return calibrate(setup, [&](const std::string& line) { progress.done(line); });
+  }();
   write_calibration(folder, result);
   std::cout << describe(result) << "\ncalibration: " << (folder / "calibration.yaml").string()
             << "\nreport: " << (folder / "report.html").string() << "\n";

@@ -1,7 +1,7 @@
 #include "viwo/experiment/calibrate.hpp"
 
+#include <algorithm>
 #include <array>
-#include <numeric>
 #include <set>
 
 #include <tbb/parallel_for.h>
@@ -20,9 +20,9 @@ constexpr std::array kCalibrationParams{
               .type = ParamType::kString,
               .help = "run configuration, relative to this file"},
     ParamSpec{.name = "leave_out_by",
-              .type = ParamType::kString,
-              .fallback = "''",
-              .help = "label of the recordings whose values are left out of the fit in turn"},
+              .type = ParamType::kStrings,
+              .fallback = "[]",
+              .help = "labels of the recordings whose values are left out of the fit in turn"},
     ParamSpec{.name = "report_by",
               .type = ParamType::kStrings,
               .fallback = "[]",
@@ -89,16 +89,18 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   CalibrationSetup setup;
   setup.name = params.text("calibration");
   setup.options = options_of(params);
-  setup.leave_out_by = params.text("leave_out_by");
+  const auto leave_out_by = params.texts("leave_out_by");
+  setup.leave_out_by.assign(leave_out_by.begin(), leave_out_by.end());
   const auto report_by = params.texts("report_by");
   setup.report_by.assign(report_by.begin(), report_by.end());
   const std::vector<Recording> recordings = read_recordings(file);
   const Node base = load_base(file, assignments);
   require_labels(setup.report_by, recordings, file, "report_by");
   for (const Recording& recording : recordings) {
-    if (!setup.leave_out_by.empty() && !recording.labels.contains(setup.leave_out_by)) {
+    for (const std::string& label : setup.leave_out_by) {
+      if (recording.labels.contains(label)) continue;
       config::fail(file.find("leave_out_by")->mark(), "recording '" + recording.name +
-                                                          "' has no label '" + setup.leave_out_by +
+                                                          "' has no label '" + label +
                                                           "', by which leave_out_by divides them");
     }
     RunSetup run = read_run(resolve_placeholders(base, recording.labels), plugins);
@@ -123,42 +125,62 @@ ValidationRun validate(const CalibrationSetup& setup, std::size_t index,
   return {index, run_odometry(nominal, recording.data), run_odometry(calibrated, recording.data)};
 }
 
-}  // namespace
+/// A fit without the recordings that have one value of a label; with an empty label of all.
+struct FitOf {
+  std::string label, value;
 
-CalibrationResult calibrate(const CalibrationSetup& setup) {
-  CalibrationResult result;
-  result.setup = &setup;
-  std::vector<std::size_t> all(setup.recordings.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  std::set<std::string> groups;
-  if (!setup.leave_out_by.empty()) {
+  bool leaves_out(const CalibrationRecording& recording) const {
+    return !label.empty() && recording.label.labels.at(label) == value;
+  }
+};
+
+/// That of all, then those of each label.
+std::vector<FitOf> fits_of(const CalibrationSetup& setup) {
+  std::vector<FitOf> fits{{}};
+  for (const std::string& label : setup.leave_out_by) {
+    std::set<std::string> values;
     for (const auto& recording : setup.recordings) {
-      groups.insert(recording.label.labels.at(setup.leave_out_by));
+      values.insert(recording.label.labels.at(label));
     }
-    if (groups.size() < 2) {
-      throw InputError("all recordings have the same '" + setup.leave_out_by +
+    if (values.size() < 2) {
+      throw InputError("all recordings have the same '" + label +
                        "': nothing is left to fit when it is left out");
     }
+    for (const std::string& value : values) fits.push_back({label, value});
   }
-  // Fit number 0 has all recordings; the others leave one group out each.
-  std::vector<std::string> left_out{""};
-  left_out.insert(left_out.end(), groups.begin(), groups.end());
-  std::vector<CalibrationEstimate> estimates(left_out.size());
-  const auto is_left_out = [&](std::size_t index, std::size_t f) {
-    return f > 0 && setup.recordings[index].label.labels.at(setup.leave_out_by) == left_out[f];
-  };
-  tbb::parallel_for(std::size_t{0}, left_out.size(), [&](std::size_t f) {
+  return fits;
+}
+
+}  // namespace
+
+int count_fits(const CalibrationSetup& setup) { return static_cast<int>(fits_of(setup).size()); }
+
+CalibrationResult calibrate(const CalibrationSetup& setup,
+                            const std::function<void(const std::string&)>& on_fit) {
+  const std::vector<FitOf> fits = fits_of(setup);
+  std::vector<CalibrationEstimate> estimates(fits.size());
+  tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t f) {
     std::vector<std::size_t> used;
-    for (const std::size_t index : all) {
-      if (!is_left_out(index, f)) used.push_back(index);
+    for (std::size_t i = 0; i < setup.recordings.size(); ++i) {
+      if (!fits[f].leaves_out(setup.recordings[i])) used.push_back(i);
     }
     estimates[f] = fit(setup, used);
+    if (!on_fit) return;
+    on_fit((fits[f].label.empty() ? "all recordings"
+                                  : "without " + fits[f].label + " " + fits[f].value) +
+           ": " + std::to_string(estimates[f].iterations) + " iterations");
   });
+  CalibrationResult result;
+  result.setup = &setup;
   result.all = estimates[0];
-  for (const std::size_t index : all) {
-    result.fitted.push_back(validate(setup, index, estimates[0]));
-    for (std::size_t f = 1; f < estimates.size(); ++f) {
-      if (is_left_out(index, f)) result.left_out.push_back(validate(setup, index, estimates[f]));
+  for (const std::string& label : setup.leave_out_by) result.left_out.push_back({label, {}});
+  for (std::size_t i = 0; i < setup.recordings.size(); ++i) {
+    result.fitted.push_back(validate(setup, i, estimates[0]));
+    for (std::size_t f = 1; f < fits.size(); ++f) {
+      if (!fits[f].leaves_out(setup.recordings[i])) continue;
+      const auto by = std::find_if(result.left_out.begin(), result.left_out.end(),
+                                   [&](const LeftOut& l) { return l.by == fits[f].label; });
+      by->runs.push_back(validate(setup, i, estimates[f]));
     }
   }
   return result;

@@ -78,7 +78,11 @@ std::string pad(const std::string& text, std::size_t width) {
   return std::string(width > text.size() ? width - text.size() : 0, ' ') + text;
 }
 
-void describe_errors(const char* title, const CalibrationSetup& setup,
+std::string left_out_title(const LeftOut& left_out) {
+  return "End error of dead reckoning, recordings left out of the fit by " + left_out.by;
+}
+
+void describe_errors(const std::string& title, const CalibrationSetup& setup,
                      const std::vector<ValidationRun>& runs, std::ostringstream& out) {
   if (runs.empty()) return;
   out << "\n"
@@ -146,7 +150,7 @@ report::Table parameter_table(const CalibrationResult& result) {
 }
 
 void add_plots(const CalibrationResult& result, report::Document& document) {
-  const auto& runs = result.left_out.empty() ? result.fitted : result.left_out;
+  const auto& runs = result.left_out.empty() ? result.fitted : result.left_out.front().runs;
   for (const ValidationRun& run : runs) {
     const CalibrationRecording& recording = result.setup->recordings[run.recording];
     std::string heading = "Recording " + recording.label.name;
@@ -214,8 +218,9 @@ std::string describe(const CalibrationResult& result) {
   }
   describe_errors("End error of dead reckoning, recordings used in the fit", *result.setup,
                   result.fitted, out);
-  describe_errors("End error of dead reckoning, recordings left out of the fit", *result.setup,
-                  result.left_out, out);
+  for (const LeftOut& left_out : result.left_out) {
+    describe_errors(left_out_title(left_out), *result.setup, left_out.runs, out);
+  }
   return out.str();
 }
 
@@ -244,6 +249,12 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
     for (const auto& [name, weight] : direction.weights) weights[name] = weight;
     undetermined.push_back({{"sigma_ratio", direction.sigma_ratio}, {"weights", weights}});
   }
+  std::vector<json> left_out;
+  json by_label = json::object();
+  for (const LeftOut& one : result.left_out) {
+    left_out.push_back(errors_json(*result.setup, one.runs));
+    by_label[one.by] = left_out.back();
+  }
   const json summary = {{"status", estimate.converged ? "ok" : "failed"},
                         {"calibration", parameters},
                         {"noise",
@@ -253,7 +264,8 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
                         {"clock_offset_s", estimate.clock_offset_s},
                         {"undetermined", undetermined},
                         {"fitted", errors_json(*result.setup, result.fitted)},
-                        {"left_out", errors_json(*result.setup, result.left_out)}};
+                        {"left_out", left_out.empty() ? json::object() : left_out.front()},
+                        {"left_out_by", by_label}};
   write_text(folder / "summary.json", summary.dump(2) + "\n");
 
   report::Document document{result.setup->name,
@@ -269,9 +281,8 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
   }
   document.sections.push_back(
       {"End error, recordings used in the fit", {error_table(*result.setup, result.fitted)}});
-  if (!result.left_out.empty()) {
-    document.sections.push_back({"End error, recordings left out of the fit",
-                                 {error_table(*result.setup, result.left_out)}});
+  for (const LeftOut& one : result.left_out) {
+    document.sections.push_back({left_out_title(one), {error_table(*result.setup, one.runs)}});
   }
   add_plots(result, document);
   report::write_html(folder / "report.html", document);

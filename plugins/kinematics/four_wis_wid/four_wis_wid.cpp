@@ -21,10 +21,10 @@ class FourWisWid final : public swerve::SwerveBase {
               RowSystem& out) const override {
     for (int j = 0; j < n(); ++j) {
       const auto channel = static_cast<std::size_t>(j);
-      const double delta = sample.steer_rad[channel] - x_WI[delta_o(j)];  // (S-1)
+      const double delta_j = delta(sample, x_WI, j);  // (S-1)
       const double v = x_WI[r(j)] * sample.drive_rad_per_s[channel];
-      const double c = std::cos(delta);
-      const double s = std::sin(delta);
+      const double c = std::cos(delta_j);
+      const double s = std::sin(delta_j);
       out.b[2 * j] = v * c;  // (S-2)
       out.b[2 * j + 1] = v * s;
       out.kept[2 * channel] = c;
@@ -37,7 +37,7 @@ class FourWisWid final : public swerve::SwerveBase {
     return Status::kOk;
   }
 
-  void intrinsic_derivatives(const EncoderSample& /*sample*/, const Intrinsics& x_WI,
+  void intrinsic_derivatives(const EncoderSample& sample, const Intrinsics& x_WI,
                              const RowSystem& /*rows*/, const RowVector& b, const Twist& xi,
                              const RowVector& e, IntrinsicDerivatives& out) const override {
     const double omega = xi.z();
@@ -50,6 +50,11 @@ class FourWisWid final : public swerve::SwerveBase {
       out.J(i, y(j)) = omega;
       out.J(i, delta_o(j)) = b[i + 1];  // (S-6)
       out.J(i + 1, delta_o(j)) = -b[i];
+      if (has_gains()) {
+        const double read = sample.steer_rad[static_cast<std::size_t>(j)];
+        out.J(i, kappa(j)) = -read * b[i + 1];  // (S-12)
+        out.J(i + 1, kappa(j)) = read * b[i];
+      }
       out.DtE(2, x(j)) = e[i + 1];  // (S-7)
       out.DtE(2, y(j)) = -e[i];
     }
@@ -65,8 +70,8 @@ class FourWisWid final : public swerve::SwerveBase {
       const double s = rows.kept[k + 1];
       out.J(i, j) = x_WI[r(j)] * c;  // (S-8) drive
       out.J(i + 1, j) = x_WI[r(j)] * s;
-      out.J(i, n() + j) = -b[i + 1];  // steering
-      out.J(i + 1, n() + j) = b[i];
+      out.J(i, n() + j) = -gain(x_WI, j) * b[i + 1];  // steering
+      out.J(i + 1, n() + j) = gain(x_WI, j) * b[i];
       out.J(i, 2 * n() + j) = -s;  // lateral slip
       out.J(i + 1, 2 * n() + j) = c;
     }

@@ -37,9 +37,9 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
               RowSystem& out) const override {
     for (int j = 0; j < n(); ++j) {
       const auto channel = static_cast<std::size_t>(j);
-      const double delta = sample.steer_rad[channel] - x_WI[delta_o(j)];
-      const double c = std::cos(delta);
-      const double s = std::sin(delta);
+      const double delta_j = delta(sample, x_WI, j);
+      const double c = std::cos(delta_j);
+      const double s = std::sin(delta_j);
       out.A.row(j) << c, s, x_WI[x(j)] * s - x_WI[y(j)] * c;  // (D-1)
       out.b[j] = x_WI[r(j)] * sample.drive_rad_per_s[channel];
       out.kept[channel] = x_WI[x(j)] * c + x_WI[y(j)] * s;  // third entry of dA/d delta (D-2)
@@ -47,7 +47,7 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
     return Status::kOk;
   }
 
-  void intrinsic_derivatives(const EncoderSample& /*sample*/, const Intrinsics& x_WI,
+  void intrinsic_derivatives(const EncoderSample& sample, const Intrinsics& x_WI,
                              const RowSystem& rows, const RowVector& b, const Twist& xi,
                              const RowVector& e, IntrinsicDerivatives& out) const override {
     // A wheel that had measured what the twist predicts would point along its contact velocity: at
@@ -66,6 +66,11 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
       out.DtE.col(x(j)) << 0., 0., s * e[j];
       out.DtE.col(y(j)) << 0., 0., -c * e[j];
       out.DtE.col(delta_o(j)) = -turned * e[j];
+      if (has_gains()) {
+        const double read = sample.steer_rad[static_cast<std::size_t>(j)];
+        out.J(j, kappa(j)) = -read * out.J(j, delta_o(j));  // (D-9)
+        out.DtE.col(kappa(j)) = -read * out.DtE.col(delta_o(j));
+      }
     }
   }
 
@@ -76,8 +81,8 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
       const Eigen::Vector3d turned = turned_row(rows, j);
       out.J(j, j) = x_WI[r(j)];  // (D-6) drive
       out.DtE.col(j).setZero();
-      out.J(j, n() + j) = -turned.dot(xi);  // steering
-      out.DtE.col(n() + j) = turned * e[j];
+      out.J(j, n() + j) = -gain(x_WI, j) * turned.dot(xi);  // steering
+      out.DtE.col(n() + j) = gain(x_WI, j) * turned * e[j];
     }
   }
 

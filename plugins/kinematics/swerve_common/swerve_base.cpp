@@ -24,6 +24,7 @@ SwerveBase::SwerveBase(const ParamSet& params)
     : prior_sigma_radius_m_(params.number("prior_sigma_radius_m")),
       prior_sigma_position_m_(params.number("prior_sigma_position_m")),
       prior_sigma_steer_offset_rad_(params.number("prior_sigma_steer_offset_rad")),
+      prior_sigma_steer_gain_(params.number("prior_sigma_steer_gain")),
       sigma_drive_rad_per_s_(params.number("sigma_drive_rad_per_s")),
       sigma_steer_rad_(params.number("sigma_steer_rad")),
       sigma_lateral_m_per_s_(params.number("sigma_lateral_m_per_s")) {
@@ -45,6 +46,14 @@ SwerveBase::SwerveBase(const ParamSet& params)
   nominal_.insert(nominal_.end(), x_m.begin(), x_m.end());
   nominal_.insert(nominal_.end(), y_m.begin(), y_m.end());
   append("steer_offset_rad", params.numbers("steer_offset_rad"), n_, nominal_);
+  if (!has_gains()) return;
+  nominal_.resize(nominal_.size() + x_m.size(), 0.);
+  if (nominal_.size() > static_cast<std::size_t>(kMaxIntrinsics)) {
+    throw ParamError("prior_sigma_steer_gain",
+                     "makes " + std::to_string(nominal_.size()) + " intrinsics of " +
+                         std::to_string(n_) + " wheels, at most " + std::to_string(kMaxIntrinsics) +
+                         " can be estimated");
+  }
 }
 
 void SwerveBase::describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& out) const {
@@ -62,8 +71,10 @@ void SwerveBase::describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& 
   const Group groups[] = {{"r_", "m", prior_sigma_radius_m_, false},
                           {"x_", "m", prior_sigma_position_m_, true},
                           {"y_", "m", prior_sigma_position_m_, true},
-                          {"delta_o", "rad", prior_sigma_steer_offset_rad_, true}};
+                          {"delta_o", "rad", prior_sigma_steer_offset_rad_, true},
+                          {"kappa_", "1", prior_sigma_steer_gain_, false}};
   for (const Group& group : groups) {
+    if (!(group.prior_sigma > 0.)) continue;
     for (int j = 0; j < n_; ++j) {
       out.intrinsics.push_back({.name = group.name + std::to_string(j + 1),
                                 .unit = group.unit,
@@ -101,13 +112,12 @@ Status SwerveBase::inverse(const Twist& xi, const Intrinsics& x_WI, const RowVec
     // backwards where that is the shorter way.
     if (v > 1e-9) {
       double turn =
-          std::remainder(std::atan2(u.y(), u.x()) + x_WI[delta_o(j)] - sample.steer_rad[channel],
-                         2. * std::numbers::pi);
+          std::remainder(std::atan2(u.y(), u.x()) - delta(sample, x_WI, j), 2. * std::numbers::pi);
       if (std::abs(turn) > std::numbers::pi / 2. + 1e-9) {
         turn -= std::copysign(std::numbers::pi, turn);
         v = -v;
       }
-      sample.steer_rad[channel] += turn;
+      sample.steer_rad[channel] += turn / gain(x_WI, j);
     } else {
       v = 0.;
     }

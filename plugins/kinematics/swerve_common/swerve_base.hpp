@@ -1,10 +1,12 @@
 // What the models of a base with N steered and driven wheels share: parameters, the order of the
-// intrinsics x_WI = [r_1..r_N, x_1..x_N, y_1..y_N, delta_o1..delta_oN], inverse kinematics.
-// Wheel j steers by delta_j = delta_mj - delta_oj and rolls with v_j = r_j omega_j along
+// intrinsics x_WI = [r_1..r_N, x_1..x_N, y_1..y_N, delta_o1..delta_oN], and kappa_1..kappa_N where
+// they are asked for, inverse kinematics. Wheel j steers by
+// delta_j = (1 + kappa_j) delta_mj - delta_oj and rolls with v_j = r_j omega_j along
 // d_j = [cos delta_j, sin delta_j]^T (four_wis_wid/model.md, S-1).
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "viwo/api/kinematic_model.hpp"
@@ -55,6 +57,13 @@ inline constexpr std::array kParams{
               .min = 0.,
               .min_exclusive = true,
               .help = "how well the steering offsets are known"},
+    ParamSpec{.name = "prior_sigma_steer_gain",
+              .type = ParamType::kNumber,
+              .unit = "1",
+              .fallback = "0",
+              .min = 0.,
+              .help = "how well it is known that the steering angles turn by what is read; 0: they "
+                      "do, and no gains are estimated"},
     ParamSpec{.name = "sigma_drive_rad_per_s",
               .type = ParamType::kNumber,
               .unit = "rad/s",
@@ -105,11 +114,22 @@ class SwerveBase : public KinematicModel {
   int x(int j) const { return n_ + j; }
   int y(int j) const { return 2 * n_ + j; }
   int delta_o(int j) const { return 3 * n_ + j; }
+  bool has_gains() const { return prior_sigma_steer_gain_ > 0.; }
+  int kappa(int j) const { return 4 * n_ + j; }  ///< only with gains
+
+  /// Of wheel j: by how much it turns for each radian that is read, and where it points (S-1), rad.
+  double gain(const Intrinsics& x_WI, int j) const {
+    return has_gains() ? 1. + x_WI[kappa(j)] : 1.;
+  }
+  double delta(const EncoderSample& sample, const Intrinsics& x_WI, int j) const {
+    return gain(x_WI, j) * sample.steer_rad[static_cast<std::size_t>(j)] - x_WI[delta_o(j)];
+  }
 
  private:
   int n_ = 0;
   std::vector<double> nominal_;
   double prior_sigma_radius_m_, prior_sigma_position_m_, prior_sigma_steer_offset_rad_;
+  double prior_sigma_steer_gain_;
   double sigma_drive_rad_per_s_, sigma_steer_rad_, sigma_lateral_m_per_s_;
 };
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,8 +41,8 @@ struct CalibrationRecording {
 struct CalibrationSetup {
   std::string name;
   CalibrationOptions options;
-  std::string leave_out_by;            ///< label whose values are left out in turn; may be empty
-  std::vector<std::string> report_by;  ///< labels to break the tables down by
+  std::vector<std::string> leave_out_by;  ///< labels whose values are left out in turn
+  std::vector<std::string> report_by;     ///< labels to break the tables down by
   std::vector<CalibrationRecording> recordings;
 };
 
@@ -72,11 +73,17 @@ struct ValidationRun {
   RunResult calibrated;
 };
 
+/// All recordings, each with the estimate from those that have another value of a label.
+struct LeftOut {
+  std::string by;  ///< the label
+  std::vector<ValidationRun> runs;
+};
+
 struct CalibrationResult {
   const CalibrationSetup* setup = nullptr;
-  CalibrationEstimate all;              ///< from all recordings
-  std::vector<ValidationRun> left_out;  ///< by leave-one-out; empty without leave_out_by
-  std::vector<ValidationRun> fitted;    ///< all recordings with the estimate from all of them
+  CalibrationEstimate all;            ///< from all recordings
+  std::vector<LeftOut> left_out;      ///< of each of leave_out_by
+  std::vector<ValidationRun> fitted;  ///< all recordings with the estimate from all of them
 };
 
 /// Throws InputError for what is wrong in the configuration or in a recording.
@@ -87,7 +94,11 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& file,
 /// Fits the recordings named by index (CAL-1). Throws std::runtime_error when the solver fails.
 CalibrationEstimate fit(const CalibrationSetup& setup, const std::vector<std::size_t>& recordings);
 
-CalibrationResult calibrate(const CalibrationSetup& setup);
+/// How many fits calibrate() makes. Throws InputError where nothing is left to fit.
+int count_fits(const CalibrationSetup& setup);
+/// `on_fit`: told, by any thread, of each fit that is done and what is left out of it.
+CalibrationResult calibrate(const CalibrationSetup& setup,
+                            const std::function<void(const std::string&)>& on_fit = {});
 
 /// Writes calibration.yaml, summary.json and report.html.
 void write_calibration(const std::filesystem::path& folder, const CalibrationResult& result);
