@@ -326,6 +326,34 @@ TEST(Plausibility, NamesNoLagOfAClockThatWasSetOnTheWay) {
                           "bus and clock, or at what has recorded it"));
 }
 
+TEST(Plausibility, NamesTheSensorWhoseClockIsAnother) {
+  constexpr std::int64_t kYearsNs = 1'700'000'000'000'000'000;
+  const auto later = [](auto& sample) {
+    sample.t_ns += kYearsNs;
+    if constexpr (requires { sample.begin_ns; }) {
+      sample.begin_ns += kYearsNs;
+      sample.end_ns += kYearsNs;
+    }
+  };
+  const std::string cause =
+      " those of the IMU: of another clock, or of another recording - none of its samples can be "
+      "used";
+  EXPECT_THAT(found({.wheels = later}),
+              ElementsAre("wheels0: its stamps are 1.7e+09 s ahead of" + cause));
+  EXPECT_THAT(found({.images = later}),
+              ElementsAre("images0: its stamps are 1.7e+09 s ahead of" + cause));
+  EXPECT_THAT(found({.imu = later}),
+              ::testing::IsSupersetOf({"wheels0: its stamps are 1.7e+09 s behind" + cause,
+                                       "images0: its stamps are 1.7e+09 s behind" + cause}));
+}
+
+TEST(Plausibility, NamesStampsThatAreNotInNanoseconds) {
+  EXPECT_THAT(found({.imu = [](ImuSample& s) { s.t_ns /= 1000; }}),
+              ::testing::Contains("imu0: a sample every 5e-06 s: its stamps are not in nanoseconds "
+                                  "(multiply those in microseconds by 1e3, those in milliseconds "
+                                  "by 1e6)"));
+}
+
 TEST(Plausibility, NamesCamerasThatAreSwapped) {
   EXPECT_THAT(found({.images = [](FeatureSample& s) { s.camera = 1 - s.camera; }}),
               ElementsAre(::testing::MatchesRegex(

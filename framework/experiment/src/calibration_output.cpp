@@ -74,8 +74,9 @@ std::string direction_text(const UndeterminedDirection& direction) {
   return text;
 }
 
+/// Right-aligned in its column, apart from the one before however long it is.
 std::string pad(const std::string& text, std::size_t width) {
-  return std::string(width > text.size() ? width - text.size() : 0, ' ') + text;
+  return std::string(std::max(width, text.size() + 1) - text.size(), ' ') + text;
 }
 
 std::string left_out_title(const LeftOut& left_out) {

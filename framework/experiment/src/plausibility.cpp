@@ -8,6 +8,7 @@
 #include "stereo_check.hpp"
 #include "stream_watch.hpp"
 #include "twist_check.hpp"
+#include "viwo/experiment/output.hpp"
 
 namespace viwo::experiment {
 
@@ -25,14 +26,26 @@ struct Plausibility::Checks {
     std::string sensor;
     const SampleType* type;
     StreamWatch watch;
+    /// How far its stamps are ahead of those of the IMU, which the estimator's time is.
+    double ahead_s(const StreamWatch& imu_watch) const {
+      if (!imu_watch.has_begun() || !watch.has_begun()) return 0.;
+      return 1e-9 * (static_cast<double>(imu_watch.first_offset_ns()) -
+                     static_cast<double>(watch.first_offset_ns()));
+    }
   };
 
   std::string imu_name;
   ImuCheck imu;
   std::vector<WheelsCheck> wheels;
   StereoCheck stereo;
-  std::vector<Watched> streams;
+  std::vector<Watched> streams;  ///< the IMU's first
   bool moves = false;  ///< the wheels turn
+
+  /// Nothing of what it gives is of the time of the run.
+  bool is_of_another_clock(const Watched& stream) const {
+    constexpr double kFar_s = 10.;
+    return std::abs(stream.ahead_s(streams.front().watch)) > kFar_s;
+  }
 
   void add(WheelsCheck& check, const EncoderSample& sample) {
     try {
@@ -63,6 +76,14 @@ std::string source_of(const std::string& name, const std::vector<SensorEntry>& s
     if (entry.name == name && !entry.input.empty()) return source_of(entry.input, sensors);
   }
   return name;
+}
+
+Finding of_another_clock(const std::string& name, double ahead_s) {
+  return {name + " clock",
+          name + ": its stamps are " + significant(std::abs(ahead_s), 2) + " s " +
+              (ahead_s > 0. ? "ahead of" : "behind") +
+              " those of the IMU: of another clock, or of another recording - none of its samples "
+              "can be used"};
 }
 
 }  // namespace
@@ -107,6 +128,8 @@ void Plausibility::watch_streams(const RunSetup& setup) {
     });
     if (!is_known) taken.push_back(&route);
   }
+  std::stable_partition(taken.begin(), taken.end(),
+                        [](const Route* route) { return route->consumer == Consumer::kImu; });
   for (const Route* route : taken) {
     std::string name = source_of(route->sensor, setup.sensors);
     const auto of_it = std::count_if(taken.begin(), taken.end(), [&](const Route* other) {
@@ -142,7 +165,9 @@ void Plausibility::watch(const std::string& sensor, SampleView sample) {
     if (!now_ns_) now_ns_ = next_look_ns_ = t_ns;
     if (!zero_ns_) zero_ns_ = now_ns_;
     stream.watch.add(t_ns, sample.type().channel(sample.data()), *now_ns_);
-    if (stream.watch.has_begun()) now_ns_ = std::max(*now_ns_, stream.watch.newest_ns());
+    if (stream.watch.has_begun() && !checks_->is_of_another_clock(stream)) {
+      now_ns_ = std::max(*now_ns_, stream.watch.newest_ns());
+    }
     waited_ns_ = 0;
     look_now_and_then();
     return;
@@ -178,8 +203,11 @@ void Plausibility::look(bool at_end) {
     if (findings_.size() == before) wheels.twist.findings(checks_->imu.up(), findings_);
   }
   checks_->stereo.findings(findings_);
+  const StreamWatch& imu = checks_->streams.front().watch;
   for (const auto& stream : checks_->streams) {
-    if (at_end) {
+    if (checks_->is_of_another_clock(stream)) {
+      findings_.push_back(of_another_clock(stream.watch.name(), stream.ahead_s(imu)));
+    } else if (at_end) {
       stream.watch.findings(*now_ns_, *zero_ns_, live_ ? "run" : "recording", findings_);
     } else {
       stream.watch.findings(*now_ns_ + waited_ns_, *zero_ns_, findings_);

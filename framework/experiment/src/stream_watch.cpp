@@ -41,6 +41,7 @@ void StreamWatch::add(std::int64_t stamp_ns, int number, std::int64_t now_ns) {
     // Of another clock.
     const std::int64_t off_ns = now_ns - stamp_ns;
     if (off_ns > kSecondNs / 2 || off_ns < -kSecondNs / 2) offset_ns_ = off_ns;
+    first_offset_ns_ = offset_ns_;
   }
   std::int64_t t_ns = stamp_ns + offset_ns_;
   if (has_begun_ && t_ns <= newest_ns_) {
@@ -124,6 +125,16 @@ void StreamWatch::find_held_up(Findings& out) const {
                      "stamped when they arrive - stamp them when they are measured"});
 }
 
+/// No sensor of a robot gives a reading every 20 microseconds.
+void StreamWatch::find_unit(Findings& out) const {
+  constexpr double kShortest_ns = 20e3;
+  if (n_spacings_ < kFewestSpacings || period_ns_ >= kShortest_ns) return;
+  const std::string period = significant(1e-9 * period_ns_, 2);
+  out.push_back({name_ + " unit", name_ + ": a sample every " + period +
+                                      " s: its stamps are not in nanoseconds (multiply those in "
+                                      "microseconds by 1e3, those in milliseconds by 1e6)"});
+}
+
 /// Of several, while others go on.
 void StreamWatch::find_silent_channels(std::int64_t now_ns, std::int64_t zero_ns,
                                        std::int64_t longest_ns, Findings& out) const {
@@ -142,6 +153,7 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, Findings& 
       out.push_back({name_ + " none", name_ + ": no samples" + kLook});
     return;
   }
+  find_unit(out);
   find_held_up(out);
   if (n_gaps_ > kMostSaid) return;
   const std::string number = std::to_string(n_gaps_);
@@ -166,6 +178,7 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, const char
     out.push_back({name_ + " none", name_ + ": no samples in all of the " + of_what + kLook});
     return;
   }
+  find_unit(out);
   find_held_up(out);
   if (n_gaps_ > 0) {
     const bool several = n_gaps_ > 1;

@@ -25,7 +25,10 @@ class StreamWatch {
   /// A sample has come, of camera `number` if there are several. `now_ns`: the newest time of all
   /// streams, which begins with the first one.
   void add(std::int64_t stamp_ns, int number, std::int64_t now_ns);
+  const std::string& name() const { return name_; }
   bool has_begun() const { return has_begun_; }
+  /// From its stamps to the common time, when it began: 0 but for stamps of another clock.
+  std::int64_t first_offset_ns() const { return first_offset_ns_; }
   /// Time of the newest sample.
   std::int64_t newest_ns() const { return newest_ns_; }
 
@@ -46,12 +49,14 @@ class StreamWatch {
   void watch_period(std::int64_t spacing_ns);
   void watch_bursts(std::int64_t spacing_ns);
   void find_held_up(Findings& out) const;
+  void find_unit(Findings& out) const;
 
   std::string name_;
   std::int64_t least_gap_ns_;
   StampJump jump_{1.};
   bool has_begun_ = false;
   std::int64_t offset_ns_ = 0;  ///< from its stamps to the common time
+  std::int64_t first_offset_ns_ = 0;
   std::int64_t newest_ns_ = 0;
   std::optional<std::int64_t> doubted_ns_;  ///< time of the last sample, if that is far ahead
   int n_behind_ = 0;  ///< samples without a break that are long before the newest
