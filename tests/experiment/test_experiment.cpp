@@ -36,7 +36,7 @@ TEST_F(ExperimentFile, RunsEveryVariantWithEveryMotionAndSeedWhateverTheJobs) {
   const auto summary = nlohmann::json::parse(in);
   EXPECT_EQ(summary["variants"]["drive_only"]["runs"], 4);
   EXPECT_EQ(summary["variants"]["drive_only"]["diverged"], 0);
-  EXPECT_TRUE(summary["variants"]["redundant"]["rpe"].contains("10"));
+  EXPECT_FALSE(summary["variants"]["redundant"]["rpe"].empty());
 }
 
 TEST(FilterExperiment, GivesTheSameBitsForAnyNumberOfJobsAndTwiceInARow) {

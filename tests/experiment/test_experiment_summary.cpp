@@ -95,7 +95,8 @@ TEST_F(Summary, HasTheRelativeErrorsOverTheLengthsThatTheRunsAreConfiguredWith) 
   options.assignments = {"sensors.simulator0.duration_s=60"};  // longer than 10 m
   const auto file = write(
       "experiment: test\nbase: run.yaml\nmotions: [circle]\nvariants:\n"
-      "  usual:\n  short: {evaluation.segment_lengths_m: [2.5, 0.5]}\n");
+      "  usual: {evaluation.segment_lengths_m: [10, 25]}\n  short: {evaluation.segment_lengths_m: "
+      "[2.5, 0.5]}\n");
   const auto result = run_experiment(read_experiment(file, options), options, registry(), {});
   const auto summary = summary_of(result);
   // Both variants have the lengths of both; what one was not evaluated over is empty.

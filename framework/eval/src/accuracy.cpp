@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <span>
 #include <string>
 
 #include "viwo/api/measurement.hpp"
@@ -82,6 +83,27 @@ SegmentErrors segment_errors(const std::vector<PosePair>& pairs, const std::vect
           mean(errors_deg), root_mean_square(errors_deg)};
 }
 
+/// The two longest of 1, 2.5, 5, 10, .. that the path has at least three of, the shorter one first.
+std::vector<double> lengths_of(double path_m) {
+  constexpr double kFewest = 3., kShortest_m = 0.01;
+  constexpr std::array kSteps{1., 2.5, 5.};
+  std::vector<double> lengths_m;
+  for (int power = -2; kFewest * std::pow(10., power) <= path_m && power < 9; ++power) {
+    for (const double step : kSteps) {
+      const double length_m =
+          power < 0 ? step / std::pow(10., -power) : step * std::pow(10., power);
+      if (length_m >= kShortest_m && kFewest * length_m <= path_m) lengths_m.push_back(length_m);
+    }
+  }
+  if (lengths_m.size() > 2) lengths_m.erase(lengths_m.begin(), lengths_m.end() - 2);
+  return lengths_m;
+}
+
+/// Where the first poses coincide, as far as the alignment leaves the two worlds open.
+RigidTransform align_first(std::span<const PosePair> first, Alignment alignment) {
+  return align(first, alignment == Alignment::kSe3 ? Alignment::kStart : alignment);
+}
+
 ErrorSeries error_series(const std::vector<PosePair>& pairs, const std::vector<double>& path_m) {
   ErrorSeries series;
   series.path_length_m = path_m;
@@ -126,12 +148,15 @@ Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate, const
   result.ate_m = root_mean_square(errors_m);
   result.ate_deg = root_mean_square(errors_deg);
 
-  for (const double length_m : options.segment_lengths_m) {
+  const std::vector<double> lengths_m = options.segment_lengths_m.empty()
+                                            ? lengths_of(result.path_length_m)
+                                            : options.segment_lengths_m;
+  for (const double length_m : lengths_m) {
     result.rpe.push_back(segment_errors(common.pairs, path_m, length_m, options.segment_stride));
   }
 
   const std::vector<PosePair> from_start =
-      transformed(common.pairs, align(common.pairs, Alignment::kStart));
+      transformed(common.pairs, align_first({common.pairs.data(), 1}, options.alignment));
   result.series = error_series(from_start, path_m);
   result.end_m = position_error_m(from_start.back());
   result.end_deg = angle_error_deg(from_start.back());

@@ -41,7 +41,9 @@ TEST(Accuracy, OfAConstantYawDriftIsTheClosedForm) {
     const double y = (1. - std::cos(kKappa * length)) / kKappa;
     return std::hypot(x, y);
   };
-  const Accuracy accuracy = evaluate(reference, estimate);
+  Options options;
+  options.segment_lengths_m = {10., 25.};
+  const Accuracy accuracy = evaluate(reference, estimate, options);
   EXPECT_NEAR(accuracy.path_length_m, 40., 1e-9);
   ASSERT_EQ(accuracy.rpe.size(), 2U);
   EXPECT_EQ(accuracy.rpe[0].count, 301);
@@ -149,6 +151,34 @@ TEST(Accuracy, AsJsonHasTheAgreedNamesAndNullForMissingSegments) {
   EXPECT_DOUBLE_EQ(json.at("end").at("deg").get<double>(), accuracy.end_deg);
   EXPECT_EQ(json.at("alignment"), "yaw_position");
   EXPECT_EQ(json.at("poses"), 121);
+}
+
+TEST(Accuracy, IsOverLengthsThatThePathHasThreeOf) {
+  const auto lengths = [](int poses) {
+    std::vector<double> lengths_m;
+    for (const SegmentErrors& e : evaluate(arc(0., 0.1, poses), arc(0., 0.1, poses)).rpe) {
+      lengths_m.push_back(e.length_m);
+      EXPECT_GT(e.count, 0);
+    }
+    return lengths_m;
+  };
+  EXPECT_EQ(lengths(311), (std::vector<double>{5., 10.}));  // of 31 m
+  EXPECT_EQ(lengths(290), (std::vector<double>{2.5, 5.}));
+  EXPECT_EQ(lengths(9), (std::vector<double>{0.1, 0.25}));
+}
+
+TEST(Accuracy, EndErrorLeavesOpenWhatTheAlignmentDoes) {
+  // The estimate is tilted by 5 mrad at its start, and right from then on.
+  const Trajectory reference = arc(0.02, 0.1, 401);  // 40 m
+  Trajectory estimate = moved(reference, about_z(0.3), {1., 2., 3.});
+  StampedPose& first = estimate.front();
+  first.q_BtoW = first.q_BtoW * Eigen::AngleAxisd(0.005, Eigen::Vector3d::UnitY());
+  Options options;
+  EXPECT_LT(evaluate(reference, estimate, options).end_m, 1e-3);  // gravity is known to both
+  options.alignment = Alignment::kSe3;
+  EXPECT_GT(evaluate(reference, estimate, options).end_m, 0.005 * 30.);
+  options.alignment = Alignment::kNone;
+  EXPECT_GT(evaluate(reference, estimate, options).end_m, 3.);
 }
 
 TEST(Accuracy, WithoutNumbersIsNullInJson) {

@@ -140,8 +140,6 @@ class Runner {
         RunSetup check = read_run(configuration(v, r), plugins_);
         if (v == 0 || r == 0) collect(check);
         configurations_.push_back(text_of(check));
-        const std::vector<double>& lengths_m = check.evaluation.segment_lengths_m;
-        result_.segment_lengths_m.insert(lengths_m.begin(), lengths_m.end());
         for (int s = 0; s < setup_.seeds; ++s) {
           const auto seed = setup_.seeds > 1 ? static_cast<std::uint64_t>(s) + 1 : check.seed;
           result_.runs.push_back({v, r, seed, {}});

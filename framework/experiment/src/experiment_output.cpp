@@ -53,7 +53,7 @@ json paired_json(const ExperimentResult& result, const Group& group) {
 /// Mean relative pose errors by length.
 json rpe_json(const ExperimentResult& result, std::size_t variant) {
   json all = json::object();
-  for (const double length_m : result.segment_lengths_m) {
+  for (const double length_m : segment_lengths_m(result)) {
     std::vector<double> m, deg;
     for (const ExperimentRun& run : result.runs) {
       if (run.variant != variant || !std::isfinite(rpe(run.result, length_m, false))) continue;

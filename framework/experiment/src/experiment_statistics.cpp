@@ -27,6 +27,7 @@ const Metric kAfterRpe[] = {
     {"nees_position", "NEES pos (3)", 1., [](const RunResult& r) { return r.nees.position; }, 3.},
     {"nees_orientation", "NEES ori (3)", 1., [](const RunResult& r) { return r.nees.orientation; },
      3.},
+    {"nees_relative", "NEES rel (6)", 1., [](const RunResult& r) { return r.nees.relative; }, 6.},
     {"epoch_ms", "epoch [ms]", 1.,
      [](const RunResult& r) { return r.updates.empty() ? kNan : r.total_ms.mean_ms; }},
 };
@@ -41,9 +42,18 @@ void add_rpe(double length_m, std::vector<Metric>& metrics) {
 
 }  // namespace
 
+std::set<double> segment_lengths_m(const ExperimentResult& result) {
+  std::set<double> lengths_m;
+  for (const ExperimentRun& run : result.runs) {
+    if (!run.result.accuracy) continue;
+    for (const auto& segment : run.result.accuracy->rpe) lengths_m.insert(segment.length_m);
+  }
+  return lengths_m;
+}
+
 std::vector<Metric> all_metrics(const ExperimentResult& result) {
   std::vector<Metric> metrics(std::begin(kBeforeRpe), std::end(kBeforeRpe));
-  for (const double length_m : result.segment_lengths_m) add_rpe(length_m, metrics);
+  for (const double length_m : segment_lengths_m(result)) add_rpe(length_m, metrics);
   metrics.insert(metrics.end(), std::begin(kAfterRpe), std::end(kAfterRpe));
   return metrics;
 }

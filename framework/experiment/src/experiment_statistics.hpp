@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,8 +24,10 @@ struct Metric {
   double target = 0.;  ///< best value; 0: the lower the better
 };
 
-/// In the order of the columns; relative pose errors over every length that a run is configured
-/// with.
+/// Path lengths [m] that relative pose errors of a run were evaluated over.
+std::set<double> segment_lengths_m(const ExperimentResult& result);
+
+/// In the order of the columns; relative pose errors over every length of any run.
 std::vector<Metric> all_metrics(const ExperimentResult& result);
 
 /// Those that at least one run has.

@@ -321,7 +321,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
       Eigen::Vector3d::Map(sample.w_IinI_rad_per_s.data()) = filter.clones().back().w_IinI;
     }
     Eigen::Map<Eigen::Matrix<double, 9, 9, Eigen::RowMajor>>(sample.covariance.data()) =
-        filter.covariance().topLeftCorner<9, 9>();
+        filter.imu_covariance().topLeftCorner<9, 9>();
     return sample;
   }
 

@@ -148,7 +148,8 @@ void RunPictures::watch(RunHooks& hooks) {
 }
 
 void RunPictures::on_epoch(const Filter& filter, const EpochData& data) {
-  sigma_position_m_ = std::sqrt(filter.covariance().diagonal().segment<3>(kPositionColumn).sum());
+  sigma_position_m_ =
+      std::sqrt(filter.imu_covariance().diagonal().segment<3>(kPositionColumn).sum());
   for (const SampleSpan& stream : data.streams) {
     if (stream.type != nullptr && *stream.type == sample_type<FeatureSample>()) {
       see({static_cast<const FeatureSample*>(stream.data), stream.size});

@@ -39,7 +39,7 @@ struct Plausibility::Checks {
   std::vector<WheelsCheck> wheels;
   StereoCheck stereo;
   std::vector<Watched> streams;  ///< the IMU's first
-  bool moves = false;  ///< the wheels turn
+  bool moves = false;            ///< the wheels turn
 
   /// Nothing of what it gives is of the time of the run.
   bool is_of_another_clock(const Watched& stream) const {

@@ -131,6 +131,7 @@ void Recorder::finish(const Estimator& estimator) {
     result_.nees.position = sum_position_ / n_nees_;
     result_.nees.orientation = sum_orientation_ / n_nees_;
   }
+  if (n_relative_ > 0) result_.nees.relative = sum_relative_ / n_relative_;
   if (!truth_.empty()) result_.reference = truth_;
 }
 
@@ -144,7 +145,7 @@ void Recorder::add_error(const Filter& filter, double t_s) {
   Eigen::Matrix<double, 6, 1> error;
   error.head<3>() = -log_so3(truth->q_BtoW.toRotationMatrix().transpose() * imu.R_GtoI.transpose());
   error.tail<3>() = truth->p_BinW - imu.p_IinG;
-  const auto& P = filter.covariance();
+  const ImuMatrix P = filter.imu_covariance();
   const Eigen::Vector3d up_in_I = imu.R_GtoI.col(2);
   PoseError sample;
   sample.t_s = t_s;
@@ -154,6 +155,7 @@ void Recorder::add_error(const Filter& filter, double t_s) {
   sample.yaw_rad = -up_in_I.dot(error.head<3>());
   sample.yaw_sigma_rad = std::sqrt(up_in_I.dot(P.topLeftCorner<3, 3>() * up_in_I));
   result_.errors.push_back(sample);
+  add_relative_error(filter, *truth);
   const double pose = eval::nees(error, P.topLeftCorner<6, 6>());
   if (!std::isfinite(pose)) return;
   sum_pose_ += pose;
@@ -161,6 +163,27 @@ void Recorder::add_error(const Filter& filter, double t_s) {
   sum_position_ += eval::nees(error.tail<3>(), P.block<3, 3>(3, 3));
   ++n_nees_;
   result_.nees.series.emplace_back(t_s, pose);
+}
+
+/// From the oldest clone to now (F-40).
+void Recorder::add_relative_error(const Filter& filter, const StampedPose& truth) {
+  const CloneView& from = filter.clones().front();
+  const auto true_from = interpolate(truth_, from.t_ns, 0.2);
+  if (!true_from || from.t_ns >= filter.t_ns()) return;
+  const auto R_GtoI = [](const StampedPose& pose) -> Eigen::Matrix3d {
+    return pose.q_BtoW.toRotationMatrix().transpose();
+  };
+  const ImuView& to = filter.imu();
+  const auto& P = filter.covariance();
+  Eigen::Matrix<double, 12, 12> both;
+  both << P.topLeftCorner<6, 6>(), P.block<6, 6>(0, from.column), P.block<6, 6>(from.column, 0),
+      P.block<6, 6>(from.column, from.column);
+  const double relative =
+      eval::relative_nees({from.R_GtoI, R_GtoI(*true_from), from.p_IinG, true_from->p_BinW},
+                          {to.R_GtoI, R_GtoI(truth), to.p_IinG, truth.p_BinW}, both);
+  if (!std::isfinite(relative)) return;
+  sum_relative_ += relative;
+  ++n_relative_;
 }
 
 void Recorder::add_counts(const Estimator& estimator) {

@@ -28,6 +28,7 @@ class Recorder {
   void bound_series();
   void add_piece(std::int64_t t_ns);
   void add_error(const Filter& filter, double t_s);
+  void add_relative_error(const Filter& filter, const StampedPose& truth);
   void add_counts(const Estimator& estimator);
   void add_calibration(const Filter& filter);
 
@@ -42,6 +43,8 @@ class Recorder {
   TimeStatistics total_ms_;
   double sum_pose_ = 0., sum_position_ = 0., sum_orientation_ = 0.;
   int n_nees_ = 0;
+  double sum_relative_ = 0.;
+  int n_relative_ = 0;
   std::int64_t stride_ = 1;  ///< every so many-th epoch stays in the series of a live run
   bool in_piece_ = false;
   // Of the pieces that have ended.

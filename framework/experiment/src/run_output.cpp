@@ -113,6 +113,7 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
   accuracy["nees_pose"] = number_or_null(result.nees.pose);
   accuracy["nees_position"] = number_or_null(result.nees.position);
   accuracy["nees_orientation"] = number_or_null(result.nees.orientation);
+  accuracy["nees_relative"] = number_or_null(result.nees.relative);
   json rejected = json::object();
   for (const auto& [source, rejection] : result.rejections) {
     rejected[source].push_back(

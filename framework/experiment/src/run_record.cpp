@@ -53,7 +53,7 @@ namespace viwo::experiment {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StageTime, mean_ms, p95_ms, max_ms)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CalibrationTrack, name, unit, estimate, sigma, truth,
                                    final_error)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PoseNees, pose, position, orientation, series)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PoseNees, pose, position, orientation, relative, series)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PoseError, t_s, position_m, position_sigma_m, yaw_rad,
                                    yaw_sigma_rad)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateTrack, name, total, failures, applied, rejected)

@@ -74,10 +74,11 @@ constexpr std::array kEvaluationParams{
     ParamSpec{.name = "segment_lengths_m",
               .type = ParamType::kNumbers,
               .unit = "m",
-              .fallback = "[10, 25]",
+              .fallback = "[]",
               .min = 0.,
               .min_exclusive = true,
-              .help = "path lengths of the relative pose error"},
+              .help = "path lengths of the relative pose error; none: two that the path has "
+                      "several of"},
     ParamSpec{.name = "reference_max_gap_s",
               .type = ParamType::kNumber,
               .unit = "s",

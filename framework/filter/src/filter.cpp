@@ -70,7 +70,15 @@ void Filter::initialize(const ImuPrior& prior) {
   imu_.v_IinG_fej = imu_.v_IinG;
   clones_.clear();
   std::fill(slots_.begin(), slots_.end(), false);
-  covariance_.set_block(0, prior.P);
+  ImuMatrix P = prior.P;
+  shared_position_.take_from(P.block<3, 3>(kPositionColumn, kPositionColumn));
+  covariance_.set_block(0, P);
+}
+
+ImuMatrix Filter::imu_covariance() const {
+  ImuMatrix P = covariance_.matrix().topLeftCorner<kImuSize, kImuSize>();
+  P.block<3, 3>(kPositionColumn, kPositionColumn) += shared_position_.covariance();
+  return P;
 }
 
 ImuTransition Filter::propagate(std::span<const ImuSample> samples,
@@ -124,8 +132,16 @@ void Filter::drop_oldest_clone() {
   clones_.erase(clones_.begin());
 }
 
+/// What tells where all of it is needs to know how little that was known (F-41).
+template <class Factor>
+void Filter::see_position(const Factor& factor) {
+  if (shared_position_.is_zero() || !shared_position_.is_seen_by(factor, clones_)) return;
+  shared_position_.return_to(covariance_, clones_);
+}
+
 template <class Factor>
 FactorResult Filter::apply_factor(const Factor& factor) {
+  see_position(factor);
   held_.before(covariance_.matrix());
   const FactorResult result = covariance_.apply(factor, dx_);
   if (is_applied(result)) {
@@ -151,6 +167,7 @@ FactorResult Filter::apply(InformationFactor& factor, std::span<const AddedBlock
     for (int i = 0; i < view.size(); ++i) new_columns_.push_back(view.column() + i);
   }
   dx_.setZero();
+  see_position(factor);
   if (!covariance_.split(new_columns_, factor)) return FactorResult::kRejected;
   if (covariance_.ties_known_columns()) {
     held_.before(covariance_.matrix());

@@ -1,6 +1,7 @@
 #include "viwo/sim/planar_motion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -36,6 +37,19 @@ Twist sweep(double t, const MotionOptions& o, double amplitude) {
   return along(o.speed_m_per_s * (1. + amplitude * 0.3 * wave(kSpeedHz, t)),
                amplitude * kDirectionSwing * wave(kDirectionHz, t),
                amplitude * o.yaw_rate_rad_per_s * wave(kYawRateHz, t));
+}
+
+/// What a base does all day, a piece after the other, with a smooth change at the beginning of
+/// each.
+Twist mixed(double t, const MotionOptions& o) {
+  constexpr double kPieceS = 20., kChangeS = 2.;
+  const double v = o.speed_m_per_s, w = o.yaw_rate_rad_per_s;
+  const std::array<Twist, 6> pieces = {sweep(t, o, 1.),  Twist(v, 0., 0.),  Twist(v, 0., w),
+                                       Twist(0., v, 0.), Twist(0., 0., 0.), Twist(-v, 0., -w)};
+  const double number = std::floor(std::max(t, 0.) / kPieceS);
+  const auto now = static_cast<std::size_t>(std::fmod(number, 6.));
+  const Twist& before = pieces[number > 0. ? (now + 5) % 6 : now];
+  return before + smooth_step((t - number * kPieceS) / kChangeS) * (pieces[now] - before);
 }
 
 }  // namespace
@@ -79,6 +93,7 @@ const std::vector<PlanarMotion::Entry>& PlanarMotion::entries() {
        [](double t, const MotionOptions& o) {
          return sweep(t, o, 1. - smooth_step((t - kSweepS) / kStraightenS));
        }},
+      {"mixed", mixed},
   };
   return kEntries;
 }

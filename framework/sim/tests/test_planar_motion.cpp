@@ -194,6 +194,27 @@ TEST(PlanarMotion, SweepThenStraightIsTheSweepThenAStraightLineAndSmoothBetween)
   }
 }
 
+TEST(PlanarMotion, MixedIsAllOfThemByTurnsAndSmoothBetween) {
+  const PlanarMotion motion("mixed", kNoRamp), sweep("icr_sweep", kNoRamp);
+  const auto expect = [&](double t, const Twist& xi) {
+    EXPECT_LT((motion.twist(t) - xi).norm(), 1e-12) << t;
+  };
+  for (const double t : {0., 7.3, 19.9, 125., 245.}) expect(t, sweep.twist(t));
+  for (const double t : {22., 39.9, 150.}) expect(t, Twist(kV, 0., 0.));
+  for (const double t : {65., 185.}) expect(t, Twist(0., kV, 0.));
+  for (const double t : {85., 99., 205.}) expect(t, Twist(0., 0., 0.));
+  expect(105., -motion.twist(45.));
+  constexpr double h = 1e-3;
+  const auto second = [&](double t) -> Twist {
+    return (motion.twist(t + h) - 2. * motion.twist(t) + motion.twist(t - h)) / (h * h);
+  };
+  for (const double change : {20., 40., 60., 80., 100., 120.}) {
+    for (double t = change - 0.1; t < change + 2.1; t += h) {
+      EXPECT_LT((second(t + h) - second(t)).norm(), 0.1) << t;
+    }
+  }
+}
+
 TEST(PlanarMotion, UnknownNamesAreRefusedWithTheKnownOnes) {
   try {
     PlanarMotion("sideways");
@@ -202,7 +223,7 @@ TEST(PlanarMotion, UnknownNamesAreRefusedWithTheKnownOnes) {
     EXPECT_EQ(std::string(error.what()),
               "no motion 'sideways' - there are: icr_sweep, straight, lateral, circle, stationary, "
               "figure_eight, crab_varying, spin, constant_steering, pivot, "
-              "sweep_then_straight");
+              "sweep_then_straight, mixed");
   }
 }
 

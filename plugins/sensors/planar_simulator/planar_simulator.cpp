@@ -21,7 +21,7 @@ constexpr std::array kParams{
               .type = ParamType::kString,
               .fallback = "icr_sweep",
               .choices = "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
-                         "spin|constant_steering|pivot|sweep_then_straight",
+                         "spin|constant_steering|pivot|sweep_then_straight|mixed",
               .help = "how the base moves"},
     ParamSpec{.name = "duration_s",
               .type = ParamType::kNumber,

@@ -15,7 +15,7 @@ namespace viwo::eval {
 
 struct Options {
   Alignment alignment = Alignment::kYawPosition;  ///< for ATE; the RPE needs none
-  std::vector<double> segment_lengths_m = {10., 25.};
+  std::vector<double> segment_lengths_m;          ///< none: two that the path has several of
   int segment_stride = 1;            ///< a segment starts at every pose, every second, ...
   double max_reference_gap_s = 0.5;  ///< no interpolation between reference poses further apart
 };
@@ -30,7 +30,7 @@ struct SegmentErrors {
   double rmse_deg = 0.;
 };
 
-/// One entry per common pose, after the first common poses were made to coincide.
+/// One entry per common pose; the worlds are those of the end error.
 struct ErrorSeries {
   std::vector<double> t_s;            ///< since the first common pose
   std::vector<double> path_length_m;  ///< of the reference
@@ -48,9 +48,11 @@ struct Accuracy {
   double ate_m = 0.;          ///< root mean square position error
   double ate_deg = 0.;        ///< root mean square angle of the orientation error
   std::vector<SegmentErrors> rpe;  ///< in the order of Options::segment_lengths_m
-  double end_m = 0.;               ///< last pose, aligned at the first pose
-  double end_deg = 0.;             ///< angle of the whole orientation error, 0 .. 180
-  double end_yaw_deg = 0.;         ///< signed, estimate minus reference, continued over +-180
+  /// Of the last pose, where the first poses coincide as far as `alignment` leaves the two worlds
+  /// open: in position and yaw where both know gravity, not at all where the worlds are the same.
+  double end_m = 0.;
+  double end_deg = 0.;      ///< angle of the whole orientation error, 0 .. 180
+  double end_yaw_deg = 0.;  ///< signed, estimate minus reference, continued over +-180
   ErrorSeries series;
 };
 
@@ -58,8 +60,10 @@ struct Accuracy {
 ///
 /// A segment of length L starts at a pose of the estimate and ends at the first pose where the
 /// reference has come at least L further; its error is the difference of the two poses as seen from
-/// the start of the segment. Throws InputError for trajectories that cannot be compared
-/// (association.hpp, alignment.hpp) and for options out of range.
+/// the start of the segment. Without lengths they are the two longest of 1, 2.5 and 5 times powers
+/// of ten (m) that the path of the reference has at least three of. Throws InputError for
+/// trajectories that cannot be compared (association.hpp, alignment.hpp) and for options out of
+/// range.
 Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate,
                   const Options& options = {});
 

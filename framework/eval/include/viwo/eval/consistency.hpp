@@ -10,6 +10,18 @@ namespace viwo::eval {
 /// std::invalid_argument when the sizes do not fit. Only the lower triangle of `cov` is read.
 double nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& cov);
 
+/// An estimated pose, its truth, both of the IMU I in their world.
+struct ErringPose {
+  Eigen::Matrix3d R_GtoI, R_GtoI_true;
+  Eigen::Vector3d p_IinG, p_IinG_true;  ///< m
+};
+
+/// NEES of the pose `to` as seen from the pose `from` (F-40): worlds may differ, and neither the
+/// start nor the drift up to `from` has a part in it. 6 where consistent. `cov`: of the errors
+/// [dtheta, dp] of `to`, then `from`, with R_GtoI_true = Exp(-dtheta) R_GtoI, p_true = p + dp.
+double relative_nees(const ErringPose& from, const ErringPose& to,
+                     const Eigen::Matrix<double, 12, 12>& cov);
+
 /// The value below which a chi-square variable with `dof` degrees of freedom stays with probability
 /// `p`. Throws std::invalid_argument unless 0 <= p < 1 and dof > 0.
 double chi2_quantile(double p, double dof);

@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -65,7 +64,6 @@ struct ExperimentResult {
   double wall_s = 0.;  ///< without the time of runs that were taken over
   /// "m", "rad", "s" of the calibration parameters, by name.
   std::map<std::string, std::string> units;
-  std::set<double> segment_lengths_m;  ///< of the relative pose errors, of all configurations
 };
 
 /// The run configuration of one cell, placeholders replaced. Throws InputError.

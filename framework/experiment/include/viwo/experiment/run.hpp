@@ -123,7 +123,9 @@ struct PoseNees {
   double pose = std::numeric_limits<double>::quiet_NaN();         ///< 6 = consistent
   double position = std::numeric_limits<double>::quiet_NaN();     ///< 3
   double orientation = std::numeric_limits<double>::quiet_NaN();  ///< 3
-  std::vector<std::pair<double, double>> series;                  ///< time [s], pose
+  /// Of the pose as seen from the oldest clone: what the start has to do with it is gone. 6.
+  double relative = std::numeric_limits<double>::quiet_NaN();
+  std::vector<std::pair<double, double>> series;  ///< time [s], pose
 };
 
 /// Error of the filter's estimate at an epoch, with its own sigmas.

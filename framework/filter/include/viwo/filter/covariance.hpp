@@ -44,6 +44,10 @@ class Covariance {
   /// The pose at `column` becomes a copy of the inertial one.
   void clone_pose(int column);
 
+  /// More covariance of three consecutive errors with three consecutive ones.
+  void add(int row, int column, const Eigen::Matrix3d& block) {
+    P_.block<3, 3>(row, column) += block;
+  }
   /// One column of the error becomes `kept` of what it was, and gains `variance`.
   void decay(int column, double kept, double variance);
   /// The errors of J's rows, from column `first` on, become J times those of `columns` (F-24).

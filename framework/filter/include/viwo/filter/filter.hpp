@@ -14,6 +14,7 @@
 #include "viwo/api/update.hpp"
 #include "viwo/filter/covariance.hpp"
 #include "viwo/filter/held_directions.hpp"
+#include "viwo/filter/shared_position.hpp"
 #include "viwo/filter/state_blocks.hpp"
 
 namespace viwo {
@@ -80,7 +81,9 @@ class Filter {
   const ImuView& imu() const { return imu_; }
   std::span<const CloneView> clones() const { return clones_; }
   const StateBlocks& blocks() const { return blocks_; }
+  /// Without what all poses have in common where that is large (F-41): imu_covariance() has it.
   const Eigen::MatrixXd& covariance() const { return covariance_.matrix(); }
+  ImuMatrix imu_covariance() const;
   int size() const { return covariance_.size(); }
   /// Estimates of the entries of a declared block, in their order; appended to `out`.
   void estimates(BlockId id, std::vector<BlockEstimate>& out) const {
@@ -92,6 +95,8 @@ class Filter {
   static constexpr std::int64_t kNever = -1;
   template <class Factor>
   FactorResult apply_factor(const Factor& factor);
+  template <class Factor>
+  void see_position(const Factor& factor);
   void correct();
 
   FilterOptions options_;
@@ -102,6 +107,7 @@ class Filter {
   std::size_t window_limit_ = std::numeric_limits<std::size_t>::max();
   StateBlocks blocks_;
   Covariance covariance_;
+  SharedPosition shared_position_;
   HeldDirections held_;
   Eigen::VectorXd dx_;
   std::vector<int> new_columns_;

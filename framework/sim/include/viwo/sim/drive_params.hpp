@@ -18,7 +18,7 @@ BodyTrajectory drive_from(const ParamSet& params, double end_s, double margin_s,
 inline constexpr std::array kDriveParams{
     ParamSpec{.name = "motion", .type = ParamType::kString, .fallback = "icr_sweep",
               .choices = "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
-                         "spin|constant_steering|pivot|sweep_then_straight",
+                         "spin|constant_steering|pivot|sweep_then_straight|mixed",
               .help = "how the base moves"},
     ParamSpec{.name = "duration_s", .type = ParamType::kNumber, .unit = "s", .fallback = "60",
               .min = 0., .max = 7200., .min_exclusive = true, .help = "how long"},

@@ -31,6 +31,8 @@ struct MotionOptions {
 ///   spin               [0, 0, w]
 ///   constant_steering  [v, 0, w] (1 + 0.5 sin): a circle at varying speed
 ///   sweep_then_straight  icr_sweep for 20 s, then within 2 s into [v, 0, 0]
+///   mixed                20 s each of icr_sweep, straight, circle, lateral, standing and a circle
+///                        driven backwards the other way, and again, with changes of 2 s
 ///   pivot              w (1 + 0.5 sin) about a point of the base: a wheel there does not roll
 ///
 /// The ramp slows the beginning of a motion down and leaves the path as it is: the motion at time t
