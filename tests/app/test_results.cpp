@@ -210,6 +210,9 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsOfTheFilter) {
   expect_done({"experiment", kConfigFolder + "experiments/paper_exact.yaml", "--seeds", "1",
                "--out", "exact", "--set", "sensors.simulator0.duration_s=2"});
   EXPECT_EQ(summary("exact").at("variants").at("drive_only").at("runs"), 6);
+  expect_done({"experiment", kConfigFolder + "experiments/long_runs.yaml", "--seeds", "1", "--out",
+               "long", "--set", "sensors.simulator0.duration_s=5"});
+  EXPECT_TRUE(summary("long").at("by").at("motion").contains("mixed"));
   const nlohmann::json variants = summary("paper").at("variants");
   for (const char* variant : {"true_init_calib_on", "true_init_calib_off", "bad_init_calib_on",
                               "bad_init_calib_off", "bad_init_twist_only", "bad_init_drive_only"}) {
@@ -350,6 +353,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                                           "experiments/drive_only_twist_full.yaml",
                                           "experiments/hybrid.yaml",
                                           "experiments/images.yaml",
+                                          "experiments/long_runs.yaml",
                                           "experiments/nominal_dead_reckoning.yaml",
                                           "experiments/openvins_cameras.yaml",
                                           "experiments/paper_accuracy.yaml",
