@@ -85,14 +85,13 @@ SegmentErrors segment_errors(const std::vector<PosePair>& pairs, const std::vect
 
 /// The two longest of 1, 2.5, 5, 10, .. that the path has at least three of, the shorter one first.
 std::vector<double> lengths_of(double path_m) {
-  constexpr double kFewest = 3., kShortest_m = 0.01;
-  constexpr std::array kSteps{1., 2.5, 5.};
+  constexpr double kFewest = 3.;
   std::vector<double> lengths_m;
-  for (int power = -2; kFewest * std::pow(10., power) <= path_m && power < 9; ++power) {
-    for (const double step : kSteps) {
-      const double length_m =
-          power < 0 ? step / std::pow(10., -power) : step * std::pow(10., power);
-      if (length_m >= kShortest_m && kFewest * length_m <= path_m) lengths_m.push_back(length_m);
+  // In centimetres, which are exact.
+  for (double decade_cm = 1.; decade_cm < 1e11; decade_cm *= 10.) {
+    for (const double step : {1., 2.5, 5.}) {
+      const double length_m = step * decade_cm / 100.;
+      if (kFewest * length_m <= path_m) lengths_m.push_back(length_m);
     }
   }
   if (lengths_m.size() > 2) lengths_m.erase(lengths_m.begin(), lengths_m.end() - 2);

@@ -26,6 +26,7 @@ struct Plausibility::Checks {
     std::string sensor;
     const SampleType* type;
     StreamWatch watch;
+
     /// How far its stamps are ahead of those of the IMU, which the estimator's time is.
     double ahead_s(const StreamWatch& imu_watch) const {
       if (!imu_watch.has_begun() || !watch.has_begun()) return 0.;

@@ -13,40 +13,33 @@ namespace {
 constexpr double kLargestVariance_m2 = 100.;
 constexpr double kRounding = 1e-9;
 
-/// Of a row of a Jacobian by the columns of a factor: what moving all poses together changes, and
-/// the largest of what was added up for it.
-class Together {
- public:
-  explicit Together(std::span<const CloneView> clones) : clones_(clones) {}
+/// x, y or z of the position of a pose; -1: another column.
+int axis_of(int column, std::span<const CloneView> clones) {
+  const auto within = [column](int first) {
+    return column >= first && column < first + 3 ? column - first : -1;
+  };
+  int axis = within(kPositionColumn);
+  for (const CloneView& clone : clones) axis = std::max(axis, within(clone.column + 3));
+  return axis;
+}
 
-  template <class Row>
-  bool is_seen_in(const Row& row, const FactorColumns& columns) const {
-    Eigen::Array3d sum = Eigen::Array3d::Zero();
-    double largest = 0.;
-    int at = 0;
-    for (const ColumnRange& block : columns.blocks()) {
-      for (int i = 0; i < block.count; ++i, ++at) {
-        const int axis = axis_of(block.first + i);
-        if (axis < 0) continue;
-        sum[axis] += row(at);
-        largest = std::max(largest, std::abs(row(at)));
-      }
+/// Whether moving all poses together changes what a row of a Jacobian, by the columns of a factor,
+/// is of: more than rounding leaves of what was added up.
+template <class Row>
+bool is_seen_in(const Row& row, const FactorColumns& columns, std::span<const CloneView> clones) {
+  Eigen::Array3d sum = Eigen::Array3d::Zero();
+  double largest = 0.;
+  int at = 0;
+  for (const ColumnRange& block : columns.blocks()) {
+    for (int i = 0; i < block.count; ++i, ++at) {
+      const int axis = axis_of(block.first + i, clones);
+      if (axis < 0) continue;
+      sum[axis] += row(at);
+      largest = std::max(largest, std::abs(row(at)));
     }
-    return sum.abs().maxCoeff() > kRounding * largest;
   }
-
- private:
-  int axis_of(int column) const {
-    const auto within = [column](int first) {
-      return column >= first && column < first + 3 ? column - first : -1;
-    };
-    int axis = within(kPositionColumn);
-    for (const CloneView& clone : clones_) axis = std::max(axis, within(clone.column + 3));
-    return axis;
-  }
-
-  std::span<const CloneView> clones_;
-};
+  return sum.abs().maxCoeff() > kRounding * largest;
+}
 
 }  // namespace
 
@@ -61,21 +54,19 @@ void SharedPosition::take_from(Eigen::Ref<Eigen::Matrix3d> P_position) {
 
 bool SharedPosition::is_seen_by(const ResidualFactor& factor,
                                 std::span<const CloneView> clones) const {
-  const Together together(clones);
   for (Eigen::Index i = 0; i < factor.H.rows(); ++i) {
-    if (together.is_seen_in(factor.H.row(i), factor.columns)) return true;
+    if (is_seen_in(factor.H.row(i), factor.columns, clones)) return true;
   }
   return false;
 }
 
 bool SharedPosition::is_seen_by(const InformationFactor& factor,
                                 std::span<const CloneView> clones) const {
-  const Together together(clones);
   const int n = factor.columns.size();
   for (int i = 0; i < n; ++i) {
     // Only the lower triangle is filled.
     const auto row = [&](int j) { return factor.Lambda(std::max(i, j), std::min(i, j)); };
-    if (together.is_seen_in(row, factor.columns)) return true;
+    if (is_seen_in(row, factor.columns, clones)) return true;
   }
   return false;
 }

@@ -7,6 +7,7 @@
 
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
+#include "viwo/sim/drive_params.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/planar_motion.hpp"
 
@@ -20,8 +21,7 @@ constexpr std::array kParams{
     ParamSpec{.name = "motion",
               .type = ParamType::kString,
               .fallback = "icr_sweep",
-              .choices = "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
-                         "spin|constant_steering|pivot|sweep_then_straight|mixed",
+              .choices = sim::kMotionChoices,
               .help = "how the base moves"},
     ParamSpec{.name = "duration_s",
               .type = ParamType::kNumber,

@@ -14,11 +14,15 @@ namespace viwo::sim {
 BodyTrajectory drive_from(const ParamSet& params, double end_s, double margin_s,
                           const SidewaysVelocity& sideways = {});
 
+/// Names of PlanarMotion.
+inline constexpr const char* kMotionChoices =
+    "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
+    "spin|constant_steering|pivot|sweep_then_straight|mixed";
+
 // clang-format off
 inline constexpr std::array kDriveParams{
     ParamSpec{.name = "motion", .type = ParamType::kString, .fallback = "icr_sweep",
-              .choices = "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
-                         "spin|constant_steering|pivot|sweep_then_straight|mixed",
+              .choices = kMotionChoices,
               .help = "how the base moves"},
     ParamSpec{.name = "duration_s", .type = ParamType::kNumber, .unit = "s", .fallback = "60",
               .min = 0., .max = 7200., .min_exclusive = true, .help = "how long"},
