@@ -1,7 +1,8 @@
-// How much of the roll and the pitch that a base turns by is the ground's, and how much is noise.
-// Equations: model.md beside this file.
+// Whether the roll and the pitch that a base turns by are the ground's or noise, and what the
+// intervals before tell of them. Equations: model.md beside this file.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Core>
@@ -15,24 +16,36 @@ class GroundTilt {
   /// `sigmas`: by how many of its own the scatter has to be above noise.
   explicit GroundTilt(double sigmas = 0.) : sigmas_(sigmas) {}
 
-  /// An interval: yaw and [roll, pitch] of O, rad, and the variance of one of the latter.
-  void add(double yaw, const Eigen::Vector2d& tilt, double variance) {
-    if (!(variance > 0.) || !tilt.allFinite() || !std::isfinite(yaw)) return;
+  /// An interval: its length, yaw and [roll, pitch] of O, rad, and the variance of one of the
+  /// latter.
+  void add(double duration_s, double yaw, const Eigen::Vector2d& tilt, double variance) {
+    if (!(variance > 0.) || !(duration_s > 0.) || !tilt.allFinite() || !std::isfinite(yaw)) return;
     constexpr double kMemory = 100.;
     const double kept = 1. - 1. / kMemory;
     n_ = kept * n_ + 1.;
     yaw_squares_ = kept * yaw_squares_ + yaw * yaw / variance;
     products_ = kept * products_ + yaw * tilt / variance;
     squares_ = kept * squares_ + tilt.squaredNorm() / variance;
+
+    const Eigen::Vector2d rate = tilt / duration_s;
+    repeated_ = kept * repeated_ + rate.dot(before_);
+    before_squares_ = kept * before_squares_ + before_.squaredNorm();
+    before_ = last_;
+    last_ = rate;
   }
 
-  /// k of (WO-16): 1 where the ground tilts, 0 where noise explains what was seen, or nothing was.
-  double share() const {
-    if (!(n_ > 0.)) return 0.;
+  /// Whether noise does not explain what was seen (WO-16); false where nothing was.
+  bool tilts() const {
+    if (!(n_ > 0.)) return false;
     const double by_yaw = yaw_squares_ > 0. ? products_.squaredNorm() / yaw_squares_ : 0.;
     const double scatter = (squares_ - by_yaw) / (2. * n_);
-    const double noise = 1. + sigmas_ / std::sqrt(n_);
-    return scatter > noise ? 1. - noise / scatter : 0.;
+    return scatter > 1. + sigmas_ / std::sqrt(n_);
+  }
+
+  /// [roll, pitch] of an interval that follows those added, of the one before the last (WO-17).
+  Eigen::Vector2d expected(double duration_s) const {
+    if (!(repeated_ > 0.) || !tilts()) return Eigen::Vector2d::Zero();
+    return std::min(repeated_ / before_squares_, 1.) * duration_s * before_;
   }
 
  private:
@@ -40,6 +53,8 @@ class GroundTilt {
   double n_ = 0.;
   double yaw_squares_ = 0., squares_ = 0.;
   Eigen::Vector2d products_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d last_ = Eigen::Vector2d::Zero(), before_ = last_;  ///< rates, rad/s
+  double repeated_ = 0., before_squares_ = 0.;  ///< of a rate and that two intervals before
 };
 
 }  // namespace viwo::wheel_odometry

@@ -9,41 +9,41 @@ namespace viwo::wheel_odometry {
 namespace {
 
 constexpr double kSigma = 5e-5;
+constexpr double kDurationS = 0.1;
 
-/// Largest share after each of the intervals of a drive that turns now and then, with a mount that
-/// is off, over ground that tilts each interval by `ground_rad` (standard deviation).
-double largest_share(double ground_rad, double sigmas, int intervals = 2000) {
+/// How often ground is seen after each of the intervals of a drive that turns now and then, with a
+/// mount that is off, over ground that tilts each interval by `ground_rad` (standard deviation).
+double seen(double ground_rad, double sigmas, int intervals = 2000) {
   std::mt19937_64 rng(5);
   std::normal_distribution<double> gauss;
   GroundTilt tilt(sigmas);
-  double largest = 0.;
+  int often = 0;
   for (int i = 0; i < intervals; ++i) {
     const double yaw = 0.1 * std::sin(0.05 * i);
     const double scatter = std::hypot(ground_rad, kSigma);
-    tilt.add(yaw, {0.01 * yaw + scatter * gauss(rng), -0.02 * yaw + scatter * gauss(rng)},
+    tilt.add(kDurationS, yaw,
+             {0.01 * yaw + scatter * gauss(rng), -0.02 * yaw + scatter * gauss(rng)},
              kSigma * kSigma);
-    largest = std::max(largest, tilt.share());
+    often += tilt.tilts() ? 1 : 0;
   }
-  return largest;
+  return static_cast<double>(often) / intervals;
 }
 
 TEST(GroundTilt, IsNoneOfNoiseAndOfAMountThatIsOff) {
-  EXPECT_EQ(largest_share(0., 5.), 0.);
-  EXPECT_GT(largest_share(0., 0.), 0.1);  // without a margin noise is ground
+  EXPECT_EQ(seen(0., 5.), 0.);
+  EXPECT_GT(seen(0., 0.), 0.1);  // without a margin noise is ground
 }
 
-TEST(GroundTilt, IsAllWhereTheGroundTilts) {
-  EXPECT_GT(largest_share(5e-3, 5.), 0.999);
-  // At once: the first intervals are enough.
-  EXPECT_GT(largest_share(5e-3, 5., 3), 0.99);
-}
+TEST(GroundTilt, IsSeenAtOnceWhereTheGroundTilts) { EXPECT_EQ(seen(5e-3, 5.), 1.); }
 
 TEST(GroundTilt, IsUnknownBeforeThereIsAnInterval) {
   GroundTilt tilt(5.);
-  EXPECT_EQ(tilt.share(), 0.);
-  tilt.add(0.1, {0.01, 0.01}, 0.);
-  tilt.add(std::nan(""), {0.01, 0.01}, 1e-8);
-  EXPECT_EQ(tilt.share(), 0.);
+  EXPECT_FALSE(tilt.tilts());
+  tilt.add(kDurationS, 0.1, {0.01, 0.01}, 0.);
+  tilt.add(kDurationS, std::nan(""), {0.01, 0.01}, 1e-8);
+  tilt.add(0., 0.1, {0.01, 0.01}, 1e-8);
+  EXPECT_FALSE(tilt.tilts());
+  EXPECT_TRUE(tilt.expected(kDurationS).isZero());
 }
 
 TEST(GroundTilt, FollowsFromFlatGroundToUnevenAndBack) {
@@ -53,14 +53,69 @@ TEST(GroundTilt, FollowsFromFlatGroundToUnevenAndBack) {
   const auto drive = [&](double ground_rad, int intervals) {
     for (int i = 0; i < intervals; ++i) {
       const double scatter = std::hypot(ground_rad, kSigma);
-      tilt.add(0.05, {scatter * gauss(rng), scatter * gauss(rng)}, kSigma * kSigma);
+      tilt.add(kDurationS, 0.05, {scatter * gauss(rng), scatter * gauss(rng)}, kSigma * kSigma);
     }
-    return tilt.share();
+    return tilt.tilts();
   };
-  EXPECT_EQ(drive(0., 300), 0.);
-  EXPECT_GT(drive(5e-3, 5), 0.98);
-  EXPECT_GT(drive(5e-3, 100), 0.999);
-  EXPECT_EQ(drive(0., 1500), 0.);
+  EXPECT_FALSE(drive(0., 300));
+  EXPECT_TRUE(drive(5e-3, 5));
+  EXPECT_TRUE(drive(5e-3, 100));
+  EXPECT_FALSE(drive(0., 1500));
+}
+
+/// Products of what is expected of an interval with its noise, with its tilt, and with itself, all
+/// over what the tilt has with itself. The noise of an orientation is in the tilts of two
+/// intervals, with both signs.
+struct Products {
+  double noise = 0., tilt = 0., itself = 0.;
+};
+Products products(double per_interval, bool of_itself = false) {
+  std::mt19937_64 rng(7);
+  constexpr double kNoise = 4e-4;
+  std::normal_distribution<double> gauss(0., kNoise);
+  GroundTilt tilt(5.);
+  Products sum;
+  double squares = 0.;
+  double before = gauss(rng);
+  for (int i = 0; i < 20000; ++i) {
+    const double now = gauss(rng);
+    const Eigen::Vector2d ground =
+        2e-3 * Eigen::Vector2d(std::sin(per_interval * i), std::cos(0.7 * per_interval * i));
+    const Eigen::Vector2d noise(now - before, before - now);
+    const Eigen::Vector2d seen = ground + noise;
+    const Eigen::Vector2d expected = of_itself ? seen : tilt.expected(kDurationS);
+    if (i > 100) {
+      sum.noise += expected.dot(noise);
+      sum.tilt += expected.dot(ground);
+      sum.itself += expected.squaredNorm();
+      squares += ground.squaredNorm();
+    }
+    tilt.add(kDurationS, 0., seen, 2. * kNoise * kNoise);
+    before = now;
+  }
+  return {sum.noise / squares, sum.tilt / squares, sum.itself / squares};
+}
+
+TEST(GroundTilt, WhatIsExpectedSharesNoNoiseWithTheInterval) {
+  EXPECT_NEAR(products(0.05).noise, 0., 0.01);
+  EXPECT_GT(products(0.05, true).noise, 0.1);  // the tilt of the interval itself does
+}
+
+TEST(GroundTilt, WhatIsExpectedTeachesNoMoreThanItTellsOfTheTilt) {
+  const Products smooth = products(0.05);
+  EXPECT_NEAR(smooth.itself, smooth.tilt, 0.02);
+  EXPECT_GT(smooth.tilt, 0.8);
+  // Ground that two intervals later is another tells nothing, rather than something wrong.
+  const Products rough = products(0.8);
+  EXPECT_LT(rough.itself, 0.1);
+  EXPECT_NEAR(rough.itself, rough.tilt, 0.02);
+}
+
+TEST(GroundTilt, WhatIsExpectedGoesWithTheLengthOfTheInterval) {
+  GroundTilt tilt(0.);
+  for (int i = 0; i < 10; ++i) tilt.add(0.1, 0., {1e-2, -2e-2}, 1e-10);
+  EXPECT_NEAR(tilt.expected(0.1).x(), 1e-2, 1e-4);
+  EXPECT_NEAR(tilt.expected(0.05).y(), -1e-2, 1e-4);
 }
 
 }  // namespace

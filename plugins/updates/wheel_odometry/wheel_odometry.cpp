@@ -111,7 +111,7 @@ class WheelOdometry final : public Update {
     ResidualFactor& factor = sink.add_residual();
     set_columns(wheels, filter.P(), first, last, factor.columns);
     iterate(wheels, encoders, *interval, factor);
-    ground_tilt_.add(pose_.g[0], tilt_, tilt_variance());
+    ground_tilt_.add(pose_.duration_s, pose_.g[0], tilt_, tilt_variance());
   }
 
   void rejections(std::vector<RejectionCount>& out) const override {
@@ -216,7 +216,7 @@ class WheelOdometry final : public Update {
     set_noise();
     // What the mount shows is proportional to the motion. Taken at the noisy first estimates it
     // would count their noise as motion, and so as information: it is taken at the motion that the
-    // wheels measured, with the tilt of the iterate.
+    // wheels measured, with a tilt that intervals before tell.
     const Eigen::Vector3d& p_IinO = at_.mount.p_IinO;
     const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt_, g_rate_, p_IinO);
     const auto n = P_.cols() - n_geometry_;
@@ -266,9 +266,9 @@ class WheelOdometry final : public Update {
     return part;
   }
 
-  /// (WO-16)
+  /// Free of the noise of this interval.
   Eigen::Vector2d moving_tilt() const {
-    return options_.twist.motion_sigmas > 0. ? ground_tilt_.share() * tilt_ : tilt_;
+    return options_.twist.motion_sigmas > 0. ? ground_tilt_.expected(pose_.duration_s) : tilt_;
   }
 
   /// Of the roll, or the pitch, of O from one clone to the other.
