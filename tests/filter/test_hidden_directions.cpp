@@ -85,6 +85,18 @@ TEST(HiddenDirections, OfARestAreAll) {
   EXPECT_NE(faults(runs("stationary", "uneven", kAllNoiseIsMotion), {"p_IinO", "y_"}), "");
 }
 
+TEST(HiddenDirections, OfACircleAreMostOfTheWheels) {
+  const std::vector<std::string> twist_alone{"updates.wheel_parity.enabled=false",
+                                             "sensors.simulator0.duration_s=60"};
+  const std::vector<std::string> hidden{"x_2", "x_3", "x_4"};
+  EXPECT_EQ(faults(runs("circle", "uneven", twist_alone), hidden), "");
+  // Rolling rows know of the directions of the wheels at second order: at first order they are
+  // learned, and wrong.
+  std::vector<std::string> first_order = twist_alone;
+  first_order.emplace_back("updates.wheel_odometry.second_order_noise=false");
+  EXPECT_NE(faults(runs("circle", "uneven", first_order), {}), "");
+}
+
 TEST(HiddenDirections, AreNoneOfASweepOverUnevenGround) {
   EXPECT_EQ(faults(runs("icr_sweep", "uneven", {}), {}), "");
   EXPECT_EQ(faults(runs("figure_eight", "uneven", {}), {}), "");

@@ -15,6 +15,7 @@
 #include "encoder_intervals.hpp"
 #include "encoders.hpp"
 #include "ground_tilt.hpp"
+#include "intrinsic_curvature.hpp"
 #include "relative_pose.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/so3.hpp"
@@ -84,6 +85,7 @@ class WheelOdometry final : public Update {
     checked_.start(wheel_model_of(blocks_), wheel_check_probability_);
     preintegrator_.emplace(wheel_model_of(blocks_), options_);
     shifted_preintegrator_.emplace(wheel_model_of(blocks_), options_);
+    curvature_.start(wheel_model_of(blocks_), options_);
   }
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
@@ -110,6 +112,11 @@ class WheelOdometry final : public Update {
     }
     ResidualFactor& factor = sink.add_residual();
     set_columns(wheels, filter.P(), first, last, factor.columns);
+    if (second_order_noise_) {
+      const auto n = P_.cols() - n_geometry_;
+      curvature_noise_ = curvature_.noise(encoders, interval->begin_ns, interval->end_ns, at_.x_WI,
+                                          P_.bottomRightCorner(n, n), pose_);
+    }
     iterate(wheels, encoders, *interval, factor);
     ground_tilt_.add(pose_.duration_s, pose_.g[0], tilt_, tilt_variance());
   }
@@ -241,7 +248,7 @@ class WheelOdometry final : public Update {
   void set_noise() {
     const double path = pose_.path_length_m;
     const auto square = [](double x) { return x * x; };
-    R_ = square(noise_scale_) * pose_.P_g;
+    R_ = square(noise_scale_) * pose_.P_g + curvature_noise_;
     R_(0, 0) += square(sigma_floor_yaw_rad_) + path * square(sigma_yaw_rad_per_sqrt_m_);
     for (int i = 1; i < 3; ++i) {
       R_(i, i) += square(sigma_floor_position_m_) + path * square(sigma_position_m_per_sqrt_m_);
@@ -423,6 +430,8 @@ class WheelOdometry final : public Update {
   Eigen::Vector3d residual_ = Eigen::Vector3d::Zero();
   Eigen::Vector2d tilt_ = Eigen::Vector2d::Zero();  // [roll, pitch] of O over the interval
   wheel_odometry::GroundTilt ground_tilt_;
+  wheel_odometry::IntrinsicCurvature curvature_;
+  Eigen::Matrix3d curvature_noise_ = Eigen::Matrix3d::Zero();
   PoseJacobian geometry_jacobian_ = PoseJacobian::Zero();
   Jacobian H_;
   Eigen::Matrix3d R_ = Eigen::Matrix3d::Zero();
