@@ -273,6 +273,8 @@ void rig() {
   MEMBER(WheelsView, extrinsics_column);
   MEMBER(WheelsView, time_offset_column);
   MEMBER(WheelsView, intrinsics_column);
+  MEMBER(WheelsView, wander_column);
+  MEMBER(WheelsView, wander_time_s);
   RECORD(WheelsPrior);
   MEMBER(WheelsPrior, name);
   MEMBER(WheelsPrior, sensor);
@@ -280,11 +282,16 @@ void rig() {
   MEMBER(WheelsPrior, sigma_extrinsics);
   MEMBER(WheelsPrior, sigma_time_offset_s);
   MEMBER(WheelsPrior, sigma_intrinsics);
+  MEMBER(WheelsPrior, intrinsics_walk);
+  MEMBER(WheelsPrior, sigma_wander);
+  MEMBER(WheelsPrior, wander_time_s);
   RECORD(WheelsBlocks);
   MEMBER(WheelsBlocks, model);
   MEMBER(WheelsBlocks, extrinsics);
   MEMBER(WheelsBlocks, clock);
   MEMBER(WheelsBlocks, intrinsics);
+  MEMBER(WheelsBlocks, wander);
+  MEMBER(WheelsBlocks, wander_time_s);
   RECORD(Rig);
 }
 

@@ -176,5 +176,17 @@ TEST(Calibrate, ReadsItsFileLeavesOutAndWritesACalibrationThatARunIncludes) {
   EXPECT_LT(included.accuracy->end_m, 0.1 * nominal.accuracy->end_m);
 }
 
+TEST(Calibrate, FindsHowTheWheelsWander) {
+  const auto found = [](std::vector<std::string> assignments) {
+    assignments.emplace_back("sensors.simulator0.duration_s=200");
+    return calibrate(setup_of({"icr_sweep", "figure_eight"}, 1, assignments)).wander;
+  };
+  const WheelWander wanders = found({"sensors.simulator0.intrinsics_wander=0.5",
+                                     "sensors.simulator0.intrinsics_wander_time_s=1"});
+  EXPECT_NEAR(wanders.sigma, 0.5, 0.1);
+  EXPECT_NEAR(wanders.time_s, 1., 0.5);
+  EXPECT_LT(found({}).sigma, 0.05);
+}
+
 }  // namespace
 }  // namespace viwo

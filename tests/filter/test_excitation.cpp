@@ -163,7 +163,7 @@ WheelsView wheels_of(const experiment::FilterSetup& setup, const Filter& filter)
         all.begin(), all.end(), [&](const BlockSpec& spec) { return spec.name == specs[k].name; });
     return BlockId{static_cast<int>(found - all.begin())};
   };
-  return WheelsBlocks{nullptr, id(0), id(1), id(2)}.view(filter.view());
+  return WheelsBlocks{nullptr, id(0), id(1), id(2), {}, 0.}.view(filter.view());
 }
 
 /// dtheta and additive, from one estimate to the next.

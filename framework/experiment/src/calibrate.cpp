@@ -8,6 +8,7 @@
 
 #include "viwo/config/params.hpp"
 #include "viwo/config/yaml.hpp"
+#include "wheel_wander.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -173,6 +174,7 @@ CalibrationResult calibrate(const CalibrationSetup& setup,
   CalibrationResult result;
   result.setup = &setup;
   result.all = estimates[0];
+  result.wander = find_wander(setup, result.all.x_WI);
   for (const std::string& label : setup.leave_out_by) result.left_out.push_back({label, {}});
   for (std::size_t i = 0; i < setup.recordings.size(); ++i) {
     result.fitted.push_back(validate(setup, i, estimates[0]));

@@ -150,6 +150,35 @@ report::Table parameter_table(const CalibrationResult& result) {
   return table;
 }
 
+/// What was found, and what to write.
+std::string wander_text(const WheelWander& wander) {
+  if (!(wander.sigma > 0.)) return "the wheels contradict each other as noise does: none wanders";
+  const std::string sigma = significant(wander.sigma, 2), time_s = significant(wander.time_s, 2);
+  return "the intrinsics wander by " + sigma + " prior sigmas, for " + time_s +
+         " s: wheels.intrinsics_wander=" + sigma + ", wheels.intrinsics_wander_time_s=" + time_s +
+         " in a filter";
+}
+
+void add_wander(const WheelWander& wander, report::Document& document) {
+  report::Plot plot{"How the intrinsics wander", "time between [s]", "covariance [prior sigmas^2]"};
+  plot.caption =
+      "How the wheels contradict each other now and later, as if all intrinsics wandered alike in "
+      "units of their prior sigmas (CAL-6). White noise is zero, what is wrong for good a "
+      "constant.";
+  report::Series found{"found", wander.lag_s, wander.covariance};
+  found.draw = report::Draw::kMarkers;
+  plot.series.push_back(std::move(found));
+  if (wander.sigma > 0.) {
+    report::Series process{"Gauss-Markov", wander.lag_s, {}};
+    for (const double lag_s : wander.lag_s) {
+      process.y.push_back(wander.sigma * wander.sigma * std::exp(-lag_s / wander.time_s));
+    }
+    plot.series.push_back(std::move(process));
+  }
+  document.sections.push_back({"What is not constant", {report::Paragraph{wander_text(wander)}}});
+  if (!wander.lag_s.empty()) document.sections.back().blocks.emplace_back(std::move(plot));
+}
+
 void add_plots(const CalibrationResult& result, report::Document& document) {
   const auto& runs = result.left_out.empty() ? result.fitted : result.left_out.front().runs;
   for (const ValidationRun& run : runs) {
@@ -202,6 +231,7 @@ std::string describe(const CalibrationResult& result) {
   out << "what the fit leaves per segment: " << significant(1e3 * estimate.noise.position_m, 3)
       << " mm, " << significant(estimate.noise.yaw_rad, 3) << " rad; parity residual "
       << significant(estimate.noise.parity_scale, 3) << " x the model's sigmas\n";
+  out << wander_text(result.wander) << "\n";
   if (!estimate.clock_offset_s.empty() && result.setup->options.clock_offset_sigma_s > 0.) {
     out << "clock offsets of the recordings: mean "
         << significant(1e3 * eval::mean(estimate.clock_offset_s), 3) << " ms, spread "
@@ -256,17 +286,19 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
     left_out.push_back(errors_json(*result.setup, one.runs));
     by_label[one.by] = left_out.back();
   }
-  const json summary = {{"status", estimate.converged ? "ok" : "failed"},
-                        {"calibration", parameters},
-                        {"noise",
-                         {{"position_m", estimate.noise.position_m},
-                          {"yaw_rad", estimate.noise.yaw_rad},
-                          {"parity_scale", estimate.noise.parity_scale}}},
-                        {"clock_offset_s", estimate.clock_offset_s},
-                        {"undetermined", undetermined},
-                        {"fitted", errors_json(*result.setup, result.fitted)},
-                        {"left_out", left_out.empty() ? json::object() : left_out.front()},
-                        {"left_out_by", by_label}};
+  const json summary = {
+      {"status", estimate.converged ? "ok" : "failed"},
+      {"calibration", parameters},
+      {"noise",
+       {{"position_m", estimate.noise.position_m},
+        {"yaw_rad", estimate.noise.yaw_rad},
+        {"parity_scale", estimate.noise.parity_scale}}},
+      {"wander", {{"sigma", result.wander.sigma}, {"time_s", result.wander.time_s}}},
+      {"clock_offset_s", estimate.clock_offset_s},
+      {"undetermined", undetermined},
+      {"fitted", errors_json(*result.setup, result.fitted)},
+      {"left_out", left_out.empty() ? json::object() : left_out.front()},
+      {"left_out_by", by_label}};
   write_text(folder / "summary.json", summary.dump(2) + "\n");
 
   report::Document document{result.setup->name,
@@ -285,6 +317,7 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
   for (const LeftOut& one : result.left_out) {
     document.sections.push_back({left_out_title(one), {error_table(*result.setup, one.runs)}});
   }
+  add_wander(result.wander, document);
   add_plots(result, document);
   report::write_html(folder / "report.html", document);
 }

@@ -351,6 +351,20 @@ inline constexpr std::array kWheelsParams{
               .min = 0.,
               .help = "random walk of the intrinsics, for what changes while driving (tyres that "
                       "warm up or wear); 0: constant"},
+    ParamSpec{.name = "intrinsics_wander",
+              .type = ParamType::kNumber,
+              .fallback = "0",
+              .min = 0.,
+              .help = "in prior sigmas, what comes and goes beside each constant intrinsic, a "
+                      "Gauss-Markov process: play of the steering, slip, tyres on uneven ground; "
+                      "viwo calibrate finds it; 0: nothing"},
+    ParamSpec{.name = "intrinsics_wander_time_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "2",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "time constant of intrinsics_wander"},
 };
 
 }  // namespace viwo::experiment

@@ -221,7 +221,7 @@ void read_cameras(const ParamSet& p, const Node& section, CalibrationError error
 
 /// A wheel set from its section `wheels`; the intrinsics and their sigmas are those of its model.
 void read_wheels(const ParamSet& p, const Node& section, WheelSet set, CalibrationError error,
-                 std::uint64_t seed, FilterSetup& setup, Errors& errors) {
+                 const ReadContext& context, FilterSetup& setup, Errors& errors) {
   const auto p_IinO = three(p, "p_IinO_m", section, errors);
   const auto rpy = three(p, "rpy_ItoO_rad", section, errors);
   const auto sigma_p = three(p, "sigma_p_IinO_m", section, errors);
@@ -242,7 +242,7 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, Calibrati
     }
   }
 
-  WrongStart wrong(error, seed, setup.wheels.size());
+  WrongStart wrong(error, context.seed, setup.wheels.size());
   const Vector3d turn = wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()));
   const Vector3d shift = wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
   const double later = wrong.draw(prior.sigma_time_offset_s);
@@ -255,6 +255,14 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, Calibrati
     }
   }
   prior.intrinsics_walk = p.number("intrinsics_walk_per_sqrt_s");
+  if (const double wander = p.number("intrinsics_wander"); wander > 0. && !context.exact) {
+    prior.sigma_wander.resize(prior.wheels.x_WI.size());
+    for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      prior.sigma_wander[i] = wander * set.model->description().intrinsics[k].prior_sigma;
+    }
+    prior.wander_time_s = p.number("intrinsics_wander_time_s");
+  }
   if (!p.flag("calibrate_extrinsics")) prior.sigma_extrinsics.setZero();
   if (!p.flag("calibrate_time_offset")) prior.sigma_time_offset_s = 0.;
   if (!p.flag("calibrate_intrinsics")) prior.sigma_intrinsics.setZero();
@@ -298,7 +306,7 @@ void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext&
                         [&] { return std::make_shared<const WheelModel>(model.object); });
     set.prior.wheels.x_WI = set.model->nominal();
     set.prior.sigma_intrinsics = set.model->prior_sigma();
-    read_wheels(*params, section, std::move(set), error, context.seed, setup, errors);
+    read_wheels(*params, section, std::move(set), error, context, setup, errors);
     Node resolved_set = Node::empty_map();
     resolved_set.set("kinematics", model.resolved);
     resolved_set.set("wheels", resolved_wheels);
@@ -377,8 +385,8 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
       set.model = model;
       set.prior.wheels.x_WI = x_WI;
       set.prior.sigma_intrinsics = sigma;
-      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error, context.seed,
-                  setup, errors);
+      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error, context, setup,
+                  errors);
     }
   }
   read_wheel_sets(run, error, context, setup, resolved, errors);

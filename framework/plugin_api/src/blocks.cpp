@@ -20,6 +20,20 @@ void add_pose(BlockSpec& block, const std::string& theta, const Eigen::Matrix3d&
   }
 }
 
+/// Entries for all intrinsics of the model of `prior`, called as it calls them.
+void add_intrinsics(BlockSpec& block, const std::string& prefix, const WheelsPrior& prior,
+                    const Intrinsics& value, const Intrinsics& sigma) {
+  ModelDescription description;
+  if (prior.wheels.model != nullptr) prior.wheels.model->describe(description);
+  for (Eigen::Index i = 0; i < value.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const bool named = k < description.intrinsics.size();
+    block.add(
+        prefix + (named ? description.intrinsics[k].name : "intrinsic_" + std::to_string(i + 1)),
+        named ? description.intrinsics[k].unit : "", value[i], sigma[i]);
+  }
+}
+
 }  // namespace
 
 BlockSpec& BlockSpec::add_rotation(const std::array<std::string, 3>& names,
@@ -91,16 +105,7 @@ std::array<BlockSpec, 3> wheels_blocks(const WheelsPrior& prior) {
   clock.add(prefix + "t_OtoI", "s", prior.wheels.t_OtoI_s, prior.sigma_time_offset_s,
             Excitation::kClock);
   BlockSpec intrinsics{.name = group + ".intrinsics", .group = group};
-  ModelDescription description;
-  if (prior.wheels.model != nullptr) prior.wheels.model->describe(description);
-  for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const bool named = k < description.intrinsics.size();
-    intrinsics.add(
-        prefix + (named ? description.intrinsics[k].name : "intrinsic_" + std::to_string(i + 1)),
-        named ? description.intrinsics[k].unit : "", prior.wheels.x_WI[i],
-        prior.sigma_intrinsics[i]);
-  }
+  add_intrinsics(intrinsics, prefix, prior, prior.wheels.x_WI, prior.sigma_intrinsics);
   if (prior.intrinsics_walk > 0.) {
     intrinsics.process = Process::kRandomWalk;
     for (BlockEntry& entry : intrinsics.entries) {
@@ -113,7 +118,20 @@ std::array<BlockSpec, 3> wheels_blocks(const WheelsPrior& prior) {
 WheelsBlocks declare_wheels(Declarations& host) {
   const WheelsPrior& prior = host.rig().wheels();
   const std::array<BlockSpec, 3> blocks = wheels_blocks(prior);
-  return {prior.wheels.model, host.block(blocks[0]), host.block(blocks[1]), host.block(blocks[2])};
+  WheelsBlocks out{
+      prior.wheels.model, host.block(blocks[0]), host.block(blocks[1]), host.block(blocks[2]), {},
+      prior.wander_time_s};
+  if (prior.sigma_wander.size() == 0) return out;
+  BlockSpec wander{
+      .name = prior.name.empty() ? "wheels.wander" : "wheels." + prior.name + ".wander",
+      .process = Process::kGaussMarkov,
+      .time_constant_s = prior.wander_time_s};
+  const Intrinsics zero = Intrinsics::Zero(prior.sigma_wander.size());
+  add_intrinsics(wander, (prior.name.empty() ? "" : prior.name + ".") + "wander_", prior, zero,
+                 prior.sigma_wander);
+  for (BlockEntry& entry : wander.entries) entry.process_sigma = entry.sigma;
+  out.wander = host.block(wander);
+  return out;
 }
 
 WheelsView WheelsBlocks::view(const FilterView& filter) const {
@@ -129,7 +147,25 @@ WheelsView WheelsBlocks::view(const FilterView& filter) const {
   view.extrinsics_column = pose.column();
   view.time_offset_column = offset.column();
   view.intrinsics_column = numbers.column();
+  if (wander.index >= 0) {
+    const BlockView& moving = filter.block(wander);
+    view.x_WI += moving.numbers();
+    view.wander_column = moving.column();
+    view.wander_time_s = wander_time_s;
+  }
   return view;
+}
+
+IntrinsicMatrix WheelsView::covariance(
+    const Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>& P) const {
+  const Eigen::Index n = x_WI.size();
+  IntrinsicMatrix sum = IntrinsicMatrix::Zero(n, n);
+  for (const int row : {intrinsics_column, wander_column}) {
+    for (const int column : {intrinsics_column, wander_column}) {
+      if (row >= 0 && column >= 0) sum += P.block(row, column, n, n);
+    }
+  }
+  return sum;
 }
 
 }  // namespace viwo

@@ -97,6 +97,42 @@ class Disturbances {
   RandomStream outliers_;
 };
 
+/// Intrinsics that wander about true ones.
+class Wander {
+ public:
+  Wander(const ModelDescription& description, const Intrinsics& truth,
+         const EncoderSimulation& options, std::uint64_t seed)
+      : truth_(truth),
+        sigma_(Intrinsics::Zero(truth.size())),
+        off_(sigma_),
+        x_WI_(truth),
+        kept_(std::exp(-1. / (options.rate_hz * options.wander_time_s))),
+        random_(seed, Stream::kWander) {
+    if (options.wander <= 0.) return;
+    for (Eigen::Index i = 0; i < truth.size(); ++i) {
+      sigma_[i] = options.wander * description.intrinsics[static_cast<std::size_t>(i)].prior_sigma;
+      off_[i] = sigma_[i] * random_.gaussian();
+    }
+    x_WI_ += off_;
+  }
+
+  void step() {
+    if (sigma_.isZero(0.)) return;
+    const double gained = std::sqrt(1. - kept_ * kept_);
+    for (Eigen::Index i = 0; i < off_.size(); ++i) {
+      off_[i] = kept_ * off_[i] + gained * sigma_[i] * random_.gaussian();
+    }
+    x_WI_ = truth_ + off_;
+  }
+
+  const Intrinsics& x_WI() const { return x_WI_; }
+
+ private:
+  Intrinsics truth_, sigma_, off_, x_WI_;
+  double kept_;
+  RandomStream random_;
+};
+
 /// The encoder channels of a base that moves as it should.
 class Base {
  public:
@@ -175,6 +211,7 @@ class Base {
 void EncoderSimulation::make_exact() {
   noise = false;
   slip = {};
+  wander = 0.;
   outlier_probability = 0.;
   drive_resolution_rad_per_s = 0.;
 }
@@ -193,7 +230,8 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
     throw std::invalid_argument("slip: no wheel " + std::to_string(options.slip.wheel));
   }
   Disturbances disturbances(description, options, seed);
-  Base base(model, description, truth);
+  Wander wander(description, truth, options, seed);
+  Base base(model, description, wander.x_WI());
   // Wheels stand in the direction of the motion when it starts.
   Twist at_start = twist(std::max(options.time_offset_s, 0.) + 0.05);
   base.follow(at_start, options.sliding_m_per_s);
@@ -208,6 +246,7 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
     EncoderSample sample = disturbances.read(exact, t);
     sample.t_ns = options.start_ns + t_ns;
     samples.push_back(sample);
+    wander.step();
   }
   log::make_cells(samples, std::numeric_limits<double>::infinity());
   return samples;

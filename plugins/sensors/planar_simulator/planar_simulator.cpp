@@ -92,6 +92,19 @@ constexpr std::array kParams{
         .fallback = "0",
         .min = 0.,
         .help = "0: the nominal intrinsics are true; s: nominal + s * prior sigma * gaussian"},
+    ParamSpec{.name = "intrinsics_wander",
+              .type = ParamType::kNumber,
+              .fallback = "0",
+              .min = 0.,
+              .help = "each intrinsic wanders about its true value with a sigma of so many prior "
+                      "sigmas (Gauss-Markov)"},
+    ParamSpec{.name = "intrinsics_wander_time_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "2",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "its time constant"},
     ParamSpec{.name = "slip_start_s",
               .type = ParamType::kNumbers,
               .unit = "s",
@@ -146,6 +159,8 @@ sim::EncoderSimulation simulation_from(const ParamSet& params) {
   out.outlier_probability = params.number("outlier_probability");
   out.outlier_rad_per_s = params.number("outlier_rad_per_s");
   out.drive_resolution_rad_per_s = params.number("drive_resolution_rad_per_s");
+  out.wander = params.number("intrinsics_wander");
+  out.wander_time_s = params.number("intrinsics_wander_time_s");
   return out;
 }
 

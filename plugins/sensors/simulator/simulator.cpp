@@ -32,6 +32,12 @@ constexpr std::array kBaseParams{
     ParamSpec{.name = "true_intrinsics_scale", .type = ParamType::kNumber, .fallback = "0",
               .min = 0.,
               .help = "0: the nominal intrinsics are true; s: nominal + s * prior sigma * gaussian"},
+    ParamSpec{.name = "intrinsics_wander", .type = ParamType::kNumber,
+              .fallback = "0", .min = 0.,
+              .help = "each intrinsic wanders about its true value with a sigma of so many prior "
+                      "sigmas (Gauss-Markov)"},
+    ParamSpec{.name = "intrinsics_wander_time_s", .type = ParamType::kNumber, .unit = "s",
+              .fallback = "2", .min = 0., .min_exclusive = true, .help = "its time constant"},
     ParamSpec{.name = "true_sigma_p_IinO_m", .type = ParamType::kNumbers, .unit = "m",
               .fallback = "[0, 0, 0]", .help = "the true mount is p_IinO_m + a draw of these sigmas"},
     ParamSpec{.name = "true_sigma_R_ItoO_rad", .type = ParamType::kNumbers, .unit = "rad",
@@ -90,6 +96,8 @@ sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
   out.outlier_probability = params.number("outlier_probability");
   out.outlier_rad_per_s = params.number("outlier_rad_per_s");
   out.drive_resolution_rad_per_s = params.number("drive_resolution_rad_per_s");
+  out.wander = params.number("intrinsics_wander");
+  out.wander_time_s = params.number("intrinsics_wander_time_s");
   out.sliding_m_per_s = kSliding;
   return out;
 }

@@ -32,10 +32,7 @@ class CheckedEncoders {
     const auto first_new = std::partition_point(encoders.begin(), encoders.end(), known);
     n_new_ = static_cast<std::size_t>(encoders.end() - first_new);
     if (!encoders.empty()) newest_ns_ = std::max(newest_ns_, encoders.back().t_ns);
-    const auto n = wheels.x_WI.size();
-    P_x_ = IntrinsicMatrix::Zero(n, n);
-    const int first = wheels.intrinsics_column;
-    if (first >= 0) P_x_ = P.block(first, first, n, n);
+    P_x_ = wheels.covariance(P);
     if (!check_->is_on()) return encoders;
     const auto is_old = [&](const EncoderSample& y) {
       return encoders.empty() || y.t_ns < encoders.front().t_ns;

@@ -2,14 +2,18 @@
 // model.md beside this file.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 
 #include "viwo/wheel/preintegration.hpp"
 
@@ -21,18 +25,21 @@ class IntrinsicCurvature {
  public:
   void start(std::shared_ptr<const WheelModel> model, const PreintegrationOptions& options) {
     preintegrator_.emplace(std::move(model), options);
-    intervals_ = 0.;
+    alike_ = 0.;
     unchecked_ = 0;
   }
 
   /// (WO-18) of `pose`, integrated from begin_ns to end_ns at x_WI with the weights there, for
-  /// intrinsics of covariance P. Zero where it is negligible, and for a few intervals after.
+  /// intrinsics of covariance P; `wander_time_s` after which part of them are others, 0: never.
+  /// Zero where it is negligible, and for a few intervals after.
   Eigen::Matrix3d noise(std::span<const EncoderSample> encoders, std::int64_t begin_ns,
                         std::int64_t end_ns, const Intrinsics& x_WI, const IntrinsicMatrix& P,
-                        const PreintegratedPose& pose) {
-    ++intervals_;
+                        double wander_time_s, const PreintegratedPose& pose) {
+    count(pose);
     if (P.cols() == 0 || --unchecked_ >= 0) return Eigen::Matrix3d::Zero();
-    const Eigen::Matrix3d common = intervals_ * left_out(encoders, begin_ns, end_ns, x_WI, P, pose);
+    double together = alike_;
+    if (wander_time_s > 0.) together = std::min(together, 1. + wander_time_s / pose.duration_s);
+    const Eigen::Matrix3d common = together * left_out(encoders, begin_ns, end_ns, x_WI, P, pose);
     const double share = common.diagonal().cwiseQuotient(pose.P_g.diagonal()).sum();
     if (share >= kNegligible) return common;
     unchecked_ = kIntervalsUnchecked;
@@ -45,6 +52,21 @@ class IntrinsicCurvature {
   /// In units of the noise of the encoders, as variances.
   static constexpr double kNegligible = 0.01;
   static constexpr int kIntervalsUnchecked = 5;
+  /// Motions in directions further apart than this bend otherwise, rad.
+  static constexpr double kAlike = 0.1;
+
+  /// (WO-19)
+  void count(const PreintegratedPose& pose) {
+    const Eigen::Vector3d rate = pose.g / pose.duration_s;
+    const Eigen::LLT<Eigen::Matrix3d> noise(pose.P_g);
+    const Eigen::Vector3d now = noise.matrixL().solve(rate);
+    const Eigen::Vector3d before = noise.matrixL().solve(motion_);
+    const double sine2 =
+        now.cross(before).squaredNorm() / (now.squaredNorm() * before.squaredNorm());
+    const double kept = std::exp(-sine2 / (kAlike * kAlike));
+    alike_ = 1. + (std::isfinite(kept) ? kept * alike_ : 0.);
+    motion_ += (rate - motion_) / alike_;
+  }
 
   Eigen::Matrix3d left_out(std::span<const EncoderSample> encoders, std::int64_t begin_ns,
                            std::int64_t end_ns, const Intrinsics& x_WI, const IntrinsicMatrix& P,
@@ -77,7 +99,8 @@ class IntrinsicCurvature {
   std::optional<Preintegrator> preintegrator_;
   PreintegratedPose moved_;
   Eigen::SelfAdjointEigenSolver<IntrinsicMatrix> eigen_;
-  double intervals_ = 0.;
+  double alike_ = 0.;                                 ///< intervals of the same motion
+  Eigen::Vector3d motion_ = Eigen::Vector3d::Zero();  ///< their mean, per second
   int unchecked_ = 0;
 };
 

@@ -38,9 +38,10 @@ class Circle : public ::testing::Test {
     return pose;
   }
 
-  Eigen::Matrix3d noise(IntrinsicCurvature& curvature, const IntrinsicMatrix& P) const {
+  Eigen::Matrix3d noise(IntrinsicCurvature& curvature, const IntrinsicMatrix& P,
+                        double wander_time_s = 0.) const {
     const Intrinsics x = model_->nominal();
-    return curvature.noise(encoders_, 1000 * kMs, 1100 * kMs, x, P, at(x));
+    return curvature.noise(encoders_, 1000 * kMs, 1100 * kMs, x, P, wander_time_s, at(x));
   }
 
   std::shared_ptr<const WheelModel> model_;
@@ -85,6 +86,14 @@ TEST_F(Circle, IsCommonToAllIntervals) {
   EXPECT_TRUE(noise(curvature, P_).isApprox(3. * first, 1e-12));
   curvature.start(model_, options_);
   EXPECT_TRUE(noise(curvature, P_).isApprox(first, 1e-12));
+}
+
+TEST_F(Circle, IsCommonForAsLongAsNothingWanders) {
+  IntrinsicCurvature curvature;
+  curvature.start(model_, options_);
+  const Eigen::Matrix3d first = noise(curvature, P_, 0.2);
+  for (int k = 0; k < 5; ++k) noise(curvature, P_, 0.2);
+  EXPECT_TRUE(noise(curvature, P_, 0.2).isApprox(3. * first, 1e-6));
 }
 
 TEST_F(Circle, IsNotLookedForWhereItIsNegligible) {

@@ -27,7 +27,7 @@ namespace {
 using namespace wheel_motion;
 using wheel_odometry::kParams;
 
-constexpr int kMaxColumns = kGeometrySize + kMaxIntrinsics;
+constexpr int kMaxColumns = kGeometrySize + 2 * kMaxIntrinsics;
 using Step = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxColumns, 1>;
 using Jacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxColumns>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxColumns,
@@ -115,7 +115,7 @@ class WheelOdometry final : public Update {
     if (second_order_noise_) {
       const auto n = P_.cols() - n_geometry_;
       curvature_noise_ = curvature_.noise(encoders, interval->begin_ns, interval->end_ns, at_.x_WI,
-                                          P_.bottomRightCorner(n, n), pose_);
+                                          P_.bottomRightCorner(n, n), wheels.wander_time_s, pose_);
     }
     iterate(wheels, encoders, *interval, factor);
     ground_tilt_.add(pose_.duration_s, pose_.g[0], tilt_, tilt_variance());
@@ -185,8 +185,9 @@ class WheelOdometry final : public Update {
     add(last.column, kPoseSize, kLastTheta);
     add(wheels.extrinsics_column, kPoseSize, kMountTheta);
     add(wheels.time_offset_column, 1, kTimeOffset);
-    if (wheels.intrinsics_column >= 0) {
-      columns.add(wheels.intrinsics_column, static_cast<int>(wheels.x_WI.size()));
+    const auto n = static_cast<int>(wheels.x_WI.size());
+    for (const int column : {wheels.intrinsics_column, wheels.wander_column}) {
+      if (column >= 0) columns.add(column, n);
     }
     // The prior of just these columns.
     P_.resize(columns.size(), columns.size());
@@ -199,6 +200,13 @@ class WheelOdometry final : public Update {
         col += cols.count;
       }
       row += rows.count;
+    }
+    // What is constant of the intrinsics and what wanders have the same derivatives: they are one
+    // here, their sum.
+    if (const int sum = n_geometry_ + n; row > sum) {
+      P_.middleCols(n_geometry_, n) += P_.rightCols(n);
+      P_.middleRows(n_geometry_, n) += P_.bottomRows(n);
+      P_.conservativeResize(sum, sum);
     }
     geometry_P_.setZero();
     for (int i = 0; i < n_geometry_; ++i) {
@@ -347,7 +355,9 @@ class WheelOdometry final : public Update {
     }
     if (second_order_noise_) add_second_order_noise(wheels);
     factor.set_rows(3);
-    factor.H = H_;
+    factor.H.leftCols(H_.cols()) = H_;
+    const auto wandering = factor.H.cols() - H_.cols();
+    factor.H.rightCols(wandering) = H_.rightCols(wandering);
     factor.residual.head<3>() = moved_back;
     factor.R = R_;
     factor.gate_probability = gate_probability_;

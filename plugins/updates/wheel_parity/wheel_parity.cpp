@@ -110,7 +110,8 @@ class WheelParity final : public Update {
     const auto samples = data.samples<EncoderSample>(encoders_);
     const std::optional<EncoderInterval> interval =
         intervals_.next(filter, wheels.t_OtoI_s, samples, period_s_ - kPeriodSlackS);
-    if (!interval.has_value() || wheels.intrinsics_column < 0) return;
+    if (!interval.has_value()) return;
+    if (wheels.intrinsics_column < 0 && wheels.wander_column < 0) return;
     if (!has_channels(preintegrator_->model().description(), samples.back())) {
       other_channels_.add(1, filter.clones.back().t_ns);
       return;
@@ -121,7 +122,7 @@ class WheelParity final : public Update {
         wheel_noise_->add(y, wheels.x_WI, checked_.P_x());
       }
     }
-    find_free(wheels, filter.P());
+    find_free(wheels.covariance(filter.P()));
     if (n_free_ == 0) return;
     const double gain = iterate(wheels.x_WI, encoders, *interval);
     tallies_.add(pose_, data.end_ns);
@@ -143,8 +144,12 @@ class WheelParity final : public Update {
       return;
     }
     ++intervals_used_;
+    intervals_alike_ = intervals_used_;
+    if (wheels.wander_time_s > 0.) {
+      intervals_alike_ = std::min(intervals_alike_, 1. + wheels.wander_time_s / pose_.duration_s);
+    }
     if (second_order_noise_ && --unchecked_ < 0) add_second_order_noise(encoders, *interval);
-    emit(wheels.intrinsics_column, sink.add_information());
+    emit(wheels, sink.add_information());
   }
 
   void rejections(std::vector<RejectionCount>& out) const override {
@@ -162,17 +167,16 @@ class WheelParity final : public Update {
 
  private:
   /// The intrinsics that have a variance, their sigmas and correlations.
-  void find_free(const WheelsView& wheels, const FilterView::Covariance& P) {
-    const int first = wheels.intrinsics_column;
+  void find_free(const IntrinsicMatrix& P) {
     n_free_ = 0;
-    for (int i = 0; i < wheels.x_WI.size(); ++i) {
-      if (P(first + i, first + i) > 0.) free_[static_cast<std::size_t>(n_free_++)] = i;
+    for (int i = 0; i < P.cols(); ++i) {
+      if (P(i, i) > 0.) free_[static_cast<std::size_t>(n_free_++)] = i;
     }
     sigma_.resize(n_free_);
     C_.resize(n_free_, n_free_);
     for (int i = 0; i < n_free_; ++i) {
-      sigma_[i] = std::sqrt(P(first + free(i), first + free(i)));
-      for (int k = 0; k < n_free_; ++k) C_(i, k) = P(first + free(i), first + free(k)) / sigma_[i];
+      sigma_[i] = std::sqrt(P(free(i), free(i)));
+      for (int k = 0; k < n_free_; ++k) C_(i, k) = P(free(i), free(k)) / sigma_[i];
     }
     for (int k = 0; k < n_free_; ++k) C_.col(k) /= sigma_[k];
   }
@@ -283,7 +287,7 @@ class WheelParity final : public Update {
     // The same curvature bends every interval the same way as long as the excitation is the same,
     // so that it does not average out: after K intervals its share is K times that of one, and the
     // last one adds the difference of Lambda K / (1 + K R) (WP-8).
-    Square R = intervals_used_ * to_white * noise * to_white.transpose();
+    Square R = intervals_alike_ * to_white * noise * to_white.transpose();
     if (R.trace() < kNegligibleCurvature) {
       unchecked_ = kIntervalsUnchecked;
       return;
@@ -305,18 +309,26 @@ class WheelParity final : public Update {
     return gate_;
   }
 
-  void emit(int first_column, InformationFactor& factor) const {
-    for (int i = 0; i < n_free_;) {
-      int end = i + 1;
-      while (end < n_free_ && free(end) == free(end - 1) + 1) ++end;
-      factor.columns.add(first_column + free(i), end - i);
-      i = end;
-    }
-    for (int k = 0; k < n_free_; ++k) {
-      for (int i = 0; i < n_free_; ++i) {
-        factor.Lambda(i, k) = Lambda_(i, k) / (sigma_[i] * sigma_[k]);
+  /// Of what is constant, and the same of what wanders.
+  void emit(const WheelsView& wheels, InformationFactor& factor) const {
+    int times = 0;
+    for (const int first_column : {wheels.intrinsics_column, wheels.wander_column}) {
+      if (first_column < 0) continue;
+      ++times;
+      for (int i = 0; i < n_free_;) {
+        int end = i + 1;
+        while (end < n_free_ && free(end) == free(end - 1) + 1) ++end;
+        factor.columns.add(first_column + free(i), end - i);
+        i = end;
       }
-      factor.eta[k] = eta_[k] / sigma_[k];
+    }
+    for (int k = 0; k < times * n_free_; ++k) {
+      const int b = k % n_free_;
+      for (int i = 0; i < times * n_free_; ++i) {
+        const int a = i % n_free_;
+        factor.Lambda(i, k) = Lambda_(a, b) / (sigma_[a] * sigma_[b]);
+      }
+      factor.eta[k] = eta_[b] / sigma_[b];
     }
   }
 
@@ -340,6 +352,7 @@ class WheelParity final : public Update {
   double gate_ = 0.;
   int gate_dof_ = 0;
   double intervals_used_ = 0.;
+  double intervals_alike_ = 0.;  // of them, those with the same intrinsics
   int intervals_seen_ = 0;
   int unchecked_ = 0;  // intervals for which curvature needs no look
 

@@ -95,6 +95,9 @@ class WheelRelativePose final : public Update {
 
   void declare(Declarations& host) override {
     blocks_ = declare_wheels(host);
+    if (blocks_.wander.index >= 0) {
+      throw InputError("takes the intrinsics as constant: wheels.intrinsics_wander must be 0");
+    }
     encoders_ = declare_encoders(host, blocks_);
   }
 

@@ -53,6 +53,13 @@ struct UndeterminedDirection {
   std::vector<std::pair<std::string, double>> weights;  ///< largest first
 };
 
+/// What comes and goes of the intrinsics, in prior sigmas: a Gauss-Markov process.
+struct WheelWander {
+  double sigma = 0.;                              ///< 0: nothing was found
+  double time_s = 0.;                             ///< time constant
+  std::vector<double> lag_s, covariance, weight;  ///< what it was fitted to (CAL-6)
+};
+
 /// What one fit found.
 struct CalibrationEstimate {
   Intrinsics x_WI;
@@ -83,6 +90,7 @@ struct CalibrationResult {
   const CalibrationSetup* setup = nullptr;
   CalibrationEstimate all;            ///< from all recordings
   std::vector<LeftOut> left_out;      ///< of each of leave_out_by
+  WheelWander wander;                 ///< at the estimate from all
   std::vector<ValidationRun> fitted;  ///< all recordings with the estimate from all of them
 };
 

@@ -34,6 +34,8 @@ using RowJacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen:
 using TwistRowsJacobian =
     Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxIntrinsics>;
 using Intrinsics = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxIntrinsics, 1>;
+using IntrinsicMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor,
+                                      kMaxIntrinsics, kMaxIntrinsics>;
 using NoiseVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxNoises, 1>;
 
 /// The rows that a column of a Jacobian touches; all others are zero and need not be written.

@@ -67,12 +67,19 @@ struct WheelsView {
   const KinematicModel* model = nullptr;
   Eigen::Matrix3d R_ItoO = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_IinO = Eigen::Vector3d::Zero();
-  double t_OtoI_s = 0.;  ///< t_imu = t_odom + t_OtoI
-  Intrinsics x_WI;
+  double t_OtoI_s = 0.;        ///< t_imu = t_odom + t_OtoI
+  Intrinsics x_WI;             ///< as they are now, what wanders included
   int extrinsics_column = -1;  ///< of dtheta of R_ItoO (same convention as R_GtoI); dp follows
   int time_offset_column = -1;
   /// Of x_WI[0]; the others follow. Entries held by the gauge have columns, with zero variance.
   int intrinsics_column = -1;
+  /// Of what wanders: as many columns, with the same derivatives.
+  int wander_column = -1;
+  double wander_time_s = 0.;  ///< after which it is another
+
+  /// Covariance of x_WI, of FilterView::P().
+  VIWO_API IntrinsicMatrix
+  covariance(const Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>& P) const;
 };
 
 /// A wheel set of the configuration with the prior of its calibration; all-zero sigmas hold a
@@ -85,6 +92,9 @@ struct WheelsPrior {
   double sigma_time_offset_s = 0.;
   Intrinsics sigma_intrinsics;
   double intrinsics_walk = 0.;  ///< random walk of the intrinsics, in prior sigmas per sqrt(s)
+  /// Gauss-Markov processes beside the constant intrinsics: play, slip, tyres. Empty: none.
+  Intrinsics sigma_wander;
+  double wander_time_s = 0.;
 };
 
 /// What an update can ask the configuration for.
@@ -110,15 +120,17 @@ class VIWO_API Rig {
 struct WheelsBlocks {
   const KinematicModel* model = nullptr;
   BlockId extrinsics, clock, intrinsics;
+  BlockId wander;  ///< index -1: none
+  double wander_time_s = 0.;
 
   VIWO_API WheelsView view(const FilterView& filter) const;
 };
 
-/// Declares `extrinsics`, `clock` and `intrinsics` of the wheel set that an instance is for
-/// (Rig::wheels()), behind `wheels.` or `wheels.<name>.`
+/// Declares `extrinsics`, `clock`, `intrinsics` and, where they wander, `wander` of the wheel set
+/// that an instance is for (Rig::wheels()), behind `wheels.` or `wheels.<name>.`
 VIWO_API WheelsBlocks declare_wheels(Declarations& host);
 
-/// The three blocks that declare_wheels() declares, in this order.
+/// The three blocks that declare_wheels() always declares, in this order.
 VIWO_API std::array<BlockSpec, 3> wheels_blocks(const WheelsPrior& prior);
 
 }  // namespace viwo

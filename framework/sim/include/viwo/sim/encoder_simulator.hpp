@@ -30,11 +30,15 @@ struct EncoderSimulation {
   double outlier_probability = 0.;  ///< per sample; hits one drive channel
   double outlier_rad_per_s = 0.;    ///< size, of either sign
   double drive_resolution_rad_per_s = 0.;  ///< rates are rounded to its multiples; 0: not rounded
+  /// Each intrinsic wanders about its true value as a Gauss-Markov process of this sigma, in prior
+  /// sigmas, with or without `noise`.
+  double wander = 0.;
+  double wander_time_s = 2.;
   /// A base that cannot move sideways follows a twist all the same whose v_y is not more than this:
   /// it slides then. For twists that are exact only up to an approximation.
   double sliding_m_per_s = 0.;
 
-  /// Readings of the motion itself: no noise, slip, outliers and resolution.
+  /// Readings of the motion itself: no noise, slip, wander, outliers and resolution.
   void make_exact();
 };
 

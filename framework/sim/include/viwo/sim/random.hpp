@@ -30,6 +30,7 @@ enum class Stream : std::uint64_t {
   kPoseOutliers,
   kTrueCameras,
   kTrueMount,
+  kWander,
 };
 
 /// A stream of independent numbers; equal seed, purpose and index give equal numbers. `index`

@@ -15,8 +15,6 @@ namespace viwo {
 /// Sensitivity of a 3-vector by the intrinsics, one contiguous row per component.
 using IntrinsicJacobian =
     Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, kMaxIntrinsics>;
-using IntrinsicMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor,
-                                      kMaxIntrinsics, kMaxIntrinsics>;
 
 struct TwistOptions {
   /// Rows weighted by the inverse of their noise instead of equally. Twist and parity noise are
