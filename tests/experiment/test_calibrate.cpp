@@ -176,6 +176,34 @@ TEST(Calibrate, ReadsItsFileLeavesOutAndWritesACalibrationThatARunIncludes) {
   EXPECT_LT(included.accuracy->end_m, 0.1 * nominal.accuracy->end_m);
 }
 
+TEST(Calibrate, KnowsNoMoreThanRecordingsThatAreLeftOutTell) {
+  CalibrationSetup setup = setup_of({"icr_sweep", "figure_eight", "circle"}, 1);
+  setup.leave_out_by = {"motion"};
+  const CalibrationResult result = calibrate(setup);
+  const Intrinsics of_fit = fit_all(setup).sigma;
+  const auto n = static_cast<int>(setup.recordings.size());
+  Eigen::MatrixXd without(of_fit.size(), n);
+  for (int left_out = 0; left_out < n; ++left_out) {
+    std::vector<std::size_t> used;
+    for (int i = 0; i < n; ++i) {
+      if (i != left_out) used.push_back(static_cast<std::size_t>(i));
+    }
+    without.col(left_out) = fit(setup, used).x_WI;
+  }
+  const Eigen::VectorXd mean = without.rowwise().mean();
+  int larger = 0;
+  for (int i = 0; i < of_fit.size(); ++i) {
+    const double jackknife =
+        std::sqrt((n - 1.) / n * (without.row(i).array() - mean[i]).square().sum());
+    EXPECT_NEAR(result.left_out[0].spread[i], jackknife, 1e-9) << i;
+    EXPECT_EQ(result.sigma_of_fit[i], of_fit[i]) << i;
+    EXPECT_EQ(result.all.sigma[i], std::max(of_fit[i], result.left_out[0].spread[i])) << i;
+    if (result.left_out[0].spread[i] > of_fit[i]) ++larger;
+  }
+  EXPECT_GT(larger, 0);
+  EXPECT_LT(larger, of_fit.size());
+}
+
 TEST(Calibrate, FindsHowTheWheelsWander) {
   const auto found = [](std::vector<std::string> assignments) {
     assignments.emplace_back("sensors.simulator0.duration_s=200");

@@ -152,6 +152,20 @@ std::vector<FitOf> fits_of(const CalibrationSetup& setup) {
   return fits;
 }
 
+/// The jackknife over the values of a label (CAL-8).
+Intrinsics spread_of(const std::string& label, const std::vector<FitOf>& fits,
+                     const std::vector<CalibrationEstimate>& estimates) {
+  std::vector<const Intrinsics*> without;
+  for (std::size_t f = 0; f < fits.size(); ++f) {
+    if (fits[f].label == label) without.push_back(&estimates[f].x_WI);
+  }
+  const auto n = static_cast<double>(without.size());
+  Intrinsics mean = Intrinsics::Zero(estimates.front().x_WI.size()), squares = mean;
+  for (const Intrinsics* x : without) mean += *x / n;
+  for (const Intrinsics* x : without) squares += (*x - mean).cwiseAbs2();
+  return ((n - 1.) / n * squares).cwiseSqrt();
+}
+
 }  // namespace
 
 int count_fits(const CalibrationSetup& setup) { return static_cast<int>(fits_of(setup).size()); }
@@ -175,7 +189,11 @@ CalibrationResult calibrate(const CalibrationSetup& setup,
   result.setup = &setup;
   result.all = estimates[0];
   result.wander = find_wander(setup, result.all.x_WI);
-  for (const std::string& label : setup.leave_out_by) result.left_out.push_back({label, {}});
+  result.sigma_of_fit = result.all.sigma;
+  for (const std::string& label : setup.leave_out_by) {
+    result.left_out.push_back({label, spread_of(label, fits, estimates), {}});
+    result.all.sigma = result.all.sigma.cwiseMax(result.left_out.back().spread);
+  }
   for (std::size_t i = 0; i < setup.recordings.size(); ++i) {
     result.fitted.push_back(validate(setup, i, estimates[0]));
     for (std::size_t f = 1; f < fits.size(); ++f) {

@@ -139,12 +139,13 @@ report::Table parameter_table(const CalibrationResult& result) {
                    {"nominal", {report::NumberFormat::Style::kSignificant, 6}},
                    {"estimate", {report::NumberFormat::Style::kSignificant, 6}},
                    {"sigma", {report::NumberFormat::Style::kSignificant, 3}},
+                   {"of the fit", {report::NumberFormat::Style::kSignificant, 3}},
                    {"change / prior sigma", {report::NumberFormat::Style::kFixed, 2}}};
   const auto& specs = model_of(result).description().intrinsics;
   for (std::size_t i = 0; i < specs.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     table.rows.push_back({specs[i].name, specs[i].unit, specs[i].nominal, result.all.x_WI[k],
-                          result.all.sigma[k],
+                          result.all.sigma[k], result.sigma_of_fit[k],
                           (result.all.x_WI[k] - specs[i].nominal) / specs[i].prior_sigma});
   }
   return table;
@@ -228,6 +229,13 @@ std::string describe(const CalibrationResult& result) {
           << pad(significant(estimate.extrinsics_sigma[i], 3), 12) << "\n";
     }
   }
+  if (!result.left_out.empty()) {
+    out << "sigma: that of the fit, or of how the estimate changes when ";
+    for (std::size_t i = 0; i < result.left_out.size(); ++i) {
+      out << (i > 0 ? " or " : "") << "a " << result.left_out[i].by;
+    }
+    out << " is left out, if that is larger\n";
+  }
   out << "what the fit leaves per segment: " << significant(1e3 * estimate.noise.position_m, 3)
       << " mm, " << significant(estimate.noise.yaw_rad, 3) << " rad; parity residual "
       << significant(estimate.noise.parity_scale, 3) << " x the model's sigmas\n";
@@ -272,6 +280,7 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
     parameters[specs[i].name] = {{"initial", specs[i].nominal},
                                  {"final", estimate.x_WI[k]},
                                  {"sigma", estimate.sigma[k]},
+                                 {"sigma_of_fit", result.sigma_of_fit[k]},
                                  {"unit", specs[i].unit}};
   }
   json undetermined = json::array();

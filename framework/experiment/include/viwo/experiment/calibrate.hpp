@@ -82,15 +82,17 @@ struct ValidationRun {
 
 /// All recordings, each with the estimate from those that have another value of a label.
 struct LeftOut {
-  std::string by;  ///< the label
+  std::string by;     ///< the label
+  Intrinsics spread;  ///< of the estimate from all, by how those without one value differ (CAL-8)
   std::vector<ValidationRun> runs;
 };
 
 struct CalibrationResult {
   const CalibrationSetup* setup = nullptr;
-  CalibrationEstimate all;            ///< from all recordings
-  std::vector<LeftOut> left_out;      ///< of each of leave_out_by
-  WheelWander wander;                 ///< at the estimate from all
+  CalibrationEstimate all;        ///< from all recordings; its sigmas are not below any `spread`
+  Intrinsics sigma_of_fit;        ///< those that the fit itself believes
+  std::vector<LeftOut> left_out;  ///< of each of leave_out_by
+  WheelWander wander;             ///< at the estimate from all
   std::vector<ValidationRun> fitted;  ///< all recordings with the estimate from all of them
 };
 
