@@ -33,6 +33,12 @@ void add_option(const std::string& name, po::options_description& options) {
     add("keep-runs", "one folder with all files for each run");
   } else if (name == "resume") {
     add("resume", "goes on with an experiment that was interrupted");
+  } else if (name == "shard") {
+    add("shard", po::value<std::string>()->value_name("I/N"),
+        "runs the cells k with k mod N = I only, again what failed, and leaves them in the folder; "
+        "I and N may be environment variables: SLURM_ARRAY_TASK_ID/SLURM_ARRAY_TASK_COUNT");
+  } else if (name == "collect") {
+    add("collect", "runs nothing: tables and page of the runs that shards have left in the folder");
   } else if (name == "figures") {
     add("figures", po::value<std::string>()->value_name("FORMAT"),
         "every plot also as a static figure for a paper: svg or pdf (needs gnuplot)");
@@ -96,6 +102,12 @@ void check_ranges(const Command& command, const po::variables_map& values) {
       values["figures"].as<std::string>() != "pdf") {
     refuse(command, "--figures takes svg or pdf");
   }
+  if (values.contains("shard") && values.contains("collect")) {
+    refuse(command, "--collect takes what all shards have left: not with --shard");
+  }
+  if ((values.contains("shard") || values.contains("collect")) && !values.contains("out")) {
+    refuse(command, "--shard and --collect need --out, the folder that all shards share");
+  }
   if (values.contains("out") && values["out"].as<std::string>().empty()) {
     refuse(command, "--out needs the name of a folder");
   }
@@ -140,6 +152,8 @@ Arguments arguments_of(const po::variables_map& values) {
   if (values.contains("jobs")) arguments.jobs = values["jobs"].as<int>();
   arguments.keep_runs = values.contains("keep-runs");
   arguments.resume = values.contains("resume");
+  arguments.shard = text("shard");
+  arguments.collect = values.contains("collect");
   arguments.show = values.contains("show");
   arguments.video = text("video");
   arguments.figures = text("figures");

@@ -23,6 +23,8 @@ struct Arguments {
   int jobs = 0;
   bool keep_runs = false;
   bool resume = false;
+  std::string shard;  ///< "I/N", or none
+  bool collect = false;
   bool show = false;
   std::filesystem::path video;  ///< none if empty
   std::string figures;          ///< "svg", "pdf" or none

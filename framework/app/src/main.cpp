@@ -20,9 +20,10 @@ constexpr Command kCommands[] = {
      "and report.html.",
      "out seed set figures show video", 1, run_command},
     {"experiment",
-     "experiment EXPERIMENT [--out DIR] [--jobs N] [--seeds N] [--resume] [--set KEY=VALUE]...",
+     "experiment EXPERIMENT [--out DIR] [--jobs N] [--seeds N] [--resume] [--shard I/N | "
+     "--collect] [--set KEY=VALUE]...",
      "Runs variants x recordings x seeds side by side and writes tables and report.html.",
-     "out jobs seeds set keep-runs resume figures", 1, experiment_command},
+     "out jobs seeds set keep-runs resume shard collect figures", 1, experiment_command},
     {"observability", "observability CONFIG [--out DIR] [--set KEY=VALUE]...",
      "Tells which directions of the state and of the calibration a run's motion and updates can "
      "observe; CONFIG is a run or an experiment (variants x motions).",

@@ -138,11 +138,12 @@ class Runner {
     for (std::size_t v = 0; v < setup_.variants.size(); ++v) {
       for (std::size_t r = 0; r < setup_.recordings.size(); ++r) {
         RunSetup check = read_run(configuration(v, r), plugins_);
-        if (v == 0 || r == 0) collect(check);
+        if (!options_.collect && (v == 0 || r == 0)) collect(check);
         configurations_.push_back(text_of(check));
         for (int s = 0; s < setup_.seeds; ++s) {
           const auto seed = setup_.seeds > 1 ? static_cast<std::uint64_t>(s) + 1 : check.seed;
           result_.runs.push_back({v, r, seed, {}});
+          cells_ += is_mine(result_.runs.size() - 1) ? 1 : 0;
         }
         if (stopped()) throw Interrupted("interrupted before the first run");
       }
@@ -153,32 +154,57 @@ class Runner {
   void open_journal(Progress& progress) {
     const int there = folder_.empty() ? 0 : journal_.size();
     if (there == 0) return;
-    if (!options_.resume) {
+    if (!options_.resume && !options_.shard && !options_.collect) {
       journal_.remove();
       std::fprintf(stderr,
                    "%d runs of an interrupted experiment are discarded (not --resume): %s\n", there,
                    journal_.folder().c_str());
       return;
     }
-    int taken = 0;
-    for (ExperimentRun& run : result_.runs) {
+    int taken = 0, failed = 0;
+    for (std::size_t i = 0; i < result_.runs.size(); ++i) {
+      ExperimentRun& run = result_.runs[i];
+      if (!is_mine(i)) continue;
       if (options_.keep_runs && !exists(run_folder(run) / "summary.json")) continue;
       std::optional<RunResult> kept = journal_.read(key_of(run));
       if (!kept) continue;
+      // A run that failed may do better once its cause is mended.
+      if (kept->status == RunStatus::kFailed && !options_.collect) {
+        ++failed;
+        continue;
+      }
       run.result = std::move(*kept);
       run.taken_over = true;
       ++taken;
     }
     finished_ = taken;
-    const std::string of = " of " + std::to_string(result_.runs.size());
+    const std::string of = " of " + std::to_string(cells_);
     progress.skipped(
         taken, std::to_string(taken) + of + " runs taken over from an interrupted experiment");
-    if (there > taken) {
+    if (failed > 0) std::fprintf(stderr, "%d runs that failed are run again\n", failed);
+    if (!options_.shard && there > taken + failed) {
       std::fprintf(stderr,
                    "%d of %d files in %s are not used: damaged, of another configuration, seed or "
                    "version, or without the folder that --keep-runs wants\n",
-                   there - taken, there, journal_.folder().c_str());
+                   there - taken - failed, there, journal_.folder().c_str());
     }
+  }
+
+  /// InputError for what collect() has not found.
+  void require_all() const {
+    constexpr int kNamed = 10;
+    const int missing = cells_ - finished_;
+    if (missing == 0) return;
+    std::string text = std::to_string(missing) + " of " + std::to_string(cells_) +
+                       " runs are not in " + journal_.folder().string() + ":";
+    int named = 0;
+    for (std::size_t i = 0; i < result_.runs.size() && named < kNamed; ++i) {
+      if (result_.runs[i].taken_over) continue;
+      text += "\n  " + std::to_string(i) + "  " + title_of(setup_, result_.runs[i]);
+      ++named;
+    }
+    if (missing > named) text += "\n  and " + std::to_string(missing - named) + " more";
+    throw InputError(text + "\nrun their shards again (cell k is in shard k mod N), then collect");
   }
 
   /// Runs a cell; false if that was interrupted.
@@ -206,15 +232,14 @@ class Runner {
       fail(run, "something was thrown that is not a std::exception");
     }
     thin(run.result);
-    // A run that failed may do better once its cause is mended.
-    if (!folder_.empty() && run.result.status != RunStatus::kFailed) {
-      journal_.write(key_of(run), run.result);
-    }
+    if (!folder_.empty()) journal_.write(key_of(run), run.result);
     ++finished_;
     return true;
   }
 
   bool stopped() const { return options_.interrupted && options_.interrupted(); }
+  bool is_mine(std::size_t cell) const { return !options_.shard || options_.shard->has(cell); }
+  int cells() const { return cells_; }
   int finished() const { return finished_; }
 
  private:
@@ -271,6 +296,7 @@ class Runner {
   RunJournal journal_;
   ExperimentResult& result_;
   std::vector<std::string> configurations_;  // by variant, recording
+  int cells_ = 0;                            // that are run or collected here
   std::atomic<int> finished_ = 0;
   std::mutex said_mutex_;
   std::set<std::string> said_;  ///< kinds of warnings
@@ -324,16 +350,18 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(result.jobs));
   {
-    Progress progress(setup.name, static_cast<int>(result.runs.size()));
+    Progress progress(setup.name, runner.cells());
     runner.open_journal(progress);
+    if (options.collect) runner.require_all();
     tbb::parallel_for(std::size_t{0}, result.runs.size(), [&](std::size_t i) {
       ExperimentRun& run = result.runs[i];
-      if (!run.taken_over && runner.run(run, progress)) progress.done(line_of(setup, run));
+      if (run.taken_over || !runner.is_mine(i)) return;
+      if (runner.run(run, progress)) progress.done(line_of(setup, run));
     });
   }
-  if (runner.finished() < static_cast<int>(result.runs.size())) {
+  if (runner.finished() < runner.cells()) {
     throw Interrupted("interrupted after " + std::to_string(runner.finished()) + " of " +
-                      std::to_string(result.runs.size()) + " runs" +
+                      std::to_string(runner.cells()) + " runs" +
                       (folder.empty() ? "" : "; continue with --resume"));
   }
   for (const ExperimentRun& run : result.runs) {

@@ -11,6 +11,7 @@
 
 #include "viwo/experiment/configuration.hpp"
 #include "viwo/experiment/run.hpp"
+#include "viwo/experiment/shard.hpp"
 #include "viwo/report/document.hpp"
 
 namespace viwo::experiment {
@@ -38,6 +39,9 @@ struct ExperimentOptions {
   bool keep_runs = false;                ///< one folder per run
   std::vector<std::string> assignments;  ///< --set, applied to the base configuration
   bool resume = false;                   ///< take over the runs of an interrupted experiment
+  /// Only its cells, which stay in the journal; those that are there are taken over.
+  std::optional<Shard> shard;
+  bool collect = false;  ///< run nothing: all cells are taken from the journal
   /// Asked from any thread, often; once it says true the experiment ends as soon as it can.
   std::function<bool()> interrupted;
 };
@@ -78,6 +82,9 @@ ExperimentSetup read_experiment(const std::filesystem::path& file,
 /// all of them in parallel. A run that fails is kept with its cause and does not stop the others.
 /// The result does not depend on the number of jobs, nor on whether the experiment was interrupted
 /// and resumed. With keep_runs, each run is written below `folder`/runs.
+///
+/// With a shard the results of other cells stay as they are made. With `collect` InputError names
+/// the cells that the journal does not have.
 ///
 /// Each run that is done is kept in `folder`/journal until write_experiment() has written the
 /// results; without a folder there is no journal. Throws Interrupted, and std::runtime_error when

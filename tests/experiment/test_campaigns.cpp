@@ -1,0 +1,152 @@
+// Experiments in parts: shards that run anywhere, in any order, and what collects them.
+#include <cstdlib>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "experiment_file.hpp"
+
+namespace viwo {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace experiment;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::registry;
+
+std::string refusal(const std::string& text) {
+  try {
+    read_shard(text);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Shard, IsTwoNumbersOrTheVariablesThatHaveThem) {
+  EXPECT_EQ(read_shard("2/7").index, 2);
+  EXPECT_EQ(read_shard("2/7").count, 7);
+  EXPECT_EQ(read_shard("7/7").index, 0);  // of an array that counts from 1
+  ::setenv("VIWO_TEST_INDEX", "3", 1);
+  ::setenv("VIWO_TEST_COUNT", "5", 1);
+  const Shard shard = read_shard("VIWO_TEST_INDEX/VIWO_TEST_COUNT");
+  EXPECT_EQ(shard.index, 3);
+  EXPECT_EQ(shard.count, 5);
+  EXPECT_EQ(read_shard("VIWO_TEST_INDEX/8").count, 8);
+  EXPECT_TRUE(shard.has(8));
+  EXPECT_FALSE(shard.has(9));
+}
+
+TEST(Shard, RefusesWhatIsNoPartOfAWhole) {
+  ::unsetenv("VIWO_TEST_NONE");
+  ::setenv("VIWO_TEST_TEXT", "three", 1);
+  EXPECT_THAT(refusal("3"), HasSubstr("there is no '/'"));
+  EXPECT_THAT(refusal("8/7"), HasSubstr("8 is none of 7 shards"));
+  EXPECT_THAT(refusal("-1/7"), HasSubstr("-1 is none of 7 shards"));
+  EXPECT_THAT(refusal("0/0"), HasSubstr("at least one shard"));
+  EXPECT_THAT(refusal("1x/7"), HasSubstr("'1x' is no number"));
+  EXPECT_THAT(refusal("/7"), HasSubstr("'' is no number"));
+  EXPECT_THAT(refusal("1/99999999999"), HasSubstr("is no number"));
+  EXPECT_THAT(refusal("VIWO_TEST_NONE/7"), HasSubstr("no environment variable VIWO_TEST_NONE"));
+  EXPECT_THAT(refusal("VIWO_TEST_TEXT/7"), HasSubstr("'VIWO_TEST_TEXT=three' is no number"));
+}
+
+class Campaign : public testing::ExperimentFile {
+ protected:
+  Campaign() {
+    options_.seeds = 2;
+    options_.assignments = {"sensors.simulator0.duration_s=4"};
+  }
+
+  ExperimentResult run(const ExperimentOptions& options, const fs::path& out) {
+    const fs::path file = VIWO_TEST_SOURCE_DIR "/configs/experiments/paper_accuracy.yaml";
+    return run_experiment(read_experiment(file, options), options, registry(), out);
+  }
+
+  void run_shard(int index, int count, const fs::path& out) {
+    ExperimentOptions options = options_;
+    options.shard = Shard{index, count};
+    run(options, out);
+  }
+
+  /// Writes the results as if every computation had taken no time; what runs.csv says.
+  std::string table_of(ExperimentResult result, const fs::path& out) {
+    for (ExperimentRun& cell : result.runs) {
+      cell.result.wall_s = 0.;
+      cell.result.total_ms = {};
+      for (auto& [t_s, ms] : cell.result.epoch_ms) ms = 0.;
+      for (auto& [name, time] : cell.result.stages) time = {};
+    }
+    write_experiment(out, result);
+    return text_of(out / "runs.csv");
+  }
+
+  std::string collected(const fs::path& out) {
+    ExperimentOptions options = options_;
+    options.collect = true;
+    return table_of(run(options, out), out);
+  }
+
+  std::string missing(const fs::path& out) {
+    try {
+      collected(out);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  ExperimentOptions options_;
+};
+
+TEST_F(Campaign, GivesTheTableOfOneRunWhateverTheNumberOfShards) {
+  const std::string whole = table_of(run(options_, folder_ / "whole"), folder_ / "whole");
+  ASSERT_NE(whole, "");
+  for (const int count : {1, 3, 7}) {
+    const fs::path out = folder_ / std::to_string(count);
+    for (int index = count - 1; index >= 0; --index) run_shard(index, count, out);
+    EXPECT_FALSE(fs::exists(out / "runs.csv"));
+    EXPECT_EQ(collected(out), whole) << count;
+    EXPECT_FALSE(fs::exists(out / "journal"));
+  }
+}
+
+TEST_F(Campaign, NamesWhatIsMissingAndRunsNothing) {
+  const fs::path out = folder_ / "out";
+  run_shard(0, 3, out);
+  run_shard(2, 3, out);
+  EXPECT_THAT(missing(out),
+              AllOf(HasSubstr("4 of 12 runs are not in " + (out / "journal").string()),
+                    HasSubstr("\n  1  true_init_calib_on  seed 2"),
+                    HasSubstr("\n  10  bad_init_drive_only  seed 1"),
+                    HasSubstr("cell k is in shard k mod N")));
+  EXPECT_FALSE(fs::exists(out / "runs.csv"));
+  // What another number of shards has left is as good.
+  run_shard(1, 1 + 1, out);
+  run_shard(0, 2, out);
+  EXPECT_EQ(missing(out), "");
+}
+
+TEST_F(Campaign, GoesOnWhereAShardWasKilled) {
+  const fs::path out = folder_ / "out";
+  ExperimentOptions killed = options_;
+  killed.jobs = 1;
+  killed.shard = Shard{0, 2};
+  killed.interrupted = [&] {
+    return fs::exists(out / "journal") &&
+           std::distance(fs::directory_iterator(out / "journal"), fs::directory_iterator()) >= 2;
+  };
+  EXPECT_THROW(run(killed, out), Interrupted);
+  run_shard(1, 2, out);
+  ExperimentOptions again = options_;
+  again.shard = Shard{0, 2};
+  const ExperimentResult result = run(again, out);
+  int taken_over = 0;
+  for (const ExperimentRun& cell : result.runs) taken_over += cell.taken_over ? 1 : 0;
+  EXPECT_EQ(taken_over, 2);
+  EXPECT_EQ(collected(out), table_of(run(options_, folder_ / "whole"), folder_ / "whole"));
+}
+
+}  // namespace
+}  // namespace viwo
