@@ -332,6 +332,25 @@ TEST_F(ResultsTest, OfTheDeliveredExperimentWithWrongCameras) {
   EXPECT_GT(ate_m("held_wrong"), 5. * ate_m("exact"));
 }
 
+TEST_F(ResultsTest, TheJobFilesOfClustersRunShards) {
+  const std::string experiment = kConfigFolder + "experiments/simulated_dead_reckoning.yaml";
+  const std::string out = at("campaign").string();
+  for (int task = 0; task < 2; ++task) {
+    const std::string command =
+        "SLURM_ARRAY_TASK_COUNT=2 SLURM_ARRAY_TASK_ID=" + std::to_string(task) + " EXPERIMENT='" +
+        experiment + "' OUT='" + out + "' VIWO='" VIWO_TEST_PROGRAM "' sh '" + kConfigFolder +
+        "cluster/slurm.sh' > /dev/null 2>&1";
+    EXPECT_EQ(std::system(command.c_str()), 0) << task;
+  }
+  expect_done({"experiment", experiment, "--out", out, "--collect"});
+  // What the other one starts, word by word.
+  std::ifstream in(kConfigFolder + "cluster/kubernetes.yaml");
+  const std::string job{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_NE(job.find("[viwo, experiment, configs/experiments/paper_accuracy.yaml, --out,"),
+            std::string::npos);
+  EXPECT_NE(job.find("--shard, JOB_COMPLETION_INDEX/8]"), std::string::npos);
+}
+
 TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
   std::set<std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(kConfigFolder)) {
@@ -345,6 +364,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                                           "cameras/kaist_urban.yaml",
                                           "cameras/pinhole.yaml",
                                           "cameras/t265_like.yaml",
+                                          "cluster/kubernetes.yaml",
                                           "experiments/calibrate_ackermann.yaml",
                                           "experiments/calibrate_mecanum.yaml",
                                           "experiments/calibrate_skid_steer.yaml",
