@@ -267,7 +267,7 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsWithTyres) {
   expect_done({"experiment", kConfigFolder + "experiments/contact_physics.yaml", "--seeds", "1",
                "--out", "experiment", "--set", shorter});
   const nlohmann::json variants = summary("experiment").at("variants");
-  EXPECT_EQ(variants.size(), 15U);
+  EXPECT_EQ(variants.size(), 18U);
   for (const auto& variant : variants) EXPECT_EQ(variant.at("runs"), 1);
 }
 
