@@ -70,15 +70,9 @@ class Campaign : public testing::ExperimentFile {
     run(options, out);
   }
 
-  /// Writes the results as if every computation had taken no time; what runs.csv says.
-  std::string table_of(ExperimentResult result, const fs::path& out) {
-    for (ExperimentRun& cell : result.runs) {
-      cell.result.wall_s = 0.;
-      cell.result.total_ms = {};
-      for (auto& [t_s, ms] : cell.result.epoch_ms) ms = 0.;
-      for (auto& [name, time] : cell.result.stages) time = {};
-    }
-    write_experiment(out, result);
+  /// What runs.csv says, but for times.
+  static std::string table_of(const ExperimentResult& result, const fs::path& out) {
+    write_without_times(result, out);
     return text_of(out / "runs.csv");
   }
 

@@ -175,18 +175,6 @@ class Resume : public testing::ExperimentFile {
     return interruption_of([&] { run(options, out); });
   }
 
-  /// Writes the results as if every computation had taken no time.
-  static void write_without_times(ExperimentResult result, const fs::path& out) {
-    result.wall_s = 0.;
-    for (ExperimentRun& cell : result.runs) {
-      cell.result.wall_s = 0.;
-      cell.result.total_ms = {};
-      for (auto& [t_s, ms] : cell.result.epoch_ms) ms = 0.;
-      for (auto& [name, time] : cell.result.stages) time = {};
-    }
-    write_experiment(out, result);
-  }
-
   void expect_same_results(const fs::path& a, const fs::path& b) {
     for (const char* name : {"runs.csv", "summary.json", "report.html"}) {
       EXPECT_FALSE(text_of(a / name).empty()) << name;

@@ -1,6 +1,5 @@
 #include "wheel_wander.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace viwo::experiment {

@@ -2,8 +2,6 @@
 // each other now and later. Equations: docs/math/batch_calibration.md, CAL-6, CAL-7.
 #pragma once
 
-#include <vector>
-
 #include "viwo/experiment/calibrate.hpp"
 
 namespace viwo::experiment {

@@ -20,6 +20,15 @@ void add_pose(BlockSpec& block, const std::string& theta, const Eigen::Matrix3d&
   }
 }
 
+/// In front of the parameters of a wheel set, and of the names of its blocks.
+struct WheelNames {
+  std::string prefix, group;
+};
+WheelNames names_of(const WheelsPrior& prior) {
+  if (prior.name.empty()) return {"", "wheels"};
+  return {prior.name + ".", "wheels." + prior.name};
+}
+
 /// Entries for all intrinsics of the model of `prior`, called as it calls them.
 void add_intrinsics(BlockSpec& block, const std::string& prefix, const WheelsPrior& prior,
                     const Intrinsics& value, const Intrinsics& sigma) {
@@ -94,8 +103,7 @@ const WheelsPrior& Rig::wheels() {
 }
 
 std::array<BlockSpec, 3> wheels_blocks(const WheelsPrior& prior) {
-  const std::string prefix = prior.name.empty() ? "" : prior.name + ".";
-  const std::string group = "wheels" + (prior.name.empty() ? "" : "." + prior.name);
+  const auto [prefix, group] = names_of(prior);
   BlockSpec extrinsics{.name = group + ".extrinsics", .group = group};
   add_pose(extrinsics, prefix + "theta_ItoO", prior.wheels.R_ItoO, prefix + "p_IinO",
            prior.wheels.p_IinO, prior.sigma_extrinsics);
@@ -122,12 +130,11 @@ WheelsBlocks declare_wheels(Declarations& host) {
       prior.wheels.model, host.block(blocks[0]), host.block(blocks[1]), host.block(blocks[2]), {},
       prior.wander_time_s};
   if (prior.sigma_wander.size() == 0) return out;
-  BlockSpec wander{
-      .name = prior.name.empty() ? "wheels.wander" : "wheels." + prior.name + ".wander",
-      .process = Process::kGaussMarkov,
-      .time_constant_s = prior.wander_time_s};
-  const Intrinsics zero = Intrinsics::Zero(prior.sigma_wander.size());
-  add_intrinsics(wander, (prior.name.empty() ? "" : prior.name + ".") + "wander_", prior, zero,
+  const auto [prefix, group] = names_of(prior);
+  BlockSpec wander{.name = group + ".wander",
+                   .process = Process::kGaussMarkov,
+                   .time_constant_s = prior.wander_time_s};
+  add_intrinsics(wander, prefix + "wander_", prior, Intrinsics::Zero(prior.sigma_wander.size()),
                  prior.sigma_wander);
   for (BlockEntry& entry : wander.entries) entry.process_sigma = entry.sigma;
   out.wander = host.block(wander);

@@ -7,14 +7,15 @@
 
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
+#include "viwo/log/sensor_params.hpp"
 #include "viwo/sim/drive_params.hpp"
-#include "viwo/sim/encoder_simulator.hpp"
+#include "viwo/sim/encoder_params.hpp"
 #include "viwo/sim/planar_motion.hpp"
 
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
+constexpr std::array kBaseParams{
     ParamSpec{.name = "robot",
               .type = ParamType::kKinematics,
               .help = "the base: its nominal intrinsics and its noise"},
@@ -86,96 +87,18 @@ constexpr std::array kParams{
               .type = ParamType::kBool,
               .fallback = "true",
               .help = "noise of encoders and wheel slip as the robot's description says"},
-    ParamSpec{
-        .name = "true_intrinsics_scale",
-        .type = ParamType::kNumber,
-        .fallback = "0",
-        .min = 0.,
-        .help = "0: the nominal intrinsics are true; s: nominal + s * prior sigma * gaussian"},
-    ParamSpec{.name = "intrinsics_wander",
-              .type = ParamType::kNumber,
-              .fallback = "0",
-              .min = 0.,
-              .help = "each intrinsic wanders about its true value with a sigma of so many prior "
-                      "sigmas (Gauss-Markov)"},
-    ParamSpec{.name = "intrinsics_wander_time_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "2",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "its time constant"},
-    ParamSpec{.name = "slip_start_s",
-              .type = ParamType::kNumbers,
-              .unit = "s",
-              .fallback = "[]",
-              .help = "when a wheel starts to spin, reading more than it rolls"},
-    ParamSpec{.name = "slip_duration_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0.5",
-              .min = 0.,
-              .help = "for how long each time"},
-    ParamSpec{.name = "slip_wheel",
-              .type = ParamType::kInt,
-              .fallback = "1",
-              .min = 1.,
-              .help = "drive channel that slips, from 1"},
-    ParamSpec{.name = "slip_ratio",
-              .type = ParamType::kNumber,
-              .fallback = "0.3",
-              .help = "0.3: the drive reads 30 % more than the wheel rolls"},
-    ParamSpec{.name = "outlier_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0",
-              .min = 0.,
-              .max = 1.,
-              .help = "probability per sample that one drive channel is off"},
-    ParamSpec{.name = "outlier_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "5",
-              .min = 0.,
-              .help = "by how much, with either sign"},
-    ParamSpec{.name = "drive_resolution_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "0",
-              .min = 0.,
-              .help = "drive rates are rounded to its multiples; 0: not rounded"},
 };
 
-sim::EncoderSimulation simulation_from(const ParamSet& params) {
-  sim::EncoderSimulation out;
-  out.duration_s = params.number("duration_s");
-  out.rate_hz = params.number("rate_hz");
-  out.start_ns = params.integer("start_ns");
-  out.time_offset_s = params.number("time_offset_s");
-  out.noise = params.flag("noise");
-  const auto starts = params.numbers("slip_start_s");
-  out.slip.start_s.assign(starts.begin(), starts.end());
-  out.slip.duration_s = params.number("slip_duration_s");
-  out.slip.ratio = params.number("slip_ratio");
-  out.outlier_probability = params.number("outlier_probability");
-  out.outlier_rad_per_s = params.number("outlier_rad_per_s");
-  out.drive_resolution_rad_per_s = params.number("drive_resolution_rad_per_s");
-  out.wander = params.number("intrinsics_wander");
-  out.wander_time_s = params.number("intrinsics_wander_time_s");
-  return out;
-}
+constexpr auto kParams = log::joined(kBaseParams, sim::kEncoderParams);
 
 std::vector<EncoderSample> encoders(const ParamSet& params, const sim::PlanarMotion& motion,
                                     const HostServices& services) {
   const KinematicModel& robot = params.kinematics("robot");
   ModelDescription description;
   robot.describe(description);
-  sim::EncoderSimulation options = simulation_from(params);
-  const std::int64_t wheel = params.integer("slip_wheel");
-  if (wheel > description.n_drive) {
-    throw ParamError("slip_wheel", std::to_string(wheel) + " is not one of the robot's " +
-                                       std::to_string(description.n_drive) + " wheels");
-  }
-  options.slip.wheel = static_cast<int>(wheel) - 1;
+  sim::EncoderSimulation options = sim::encoder_simulation_from(params, description);
+  options.rate_hz = params.number("rate_hz");
+  options.time_offset_s = params.number("time_offset_s");
   if (services.exact) options.make_exact();
   const double scale = services.exact ? 0. : params.number("true_intrinsics_scale");
   const Intrinsics truth = sim::perturbed_intrinsics(description, scale, services.seed);

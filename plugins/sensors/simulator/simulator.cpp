@@ -14,7 +14,7 @@
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/drive_params.hpp"
-#include "viwo/sim/encoder_simulator.hpp"
+#include "viwo/sim/encoder_params.hpp"
 #include "viwo/sim/random.hpp"
 #include "viwo/sim/rig_simulator.hpp"
 #include "viwo/sim/true_cameras.hpp"
@@ -29,15 +29,6 @@ constexpr double kSliding = 1e-4;
 constexpr std::array kBaseParams{
     ParamSpec{.name = "robot", .type = ParamType::kKinematics,
               .help = "the base: its nominal intrinsics and its noise"},
-    ParamSpec{.name = "true_intrinsics_scale", .type = ParamType::kNumber, .fallback = "0",
-              .min = 0.,
-              .help = "0: the nominal intrinsics are true; s: nominal + s * prior sigma * gaussian"},
-    ParamSpec{.name = "intrinsics_wander", .type = ParamType::kNumber,
-              .fallback = "0", .min = 0.,
-              .help = "each intrinsic wanders about its true value with a sigma of so many prior "
-                      "sigmas (Gauss-Markov)"},
-    ParamSpec{.name = "intrinsics_wander_time_s", .type = ParamType::kNumber, .unit = "s",
-              .fallback = "2", .min = 0., .min_exclusive = true, .help = "its time constant"},
     ParamSpec{.name = "true_sigma_p_IinO_m", .type = ParamType::kNumbers, .unit = "m",
               .fallback = "[0, 0, 0]", .help = "the true mount is p_IinO_m + a draw of these sigmas"},
     ParamSpec{.name = "true_sigma_R_ItoO_rad", .type = ParamType::kNumbers, .unit = "rad",
@@ -53,54 +44,11 @@ constexpr std::array kBaseParams{
               .min = 1., .max = 10000., .help = "rate of the encoder samples"},
     ParamSpec{.name = "t_OtoI_s", .type = ParamType::kNumber, .unit = "s", .fallback = "0",
               .min = -10., .max = 10., .help = "t_imu = t_odom + t_OtoI"},
-    ParamSpec{.name = "slip_start_s", .type = ParamType::kNumbers, .unit = "s", .fallback = "[]",
-              .help = "when a wheel starts to spin, reading more than it rolls"},
-    ParamSpec{.name = "slip_duration_s", .type = ParamType::kNumber, .unit = "s",
-              .fallback = "0.5", .min = 0., .help = "for how long each time"},
-    ParamSpec{.name = "slip_wheel", .type = ParamType::kInt, .fallback = "1", .min = 1.,
-              .help = "drive channel that slips, from 1"},
-    ParamSpec{.name = "slip_ratio", .type = ParamType::kNumber, .fallback = "0.3",
-              .help = "0.3: the drive reads 30 % more than the wheel rolls"},
-    ParamSpec{.name = "outlier_probability", .type = ParamType::kNumber, .fallback = "0",
-              .min = 0., .max = 1.,
-              .help = "probability per encoder sample that one drive channel is off"},
-    ParamSpec{.name = "outlier_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
-              .fallback = "5", .min = 0., .help = "by how much, with either sign"},
-    ParamSpec{.name = "drive_resolution_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
-              .fallback = "0", .min = 0.,
-              .help = "drive rates are rounded to its multiples; 0: not rounded"},
 };
 // clang-format on
 
-constexpr auto kParams = log::joined(kBaseParams, sim::kDriveParams, kPoseParams, sim::kRigParams,
-                                     sim::kTrueCameraParams);
-
-sim::EncoderSimulation encoder_simulation_from(const ParamSet& params,
-                                               const ModelDescription& robot) {
-  sim::EncoderSimulation out;
-  out.duration_s = params.number("duration_s");
-  out.rate_hz = params.number("wheel_rate_hz");
-  out.start_ns = params.integer("start_ns");
-  out.time_offset_s = params.number("t_OtoI_s");
-  out.noise = params.flag("noise");
-  const auto starts = params.numbers("slip_start_s");
-  out.slip.start_s.assign(starts.begin(), starts.end());
-  out.slip.duration_s = params.number("slip_duration_s");
-  out.slip.ratio = params.number("slip_ratio");
-  const std::int64_t wheel = params.integer("slip_wheel");
-  if (wheel > robot.n_drive) {
-    throw ParamError("slip_wheel", std::to_string(wheel) + " is not one of the robot's " +
-                                       std::to_string(robot.n_drive) + " wheels");
-  }
-  out.slip.wheel = static_cast<int>(wheel) - 1;
-  out.outlier_probability = params.number("outlier_probability");
-  out.outlier_rad_per_s = params.number("outlier_rad_per_s");
-  out.drive_resolution_rad_per_s = params.number("drive_resolution_rad_per_s");
-  out.wander = params.number("intrinsics_wander");
-  out.wander_time_s = params.number("intrinsics_wander_time_s");
-  out.sliding_m_per_s = kSliding;
-  return out;
-}
+constexpr auto kParams = log::joined(kBaseParams, sim::kEncoderParams, sim::kDriveParams,
+                                     kPoseParams, sim::kRigParams, sim::kTrueCameraParams);
 
 /// What is written, moved by a draw: the truth that nobody knows.
 void draw_mount(const ParamSet& params, std::uint64_t seed, sim::Mounting& mounting,
@@ -140,7 +88,10 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
   robot.describe(description);
   const std::int64_t start_ns = params.integer("start_ns");
   sim::RigSimulation rig = sim::rig_from(params, params.number("duration_s"), start_ns, services);
-  sim::EncoderSimulation wheels = encoder_simulation_from(params, description);
+  sim::EncoderSimulation wheels = sim::encoder_simulation_from(params, description);
+  wheels.rate_hz = params.number("wheel_rate_hz");
+  wheels.time_offset_s = params.number("t_OtoI_s");
+  wheels.sliding_m_per_s = kSliding;
   if (services.exact) {
     wheels.make_exact();
   } else {

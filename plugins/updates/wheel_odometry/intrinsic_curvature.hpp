@@ -2,7 +2,6 @@
 // model.md beside this file.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -15,6 +14,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
+#include "curvature.hpp"
 #include "viwo/wheel/preintegration.hpp"
 
 namespace viwo::wheel_odometry {
@@ -37,21 +37,15 @@ class IntrinsicCurvature {
                         double wander_time_s, const PreintegratedPose& pose) {
     count(pose);
     if (P.cols() == 0 || --unchecked_ >= 0) return Eigen::Matrix3d::Zero();
-    double together = alike_;
-    if (wander_time_s > 0.) together = std::min(together, 1. + wander_time_s / pose.duration_s);
-    const Eigen::Matrix3d common = together * left_out(encoders, begin_ns, end_ns, x_WI, P, pose);
+    const Eigen::Matrix3d common = intervals_alike(alike_, wander_time_s, pose.duration_s) *
+                                   left_out(encoders, begin_ns, end_ns, x_WI, P, pose);
     const double share = common.diagonal().cwiseQuotient(pose.P_g.diagonal()).sum();
-    if (share >= kNegligible) return common;
+    if (share >= kNegligibleCurvature) return common;
     unchecked_ = kIntervalsUnchecked;
     return Eigen::Matrix3d::Zero();
   }
 
  private:
-  /// Step for the derivatives, in units of the uncertainty.
-  static constexpr double kStep = 0.2;
-  /// In units of the noise of the encoders, as variances.
-  static constexpr double kNegligible = 0.01;
-  static constexpr int kIntervalsUnchecked = 5;
   /// Motions in directions further apart than this bend otherwise, rad.
   static constexpr double kAlike = 0.1;
 
@@ -72,18 +66,16 @@ class IntrinsicCurvature {
                            std::int64_t end_ns, const Intrinsics& x_WI, const IntrinsicMatrix& P,
                            const PreintegratedPose& pose) {
     const Eigen::Index n = P.cols();
-    eigen_.compute(P);
-    const IntrinsicMatrix L =
-        eigen_.eigenvectors() * eigen_.eigenvalues().cwiseMax(0.).cwiseSqrt().asDiagonal();
+    const IntrinsicMatrix L = directions_of(P, eigen_);
     // Row i of M[a]: how the derivatives of g[a] change along direction i.
     std::array<IntrinsicMatrix, 3> M;
     for (IntrinsicMatrix& of_row : M) of_row.setZero(n, n);
     preintegrator_->set_weights_at(x_WI);
     for (Eigen::Index i = 0; i < n; ++i) {
       if (L.col(i).isZero(0.)) continue;
-      preintegrator_->set_intrinsics(x_WI + kStep * L.col(i));
+      preintegrator_->set_intrinsics(x_WI + kCurvatureStep * L.col(i));
       preintegrator_->integrate(encoders, begin_ns, end_ns, moved_);
-      const IntrinsicJacobian change = (moved_.J_g_WI - pose.J_g_WI) * L / kStep;
+      const IntrinsicJacobian change = (moved_.J_g_WI - pose.J_g_WI) * L / kCurvatureStep;
       for (int a = 0; a < 3; ++a) M[static_cast<std::size_t>(a)].row(i) = change.row(a);
     }
     Eigen::Matrix3d C;

@@ -12,6 +12,7 @@
 #include <Eigen/LU>
 
 #include "checked_encoders.hpp"
+#include "curvature.hpp"
 #include "encoder_intervals.hpp"
 #include "encoders.hpp"
 #include "viwo/api/plugin.hpp"
@@ -57,16 +58,10 @@ using Square = IntrinsicMatrix;
 /// is needed.
 constexpr double kConverged = 1e-2;
 
-/// Step for the change of the information along a direction, in units of its uncertainty.
-constexpr double kCurvatureStep = 0.2;
-/// Curvature that adds less than this to the noise is left out, and not looked for in the next
-/// intervals: the uncertainty of constants does not grow.
-constexpr double kNegligibleCurvature = 0.01;
 /// Information about a direction, relative to the prior, that is not worth being corrected.
 constexpr double kNegligibleInformation = 1e-4;
 /// Epochs do not come to the nanosecond: a period may end a little early.
 constexpr double kPeriodSlackS = 0.02;
-constexpr int kIntervalsUnchecked = 5;
 
 /// An interval has hundreds of contradictions: few of them tell the noise, and a gate on so many is
 /// narrow, so that what is beyond it may be many times beyond.
@@ -122,11 +117,13 @@ class WheelParity final : public Update {
         wheel_noise_->add(y, wheels.x_WI, checked_.P_x());
       }
     }
-    find_free(wheels.covariance(filter.P()));
+    find_free(checked_.P_x());
     if (n_free_ == 0) return;
     const double gain = iterate(wheels.x_WI, encoders, *interval);
-    tallies_.add(pose_, data.end_ns);
-    if (std::isnan(gain)) return;
+    if (std::isnan(gain)) {
+      tallies_.add(pose_, data.end_ns);
+      return;
+    }
     // (WP-5): what no change of the intrinsics within their prior explains.
     const int dof = pose_.parity.dof;
     const double threshold = gate(dof);
@@ -140,15 +137,16 @@ class WheelParity final : public Update {
     }
     sink.count(believed ? 1 : 0, believed ? 0 : 1);
     if (!believed) {
-      gated_.add(1, data.end_ns);
+      gated_.add(1, data.end_ns);  // one by one its samples mean nothing where it was linearised
       return;
     }
+    tallies_.add(pose_, data.end_ns);
     ++intervals_used_;
-    intervals_alike_ = intervals_used_;
-    if (wheels.wander_time_s > 0.) {
-      intervals_alike_ = std::min(intervals_alike_, 1. + wheels.wander_time_s / pose_.duration_s);
+    if (second_order_noise_ && --unchecked_ < 0) {
+      add_second_order_noise(
+          encoders, *interval,
+          intervals_alike(intervals_used_, wheels.wander_time_s, pose_.duration_s));
     }
-    if (second_order_noise_ && --unchecked_ < 0) add_second_order_noise(encoders, *interval);
     emit(wheels, sink.add_information());
   }
 
@@ -242,10 +240,8 @@ class WheelParity final : public Update {
   /// (WP-6), (WP-7): the noise of eta_ grows by what the curvature makes of the prior
   /// uncertainty.
   void add_second_order_noise(std::span<const EncoderSample> encoders,
-                              const EncoderInterval& interval) {
-    eigen_.compute(C_);
-    const Square L =
-        eigen_.eigenvectors() * eigen_.eigenvalues().cwiseMax(0.).cwiseSqrt().asDiagonal();
+                              const EncoderInterval& interval, double alike) {
+    const Square L = directions_of(C_, eigen_);
     Square M(n_free_, n_free_);
     const double weight = parity_weight();
     Square noise = Square::Zero(n_free_, n_free_);
@@ -268,11 +264,11 @@ class WheelParity final : public Update {
     }
     noise += mean * mean.transpose();
     if (!noise.allFinite()) return;
-    inflate(noise);
+    inflate(noise, alike);
   }
 
   /// Lambda_ and eta_ for noise of covariance Lambda_ + `noise` in eta_.
-  void inflate(const Square& noise) {
+  void inflate(const Square& noise, double alike) {
     eigen_.compute(Lambda_);
     const Intrinsics information = eigen_.eigenvalues();
     int dropped = 0;  // directions that the interval tells next to nothing about
@@ -287,7 +283,7 @@ class WheelParity final : public Update {
     // The same curvature bends every interval the same way as long as the excitation is the same,
     // so that it does not average out: after K intervals its share is K times that of one, and the
     // last one adds the difference of Lambda K / (1 + K R) (WP-8).
-    Square R = intervals_alike_ * to_white * noise * to_white.transpose();
+    Square R = alike * to_white * noise * to_white.transpose();
     if (R.trace() < kNegligibleCurvature) {
       unchecked_ = kIntervalsUnchecked;
       return;
@@ -352,7 +348,6 @@ class WheelParity final : public Update {
   double gate_ = 0.;
   int gate_dof_ = 0;
   double intervals_used_ = 0.;
-  double intervals_alike_ = 0.;  // of them, those with the same intrinsics
   int intervals_seen_ = 0;
   int unchecked_ = 0;  // intervals for which curvature needs no look
 
