@@ -10,12 +10,18 @@
 //   };
 //
 // Slip sources (NoiseKind::kSlip) must name one row each: the row whose b the slip is added to.
-// A model may leave its row ranges empty (all rows). Derivatives cost about a hundred times those
-// by hand, so a model for production writes them out and keeps the automatic twin for its test.
+// A model may leave its row ranges empty (all rows). Preintegration takes about seven times as long
+// as with derivatives by hand, so a model for production writes them out and keeps the automatic
+// twin for its test.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
+#include <mutex>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -53,125 +59,160 @@ class AutoKinematics : public KinematicModel {
   void intrinsic_derivatives(const EncoderSample& y, const Intrinsics& x_WI, const RowSystem& rows,
                              const RowVector& b, const Twist& xi, const RowVector& e,
                              IntrinsicDerivatives& out) const final {
-    const AutoRows<Dual> d = differentiate(reading_for(y, x_WI, rows, b, xi), x_WI);
-    for (int k = 0; k < x_WI.size(); ++k) fill_column(d, k, xi, e, k, out);
+    const bool measured = b == rows.b;
+    const EncoderSample at = measured ? y : reading_for(y, x_WI, rows, b, xi);
+    const int first = y.n_drive + y.n_steer, last = first + static_cast<int>(x_WI.size());
+    differentiate(at, x_WI, first, last, xi, e, [&](int variable, const auto& J, const auto& DtE) {
+      out.J.col(variable - first) = J;
+      out.DtE.col(variable - first) = DtE;
+    });
+    if (!measured) carry_back(at, x_WI, rows, out.J);
   }
 
   void noise_derivatives(const EncoderSample& y, const Intrinsics& x_WI, const RowSystem& /*rows*/,
                          const RowVector& /*b*/, const Twist& xi, const RowVector& e,
                          NoiseDerivatives& out) const final {
-    const ModelDescription description = described();
-    const AutoRows<Dual> d = differentiate(y, x_WI);
-    for (std::size_t k = 0; k < description.noises.size(); ++k) {
-      const NoiseSpec& noise = description.noises[k];
-      const int column = static_cast<int>(k);
-      switch (noise.kind) {
-        case NoiseKind::kDrive:
-          fill_column(d, kFirstDrive + noise.channel, xi, e, column, out);
-          break;
-        case NoiseKind::kSteer:
-          fill_column(d, kFirstSteer + noise.channel, xi, e, column, out);
-          break;
-        case NoiseKind::kSlip:
-          out.J.col(column).setZero();
-          out.J(noise.rows.first, column) = 1.;
-          out.DtE.col(column).setZero();
-          break;
-      }
+    const auto& noises = this->noises();
+    differentiate(y, x_WI, 0, y.n_drive + y.n_steer, xi, e,
+                  [&](int variable, const auto& J, const auto& DtE) {
+                    for (std::size_t k = 0; k < noises.size(); ++k) {
+                      if (variable_of(noises[k], y) != variable) continue;
+                      out.J.col(static_cast<int>(k)) = J;
+                      out.DtE.col(static_cast<int>(k)) = DtE;
+                    }
+                  });
+    for (std::size_t k = 0; k < noises.size(); ++k) {
+      if (noises[k].kind != NoiseKind::kSlip) continue;
+      const auto column = static_cast<int>(k);
+      out.J.col(column).setZero();
+      out.J(noises[k].rows.first, column) = 1.;
+      out.DtE.col(column).setZero();
     }
   }
 
  private:
-  static constexpr int kFirstDrive = kMaxIntrinsics;
-  static constexpr int kFirstSteer = kMaxIntrinsics + kMaxDrives;
-  static constexpr int kActive = kMaxIntrinsics + kMaxDrives + kMaxSteers;
-  using Gradient = Eigen::Matrix<double, kActive, 1>;
+  /// Of its sigma, how much slip counts where encoders could have read what the rows ask for.
+  static constexpr double kSlipShare = 0.01;
+
+  /// Derivatives by so many variables are taken at once.
+  static constexpr int kLanes = 16;
+  using Gradient = Eigen::Matrix<double, kLanes, 1>;
   using Dual = Eigen::AutoDiffScalar<Gradient>;
 
   const Derived& derived() const { return static_cast<const Derived&>(*this); }
 
-  ModelDescription described() const {
-    ModelDescription description;
-    this->describe(description);
-    return description;
+  /// Of the description, which is the same for good. Any thread may ask.
+  const std::vector<NoiseSpec>& noises() const {
+    std::call_once(described_, [this] {
+      ModelDescription description;
+      this->describe(description);
+      noises_ = std::move(description.noises);
+    });
+    return noises_;
   }
 
-  static Dual variable(double value, int index) {
-    Dual dual(value, Gradient::Zero());
-    dual.derivatives()[index] = 1.;
-    return dual;
+  /// Among [drives, steers, intrinsics]; none of them for slip.
+  static int variable_of(const NoiseSpec& noise, const EncoderSample& y) {
+    if (noise.kind == NoiseKind::kSlip) return -1;
+    return noise.channel + (noise.kind == NoiseKind::kSteer ? y.n_drive : 0);
   }
 
-  AutoRows<Dual> differentiate(const EncoderSample& y, const Intrinsics& x_WI) const {
-    std::array<Dual, kMaxDrives> drive;
-    std::array<Dual, kMaxSteers> steer;
-    std::array<Dual, kMaxIntrinsics> x;
+  /// Tells `use(variable, J, DtE)` the columns of the variables `first` .. `last` - 1 of [drives,
+  /// steers, intrinsics]: d(b - A xi) and (dA)^T e.
+  template <class Use>
+  void differentiate(const EncoderSample& y, const Intrinsics& x_WI, int first, int last,
+                     const Twist& xi, const RowVector& e, const Use& use) const {
+    std::array<Dual, kMaxDrives + kMaxSteers + kMaxIntrinsics> variables;
     const auto n_drive = static_cast<std::size_t>(y.n_drive);
     const auto n_steer = static_cast<std::size_t>(y.n_steer);
     const auto n = static_cast<std::size_t>(x_WI.size());
-    for (std::size_t i = 0; i < n_drive; ++i) {
-      drive[i] = variable(y.drive_rad_per_s[i], kFirstDrive + static_cast<int>(i));
-    }
-    for (std::size_t i = 0; i < n_steer; ++i) {
-      steer[i] = variable(y.steer_rad[i], kFirstSteer + static_cast<int>(i));
-    }
-    for (std::size_t i = 0; i < n; ++i) x[i] = variable(x_WI.data()[i], static_cast<int>(i));
-    AutoRows<Dual> out;
-    for (auto& row : out.rows) row.fill(Dual(0., Gradient::Zero()));
-    out.b.fill(Dual(0., Gradient::Zero()));
-    derived().template auto_rows<Dual>(std::span<const Dual>(drive.data(), n_drive),
-                                       std::span<const Dual>(steer.data(), n_steer),
-                                       std::span<const Dual>(x.data(), n), out);
-    return out;
-  }
-
-  /// Column `column` of `out`: derivatives by the active variable `variable_index`.
-  template <class Derivatives>
-  static void fill_column(const AutoRows<Dual>& d, int variable_index, const Twist& xi,
-                          const RowVector& e, int column, Derivatives& out) {
-    out.DtE.col(column).setZero();
-    for (int i = 0; i < e.size(); ++i) {
-      const auto row = static_cast<std::size_t>(i);
-      double J = d.b[row].derivatives()[variable_index];
-      for (std::size_t j = 0; j < 3; ++j) {
-        const double dA = d.rows[row][j].derivatives()[variable_index];
-        J -= dA * xi[static_cast<int>(j)];
-        out.DtE(static_cast<int>(j), column) += dA * e[i];
+    Dual* const all = variables.data();
+    for (std::size_t i = 0; i < n_drive; ++i) all[i].value() = y.drive_rad_per_s[i];
+    for (std::size_t i = 0; i < n_steer; ++i) all[n_drive + i].value() = y.steer_rad[i];
+    for (std::size_t i = 0; i < n; ++i) all[n_drive + n_steer + i].value() = x_WI.data()[i];
+    AutoRows<Dual> rows;
+    Eigen::Matrix<double, Eigen::Dynamic, kLanes, Eigen::RowMajor, kMaxRows, kLanes> J(e.size(),
+                                                                                       kLanes);
+    Eigen::Matrix<double, 3, kLanes, Eigen::RowMajor> DtE;
+    for (; first < last; first += kLanes) {
+      const int end = std::min(last, first + kLanes);
+      for (Dual& variable : variables) variable.derivatives().setZero();
+      for (int k = first; k < end; ++k) all[k].derivatives()[k - first] = 1.;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(e.size()); ++i) {
+        rows.rows[i].fill(Dual(0., Gradient::Zero()));
+        rows.b[i] = Dual(0., Gradient::Zero());
       }
-      out.J(i, column) = J;
+      derived().template auto_rows<Dual>(std::span<const Dual>(all, n_drive),
+                                         std::span<const Dual>(all + n_drive, n_steer),
+                                         std::span<const Dual>(all + n_drive + n_steer, n), rows);
+      DtE.setZero();
+      for (int i = 0; i < e.size(); ++i) {
+        const auto row = static_cast<std::size_t>(i);
+        J.row(i) = rows.b[row].derivatives().transpose();
+        for (std::size_t j = 0; j < 3; ++j) {
+          const auto dA = rows.rows[row][j].derivatives().transpose();
+          J.row(i) -= xi[static_cast<int>(j)] * dA;
+          DtE.row(static_cast<int>(j)) += e[i] * dA;
+        }
+      }
+      for (int k = first; k < end; ++k) use(k, J.col(k - first), DtE.col(k - first));
     }
   }
 
-  /// The encoder reading nearest to `y`, in units of the noise, for which the rows would hold with
-  /// the signal `b` (slip takes what the encoders cannot): one Gauss-Newton step, so exact to
-  /// second order in b - rows.b. `y` itself for the measured signal.
+  /// The encoder reading nearest to `y`, in units of the noise, for which the rows would hold at
+  /// the twist. Two Gauss-Newton steps: b - rows.b may be many
+  /// times the noise. Slip takes what the encoders cannot, and no more: a wheel that is told to
+  /// slide sideways moves by its steering offset, in a direction that is noise.
   EncoderSample reading_for(const EncoderSample& y, const Intrinsics& x_WI, const RowSystem& rows,
                             const RowVector& b, const Twist& xi) const {
-    if (b == rows.b) return y;
-    const ModelDescription description = described();
+    EncoderSample moved = y;
+    move_reading(x_WI, rows, xi, b - rows.b, moved);
+    RowSystem at_moved = rows;
+    this->rows(moved, x_WI, false, at_moved);
+    move_reading(x_WI, at_moved, xi, at_moved.A * xi - at_moved.b, moved);
+    return moved;
+  }
+
+  /// Derivatives at the reading `at`, by which the rows may have turned, to the rows of `rows`:
+  /// what a change of the twist does as well must stay that. T = I + (A - A') A'^+ takes A' to A.
+  void carry_back(const EncoderSample& at, const Intrinsics& x_WI, const RowSystem& rows,
+                  RowJacobian& J) const {
+    RowSystem there = rows;
+    this->rows(at, x_WI, false, there);
+    Eigen::Matrix3d AtA = there.A.transpose() * there.A;
+    AtA.diagonal().array() += 1e-12 * AtA.trace();  // of a base that cannot tell its twist
+    const TwistRowsJacobian as_twist = AtA.llt().solve(there.A.transpose() * J);
+    J += (rows.A - there.A) * as_twist;
+  }
+
+  /// Moves `y`, where the model has `rows`, by the least noise that makes `needed` of the rows.
+  void move_reading(const Intrinsics& x_WI, const RowSystem& rows, const Twist& xi,
+                    const RowVector& needed, EncoderSample& y) const {
+    const auto& noises = this->noises();
     NoiseDerivatives by_n;
-    const int q = static_cast<int>(description.noises.size());
-    by_n.J.setZero(b.size(), q);
+    const int q = static_cast<int>(noises.size());
+    by_n.J.setZero(needed.size(), q);
     by_n.DtE.setZero(3, q);
-    const RowVector no_residual = RowVector::Zero(b.size());
+    const RowVector no_residual = RowVector::Zero(needed.size());
     noise_derivatives(y, x_WI, rows, rows.b, xi, no_residual, by_n);
     for (int k = 0; k < q; ++k) {
-      by_n.J.col(k) *= description.noises[static_cast<std::size_t>(k)].sigma;
+      const NoiseSpec& noise = noises[static_cast<std::size_t>(k)];
+      by_n.J.col(k) *= noise.kind == NoiseKind::kSlip ? kSlipShare * noise.sigma : noise.sigma;
     }
     using Square =
         Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxRows, kMaxRows>;
     const Square R = by_n.J * by_n.J.transpose();
-    const RowVector needed = Eigen::LLT<Square>(R).solve(b - rows.b);
-    const NoiseVector step = by_n.J.transpose() * needed;
-    EncoderSample moved = y;
+    const NoiseVector step = by_n.J.transpose() * Eigen::LLT<Square>(R).solve(needed);
     for (int k = 0; k < q; ++k) {
-      const NoiseSpec& noise = description.noises[static_cast<std::size_t>(k)];
+      const NoiseSpec& noise = noises[static_cast<std::size_t>(k)];
       const auto channel = static_cast<std::size_t>(noise.channel);
-      if (noise.kind == NoiseKind::kDrive) moved.drive_rad_per_s[channel] += noise.sigma * step[k];
-      if (noise.kind == NoiseKind::kSteer) moved.steer_rad[channel] += noise.sigma * step[k];
+      if (noise.kind == NoiseKind::kDrive) y.drive_rad_per_s[channel] += noise.sigma * step[k];
+      if (noise.kind == NoiseKind::kSteer) y.steer_rad[channel] += noise.sigma * step[k];
     }
-    return moved;
   }
+
+  mutable std::once_flag described_;
+  mutable std::vector<NoiseSpec> noises_;
 };
 
 }  // namespace viwo
