@@ -129,24 +129,23 @@ class Fit {
   }
 
   CalibrationEstimate run() {
-    // Noise scales and estimate by turns: each needs the other (CAL-5).
-    constexpr int kRounds = 5;
-    for (int round = 0; round < kRounds; ++round) {
-      set_noise();
-      solve();
-      if (round + 1 < kRounds) rescale(linearise());
+    // Noise scales and estimate by turns, as each needs the other (CAL-5): few steps at a time once
+    // the estimate is near.
+    constexpr int kMostRounds = 50, kFewIterations = 2, kMostIterations = 50;
+    constexpr double kUnchanged = 1e-3;
+    solve(kMostIterations);
+    for (int round = 0; round < kMostRounds && rescale(linearise()) > kUnchanged; ++round) {
+      solve(kFewIterations);
     }
+    solve(kMostIterations);
     return result(linearise());
   }
 
  private:
   CalibrationPoint point(std::size_t k) const { return prior_.point(shared_.data(), clock_[k]); }
 
-  void set_noise() {
+  void solve(int most_iterations) {
     for (const auto& problem : problems_) problem->set_noise(estimate_.noise);
-  }
-
-  void solve() {
     ceres::Problem problem;
     for (std::size_t k = 0; k < problems_.size(); ++k) {
       problem.AddResidualBlock(new RecordingCost(*problems_[k], prior_), nullptr, shared_.data(),
@@ -157,7 +156,7 @@ class Fit {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
     options.logging_type = ceres::SILENT;
-    options.max_num_iterations = 50;
+    options.max_num_iterations = most_iterations;
     options.num_threads = 1;  // same bits on every machine; recordings share no scratch memory
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
@@ -197,8 +196,9 @@ class Fit {
     return all;
   }
 
-  /// Variance components: squares over redundancy, group by group.
-  void rescale(const Linearisation& at) {
+  /// Variance components: squares over redundancy, group by group. Returns by what part the most
+  /// changed of them did.
+  double rescale(const Linearisation& at) {
     const Eigen::MatrixXd P = covariance(at);
     const auto factor = [&](const NoiseGroup& group) {
       const double redundancy = group.residuals - (P * group.information).trace();
@@ -206,9 +206,12 @@ class Fit {
       if (redundancy < 1. || group.squares < 1e-12) return 1.;
       return std::sqrt(group.squares / redundancy);
     };
-    estimate_.noise.position_m *= factor(at.position);
-    estimate_.noise.yaw_rad *= factor(at.yaw);
-    if (setup_.options.parity) estimate_.noise.parity_scale *= factor(at.parity);
+    const double position = factor(at.position), yaw = factor(at.yaw);
+    const double parity = setup_.options.parity ? factor(at.parity) : 1.;
+    estimate_.noise.position_m *= position;
+    estimate_.noise.yaw_rad *= yaw;
+    estimate_.noise.parity_scale *= parity;
+    return std::max({std::abs(position - 1.), std::abs(yaw - 1.), std::abs(parity - 1.)});
   }
 
   static Eigen::MatrixXd covariance(const Linearisation& at) {

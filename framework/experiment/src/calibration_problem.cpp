@@ -92,7 +92,11 @@ void RecordingProblem::integrate(const CalibrationPoint& point,
 
 void RecordingProblem::evaluate(const CalibrationPoint& point, bool jacobian,
                                 RecordingResiduals& out) {
-  integrate(point, segments_);
+  // A solver asks for the residuals of a point, then for their derivatives, which are there.
+  if (!integrated_ || !(*integrated_ == point)) {
+    integrate(point, segments_);
+    integrated_ = point;
+  }
   const bool clock = options_.clock_offset_sigma_s > 0.;
   if (jacobian && clock) {
     CalibrationPoint shifted = point;

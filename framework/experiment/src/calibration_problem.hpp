@@ -1,6 +1,7 @@
 // The least-squares problem of a batch calibration: residuals and Jacobians of one recording.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -15,6 +16,8 @@ struct CalibrationPoint {
   Intrinsics x_WI;
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
   double clock_offset_s = 0.;
+
+  bool operator==(const CalibrationPoint&) const = default;
 };
 
 /// Residuals of one recording, whitened, with their derivatives by [x_WI, extrinsics, clock
@@ -52,6 +55,7 @@ class RecordingProblem {
   std::vector<Eigen::Vector3d> reference_;  ///< motion of B over each segment
   CalibrationNoise noise_;
   std::vector<PreintegratedPose> segments_, later_, earlier_;
+  std::optional<CalibrationPoint> integrated_;  ///< where segments_ are
 };
 
 /// h = E (+) g (+) E^-1: motion of B for motion g of O, with E = [yaw, x, y] of O in B (CAL-2), and
