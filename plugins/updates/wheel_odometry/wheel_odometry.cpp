@@ -28,6 +28,7 @@ using namespace wheel_motion;
 using wheel_odometry::kParams;
 
 constexpr int kMaxColumns = kGeometrySize + 2 * kMaxIntrinsics;
+static_assert(kMaxColumns <= kMaxFactorColumns);
 using Step = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxColumns, 1>;
 using Jacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxColumns>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxColumns,

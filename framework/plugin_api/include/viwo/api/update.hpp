@@ -21,7 +21,7 @@
 namespace viwo {
 
 inline constexpr int kMaxFactorRows = 24;
-inline constexpr int kMaxFactorColumns = 80;
+inline constexpr int kMaxFactorColumns = 84;
 inline constexpr int kMaxFactorBlocks = 32;
 
 /// Consecutive columns of the error state.
