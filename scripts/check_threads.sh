@@ -21,7 +21,8 @@ export TSAN_OPTIONS=halt_on_error=1
 echo "== Conformance of ${#models[@]} kinematic models"
 failed=0
 for model in "${models[@]}"; do
-  library=$(echo build-tsan/lib/viwo/plugins/v*/libviwo_kinematics_"$model".so)
+  # An older build may have left one of another version of the API.
+  library=$(printf '%s\n' build-tsan/lib/viwo/plugins/v*/libviwo_kinematics_"$model".so | sort -V | tail -n 1)
   config=tests/conformance/configs/kinematics_$model.yaml
   arguments=()
   if [ -e "$config" ]; then arguments=(--config "$config"); fi

@@ -107,6 +107,10 @@ TEST_F(CommandLineTest, RefusesOptionValuesThatMakeNoSense) {
   experiment("--seeds", "-3", "--seeds must be at least 1");
   experiment("--jobs", "-1", "--jobs must not be negative");
   experiment("--jobs", "two", "the argument ('two') for option '--jobs' is invalid");
+  // A variable of the shell that is not set is not the whole experiment.
+  const Outcome shard = viwo({"experiment", "e.yaml", "--out", "here", "--shard", ""});
+  EXPECT_NE(shard.code, 0);
+  EXPECT_NE(shard.err.find("--shard : there is no '/'"), std::string::npos) << shard.err;
 }
 
 TEST_F(CommandLineTest, ListsAndDescribesPlugins) {

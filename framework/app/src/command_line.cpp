@@ -152,7 +152,7 @@ Arguments arguments_of(const po::variables_map& values) {
   if (values.contains("jobs")) arguments.jobs = values["jobs"].as<int>();
   arguments.keep_runs = values.contains("keep-runs");
   arguments.resume = values.contains("resume");
-  arguments.shard = text("shard");
+  if (values.contains("shard")) arguments.shard = text("shard");
   arguments.collect = values.contains("collect");
   arguments.show = values.contains("show");
   arguments.video = text("video");

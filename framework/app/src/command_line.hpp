@@ -23,7 +23,7 @@ struct Arguments {
   int jobs = 0;
   bool keep_runs = false;
   bool resume = false;
-  std::string shard;  ///< "I/N", or none
+  std::optional<std::string> shard;  ///< "I/N"
   bool collect = false;
   bool show = false;
   std::filesystem::path video;  ///< none if empty

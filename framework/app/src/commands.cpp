@@ -84,6 +84,23 @@ RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
   return read_run(configuration, plugins, arguments.seed);
 }
 
+/// The results of a shard wait for those of the others.
+int shard_is_done(const ExperimentResult& result, const Shard& shard, const std::string& file,
+                  const std::filesystem::path& folder) {
+  std::size_t cells = 0, bad = 0;
+  for (std::size_t i = 0; i < result.runs.size(); ++i) {
+    if (!shard.has(i)) continue;
+    ++cells;
+    if (result.runs[i].result.status != RunStatus::kOk) ++bad;
+  }
+  std::cout << "shard " << shard.index << " of " << shard.count << ": " << cells << " of "
+            << result.runs.size() << " runs are in " << (folder / "journal").string() << ", " << bad
+            << " of them failed or diverged; when all shards are done, with the same --seeds and "
+               "--set:\n  viwo experiment "
+            << file << " --out " << folder.string() << " --collect\n";
+  return bad == 0 ? 0 : 1;
+}
+
 }  // namespace
 
 int run_command(const Arguments& arguments) {
@@ -119,27 +136,6 @@ int run_command(const Arguments& arguments) {
   return result.status == RunStatus::kOk ? 0 : 1;
 }
 
-namespace {
-
-/// The results of a shard wait for those of the others.
-int shard_is_done(const ExperimentResult& result, const Shard& shard, const std::string& file,
-                  const std::filesystem::path& folder) {
-  std::size_t cells = 0, bad = 0;
-  for (std::size_t i = 0; i < result.runs.size(); ++i) {
-    if (!shard.has(i)) continue;
-    ++cells;
-    if (result.runs[i].result.status != RunStatus::kOk) ++bad;
-  }
-  std::cout << "shard " << shard.index << " of " << shard.count << ": " << cells << " of "
-            << result.runs.size() << " runs are in " << (folder / "journal").string() << ", " << bad
-            << " of them failed or diverged; when all shards are done, with the same --seeds and "
-               "--set:\n  viwo experiment "
-            << file << " --out " << folder.string() << " --collect\n";
-  return bad == 0 ? 0 : 1;
-}
-
-}  // namespace
-
 int experiment_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   ExperimentOptions options;
@@ -149,7 +145,7 @@ int experiment_command(const Arguments& arguments) {
   options.assignments = arguments.assignments;
   options.resume = arguments.resume;
   options.collect = arguments.collect;
-  if (!arguments.shard.empty()) options.shard = read_shard(arguments.shard);
+  if (arguments.shard) options.shard = read_shard(*arguments.shard);
   const InterruptSignal interrupt;
   options.interrupted = [&interrupt] { return interrupt.raised(); };
   const ExperimentSetup setup = read_experiment(arguments.positional[0], options);

@@ -153,6 +153,10 @@ report::Table parameter_table(const CalibrationResult& result) {
 
 /// What was found, and what to write.
 std::string wander_text(const WheelWander& wander) {
+  if (wander.lag_s.empty()) {
+    return "whether the intrinsics wander cannot be told: only wheels that could contradict each "
+           "other, for longer than a second, tell it";
+  }
   if (!(wander.sigma > 0.)) return "the wheels contradict each other as noise does: none wanders";
   const std::string sigma = significant(wander.sigma, 2), time_s = significant(wander.time_s, 2);
   return "the intrinsics wander by " + sigma + " prior sigmas, for " + time_s +
