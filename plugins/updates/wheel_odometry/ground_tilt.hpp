@@ -28,6 +28,10 @@ class GroundTilt {
     squares_ = kept * squares_ + tilt.squaredNorm() / variance;
 
     const Eigen::Vector2d rate = tilt / duration_s;
+    const Eigen::Vector2d unexpected = rate - expected(duration_s) / duration_s;
+    unexpected_repeated_ = kept * unexpected_repeated_ + unexpected.dot(unexpected_);
+    unexpected_squares_ = kept * unexpected_squares_ + unexpected_.squaredNorm();
+    unexpected_ = unexpected;
     repeated_ = kept * repeated_ + rate.dot(before_);
     before_squares_ = kept * before_squares_ + before_.squaredNorm();
     before_ = last_;
@@ -48,6 +52,15 @@ class GroundTilt {
     return std::min(repeated_ / before_squares_, 1.) * duration_s * before_;
   }
 
+  /// How many neighbouring intervals have alike what of the tilt was not expected: half a wave's
+  /// worth (WO-20).
+  double alike() const {
+    if (!(unexpected_repeated_ > 0.) || !tilts()) return 1.;
+    const double most = n_ * (n_ + 1.);  // of equal ones, all together tell what one does
+    const double r = unexpected_repeated_ / unexpected_squares_;
+    return r < 1. ? std::clamp(2. / std::acos(r), 1., most) : most;
+  }
+
  private:
   double sigmas_;
   double n_ = 0.;
@@ -55,6 +68,8 @@ class GroundTilt {
   Eigen::Vector2d products_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d last_ = Eigen::Vector2d::Zero(), before_ = last_;  ///< rates, rad/s
   double repeated_ = 0., before_squares_ = 0.;  ///< of a rate and that two intervals before
+  Eigen::Vector2d unexpected_ = Eigen::Vector2d::Zero();  ///< of the latest rate
+  double unexpected_repeated_ = 0., unexpected_squares_ = 0.;
 };
 
 }  // namespace viwo::wheel_odometry

@@ -118,5 +118,31 @@ TEST(GroundTilt, WhatIsExpectedGoesWithTheLengthOfTheInterval) {
   EXPECT_NEAR(tilt.expected(0.05).y(), -1e-2, 1e-4);
 }
 
+/// Alike after `intervals` over ground whose tilt is `ground(i)`.
+template <class Ground>
+double alike(int intervals, const Ground& ground) {
+  std::mt19937_64 rng(8);
+  std::normal_distribution<double> gauss(0., kSigma);
+  GroundTilt tilt(5.);
+  for (int i = 0; i < intervals; ++i) {
+    tilt.add(kDurationS, 0., {ground(i) + gauss(rng), gauss(rng)}, kSigma * kSigma);
+  }
+  return tilt.alike();
+}
+
+TEST(GroundTilt, WhatIsNotExpectedIsAlikeInIntervalsThatFollowEachOther) {
+  // At the start of a slope nothing is known of it: all intervals together are one.
+  EXPECT_NEAR(alike(3, [](int) { return 5e-3; }), 3. * 4., 2.);
+  // Waves are expected too late, for a part of their length.
+  const double of_waves = alike(2000, [](int i) { return 5e-3 * std::sin(0.1 * i); });
+  EXPECT_GT(of_waves, 4.);
+  EXPECT_LT(of_waves, M_PI / 0.1);
+  // Stones, one after the other, are not; nor is noise on flat ground.
+  std::mt19937_64 rng(9);
+  std::normal_distribution<double> stones(0., 5e-3);
+  EXPECT_LT(alike(2000, [&](int) { return stones(rng); }), 1.5);
+  EXPECT_EQ(alike(2000, [](int) { return 0.; }), 1.);
+}
+
 }  // namespace
 }  // namespace viwo::wheel_odometry

@@ -17,6 +17,7 @@
 #include "ground_tilt.hpp"
 #include "intrinsic_curvature.hpp"
 #include "relative_pose.hpp"
+#include "small_turn.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/so3.hpp"
 #include "wheel_odometry_params.hpp"
@@ -83,6 +84,7 @@ class WheelOdometry final : public Update {
   void start(const UpdateSetup& /*setup*/) override {
     noise_.reset();
     ground_tilt_ = wheel_odometry::GroundTilt(options_.twist.motion_sigmas);
+    small_turn_ = wheel_odometry::SmallTurn(options_.twist.motion_sigmas);
     checked_.start(wheel_model_of(blocks_), wheel_check_probability_);
     preintegrator_.emplace(wheel_model_of(blocks_), options_);
     shifted_preintegrator_.emplace(wheel_model_of(blocks_), options_);
@@ -120,6 +122,7 @@ class WheelOdometry final : public Update {
     }
     iterate(wheels, encoders, *interval, factor);
     ground_tilt_.add(pose_.duration_s, pose_.g[0], tilt_, tilt_variance());
+    small_turn_.add(pose_.duration_s, pose_.g[0], R_(0, 0), lasting_[0]);
   }
 
   void rejections(std::vector<RejectionCount>& out) const override {
@@ -236,11 +239,12 @@ class WheelOdometry final : public Update {
     const Eigen::Vector3d& p_IinO = at_.mount.p_IinO;
     const CalibrationJacobian measured = calibration_jacobian(pose_.g, tilt_, g_rate_, p_IinO);
     const auto n = P_.cols() - n_geometry_;
-    const Eigen::Vector3d noise =
-        R_.diagonal() +
+    lasting_ =
         (pose_.J_g_WI * P_.bottomRightCorner(n, n)).cwiseProduct(pose_.J_g_WI).rowwise().sum();
+    Eigen::Vector3d motion_of_O = planar_part(pose_.g, R_.diagonal() + lasting_);
+    if (motion_of_O[0] == 0.) motion_of_O[0] = small_turn_.expected(pose_.duration_s);
     const CalibrationJacobian moving =
-        calibration_jacobian(planar_part(pose_.g, noise), moving_tilt(), moving_rate(), p_IinO);
+        calibration_jacobian(motion_of_O, moving_tilt(), moving_rate(), p_IinO);
     geometry_jacobian_.rightCols<kCalibrationSize>() = moving;
     H_.resize(3, P_.cols());
     for (int k = 0; k < n_geometry_; ++k) {
@@ -250,7 +254,8 @@ class WheelOdometry final : public Update {
     // What the calibration may be off by, through columns that are not in the Jacobian, is noise.
     if (measured == moving) return;
     const CalibrationJacobian D = measured - moving;
-    R_ += D * geometry_P_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() * D.transpose();
+    R_ += ground_tilt_.alike() * D *
+          geometry_P_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() * D.transpose();
   }
 
   /// (WO-9)
@@ -441,6 +446,8 @@ class WheelOdometry final : public Update {
   Eigen::Vector3d residual_ = Eigen::Vector3d::Zero();
   Eigen::Vector2d tilt_ = Eigen::Vector2d::Zero();  // [roll, pitch] of O over the interval
   wheel_odometry::GroundTilt ground_tilt_;
+  wheel_odometry::SmallTurn small_turn_;
+  Eigen::Vector3d lasting_ = Eigen::Vector3d::Zero();  // variance of pose_.g by the intrinsics
   wheel_odometry::IntrinsicCurvature curvature_;
   Eigen::Matrix3d curvature_noise_ = Eigen::Matrix3d::Zero();
   PoseJacobian geometry_jacobian_ = PoseJacobian::Zero();
