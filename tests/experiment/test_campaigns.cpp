@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "experiment_file.hpp"
+#include "run_identity.hpp"
+#include "viwo/experiment/folder_lock.hpp"
 
 namespace viwo {
 namespace {
@@ -140,6 +142,55 @@ TEST_F(Campaign, GoesOnWhereAShardWasKilled) {
   for (const ExperimentRun& cell : result.runs) taken_over += cell.taken_over ? 1 : 0;
   EXPECT_EQ(taken_over, 2);
   EXPECT_EQ(collected(out), table_of(run(options_, folder_ / "whole"), folder_ / "whole"));
+}
+
+TEST(RunIdentity, IsOfContentsWhereverTheyLie) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "viwo_run_identity";
+  fs::remove_all(folder);
+  const auto identity = [&](const char* place) {
+    RunSetup run;
+    run.resolved = config::Node::empty_map();
+    for (const char* name : {"log.csv", "images", "log2.csv"}) {
+      run.resolved.set(name, config::Node::scalar_of((folder / place / name).string()));
+    }
+    return RunIdentity().of(run);
+  };
+  for (const char* place : {"here", "there"}) {
+    fs::create_directories(folder / place / "images" / "cam0");
+    std::ofstream(folder / place / "log.csv") << "1,2\n";
+    std::ofstream(folder / place / "log2.csv.gz") << "gzip";
+    std::ofstream(folder / place / "images" / "cam0" / "1.png") << "pixels";
+  }
+  const std::string first = identity("here");
+  EXPECT_EQ(first, identity("there"));
+  EXPECT_THAT(first, Not(HasSubstr(folder.string())));
+  // Another digit, another file in a folder, another name of one.
+  std::ofstream(folder / "there" / "log.csv") << "1,3\n";
+  EXPECT_NE(first, identity("there"));
+  std::ofstream(folder / "there" / "log.csv") << "1,2\n";
+  EXPECT_EQ(first, identity("there"));
+  std::ofstream(folder / "there" / "log2.csv.gz") << "gzap";
+  EXPECT_NE(first, identity("there"));
+  std::ofstream(folder / "there" / "log2.csv.gz") << "gzip";
+  fs::rename(folder / "there" / "images" / "cam0" / "1.png",
+             folder / "there" / "images" / "cam0" / "2.png");
+  EXPECT_NE(first, identity("there"));
+}
+
+TEST(FolderLock, IsOfOneOrOfShards) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "viwo_folder_lock";
+  fs::create_directories(folder);
+  {
+    const FolderLock shard(folder, true);
+    const FolderLock another(folder, true);
+    EXPECT_THROW(FolderLock(folder, false), InputError);
+  }
+  {
+    const FolderLock whole(folder, false);
+    EXPECT_THROW(FolderLock(folder, true), InputError);
+    EXPECT_THROW(FolderLock(folder, false), InputError);
+  }
+  const FolderLock again(folder, false);
 }
 
 }  // namespace

@@ -305,8 +305,8 @@ TEST_F(Resume, StopsWithAClearMessageWhenTheDiskIsFull) {
     FAIL() << "this is no interruption";
   } catch (const std::runtime_error& error) {
     EXPECT_EQ(std::string(error.what()),
-              "cannot write " + (out / "journal" / "redundant,lateral,1.cbor.tmp").string() +
-                  " (is the disk full?)");
+              "cannot write " + (out / "journal" / "redundant,lateral,1.cbor").string() +
+                  ": No space left on device");
   }
   EXPECT_TRUE(fs::exists(out / "journal" / "redundant,circle,1.cbor"));
 }

@@ -9,6 +9,7 @@
 #include "viwo/eval/accuracy.hpp"
 #include "viwo/experiment/calibrate.hpp"
 #include "viwo/experiment/experiment.hpp"
+#include "viwo/experiment/folder_lock.hpp"
 #include "viwo/experiment/interrupt.hpp"
 #include "viwo/experiment/observability.hpp"
 #include "viwo/experiment/output.hpp"
@@ -150,6 +151,8 @@ int experiment_command(const Arguments& arguments) {
   options.interrupted = [&interrupt] { return interrupt.raised(); };
   const ExperimentSetup setup = read_experiment(arguments.positional[0], options);
   const auto folder = out_folder(arguments);
+  std::optional<FolderLock> lock;
+  options.folder_is_there = [&] { lock.emplace(folder, options.shard.has_value()); };
   const Figures figures(arguments, folder);
   const ExperimentResult result = run_experiment(setup, options, plugins, folder);
   if (options.shard) return shard_is_done(result, *options.shard, arguments.positional[0], folder);

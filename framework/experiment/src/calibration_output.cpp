@@ -332,7 +332,7 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
   }
   add_wander(result.wander, document);
   add_plots(result, document);
-  report::write_html(folder / "report.html", document);
+  write_text(folder / "report.html", report::to_html(document));
 }
 
 }  // namespace viwo::experiment

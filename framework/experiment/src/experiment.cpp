@@ -14,6 +14,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "run_identity.hpp"
 #include "run_journal.hpp"
 #include "run_record.hpp"
 #include "viwo/config/overrides.hpp"
@@ -104,20 +105,6 @@ std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
   return line;
 }
 
-/// All that decides the result of a cell, but for its seed and for the contents of its logs.
-std::string text_of(const RunSetup& run) {
-  std::string text = std::string("viwo ") + viwo_version() + "\n";
-  const auto add = [&](const PluginInfo& info) {
-    text += info.kind + " " + info.name + " " + info.version + "\n";
-  };
-  if (run.kinematics.object) add(run.kinematics.info);
-  for (const SensorEntry& entry : run.sensors) add(entry.sensor.info);
-  if (run.filter) {
-    for (const auto& entry : run.filter->updates) add(entry.update.info);
-  }
-  return text + config::to_yaml(run.resolved);
-}
-
 /// Thrown out of a run that the user does not wait for any more.
 struct Stopped {};
 
@@ -139,7 +126,7 @@ class Runner {
       for (std::size_t r = 0; r < setup_.recordings.size(); ++r) {
         RunSetup check = read_run(configuration(v, r), plugins_);
         if (!options_.collect && (v == 0 || r == 0)) collect(check);
-        configurations_.push_back(text_of(check));
+        configurations_.push_back(identity_.of(check));
         for (int s = 0; s < setup_.seeds; ++s) {
           const auto seed = setup_.seeds > 1 ? static_cast<std::uint64_t>(s) + 1 : check.seed;
           result_.runs.push_back({v, r, seed, {}});
@@ -294,6 +281,7 @@ class Runner {
   PluginRegistry& plugins_;
   std::filesystem::path folder_;
   RunJournal journal_;
+  RunIdentity identity_;
   ExperimentResult& result_;
   std::vector<std::string> configurations_;  // by variant, recording
   int cells_ = 0;                            // that are run or collected here
@@ -345,6 +333,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
   runner.check();
   // Whether results can be written shows before the work, too.
   if (!folder.empty()) make_folder(folder);
+  if (options.folder_is_there) options.folder_is_there();
   const auto begin = std::chrono::steady_clock::now();
   result.jobs = options.jobs > 0 ? options.jobs : tbb::this_task_arena::max_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,

@@ -162,7 +162,7 @@ void write_experiment(const std::filesystem::path& folder, const ExperimentResul
   make_folder(folder);
   write_text(folder / "runs.csv", runs_csv(result));
   write_text(folder / "summary.json", summary_of(result).dump(2) + "\n");
-  report::write_html(folder / "report.html", report_of(result));
+  write_text(folder / "report.html", report::to_html(report_of(result)));
   RunJournal(folder).remove();
 }
 

@@ -245,7 +245,7 @@ report::Document report_of(const ObservabilityReport& report) {
 void write_observability(const std::filesystem::path& folder, const ObservabilityReport& report) {
   make_folder(folder);
   write_text(folder / "observability.json", to_json(report).dump(2) + "\n");
-  report::write_html(folder / "report.html", report_of(report));
+  write_text(folder / "report.html", report::to_html(report_of(report)));
 }
 
 std::string describe(const ObservabilityReport& report) {

@@ -81,13 +81,7 @@ void RunJournal::write(const RunKey& key, const RunResult& run) const {
   std::string bytes;
   nlohmann::json::to_cbor(entry, bytes);
   bytes += checksum(bytes);
-  const fs::path file = file_of(key);
-  fs::path unfinished = file;
-  unfinished += ".tmp";
-  write_text(unfinished, bytes);
-  std::error_code error;
-  fs::rename(unfinished, file, error);
-  if (error) throw std::runtime_error("cannot write " + file.string() + ": " + error.message());
+  write_text(file_of(key), bytes);
 }
 
 void RunJournal::remove() const {

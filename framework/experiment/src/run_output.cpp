@@ -174,7 +174,7 @@ void write_run(const std::filesystem::path& folder, const RunSetup& setup,
   }
   if (!result.reference.empty()) log::write_tum(folder / "reference.tum", result.reference);
   write_text(folder / "summary.json", summary_of(setup, result).dump(2) + "\n");
-  report::write_html(folder / "report.html", report_of(setup, result));
+  write_text(folder / "report.html", report::to_html(report_of(setup, result)));
 }
 
 namespace {

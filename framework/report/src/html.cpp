@@ -1,15 +1,12 @@
 #include "viwo/report/html.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <stdexcept>
 #include <string_view>
-#include <system_error>
 
 #include "assets.hpp"
 #include "plots.hpp"
@@ -234,18 +231,6 @@ std::string to_html(const Document& document) {
                                           {"plotly_version", assets::plotly_version()},
                                           {"plotly_license", license},
                                           {"viwo_version", VIWO_REPORT_VERSION}});
-}
-
-void write_html(const std::filesystem::path& path, const Document& document) {
-  const std::string html = to_html(document);
-  errno = 0;
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file.write(html.data(), static_cast<std::streamsize>(html.size()));
-  file.close();
-  if (!file) {
-    throw std::runtime_error("cannot write report '" + path.string() +
-                             "': " + std::generic_category().message(errno));
-  }
 }
 
 }  // namespace viwo::report

@@ -1,7 +1,5 @@
 // The page as text: structure, escaping, numbers, and data that reads back.
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <stdexcept>
@@ -284,32 +282,6 @@ TEST(Report, NamesWhatDoesNotFit) {
             "report: plot 'Path': z and text of the heat map need a row per y and a column per x");
   EXPECT_EQ(message_of(one_block(Image{"I", "", "text/html", ""})),
             "report: image 'I' is of type 'text/html', not PNG, JPEG or SVG");
-}
-
-TEST(Report, IsWrittenAsItIs) {
-  const std::filesystem::path path =
-      std::filesystem::path(testing::TempDir()) / "viwo_test_report_written.html";
-  write_html(path, sample_document());
-  std::ifstream file(path, std::ios::binary);
-  const std::string written{std::istreambuf_iterator<char>(file), {}};
-  EXPECT_EQ(written, to_html(sample_document()));
-  std::filesystem::remove(path);
-}
-
-TEST(Report, ThatCannotBeWrittenIsAnError) {
-  const auto message = [](const std::string& path) -> std::string {
-    try {
-      write_html(path, sample_document());
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "nothing thrown";
-  };
-  EXPECT_EQ(message("/nonexistent/report.html"),
-            "cannot write report '/nonexistent/report.html': No such file or directory");
-  if (std::filesystem::exists("/dev/full")) {
-    EXPECT_EQ(message("/dev/full"), "cannot write report '/dev/full': No space left on device");
-  }
 }
 
 }  // namespace

@@ -42,6 +42,8 @@ struct ExperimentOptions {
   /// Only its cells, which stay in the journal; those that are there are taken over.
   std::optional<Shard> shard;
   bool collect = false;  ///< run nothing: all cells are taken from the journal
+  /// Told once that the folder of the results is there, before anything in it is read or written.
+  std::function<void()> folder_is_there;
   /// Asked from any thread, often; once it says true the experiment ends as soon as it can.
   std::function<bool()> interrupted;
 };

@@ -1,7 +1,6 @@
 // A Document as one HTML file that needs nothing else: style, data and plot library are inside.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "viwo/report/document.hpp"
@@ -11,8 +10,5 @@ namespace viwo::report {
 /// The page. The same document gives the same bytes. Throws std::invalid_argument, naming the
 /// table, plot or image, when sizes in the document do not fit.
 std::string to_html(const Document& document);
-
-/// Writes to_html(document) to `path`. Throws std::runtime_error when that fails.
-void write_html(const std::filesystem::path& path, const Document& document);
 
 }  // namespace viwo::report

@@ -1,0 +1,26 @@
+#include "viwo/experiment/folder_lock.hpp"
+
+#include <cerrno>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "viwo/api/status.hpp"
+
+namespace viwo::experiment {
+
+FolderLock::FolderLock(const std::filesystem::path& folder, bool shared)
+    : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (fd_ < 0 || ::flock(fd_, (shared ? LOCK_SH : LOCK_EX) | LOCK_NB) == 0) return;
+  if (errno != EWOULDBLOCK) return;
+  ::close(fd_);
+  throw InputError("another viwo is at work in " + folder.string() +
+                   (shared ? ", and not as a shard" : "") + ": wait until it is done");
+}
+
+FolderLock::~FolderLock() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+}  // namespace viwo::experiment

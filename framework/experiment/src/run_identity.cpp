@@ -1,0 +1,92 @@
+#include "run_identity.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <stdexcept>
+#include <string_view>
+#include <vector>
+
+#include <zlib.h>
+
+#include "viwo/config/yaml.hpp"
+#include "viwo/experiment/output.hpp"
+
+namespace viwo::experiment {
+namespace {
+
+namespace fs = std::filesystem;
+
+unsigned long crc_of(std::string_view bytes, unsigned long before) {
+  return crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+}
+
+/// "SIZE bytes, crc NUMBER"
+std::string checksum_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::vector<char> buffer(std::size_t{1} << 20);
+  unsigned long crc = 0;
+  std::uintmax_t size = 0;
+  while (in) {
+    in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+    const auto count = static_cast<std::size_t>(in.gcount());
+    crc = crc_of({buffer.data(), count}, crc);
+    size += count;
+  }
+  if (!in.eof()) throw std::runtime_error("cannot read " + file.string());
+  return std::to_string(size) + " bytes, crc " + std::to_string(crc);
+}
+
+/// Of all files below it, in the order of their names.
+std::string checksums_of(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  std::string text;
+  for (const fs::path& file : files) {
+    text += file.lexically_relative(folder).string() + ": " + checksum_of(file) + "\n";
+  }
+  return std::to_string(files.size()) + " files, crc " + std::to_string(crc_of(text, 0));
+}
+
+}  // namespace
+
+std::string RunIdentity::of(const RunSetup& run) {
+  std::string text = std::string("viwo ") + viwo_version() + "\n";
+  const auto add = [&](const PluginInfo& info) {
+    text += info.kind + " " + info.name + " " + info.version;
+    // One that is linked into the program has none.
+    if (fs::is_regular_file(info.file)) text += ": " + content_of(info.file);
+    text += "\n";
+  };
+  if (run.kinematics.object) add(run.kinematics.info);
+  for (const SensorEntry& entry : run.sensors) add(entry.sensor.info);
+  if (run.filter) {
+    for (const auto& entry : run.filter->updates) add(entry.update.info);
+  }
+  config::Node configuration = run.resolved;
+  replace_paths(configuration);
+  return text + config::to_yaml(configuration);
+}
+
+const std::string& RunIdentity::content_of(const fs::path& path) {
+  const auto [at, is_new] = contents_.try_emplace(path);
+  if (is_new) at->second = fs::is_directory(path) ? checksums_of(path) : checksum_of(path);
+  return at->second;
+}
+
+/// A resolved configuration has absolute paths only. A log may be there as FILE.gz.
+void RunIdentity::replace_paths(config::Node& node) {
+  for (config::Node& item : node.items()) replace_paths(item);
+  for (config::Node::Entry& entry : node.entries()) replace_paths(entry.value);
+  if (!node.is_scalar() || !node.scalar().starts_with('/')) return;
+  for (const char* extension : {"", ".gz"}) {
+    const fs::path path = node.scalar() + extension;
+    if (!fs::is_regular_file(path) && !fs::is_directory(path)) continue;
+    node = config::Node::scalar_of(path.filename().string() + ": " + content_of(path));
+    return;
+  }
+}
+
+}  // namespace viwo::experiment
