@@ -153,7 +153,7 @@ TEST(RunIdentity, IsOfContentsWhereverTheyLie) {
     for (const char* name : {"log.csv", "images", "log2.csv"}) {
       run.resolved.set(name, config::Node::scalar_of((folder / place / name).string()));
     }
-    return RunIdentity().of(run);
+    return RunIdentity(folder / place / "images" / "out").of(run);
   };
   for (const char* place : {"here", "there"}) {
     fs::create_directories(folder / place / "images" / "cam0");
@@ -164,6 +164,10 @@ TEST(RunIdentity, IsOfContentsWhereverTheyLie) {
   const std::string first = identity("here");
   EXPECT_EQ(first, identity("there"));
   EXPECT_THAT(first, Not(HasSubstr(folder.string())));
+  // Results may lie among the inputs.
+  fs::create_directories(folder / "there" / "images" / "out" / "journal");
+  std::ofstream(folder / "there" / "images" / "out" / "journal" / "1.cbor") << "run";
+  EXPECT_EQ(first, identity("there"));
   // Another digit, another file in a folder, another name of one.
   std::ofstream(folder / "there" / "log.csv") << "1,3\n";
   EXPECT_NE(first, identity("there"));

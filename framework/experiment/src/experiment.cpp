@@ -118,6 +118,7 @@ class Runner {
         plugins_(plugins),
         folder_(folder),
         journal_(folder),
+        identity_(folder),
         result_(result) {}
 
   /// Wrong input is found here, before anything has run: sensors read their logs when made.

@@ -36,11 +36,14 @@ std::string checksum_of(const fs::path& file) {
   return std::to_string(size) + " bytes, crc " + std::to_string(crc);
 }
 
-/// Of all files below it, in the order of their names.
-std::string checksums_of(const fs::path& folder) {
+/// Of all files below it but those of the results, in the order of their names.
+std::string checksums_of(const fs::path& folder, const fs::path& results) {
   std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) files.push_back(entry.path());
+  for (fs::recursive_directory_iterator at(folder), end; at != end; ++at) {
+    if (at->is_regular_file()) files.push_back(at->path());
+    if (at->is_directory() && fs::weakly_canonical(at->path()) == results) {
+      at.disable_recursion_pending();
+    }
   }
   std::sort(files.begin(), files.end());
   std::string text;
@@ -72,7 +75,8 @@ std::string RunIdentity::of(const RunSetup& run) {
 
 const std::string& RunIdentity::content_of(const fs::path& path) {
   const auto [at, is_new] = contents_.try_emplace(path);
-  if (is_new) at->second = fs::is_directory(path) ? checksums_of(path) : checksum_of(path);
+  if (is_new)
+    at->second = fs::is_directory(path) ? checksums_of(path, results_) : checksum_of(path);
   return at->second;
 }
 
