@@ -160,9 +160,9 @@ class AutoKinematics : public KinematicModel {
   }
 
   /// The encoder reading nearest to `y`, in units of the noise, for which the rows would hold at
-  /// the twist. Two Gauss-Newton steps: b - rows.b may be many
-  /// times the noise. Slip takes what the encoders cannot, and no more: a wheel that is told to
-  /// slide sideways moves by its steering offset, in a direction that is noise.
+  /// the twist. Two Gauss-Newton steps: b - rows.b may be many times the noise. Slip takes what
+  /// the encoders cannot, and no more: a wheel that is told to slide sideways moves by its steering
+  /// offset, in a direction that is noise.
   EncoderSample reading_for(const EncoderSample& y, const Intrinsics& x_WI, const RowSystem& rows,
                             const RowVector& b, const Twist& xi) const {
     EncoderSample moved = y;
