@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 
+#include "lagged.hpp"
+
 namespace viwo::wheel_odometry {
 
 /// Of the latest intervals. On a plane the tilt goes with the yaw, as the mount is not known
@@ -29,13 +31,8 @@ class GroundTilt {
 
     const Eigen::Vector2d rate = tilt / duration_s;
     const Eigen::Vector2d unexpected = rate - expected(duration_s) / duration_s;
-    unexpected_repeated_ = kept * unexpected_repeated_ + unexpected.dot(unexpected_);
-    unexpected_squares_ = kept * unexpected_squares_ + unexpected_.squaredNorm();
-    unexpected_ = unexpected;
-    repeated_ = kept * repeated_ + rate.dot(before_);
-    before_squares_ = kept * before_squares_ + before_.squaredNorm();
-    before_ = last_;
-    last_ = rate;
+    unexpected_.add(unexpected, kept);
+    rates_.add(rate, kept);
   }
 
   /// Whether noise does not explain what was seen (WO-16); false where nothing was.
@@ -48,16 +45,16 @@ class GroundTilt {
 
   /// [roll, pitch] of an interval that follows those added, of the one before the last (WO-17).
   Eigen::Vector2d expected(double duration_s) const {
-    if (!(repeated_ > 0.) || !tilts()) return Eigen::Vector2d::Zero();
-    return std::min(repeated_ / before_squares_, 1.) * duration_s * before_;
+    if (!(rates_.products() > 0.) || !tilts()) return Eigen::Vector2d::Zero();
+    return rates_.share() * duration_s * rates_.before();
   }
 
   /// How many neighbouring intervals have alike what of the tilt was not expected: half a wave's
   /// worth (WO-20).
   double alike() const {
-    if (!(unexpected_repeated_ > 0.) || !tilts()) return 1.;
+    if (!(unexpected_.products() > 0.) || !tilts()) return 1.;
     const double most = n_ * (n_ + 1.);  // of equal ones, all together tell what one does
-    const double r = unexpected_repeated_ / unexpected_squares_;
+    const double r = unexpected_.correlation();
     return r < 1. ? std::clamp(2. / std::acos(r), 1., most) : most;
   }
 
@@ -66,10 +63,8 @@ class GroundTilt {
   double n_ = 0.;
   double yaw_squares_ = 0., squares_ = 0.;
   Eigen::Vector2d products_ = Eigen::Vector2d::Zero();
-  Eigen::Vector2d last_ = Eigen::Vector2d::Zero(), before_ = last_;  ///< rates, rad/s
-  double repeated_ = 0., before_squares_ = 0.;  ///< of a rate and that two intervals before
-  Eigen::Vector2d unexpected_ = Eigen::Vector2d::Zero();  ///< of the latest rate
-  double unexpected_repeated_ = 0., unexpected_squares_ = 0.;
+  Lagged<2, 2> rates_;       ///< rad/s
+  Lagged<2, 1> unexpected_;  ///< of them
 };
 
 }  // namespace viwo::wheel_odometry

@@ -2,8 +2,9 @@
 // beside this file.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
+
+#include "lagged.hpp"
 
 namespace viwo::wheel_odometry {
 
@@ -23,28 +24,26 @@ class SmallTurn {
     const bool small = yaw * yaw <= 4. * sigmas_ * sigmas_ * (noise + lasting);
     const double rate = small ? yaw / duration_s : 0.;
     n_ = kept * n_ + 1.;
-    repeated_ = kept * repeated_ + rate * before_;
-    before_squares_ = kept * before_squares_ + before_ * before_;
+    rates_.add(Rates::Vector(rate), kept);
     noise_ = noise / (duration_s * duration_s);
     lasting_ = lasting / (duration_s * duration_s);
-    before_ = last_;
-    last_ = rate;
   }
 
   /// Yaw of an interval that follows those added, of the one before the last (WO-21).
   double expected(double duration_s) const {
     if (!(n_ > 0.)) return 0.;
     const double by_chance = sigmas_ * (sigmas_ * lasting_ + noise_ / std::sqrt(n_));
-    if (!(repeated_ > n_ * by_chance)) return 0.;
-    return std::min(repeated_ / before_squares_, 1.) * duration_s * before_;
+    if (!(rates_.products() > n_ * by_chance)) return 0.;
+    return rates_.share() * duration_s * rates_.before()[0];
   }
 
  private:
+  using Rates = Lagged<1, 2>;  // rad/s
+
   double sigmas_;
   double n_ = 0.;
-  double last_ = 0., before_ = 0.;              ///< rates, rad/s
-  double repeated_ = 0., before_squares_ = 0.;  ///< of a rate and that two intervals before
-  double noise_ = 0., lasting_ = 0.;            ///< of the latest rate, squared
+  Rates rates_;
+  double noise_ = 0., lasting_ = 0.;  ///< of the latest rate, squared
 };
 
 }  // namespace viwo::wheel_odometry
