@@ -46,7 +46,7 @@ class Runs {
       assignments_.emplace_back("updates.wheel_parity.enabled=false");
     }
     restart();
-    data_ = experiment::collect(*setup_);
+    data_ = collect(*setup_);
     start_ = data_.states().front();
     measurements_ = testing::in_time_order(data_);
     next_ = measurements_.size();
@@ -77,9 +77,9 @@ class Runs {
   void restart() { setup_.emplace(testing::run_setup("runs/viwo_swerve.yaml", assignments_)); }
 
   std::vector<std::string> assignments_;
-  std::optional<experiment::RunSetup> setup_;
+  std::optional<RunSetup> setup_;
   StateSample start_;
-  experiment::RunData data_;
+  RunData data_;
   std::vector<testing::Given> measurements_;
   std::size_t next_ = 0;
   std::unique_ptr<Estimator> estimator_;

@@ -100,6 +100,11 @@ class EquationLabels(Tree):
 class Includes(Tree):
     def setUp(self):
         super().setUp()
+        self.write("docs/architecture.md",
+                   "| module | for | includes |\n|---|---|---|\n| `plugin_api` | all | - |\n"
+                   "| `math` | numbers | - |\n| `config` | text | - |\n"
+                   "| `plugin_host` | plugins | - |\n"
+                   "| `wheel` | twists | plugin_api, plugin_host |\n| `experiment` | runs | - |\n")
         self.write("framework/wheel/src/a.cpp",
                    '#include <vector>\n#include "viwo/wheel/a.hpp"\n#include "viwo/api/b.hpp"\n'
                    '#include "viwo/plugin_host/c.hpp"\n#include "local.hpp"\n')
@@ -141,8 +146,20 @@ class Includes(Tree):
 
     def test_wants_a_place_for_every_module(self):
         self.write("framework/extra/src/x.cpp", "")
-        self.assertEqual(self.errors(), ["framework/extra/src/x.cpp: module 'extra' has no place "
-                                         "in the order of the modules"])
+        self.assertEqual(self.errors(), ["framework/extra/src/x.cpp: module 'extra' is not in the "
+                                         "table of docs/architecture.md"])
+
+    def test_finds_an_arrow_that_is_drawn_and_not_there(self):
+        self.write("framework/wheel/src/a.cpp", '#include "viwo/api/b.hpp"\n')
+        self.assertEqual(self.errors(), ["docs/architecture.md: wheel -> plugin_host is drawn, but "
+                                         "nothing includes it"])
+
+    def test_finds_an_arrow_that_points_down(self):
+        page = self.root / "docs/architecture.md"
+        self.write("docs/architecture.md", page.read_text().replace("numbers | -", "numbers | wheel"))
+        self.write("framework/math/a.hpp", '#include "viwo/wheel/a.hpp"\n')
+        self.assertEqual(self.errors(), ["docs/architecture.md: math -> wheel: an arrow to a module "
+                                         "that is not above it"])
 
     def test_fails_as_a_program_and_says_why(self):
         self.write("framework/math/a.hpp", '#include "viwo/eval/a.hpp"\n')

@@ -6,23 +6,22 @@
 #include <vector>
 
 #include "registry.hpp"
-#include "viwo/experiment/configuration.hpp"
 #include "viwo/experiment/experiment.hpp"
-#include "viwo/experiment/run.hpp"
+#include "viwo/run/run.hpp"
+#include "viwo/setup/configuration.hpp"
 
 namespace viwo::testing {
 
 /// A run of a delivered configuration, with assignments as --set would give them.
-inline experiment::RunSetup run_setup(const std::string& name,
-                                      const std::vector<std::string>& assignments,
-                                      std::uint64_t seed = 1) {
-  const auto run = experiment::load_run_configuration(configuration(name), assignments);
-  return experiment::read_run(experiment::resolve_placeholders(run), registry(), seed);
+inline RunSetup run_setup(const std::string& name, const std::vector<std::string>& assignments,
+                          std::uint64_t seed = 1) {
+  const auto run = load_run_configuration(configuration(name), assignments);
+  return read_run(resolve_placeholders(run), registry(), seed);
 }
 
 /// One variant of configs/experiments/paper_accuracy.yaml over the seeds 1 .. `seeds`.
-inline std::vector<experiment::RunResult> paper_runs(const std::string& variant, int seeds,
-                                                     std::vector<std::string> assignments) {
+inline std::vector<RunResult> paper_runs(const std::string& variant, int seeds,
+                                         std::vector<std::string> assignments) {
   experiment::ExperimentOptions options;
   options.seeds = seeds;
   options.assignments = std::move(assignments);
@@ -30,15 +29,15 @@ inline std::vector<experiment::RunResult> paper_runs(const std::string& variant,
       experiment::read_experiment(configuration("experiments/paper_accuracy.yaml"), options);
   std::erase_if(setup.variants, [&](const auto& v) { return v.name != variant; });
   auto result = experiment::run_experiment(setup, options, registry(), {});
-  std::vector<experiment::RunResult> runs;
+  std::vector<RunResult> runs;
   for (experiment::ExperimentRun& run : result.runs) runs.push_back(std::move(run.result));
   return runs;
 }
 
 /// The estimator of a run that starts at the first true state.
-inline Estimator make_estimator(const experiment::RunSetup& run, const StateSample& truth) {
-  const experiment::FilterSetup& setup = *run.filter;
-  Estimator estimator = experiment::make_estimator(setup);
+inline Estimator make_estimator(const RunSetup& run, const StateSample& truth) {
+  const FilterSetup& setup = *run.filter;
+  Estimator estimator = make_estimator(setup);
   const auto& q = truth.q_ItoG_xyzw;
   const auto vector = [](const std::array<double, 3>& v) { return Eigen::Vector3d(v.data()); };
   ImuPrior prior;
@@ -67,10 +66,10 @@ struct Given {
 };
 
 /// What a filter takes of a run in the order of stamps: IMU, encoders, tracks.
-inline std::vector<Given> in_time_order(const experiment::RunData& data) {
+inline std::vector<Given> in_time_order(const RunData& data) {
   std::vector<Given> all;
   for (const SampleType* type : sample_types<ImuSample, EncoderSample, FeatureSample>()) {
-    for (const experiment::Recorded::Track& track : data.recorded.tracks()) {
+    for (const Recorded::Track& track : data.recorded.tracks()) {
       if (!(track.samples->type() == *type)) continue;
       for (std::size_t i = 0; i < track.samples->size(); ++i) {
         all.push_back({&track.sensor, track.samples->view(i)});
@@ -83,11 +82,11 @@ inline std::vector<Given> in_time_order(const experiment::RunData& data) {
   return all;
 }
 
-inline void add(Estimator& estimator, const experiment::RunSetup& setup, const Given& given) {
-  setup.routes.dispatch(*given.sensor, given.sample.type(), [&](const experiment::Route& route) {
-    if (route.consumer == experiment::Consumer::kImu) {
+inline void add(Estimator& estimator, const RunSetup& setup, const Given& given) {
+  setup.routes.dispatch(*given.sensor, given.sample.type(), [&](const Route& route) {
+    if (route.consumer == Consumer::kImu) {
       estimator.add(*given.sample.get_if<ImuSample>());
-    } else if (route.consumer == experiment::Consumer::kStream) {
+    } else if (route.consumer == Consumer::kStream) {
       estimator.add(route.stream, given.sample);
     }
   });

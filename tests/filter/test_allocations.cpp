@@ -15,7 +15,7 @@ struct Counted {
 };
 Counted count(const std::vector<std::string>& assignments, double warm_up_s) {
   auto setup = testing::run_setup("runs/viwo_swerve.yaml", assignments);
-  const auto data = experiment::collect(setup);
+  const auto data = collect(setup);
   const auto measurements = testing::in_time_order(data);
   Estimator estimator = testing::make_estimator(setup, data.states().front());
   Counted counted;

@@ -38,8 +38,7 @@ std::vector<std::string> with_open_gates(std::vector<std::string> assignments) {
 
 void PrintTo(const Base& base, std::ostream* out) { *out << base.name; }
 
-std::vector<experiment::RunResult> runs_of(const Base& base,
-                                           const std::vector<std::string>& more = {}) {
+std::vector<RunResult> runs_of(const Base& base, const std::vector<std::string>& more = {}) {
   experiment::ExperimentOptions options;
   options.seeds = kSeeds;
   options.assignments = {"sensors.simulator0.duration_s=30"};
@@ -48,7 +47,7 @@ std::vector<experiment::RunResult> runs_of(const Base& base,
       testing::configuration(std::string("experiments/") + base.experiment + ".yaml"), options);
   std::erase_if(setup.variants, [&](const auto& v) { return v.name != base.variant; });
   auto result = experiment::run_experiment(setup, options, testing::registry(), {});
-  std::vector<experiment::RunResult> runs;
+  std::vector<RunResult> runs;
   for (experiment::ExperimentRun& run : result.runs) runs.push_back(std::move(run.result));
   return runs;
 }
@@ -59,7 +58,7 @@ bool is_intrinsic(const std::string& name) {
 
 /// Empty when the pose is consistent at all instants and no intrinsic is further off than it
 /// claims, else what is not.
-std::string inconsistency(const std::vector<experiment::RunResult>& runs) {
+std::string inconsistency(const std::vector<RunResult>& runs) {
   std::ostringstream out;
   const int n = static_cast<int>(runs.size());
   const auto pose =

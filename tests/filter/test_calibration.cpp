@@ -21,11 +21,11 @@ struct ErrorOverSeeds {
   double first_sigma = 0.;  ///< prior
 };
 
-std::map<std::string, ErrorOverSeeds> errors_of(const std::vector<experiment::RunResult>& runs) {
+std::map<std::string, ErrorOverSeeds> errors_of(const std::vector<RunResult>& runs) {
   std::map<std::string, ErrorOverSeeds> errors;
   const auto n = static_cast<double>(runs.size());
   for (const auto& run : runs) {
-    EXPECT_EQ(run.status, experiment::RunStatus::kOk) << run.cause;
+    EXPECT_EQ(run.status, RunStatus::kOk) << run.cause;
     for (const auto& track : run.calibration) {
       if (track.sigma.back() == 0.) continue;  // held
       ErrorOverSeeds& e = errors[track.name];

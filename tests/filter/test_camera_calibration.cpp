@@ -10,17 +10,14 @@
 namespace viwo {
 namespace {
 
-using experiment::CalibrationTrack;
-using experiment::RunResult;
-
 /// Fifteen seconds of the sweep, stereo, with stamps of the cameras that are off.
 RunResult run(const std::string& clock_error_s, std::vector<std::string> more) {
   more.push_back("sensors.simulator0.duration_s=15");
   more.push_back("sensors.simulator0.camera_clock_error_s=" + clock_error_s);
   auto setup = testing::run_setup("runs/viwo_swerve.yaml", more);
-  const auto data = experiment::collect(setup);
-  RunResult result = experiment::run(setup, data);
-  EXPECT_EQ(result.status, experiment::RunStatus::kOk) << result.cause;
+  const auto data = collect(setup);
+  RunResult result = run(setup, data);
+  EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
   return result;
 }
 

@@ -22,7 +22,7 @@ const std::vector<double> kInstants{5., 10., 15., 19.5};
 const std::vector<std::string> kTwentySeconds{"sensors.simulator0.duration_s=20"};
 
 /// Empty when the pose is consistent at all instants, else what is not.
-std::string inconsistency(const std::vector<experiment::RunResult>& runs) {
+std::string inconsistency(const std::vector<RunResult>& runs) {
   std::ostringstream out;
   const int n = static_cast<int>(runs.size());
   const auto bounds =

@@ -16,7 +16,6 @@ namespace viwo {
 namespace {
 
 using Eigen::VectorXd;
-using experiment::RunResult;
 
 constexpr int kSeeds = 10;
 
@@ -29,7 +28,7 @@ std::vector<std::string> moving(const std::string& motion, const std::string& gr
 
 std::vector<std::string> warnings(const std::vector<std::string>& assignments) {
   const auto runs = testing::paper_runs("bad_init_calib_on", 1, assignments);
-  EXPECT_EQ(runs.front().status, experiment::RunStatus::kOk) << runs.front().cause;
+  EXPECT_EQ(runs.front().status, RunStatus::kOk) << runs.front().cause;
   EXPECT_FALSE(runs.front().monitor.t_s.empty());
   std::vector<std::string> out;
   for (const auto& warning : runs.front().monitor.warnings) out.push_back(warning.text);
@@ -103,7 +102,7 @@ std::map<std::string, Outcome> outcomes(const std::string& ground, bool hold) {
               "updates.wheel_odometry.motion_sigmas=0", "updates.wheel_parity.motion_sigmas=0"}));
   std::map<std::string, Outcome> out;
   for (const RunResult& run : runs) {
-    EXPECT_EQ(run.status, experiment::RunStatus::kOk) << run.cause;
+    EXPECT_EQ(run.status, RunStatus::kOk) << run.cause;
     const auto at = static_cast<std::size_t>(
         std::lower_bound(run.epoch_t_s.begin(), run.epoch_t_s.end(), kStraightS) -
         run.epoch_t_s.begin());
@@ -155,7 +154,7 @@ TEST(Excitation, HoldingKeepsTheFilterConsistentOnFlatGroundWhereNoiseLooksLikeA
 }
 
 /// Calibration of the only wheel set.
-WheelsView wheels_of(const experiment::FilterSetup& setup, const Filter& filter) {
+WheelsView wheels_of(const FilterSetup& setup, const Filter& filter) {
   const auto specs = wheels_blocks(setup.wheels.front().prior);
   const auto id = [&](std::size_t k) {
     const auto all = filter.blocks().specs();
@@ -179,7 +178,7 @@ TEST(Excitation, HeldDirectionsOfARunDoNotMoveAtAll) {
       "runs/viwo_swerve.yaml",
       moving("sweep_then_straight", "uneven",
              {"estimator.hold_unexcited=true", "sensors.simulator0.duration_s=40"}));
-  const auto data = experiment::collect(setup);
+  const auto data = collect(setup);
   Estimator estimator = testing::make_estimator(setup, data.states().front());
   double largest_held = 0., largest_other = 0.;
   int steps = 0;

@@ -19,9 +19,9 @@ constexpr int kSeeds = 8;
 constexpr double kErrorProbability = 0.001;
 
 /// `variant`: of those of paper_accuracy, true_init_calib_on takes the draw of the truth back.
-std::vector<experiment::RunResult> runs(const std::string& motion, const std::string& ground,
-                                        const std::vector<std::string>& more,
-                                        const std::string& variant = "bad_init_calib_on") {
+std::vector<RunResult> runs(const std::string& motion, const std::string& ground,
+                            const std::vector<std::string>& more,
+                            const std::string& variant = "bad_init_calib_on") {
   std::vector<std::string> all{"sensors.simulator0.true_intrinsics_scale=1",
                                "sensors.simulator0.true_sigma_p_IinO_m=[0.1, 0.1, 0.1]",
                                "sensors.simulator0.true_sigma_R_ItoO_rad=[0.01, 0.01, 0.01]",
@@ -35,18 +35,17 @@ std::vector<experiment::RunResult> runs(const std::string& motion, const std::st
 
 /// Empty when all parameters are consistent and the hidden ones, called by how their names begin,
 /// have kept their sigma; else what is not so.
-std::string faults(const std::vector<experiment::RunResult>& runs,
-                   const std::vector<std::string>& hidden) {
+std::string faults(const std::vector<RunResult>& runs, const std::vector<std::string>& hidden) {
   std::ostringstream out;
   const std::size_t parameters = runs.front().calibration.size();
   const auto bounds =
       eval::mean_nees_bounds(1, kSeeds, 1. - kErrorProbability / static_cast<double>(parameters));
   for (std::size_t i = 0; i < parameters; ++i) {
-    const experiment::CalibrationTrack& any = runs.front().calibration[i];
+    const CalibrationTrack& any = runs.front().calibration[i];
     if (any.sigma.front() == 0. || !std::isfinite(any.truth)) continue;  // held, or wandering
     double nees = 0., kept = 1e9;
-    for (const experiment::RunResult& run : runs) {
-      const experiment::CalibrationTrack& track = run.calibration[i];
+    for (const RunResult& run : runs) {
+      const CalibrationTrack& track = run.calibration[i];
       nees += std::pow(track.final_error / track.sigma.back(), 2) / kSeeds;
       kept = std::min(kept, track.sigma.back() / track.sigma.front());
     }

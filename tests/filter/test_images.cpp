@@ -9,12 +9,11 @@
 namespace viwo {
 namespace {
 
-experiment::RunResult run(const std::string& configuration,
-                          const std::vector<std::string>& assignments) {
+RunResult run(const std::string& configuration, const std::vector<std::string>& assignments) {
   auto setup = testing::run_setup(configuration, assignments);
-  const auto data = experiment::collect(setup);
-  auto result = experiment::run(setup, data);
-  EXPECT_EQ(result.status, experiment::RunStatus::kOk) << result.cause;
+  const auto data = collect(setup);
+  auto result = run(setup, data);
+  EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
   return result;
 }
 
@@ -24,7 +23,7 @@ struct Intrinsics {
   double error = 0.;
 };
 
-Intrinsics intrinsics_of(const experiment::RunResult& result) {
+Intrinsics intrinsics_of(const RunResult& result) {
   Intrinsics out;
   for (const auto& track : result.calibration) {
     const bool is_intrinsic = track.name.starts_with("r_") || track.name.starts_with("x_") ||

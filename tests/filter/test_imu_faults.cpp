@@ -13,8 +13,6 @@
 namespace viwo {
 namespace {
 
-using experiment::RunResult;
-using experiment::RunStatus;
 using Readings = std::vector<ImuSample>;
 
 constexpr double kFaultS = 7.;
@@ -39,10 +37,10 @@ class ImuFaults : public ::testing::Test {
  protected:
   static RunResult run(const Fault& fault, const std::function<bool(double)>& is_lost = {}) {
     auto setup = testing::run_setup("runs/viwo_swerve.yaml", {"sensors.simulator0.duration_s=15"});
-    auto data = experiment::collect(setup);
+    auto data = collect(setup);
     const auto imu = data.imu();
     data.recorded.set("simulator0", broken({imu.begin(), imu.end()}, fault, is_lost));
-    return experiment::run(setup, data);
+    return viwo::run(setup, data);
   }
   static double ate_m(const RunResult& result) {
     return result.accuracy ? result.accuracy->ate_m : 1e9;

@@ -31,8 +31,8 @@ std::string faults(const std::vector<std::string>& more) {
     const std::string& name = runs.front().calibration[i].name;
     if (name.rfind("p_IinO", 0) != 0 && name != "t_OtoI") continue;
     double nees = 0.;
-    for (const experiment::RunResult& run : runs) {
-      const experiment::CalibrationTrack& track = run.calibration[i];
+    for (const RunResult& run : runs) {
+      const CalibrationTrack& track = run.calibration[i];
       nees += std::pow(track.final_error / track.sigma.back(), 2) / kSeeds;
     }
     if (nees < bounds.low || nees > bounds.high) {

@@ -17,9 +17,9 @@ void expect_at_most(const std::string& rig, double deg, double m) {
   auto setup = testing::run_setup("runs/openvins_sim.yaml",
                                   {"placeholders.data=" + std::filesystem::canonical(data).string(),
                                    "placeholders.rig=" + rig});
-  const auto measurements = experiment::collect(setup);
-  const auto result = experiment::run(setup, measurements);
-  ASSERT_EQ(result.status, experiment::RunStatus::kOk) << result.cause;
+  const auto measurements = collect(setup);
+  const auto result = run(setup, measurements);
+  ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
   ASSERT_TRUE(result.accuracy);
   EXPECT_GT(result.accuracy->n_poses, 1000);
   EXPECT_LE(rounded(result.accuracy->ate_deg), deg);

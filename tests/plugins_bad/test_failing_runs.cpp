@@ -5,12 +5,12 @@
 #include <gtest/gtest.h>
 
 #include "viwo/config/yaml.hpp"
-#include "viwo/experiment/configuration.hpp"
-#include "viwo/experiment/output.hpp"
-#include "viwo/experiment/run.hpp"
 #include "viwo/report/html.hpp"
+#include "viwo/results/run_output.hpp"
+#include "viwo/run/run.hpp"
+#include "viwo/setup/configuration.hpp"
 
-namespace viwo::experiment {
+namespace viwo {
 namespace {
 
 const std::string kBad = VIWO_TEST_BINARY_DIR "/tests/plugins_bad";
@@ -169,4 +169,4 @@ TEST(FailingModel, EndsARunOfTheFilterThroughAnUpdateOfAnotherPlugin) {
 }
 
 }  // namespace
-}  // namespace viwo::experiment
+}  // namespace viwo

@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "viwo/config/yaml.hpp"
-#include "viwo/experiment/run.hpp"
+#include "viwo/run/run.hpp"
 
-namespace viwo::experiment {
+namespace viwo {
 namespace {
 
 const std::string kSensors =
@@ -70,4 +70,4 @@ TEST(Seeds, AreAllOthersInARunWithAnotherSeed) {
 }
 
 }  // namespace
-}  // namespace viwo::experiment
+}  // namespace viwo

@@ -5,25 +5,30 @@
 #include <utility>
 
 #include "command_line.hpp"
+#include "interrupt.hpp"
+#include "progress.hpp"
+#include "viwo/calibration/calibrate.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/eval/accuracy.hpp"
-#include "viwo/experiment/calibrate.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/experiment/folder_lock.hpp"
-#include "viwo/experiment/interrupt.hpp"
-#include "viwo/experiment/observability.hpp"
-#include "viwo/experiment/output.hpp"
-#include "viwo/experiment/pictures.hpp"
-#include "viwo/experiment/progress.hpp"
-#include "viwo/experiment/run_stream.hpp"
-#include "viwo/experiment/simulate.hpp"
+#include "viwo/log/files.hpp"
 #include "viwo/log/tum.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/observability/observability.hpp"
 #include "viwo/report/figures.hpp"
+#include "viwo/results/run_output.hpp"
+#include "viwo/results/run_stream.hpp"
+#include "viwo/run/simulate.hpp"
+#include "viwo/setup/configuration.hpp"
+#include "viwo/view/pictures.hpp"
 
 namespace viwo::app {
 namespace {
 
 using namespace experiment;
+using log::make_folder;
+using log::write_text;
 
 /// The folder asked for, or results/<name of the configuration file>.
 std::filesystem::path out_folder(const Arguments& arguments) {
@@ -107,9 +112,9 @@ int shard_is_done(const ExperimentResult& result, const Shard& shard, const std:
 int run_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
-  PictureSinks sinks = open_sinks(setup, arguments.show, arguments.video);
+  view::PictureSinks sinks = view::open_sinks(setup, arguments.show, arguments.video);
   const RunData data = collect(setup, LiveSensors::kAllowed);
-  RunPictures pictures(setup, data, std::move(sinks));
+  view::RunPictures pictures(setup, data, std::move(sinks));
   const auto folder = out_folder(arguments);
   make_folder(folder);  // whether results can be written shows before the work
   const Figures figures(arguments, folder);
@@ -126,7 +131,7 @@ int run_command(const Arguments& arguments) {
     hooks.progress = [&](double fraction) { progress.at(fraction); };
     hooks.interrupted = [&] { return interrupt && interrupt->raised(); };
     if (!data.live.empty()) output.emplace(setup, folder, hooks);
-    result = experiment::run(setup, data, hooks);
+    result = viwo::run(setup, data, hooks);
     if (output) output->finish(result);
   }
   const std::string picture_failure = pictures.finish(result);
@@ -154,7 +159,11 @@ int experiment_command(const Arguments& arguments) {
   std::optional<FolderLock> lock;
   options.folder_is_there = [&] { lock.emplace(folder, options.shard.has_value()); };
   const Figures figures(arguments, folder);
-  const ExperimentResult result = run_experiment(setup, options, plugins, folder);
+  const ExperimentResult result = [&] {
+    Progress progress;  // gone before anything else is printed
+    options.progress = &progress;
+    return run_experiment(setup, options, plugins, folder);
+  }();
   if (options.shard) return shard_is_done(result, *options.shard, arguments.positional[0], folder);
   write_experiment(folder, result);
   figures.write(report_of(result));
@@ -171,11 +180,14 @@ int observability_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   ExperimentOptions options;
   options.assignments = arguments.assignments;
-  const ExperimentSetup setup = read_observability(arguments.positional[0], options);
+  const ExperimentSetup setup = observability::read_observability(arguments.positional[0], options);
   const auto folder = out_folder(arguments);
   make_folder(folder);
   const Figures figures(arguments, folder);
-  const ObservabilityReport report = analyse(setup, plugins);
+  const observability::ObservabilityReport report = [&] {
+    Progress progress;
+    return observability::analyse(setup, plugins, &progress);
+  }();
   write_observability(folder, report);
   figures.write(report_of(report));
   std::cout << describe(report) << "\n"
@@ -186,13 +198,13 @@ int observability_command(const Arguments& arguments) {
 
 int calibrate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
-  const CalibrationSetup setup =
-      read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
+  const calibration::CalibrationSetup setup =
+      calibration::read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
   const auto folder = out_folder(arguments);
   make_folder(folder);
-  const CalibrationResult result = [&] {
-    Progress progress("fits", count_fits(setup));
-    return calibrate(setup, [&](const std::string& line) { progress.done(line); });
+  const calibration::CalibrationResult result = [&] {
+    Progress progress;
+    return calibrate(setup, &progress);
   }();
   write_calibration(folder, result);
   std::cout << describe(result) << "\ncalibration: " << (folder / "calibration.yaml").string()

@@ -12,6 +12,7 @@
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/eval/association.hpp"
+#include "viwo/eval/json.hpp"
 #include "viwo/eval/statistics.hpp"
 
 namespace viwo::eval {
@@ -116,10 +117,6 @@ ErrorSeries error_series(const std::vector<PosePair>& pairs, const std::vector<d
     series.yaw_error_deg.push_back(previous_rad * kDegPerRad);
   }
   return series;
-}
-
-nlohmann::json number_or_null(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 
 #include "experiment_plots.hpp"
 #include "experiment_statistics.hpp"
-#include "viwo/experiment/output.hpp"
+#include "viwo/report/curves.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -54,7 +54,7 @@ void add_variant(const ExperimentResult& result, std::size_t variant, std::size_
       for (const double sign : {-1., 1.}) {
         Series bound = line(name, run.result, track->sigma.size(), [&](std::size_t k) {
           const double middle = std::isfinite(track->truth) ? 0. : error(k);
-          return middle + sign * kBandSigmas * scale * track->sigma[k];
+          return middle + sign * report::kBandSigmas * scale * track->sigma[k];
         });
         bound.dash = Dash::kDotted;
         bound.width = 1.4;
@@ -111,9 +111,9 @@ std::vector<Block> calibration_plots(const ExperimentResult& result) {
   for (const std::string& name : names) {
     const Scale scale = scale_of(result, kFirst, name);
     const auto found = result.units.find(name);
-    const DisplayUnit unit =
-        display_unit(found != result.units.end() ? found->second : "", scale.prior_sigma / 10.);
-    Plot plot{name, "time [s]", with_unit(scale.has_truth ? "error" : name, unit.name)};
+    const report::DisplayUnit unit = report::display_unit(
+        found != result.units.end() ? found->second : "", scale.prior_sigma / 10.);
+    Plot plot{name, "time [s]", report::with_unit(scale.has_truth ? "error" : name, unit.name)};
     plot.half_width = true;
     plot.height_px = 320;
     for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {

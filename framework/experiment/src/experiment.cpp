@@ -16,13 +16,14 @@
 
 #include "run_identity.hpp"
 #include "run_journal.hpp"
-#include "run_record.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
-#include "viwo/experiment/output.hpp"
-#include "viwo/experiment/progress.hpp"
+#include "viwo/log/files.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/results/run_output.hpp"
+#include "viwo/run/thin.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -139,14 +140,14 @@ class Runner {
   }
 
   /// Takes over what the journal has, or throws it away.
-  void open_journal(Progress& progress) {
+  void open_journal(WorkProgress& progress) {
     const int there = folder_.empty() ? 0 : journal_.size();
     if (there == 0) return;
     if (!options_.resume && !options_.shard && !options_.collect) {
       journal_.remove();
-      std::fprintf(stderr,
-                   "%d runs of an interrupted experiment are discarded (not --resume): %s\n", there,
-                   journal_.folder().c_str());
+      progress.note(std::to_string(there) +
+                    " runs of an interrupted experiment are discarded (not --resume): " +
+                    journal_.folder().string());
       return;
     }
     int taken = 0, failed = 0;
@@ -169,12 +170,12 @@ class Runner {
     const std::string of = " of " + std::to_string(cells_);
     progress.skipped(
         taken, std::to_string(taken) + of + " runs taken over from an interrupted experiment");
-    if (failed > 0) std::fprintf(stderr, "%d runs that failed are run again\n", failed);
+    if (failed > 0) progress.note(std::to_string(failed) + " runs that failed are run again");
     if (!options_.shard && there > taken + failed) {
-      std::fprintf(stderr,
-                   "%d of %d files in %s are not used: damaged, of another configuration, seed or "
-                   "version, or without the folder that --keep-runs wants\n",
-                   there - taken - failed, there, journal_.folder().c_str());
+      progress.note(std::to_string(there - taken - failed) + " of " + std::to_string(there) +
+                    " files in " + journal_.folder().string() +
+                    " are not used: damaged, of another configuration, seed or version, or without "
+                    "the folder that --keep-runs wants");
     }
   }
 
@@ -196,7 +197,7 @@ class Runner {
   }
 
   /// Runs a cell; false if that was interrupted.
-  bool run(ExperimentRun& run, Progress& progress) {
+  bool run(ExperimentRun& run, WorkProgress& progress) {
     if (stopped()) return false;
     try {
       RunSetup setup = read_run(configuration(run.variant, run.recording), plugins_, run.seed);
@@ -208,7 +209,7 @@ class Runner {
         if (!is_new(run, text)) return;
         progress.note(title_of(setup_, run) + ": at " + significant(t_s, 4) + " s: " + text);
       };
-      run.result = experiment::run(setup, collect(setup), hooks);
+      run.result = viwo::run(setup, collect(setup), hooks);
       write_run_of(run, setup);
     } catch (const Stopped&) {
       return false;
@@ -333,22 +334,22 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
   Runner runner(options, plugins, folder, result);
   runner.check();
   // Whether results can be written shows before the work, too.
-  if (!folder.empty()) make_folder(folder);
+  if (!folder.empty()) log::make_folder(folder);
   if (options.folder_is_there) options.folder_is_there();
   const auto begin = std::chrono::steady_clock::now();
   result.jobs = options.jobs > 0 ? options.jobs : tbb::this_task_arena::max_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(result.jobs));
-  {
-    Progress progress(setup.name, runner.cells());
-    runner.open_journal(progress);
-    if (options.collect) runner.require_all();
-    tbb::parallel_for(std::size_t{0}, result.runs.size(), [&](std::size_t i) {
-      ExperimentRun& run = result.runs[i];
-      if (run.taken_over || !runner.is_mine(i)) return;
-      if (runner.run(run, progress)) progress.done(line_of(setup, run));
-    });
-  }
+  WorkProgress nobody;
+  WorkProgress& progress = options.progress != nullptr ? *options.progress : nobody;
+  progress.begin(setup.name, runner.cells());
+  runner.open_journal(progress);
+  if (options.collect) runner.require_all();
+  tbb::parallel_for(std::size_t{0}, result.runs.size(), [&](std::size_t i) {
+    ExperimentRun& run = result.runs[i];
+    if (run.taken_over || !runner.is_mine(i)) return;
+    if (runner.run(run, progress)) progress.done(line_of(setup, run));
+  });
   if (runner.finished() < runner.cells()) {
     throw Interrupted("interrupted after " + std::to_string(runner.finished()) + " of " +
                       std::to_string(runner.cells()) + " runs" +

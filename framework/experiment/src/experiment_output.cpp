@@ -4,8 +4,10 @@
 
 #include "experiment_statistics.hpp"
 #include "run_journal.hpp"
-#include "viwo/experiment/output.hpp"
+#include "viwo/eval/json.hpp"
+#include "viwo/log/files.hpp"
 #include "viwo/report/html.hpp"
+#include "viwo/results/run_output.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -159,10 +161,10 @@ std::string runs_csv(const ExperimentResult& result) {
 }  // namespace
 
 void write_experiment(const std::filesystem::path& folder, const ExperimentResult& result) {
-  make_folder(folder);
-  write_text(folder / "runs.csv", runs_csv(result));
-  write_text(folder / "summary.json", summary_of(result).dump(2) + "\n");
-  write_text(folder / "report.html", report::to_html(report_of(result)));
+  log::make_folder(folder);
+  log::write_text(folder / "runs.csv", runs_csv(result));
+  log::write_text(folder / "summary.json", summary_of(result).dump(2) + "\n");
+  log::write_text(folder / "report.html", report::to_html(report_of(result)));
   RunJournal(folder).remove();
 }
 

@@ -7,7 +7,8 @@
 
 #include "experiment_statistics.hpp"
 #include "viwo/eval/consistency.hpp"
-#include "viwo/experiment/output.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/report/curves.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -59,9 +60,9 @@ void add_errors(const RunResult& run, const std::string& variant, Plot& position
   for (const PoseError& error : run.errors) {
     for (Series* series : {&p, &p3, &a, &a3}) series->x.push_back(rounded(error.t_s));
     p.y.push_back(error.position_m.norm());
-    p3.y.push_back(kBandSigmas * error.position_sigma_m.norm());
+    p3.y.push_back(report::kBandSigmas * error.position_sigma_m.norm());
     a.y.push_back(kDegrees * std::abs(error.yaw_rad));
-    a3.y.push_back(kDegrees * kBandSigmas * error.yaw_sigma_rad);
+    a3.y.push_back(kDegrees * report::kBandSigmas * error.yaw_sigma_rad);
   }
   if (run.errors.empty() && run.accuracy) {
     const eval::ErrorSeries& series = run.accuracy->series;
@@ -171,7 +172,7 @@ std::vector<const ExperimentRun*> first_runs(const ExperimentResult& result,
 
 /// A trajectory with no more digits than can be seen.
 Series path_series(const std::string& name, const Trajectory& trajectory) {
-  Series series = trajectory_series(name, trajectory);
+  Series series = report::trajectory_series(name, trajectory);
   for (auto* values : {&series.x, &series.y}) {
     for (double& value : *values) value = 1e-4 * std::round(1e4 * value);
   }

@@ -5,7 +5,9 @@
 #include "experiment_plots.hpp"
 #include "experiment_statistics.hpp"
 #include "viwo/config/yaml.hpp"
-#include "viwo/experiment/output.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/report/curves.hpp"
+#include "viwo/results/run_output.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -239,7 +241,7 @@ void add_calibration_table(const ExperimentResult& result, const Group& all, Sec
   for (const std::string& parameter : names) {
     std::vector<Cell> row{parameter, 0.};
     const auto found = result.units.find(parameter);
-    std::optional<DisplayUnit> unit;
+    std::optional<report::DisplayUnit> unit;
     for (const auto& column : columns) {
       const auto c = std::find_if(column.begin(), column.end(),
                                   [&](const auto& s) { return s.name == parameter; });
@@ -248,8 +250,8 @@ void add_calibration_table(const ExperimentResult& result, const Group& all, Sec
         continue;
       }
       if (!unit) {
-        unit = display_unit(found != result.units.end() ? found->second : "", c->rmse);
-        row[0] = unbroken(with_unit(parameter, unit->name));
+        unit = report::display_unit(found != result.units.end() ? found->second : "", c->rmse);
+        row[0] = unbroken(report::with_unit(parameter, unit->name));
         row[1] = rounded(unit->scale * c->prior_sigma);
       }
       row.emplace_back(

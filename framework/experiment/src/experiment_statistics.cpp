@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "viwo/experiment/output.hpp"
+#include "viwo/math/significant.hpp"
 
 namespace viwo::experiment {
 namespace {

@@ -4,7 +4,8 @@
 #include <sstream>
 
 #include "experiment_statistics.hpp"
-#include "viwo/experiment/output.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/results/run_output.hpp"
 
 namespace viwo::experiment {
 namespace {

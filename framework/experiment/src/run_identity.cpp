@@ -9,7 +9,7 @@
 #include <zlib.h>
 
 #include "viwo/config/yaml.hpp"
-#include "viwo/experiment/output.hpp"
+#include "viwo/results/run_output.hpp"
 
 namespace viwo::experiment {
 namespace {

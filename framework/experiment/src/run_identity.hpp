@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "viwo/experiment/run.hpp"
+#include "viwo/run/run.hpp"
 
 namespace viwo::experiment {
 

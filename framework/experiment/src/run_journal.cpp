@@ -8,8 +8,8 @@
 
 #include <zlib.h>
 
-#include "run_record.hpp"
-#include "viwo/experiment/output.hpp"
+#include "viwo/log/files.hpp"
+#include "viwo/results/run_record.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -72,7 +72,7 @@ std::optional<RunResult> RunJournal::read(const RunKey& key) const {
 }
 
 void RunJournal::write(const RunKey& key, const RunResult& run) const {
-  make_folder(folder_);
+  log::make_folder(folder_);
   const nlohmann::json entry = {{"variant", key.variant},
                                 {"recording", key.recording},
                                 {"seed", key.seed},
@@ -81,7 +81,7 @@ void RunJournal::write(const RunKey& key, const RunResult& run) const {
   std::string bytes;
   nlohmann::json::to_cbor(entry, bytes);
   bytes += checksum(bytes);
-  write_text(file_of(key), bytes);
+  log::write_text(file_of(key), bytes);
 }
 
 void RunJournal::remove() const {

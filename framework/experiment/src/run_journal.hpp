@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "viwo/experiment/run.hpp"
+#include "viwo/run/run.hpp"
 
 namespace viwo::experiment {
 

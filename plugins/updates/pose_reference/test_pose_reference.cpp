@@ -12,7 +12,7 @@
 #include "plane_and_gnss_runs.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/yaml.hpp"
-#include "viwo/experiment/simulate.hpp"
+#include "viwo/run/simulate.hpp"
 #include "viwo/sim/planar_motion.hpp"
 #include "viwo/testing/jacobian.hpp"
 
@@ -320,12 +320,12 @@ TEST(PoseReferenceRuns, DoNotChangeByFixesThatNobodyUses) {
 class PoseConfiguration : public ::testing::Test {
  protected:
   static config::Node run(const std::vector<std::string>& assignments) {
-    return experiment::resolve_placeholders(experiment::load_run_configuration(
+    return resolve_placeholders(load_run_configuration(
         std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/viwo_gnss.yaml", assignments));
   }
-  static experiment::RunSetup read(const config::Node& run) {
+  static RunSetup read(const config::Node& run) {
     static PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
-    return experiment::read_run(run, registry, 1);
+    return read_run(run, registry, 1);
   }
   static std::string error(const std::vector<std::string>& assignments) {
     try {
@@ -352,12 +352,12 @@ TEST_F(PoseConfiguration, TellsWhatIsWrongWithTheNameOfASensor) {
 TEST_F(PoseConfiguration, OfALogGivesTheSameBitsAsTheSimulator) {
   const auto folder = std::filesystem::path(VIWO_TEST_BINARY_DIR) / "pose_reference_log";
   auto simulated = read(run({"sensors.simulator0.duration_s=5"}));
-  experiment::write_log(simulated, folder);
+  write_log(simulated, folder);
   auto setup = read(run({"sensors.simulator0.duration_s=5"}));
-  const auto data = experiment::collect(setup);
+  const auto data = collect(setup);
   ASSERT_EQ(data.recorded.of<PoseSample>("simulator0").size(), 25u);
   EXPECT_TRUE(data.reference.empty());
-  const auto direct = experiment::run_filter(setup, data);
+  const auto direct = run_filter(setup, data);
 
   config::Node from_log = run({"updates.gnss.sensor=gnss0"});
   const std::string path = folder.string();
@@ -372,14 +372,14 @@ TEST_F(PoseConfiguration, OfALogGivesTheSameBitsAsTheSimulator) {
                         "/poses0}}",
                     "sensors"));
   auto log_setup = read(from_log);
-  const auto again = experiment::run_filter(log_setup, experiment::collect(log_setup));
+  const auto again = run_filter(log_setup, collect(log_setup));
   ASSERT_EQ(again.estimate.size(), direct.estimate.size());
   EXPECT_EQ(again.estimate.back().p_BinW, direct.estimate.back().p_BinW);
   // Turned off, the sensor is still no reference, which would be a second one.
   config::Node off = from_log;
   config::set_path(off, "updates.gnss.enabled", config::Node::scalar_of("false"));
   auto off_setup = read(off);
-  EXPECT_GT(experiment::collect(off_setup).states().size(), 40u);
+  EXPECT_GT(collect(off_setup).states().size(), 40u);
 }
 
 }  // namespace

@@ -10,8 +10,8 @@
 
 #include "gnss_runs.hpp"
 #include "local_frame.hpp"
-#include "viwo/experiment/configuration.hpp"
-#include "viwo/experiment/run.hpp"
+#include "viwo/run/run.hpp"
+#include "viwo/setup/configuration.hpp"
 
 namespace viwo {
 namespace {
@@ -47,7 +47,7 @@ class FixJudge final : public EstimatorObserver {
 };
 
 struct HuskyRun {
-  experiment::RunResult result;
+  RunResult result;
   double rms_m = 0., sigma_m = 0.;  ///< of fixes that were left out: their error, what is claimed
 };
 
@@ -64,30 +64,30 @@ HuskyRun run_husky(const std::filesystem::path& data, std::vector<std::string> a
       [&](const PluginInfo&, LogLevel, std::string_view text) { frames.read(std::string(text)); });
   assignments.push_back("placeholders.data=" + std::filesystem::canonical(data).string());
   const auto read = [&] {
-    return experiment::read_run(
-        experiment::resolve_placeholders(experiment::load_run_configuration(
+    return read_run(
+        resolve_placeholders(load_run_configuration(
             std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/husky_gnss.yaml", assignments)),
         registry, 1);
   };
   auto all = read();
-  const auto fixes = experiment::collect(all).recorded.of<GnssSample>();
+  const auto fixes = collect(all).recorded.of<GnssSample>();
   std::vector<GnssSample> left_out;
   for (std::size_t i = 1; i < fixes.size(); i += 2) left_out.push_back(fixes[i]);
   assignments.push_back("sensors.bag0.gnss_stride=2");
   auto setup = read();
-  const auto measurements = experiment::collect(setup);
+  const auto measurements = collect(setup);
   FixJudge judge(left_out, frames);
-  experiment::RunHooks hooks;
+  RunHooks hooks;
   hooks.on_start = [&](const Estimator&) { return &judge; };
   HuskyRun run;
-  run.result = experiment::run(setup, measurements, hooks);
+  run.result = viwo::run(setup, measurements, hooks);
   run.rms_m = root_mean(judge.squares);
   run.sigma_m = root_mean(judge.variances);
   EXPECT_GT(judge.squares.size(), 300u);
   return run;
 }
 
-const UpdateCounts& counts_of(const experiment::RunResult& result) {
+const UpdateCounts& counts_of(const RunResult& result) {
   return std::find_if(result.updates.begin(), result.updates.end(),
                       [](const auto& update) { return update.name == "gnss"; })
       ->total;
@@ -97,7 +97,7 @@ TEST(HuskyRecording, HasTheFixesThatAreLeftOutWhereItClaimsThem) {
   const auto data = std::filesystem::path(VIWO_TEST_SHARED_DIR) / "data/real";
   if (!std::filesystem::exists(data / "husky_bag")) GTEST_SKIP() << "the recording is not here";
   const HuskyRun run = run_husky(data, {});
-  ASSERT_EQ(run.result.status, experiment::RunStatus::kOk) << run.result.cause;
+  ASSERT_EQ(run.result.status, RunStatus::kOk) << run.result.cause;
   const UpdateCounts& counts = counts_of(run.result);
   EXPECT_GT(counts.applied, 900);
   EXPECT_LT(counts.rejected, counts.applied / 100);

@@ -10,12 +10,12 @@
 
 #include "viwo/eval/consistency.hpp"
 #include "viwo/experiment/experiment.hpp"
-#include "viwo/experiment/run.hpp"
+#include "viwo/run/run.hpp"
 
 namespace viwo::testing {
 
-inline std::vector<experiment::RunResult> plane_and_gnss(const std::string& variant, int seeds,
-                                                         std::vector<std::string> assignments) {
+inline std::vector<RunResult> plane_and_gnss(const std::string& variant, int seeds,
+                                             std::vector<std::string> assignments) {
   static PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
   experiment::ExperimentOptions options;
   options.seeds = seeds;
@@ -24,14 +24,14 @@ inline std::vector<experiment::RunResult> plane_and_gnss(const std::string& vari
       std::string(VIWO_TEST_SOURCE_DIR) + "/configs/experiments/plane_and_gnss.yaml", options);
   std::erase_if(setup.variants, [&](const auto& v) { return v.name != variant; });
   auto result = experiment::run_experiment(setup, options, registry, {});
-  std::vector<experiment::RunResult> runs;
+  std::vector<RunResult> runs;
   for (experiment::ExperimentRun& run : result.runs) runs.push_back(std::move(run.result));
   return runs;
 }
 
 /// Empty when the mean NEES of the pose over the runs is within its two-sided 99.9 % bounds at all
 /// of four instants, else what is not.
-inline std::string inconsistency(const std::vector<experiment::RunResult>& runs) {
+inline std::string inconsistency(const std::vector<RunResult>& runs) {
   const std::vector<double> instants{5., 15., 25., 29.5};
   std::ostringstream out;
   const int n = static_cast<int>(runs.size());
@@ -52,8 +52,7 @@ inline std::string inconsistency(const std::vector<experiment::RunResult>& runs)
 }
 
 /// Mean of squared final error / variance of a calibration parameter.
-inline double parameter_nees(const std::vector<experiment::RunResult>& runs,
-                             const std::string& name) {
+inline double parameter_nees(const std::vector<RunResult>& runs, const std::string& name) {
   double sum = 0.;
   for (const auto& run : runs) {
     for (const auto& track : run.calibration) {
@@ -66,8 +65,7 @@ inline double parameter_nees(const std::vector<experiment::RunResult>& runs,
 }
 
 /// Counts of an update over all runs.
-inline UpdateCounts counts(const std::vector<experiment::RunResult>& runs,
-                           const std::string& update) {
+inline UpdateCounts counts(const std::vector<RunResult>& runs, const std::string& update) {
   UpdateCounts sum;
   for (const auto& run : runs) {
     for (const auto& track : run.updates) {

@@ -1,0 +1,218 @@
+// Batch calibration of simulated robots: the truth comes out, with honest sigmas, and what the data
+// cannot determine is named.
+#include <filesystem>
+#include <fstream>
+
+#include <Eigen/Dense>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "simulated.hpp"
+#include "told.hpp"
+#include "viwo/calibration/calibrate.hpp"
+#include "viwo/eval/consistency.hpp"
+#include "viwo/sim/encoder_simulator.hpp"
+
+namespace viwo {
+namespace {
+
+using namespace calibration;
+using testing::registry;
+using testing::simulated;
+
+CalibrationSetup setup_of(const std::vector<std::string>& motions, std::uint64_t seed,
+                          const std::vector<std::string>& assignments = {}) {
+  CalibrationSetup setup;
+  setup.name = "test";
+  setup.options.segment_s = 2.;
+  setup.options.estimate_extrinsics = true;
+  for (const std::string& motion : motions) {
+    auto all = assignments;
+    all.emplace_back("sensors.simulator0.true_intrinsics_scale=1");
+    all.emplace_back("odometry.twist=noise_weighted");
+    RunSetup run = read_run(simulated(motion, all), registry(), seed);
+    RunData data = collect(run);
+    setup.recordings.push_back({{motion, {{"motion", motion}}}, std::move(run), std::move(data)});
+  }
+  return setup;
+}
+
+CalibrationEstimate fit_all(const CalibrationSetup& setup) {
+  std::vector<std::size_t> all;
+  for (std::size_t i = 0; i < setup.recordings.size(); ++i) all.push_back(i);
+  return fit(setup, all);
+}
+
+/// True intrinsics of the simulated robot: the sensor's seed is 1000 times the run's.
+Intrinsics truth_of(const CalibrationSetup& setup, std::uint64_t seed) {
+  return sim::perturbed_intrinsics(setup.recordings[0].setup.model->description(), 1., 1000 * seed);
+}
+
+TEST(Calibrate, FindsTheTrueIntrinsicsWithHonestSigmas) {
+  const int seeds = 12;
+  double sum = 0.;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    // Small noise: lateral slip n shortens what a wheel rolls by n^2/v, at the default sizes as
+    // much as the sigma of a radius (docs/math/wheel_odometry.md).
+    std::vector<std::string> small_noise;
+    for (const char* section : {"kinematics.", "sensors.simulator0.robot."}) {
+      for (const char* sigma :
+           {"sigma_drive_rad_per_s=", "sigma_steer_rad=", "sigma_lateral_m_per_s="}) {
+        small_noise.push_back(std::string(section) + sigma + "0.0001");
+      }
+    }
+    const auto setup = setup_of({"icr_sweep", "figure_eight"}, seed, small_noise);
+    const auto estimate = fit_all(setup);
+    const Intrinsics truth = truth_of(setup, seed);
+    const Intrinsics prior = setup.recordings[0].setup.model->prior_sigma();
+    EXPECT_TRUE(estimate.converged);
+    EXPECT_TRUE(estimate.undetermined.empty());
+    for (int i = 0; i < 16; ++i) {
+      if (prior[i] == 0.) {
+        EXPECT_EQ(estimate.x_WI[i], truth[i]) << "held";
+        EXPECT_EQ(estimate.sigma[i], 0.);
+        continue;
+      }
+      EXPECT_LT(estimate.sigma[i], 0.1 * prior[i]) << i;
+      const double normalised = (estimate.x_WI[i] - truth[i]) / estimate.sigma[i];
+      EXPECT_LT(std::abs(normalised), 6.) << i << " seed " << seed;
+      sum += normalised * normalised;
+      ++count;
+    }
+    EXPECT_LT(estimate.extrinsics.head<2>().norm(), 1e-3);
+    EXPECT_LT(std::abs(estimate.extrinsics[2]), 1e-3);
+  }
+  // Mean squared error over sigma: the sigmas take the residuals of a segment for independent,
+  // which position and yaw of dead reckoning are not (batch_calibration.md, Limits). Right to a
+  // factor of 2.
+  EXPECT_GT(sum / count, 0.25);
+  EXPECT_LT(sum / count, 4.);
+}
+
+TEST(Calibrate, FindsTheGainsOfTheSteeringWhereTheyAreAskedFor) {
+  const std::vector<std::string> with_gains{"kinematics.prior_sigma_steer_gain=0.02",
+                                            "sensors.simulator0.robot.prior_sigma_steer_gain=0.02"};
+  const auto setup = setup_of({"icr_sweep", "figure_eight"}, 1, with_gains);
+  const auto estimate = fit_all(setup);
+  const Intrinsics truth = truth_of(setup, 1);
+  ASSERT_EQ(truth.size(), 20);
+  EXPECT_GT(truth.tail(4).norm(), 0.01);
+  EXPECT_LT((estimate.x_WI - truth).tail(4).cwiseAbs().maxCoeff(), 0.002);
+  // A model without them takes the gains for something else.
+  const auto without = fit_all(setup_of({"icr_sweep", "figure_eight"}, 1, {with_gains[1]}));
+  EXPECT_EQ(without.x_WI.size(), 16);
+  EXPECT_GT(without.noise.parity_scale, 2. * estimate.noise.parity_scale);
+}
+
+TEST(Calibrate, FindsTheClockOffset) {
+  auto setup = setup_of({"icr_sweep"}, 1, {"sensors.simulator0.time_offset_s=0.013"});
+  setup.options.clock_offset_sigma_s = 0.05;
+  const auto estimate = fit_all(setup);
+  EXPECT_NEAR(estimate.clock_offset_s[0], 0.013, 1e-3);
+}
+
+/// Share of the null directions that lies in the intrinsics whose name starts with `prefix`.
+std::set<std::string> undetermined_names(const CalibrationEstimate& estimate, double ratio) {
+  std::set<std::string> names;
+  for (const auto& direction : estimate.undetermined) {
+    if (direction.sigma_ratio < ratio) continue;
+    for (const auto& [name, weight] : direction.weights) {
+      if (std::abs(weight) > 0.3) names.insert(name);
+    }
+  }
+  return names;
+}
+
+TEST(Calibrate, NamesThePositionsThatAStraightDriveCannotTell) {
+  const auto estimate = fit_all(setup_of({"straight"}, 1));
+  EXPECT_EQ(estimate.undetermined.size(), 6u) << "the positions of three wheels";
+  for (const std::string& name : undetermined_names(estimate, 0.9)) {
+    EXPECT_TRUE(name[0] == 'x' || name[0] == 'y') << name;
+  }
+}
+
+TEST(Calibrate, NamesTheSteeringOffsetsThatRollingRowsCannotTell) {
+  const auto redundant = fit_all(setup_of({"straight", "figure_eight"}, 1));
+  const auto drive_only = fit_all(
+      setup_of({"straight", "figure_eight"}, 1, {"kinematics.type=four_wis_wid_drive_only"}));
+  EXPECT_TRUE(redundant.undetermined.empty());
+  EXPECT_THAT(undetermined_names(drive_only, 0.7),
+              ::testing::IsSupersetOf({"delta_o2", "delta_o3", "delta_o4"}));
+}
+
+TEST(Calibrate, ReadsItsFileLeavesOutAndWritesACalibrationThatARunIncludes) {
+  const auto folder = std::filesystem::path(::testing::TempDir()) / "viwo_calibrate";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "run.yaml")
+      << config::to_yaml(simulated("'{motion}'", {"sensors.simulator0.true_intrinsics_scale=1"}));
+  std::ofstream(folder / "calibration.yaml")
+      << "calibration: test\nbase: run.yaml\nset: {odometry.twist: noise_weighted}\n"
+         "leave_out_by: [motion]\nreport_by: [motion]\nsegment_s: 2\nestimate_extrinsics: true\n"
+         "motions: [icr_sweep, figure_eight]\n";
+  const auto setup = read_calibration_setup(folder / "calibration.yaml", {}, registry());
+  testing::Told told;
+  const auto result = calibrate(setup, &told);
+  EXPECT_EQ(told.total(), 3);
+  for (const char* fit :
+       {"all recordings: ", "without motion figure_eight: ", "without motion icr_sweep: "}) {
+    EXPECT_THAT(told.text(), ::testing::HasSubstr(fit));
+  }
+  ASSERT_EQ(result.left_out.size(), 1u);
+  EXPECT_EQ(result.left_out[0].by, "motion");
+  ASSERT_EQ(result.left_out[0].runs.size(), 2u);
+  for (const ValidationRun& run : result.left_out[0].runs) {
+    EXPECT_LT(run.calibrated.accuracy->end_m, 0.1 * run.nominal.accuracy->end_m);
+  }
+  write_calibration(folder / "out", result);
+  const auto included = testing::run(simulated(
+      "circle", {"sensors.simulator0.true_intrinsics_scale=1",
+                 "kinematics.calibration=" + (folder / "out" / "calibration.yaml").string()}));
+  const auto nominal =
+      testing::run(simulated("circle", {"sensors.simulator0.true_intrinsics_scale=1"}));
+  EXPECT_LT(included.accuracy->end_m, 0.1 * nominal.accuracy->end_m);
+}
+
+TEST(Calibrate, KnowsNoMoreThanRecordingsThatAreLeftOutTell) {
+  CalibrationSetup setup = setup_of({"icr_sweep", "figure_eight", "circle"}, 1);
+  setup.leave_out_by = {"motion"};
+  const CalibrationResult result = calibrate(setup);
+  const Intrinsics of_fit = fit_all(setup).sigma;
+  const auto n = static_cast<int>(setup.recordings.size());
+  Eigen::MatrixXd without(of_fit.size(), n);
+  for (int left_out = 0; left_out < n; ++left_out) {
+    std::vector<std::size_t> used;
+    for (int i = 0; i < n; ++i) {
+      if (i != left_out) used.push_back(static_cast<std::size_t>(i));
+    }
+    without.col(left_out) = fit(setup, used).x_WI;
+  }
+  const Eigen::VectorXd mean = without.rowwise().mean();
+  int larger = 0;
+  for (int i = 0; i < of_fit.size(); ++i) {
+    const double jackknife =
+        std::sqrt((n - 1.) / n * (without.row(i).array() - mean[i]).square().sum());
+    EXPECT_NEAR(result.left_out[0].spread[i], jackknife, 1e-9) << i;
+    EXPECT_EQ(result.sigma_of_fit[i], of_fit[i]) << i;
+    EXPECT_EQ(result.all.sigma[i], std::max(of_fit[i], result.left_out[0].spread[i])) << i;
+    if (result.left_out[0].spread[i] > of_fit[i]) ++larger;
+  }
+  EXPECT_GT(larger, 0);
+  EXPECT_LT(larger, of_fit.size());
+}
+
+TEST(Calibrate, FindsHowTheWheelsWander) {
+  const auto found = [](std::vector<std::string> assignments) {
+    assignments.emplace_back("sensors.simulator0.duration_s=200");
+    return calibrate(setup_of({"icr_sweep", "figure_eight"}, 1, assignments)).wander;
+  };
+  const WheelWander wanders = found({"sensors.simulator0.intrinsics_wander=0.5",
+                                     "sensors.simulator0.intrinsics_wander_time_s=1"});
+  EXPECT_NEAR(wanders.sigma, 0.5, 0.1);
+  EXPECT_NEAR(wanders.time_s, 1., 0.5);
+  EXPECT_LT(found({}).sigma, 0.05);
+}
+
+}  // namespace
+}  // namespace viwo

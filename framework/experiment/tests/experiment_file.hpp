@@ -1,0 +1,58 @@
+// A folder with a small experiment of dead reckoning in simulation.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "simulated.hpp"
+#include "told.hpp"
+#include "viwo/experiment/experiment.hpp"
+
+namespace viwo::testing {
+
+class ExperimentFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        std::filesystem::path(::testing::TempDir()) /
+        ("viwo_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    std::ofstream(folder_ / "run.yaml") << config::to_yaml(simulated("'{motion}'"));
+  }
+
+  std::filesystem::path write(const std::string& text) {
+    std::ofstream(folder_ / "experiment.yaml") << text;
+    return folder_ / "experiment.yaml";
+  }
+
+  static std::string text_of(const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
+  /// Writes the results as if every computation had taken no time.
+  static void write_without_times(experiment::ExperimentResult result,
+                                  const std::filesystem::path& out) {
+    result.wall_s = 0.;
+    for (experiment::ExperimentRun& cell : result.runs) {
+      cell.result.wall_s = 0.;
+      cell.result.total_ms = {};
+      for (auto& [t_s, ms] : cell.result.epoch_ms) ms = 0.;
+      for (auto& [name, time] : cell.result.stages) time = {};
+    }
+    write_experiment(out, result);
+  }
+
+  std::filesystem::path folder_;
+};
+
+inline constexpr const char* kVariants =
+    "experiment: test\nbase: run.yaml\nseeds: 2\nmotions: [circle, lateral]\n"
+    "variants:\n  redundant:\n  drive_only: {kinematics.type: four_wis_wid_drive_only}\n";
+
+}  // namespace viwo::testing

@@ -1,0 +1,263 @@
+// What is written of an experiment: statistics, paired differences, labels, failures, the page.
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "experiment_file.hpp"
+#include "viwo/results/run_output.hpp"
+
+namespace viwo {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace experiment;
+using ::testing::HasSubstr;
+using testing::kVariants;
+using testing::registry;
+
+/// Two variants on two recordings with two seeds; ATE in metres as given, by variant, recording,
+/// seed.
+ExperimentResult with_errors(const std::vector<double>& ate_m) {
+  ExperimentResult result;
+  result.setup.name = "by hand";
+  result.setup.variants = {{"a", {}}, {"b", {}}};
+  result.setup.recordings = {{"1", {{"motion", "turn"}}}, {"2", {{"motion", "go"}}}};
+  result.setup.report_by = {"motion"};
+  result.setup.seeds = 2;
+  result.jobs = 2;
+  result.wall_s = 8.;
+  for (std::size_t i = 0; i < ate_m.size(); ++i) {
+    ExperimentRun run{i / 4, i / 2 % 2, i % 2 + 1, {}};
+    run.result.duration_s = 60.;
+    run.result.wall_s = 0.5;
+    if (std::isfinite(ate_m[i])) {
+      run.result.accuracy.emplace();
+      run.result.accuracy->ate_m = ate_m[i];
+    } else {
+      run.result.status = RunStatus::kDiverged;
+      run.result.cause = "went, as \"they\" say,\naway";
+    }
+    result.runs.push_back(run);
+  }
+  return result;
+}
+
+class Summary : public testing::ExperimentFile {
+ protected:
+  nlohmann::json summary_of(const ExperimentResult& result) {
+    write_experiment(folder_ / "out", result);
+    return nlohmann::json::parse(text_of(folder_ / "out" / "summary.json"));
+  }
+};
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST_F(Summary, HasMeanMedianSpreadAndQuantiles) {
+  const auto summary = summary_of(with_errors({1., 2., 3., 6., 1., 1., 1., kNan}));
+  const auto& a = summary["variants"]["a"]["metrics"]["ate_m"];
+  EXPECT_EQ(a["n"], 4);
+  EXPECT_DOUBLE_EQ(a["mean"], 3.);
+  EXPECT_DOUBLE_EQ(a["median"], 2.5);
+  EXPECT_DOUBLE_EQ(a["std"], std::sqrt((4. + 1. + 0. + 9.) / 3.));
+  EXPECT_DOUBLE_EQ(a["p5"], 1.15);   // position 0.15 between 1 and 2
+  EXPECT_DOUBLE_EQ(a["p95"], 5.55);  // position 2.85 between 3 and 6
+  EXPECT_EQ(summary["variants"]["b"]["metrics"]["ate_m"]["n"], 3);
+  EXPECT_EQ(summary["variants"]["b"]["diverged"], 1);
+  EXPECT_TRUE(summary["variants"]["a"]["metrics"]["nees_pose"]["mean"].is_null());
+  EXPECT_EQ(summary["jobs"], 2);
+  EXPECT_DOUBLE_EQ(summary["realtime_factor"], 120.);
+  EXPECT_EQ(summary["viwo_version"], viwo_version());
+}
+
+TEST_F(Summary, PairsTheRunsOfOneRecordingAndSeed) {
+  // b - a: 1, 2, 3 and nothing for the last pair; t(0.975, 2) = 4.302653.
+  ExperimentResult result = with_errors({1., 2., 3., 6., 2., 4., 6., kNan});
+  std::swap(result.runs[4], result.runs[6]);  // the order does not matter
+  auto summary = summary_of(result);
+  EXPECT_EQ(summary["paired"]["baseline"], "a");
+  EXPECT_EQ(summary["paired"]["confidence"], 0.95);
+  EXPECT_EQ(summary["paired"]["variants"].size(), 1u);
+  const auto& b = summary["paired"]["variants"]["b"]["ate_m"];
+  EXPECT_EQ(b["pairs"], 3);
+  EXPECT_DOUBLE_EQ(b["mean"], 2.);
+  EXPECT_DOUBLE_EQ(b["std"], 1.);
+  EXPECT_NEAR(b["low"], 2. - 4.302653 / std::sqrt(3.), 1e-6);
+  EXPECT_NEAR(b["high"], 2. + 4.302653 / std::sqrt(3.), 1e-6);
+  result.setup.baseline = 1;
+  summary = summary_of(result);
+  EXPECT_EQ(summary["paired"]["baseline"], "b");
+  EXPECT_DOUBLE_EQ(summary["paired"]["variants"]["a"]["ate_m"]["mean"], -2.);
+}
+
+TEST_F(Summary, HasTheRelativeErrorsOverTheLengthsThatTheRunsAreConfiguredWith) {
+  ExperimentOptions options;
+  options.assignments = {"sensors.simulator0.duration_s=60"};  // longer than 10 m
+  const auto file = write(
+      "experiment: test\nbase: run.yaml\nmotions: [circle]\nvariants:\n"
+      "  usual: {evaluation.segment_lengths_m: [10, 25]}\n  short: {evaluation.segment_lengths_m: "
+      "[2.5, 0.5]}\n");
+  const auto result = run_experiment(read_experiment(file, options), options, registry(), {});
+  const auto summary = summary_of(result);
+  // Both variants have the lengths of both; what one was not evaluated over is empty.
+  const auto& usual = summary["variants"]["usual"];
+  const auto& brief = summary["variants"]["short"];
+  const eval::Accuracy& accuracy = *result.runs[1].result.accuracy;
+  EXPECT_EQ(brief["metrics"]["rpe_2.5_m"]["mean"], accuracy.rpe[0].mean_m);
+  EXPECT_EQ(brief["metrics"]["rpe_0.5_deg"]["mean"], accuracy.rpe[1].mean_deg);
+  EXPECT_EQ(brief["rpe"]["0.5"]["m"], accuracy.rpe[1].mean_m);
+  EXPECT_EQ(brief["metrics"]["rpe_10_m"]["n"], 0);
+  EXPECT_EQ(usual["metrics"]["rpe_10_m"]["mean"], result.runs[0].result.accuracy->rpe[0].mean_m);
+  EXPECT_EQ(usual["metrics"]["rpe_0.5_m"]["n"], 0);
+  EXPECT_TRUE(usual["metrics"]["rpe_0.5_m"]["mean"].is_null());
+  EXPECT_EQ(summary["paired"]["variants"]["short"]["rpe_2.5_m"]["pairs"], 0);
+  const std::string csv = text_of(folder_ / "out" / "runs.csv");
+  EXPECT_THAT(csv.substr(0, csv.find('\n')),
+              HasSubstr(",ate_deg,rpe_0.5_m,rpe_0.5_deg,rpe_2.5_m,rpe_2.5_deg,rpe_10_m,rpe_10_deg,"
+                        "rpe_25_m,rpe_25_deg,nees_planar,"));
+  EXPECT_THAT(describe(result), HasSubstr("RPE 0.5 m [mm]"));
+  EXPECT_THAT(text_of(folder_ / "out" / "report.html"), HasSubstr("RPE 2.5 m [deg]"));
+}
+
+TEST_F(Summary, IsBrokenDownByLabels) {
+  const auto summary = summary_of(with_errors({1., 2., 3., 6., 2., 4., 6., kNan}));
+  const auto& by = summary["by"]["motion"];
+  ASSERT_EQ(by.size(), 2u);
+  EXPECT_DOUBLE_EQ(by["turn"]["variants"]["a"]["metrics"]["ate_m"]["mean"], 1.5);
+  EXPECT_DOUBLE_EQ(by["go"]["variants"]["a"]["metrics"]["ate_m"]["mean"], 4.5);
+  EXPECT_EQ(by["go"]["variants"]["b"]["runs"], 2);
+  EXPECT_EQ(by["go"]["variants"]["b"]["diverged"], 1);
+  EXPECT_EQ(by["turn"]["variants"]["b"]["diverged"], 0);
+  EXPECT_DOUBLE_EQ(by["turn"]["paired"]["variants"]["b"]["ate_m"]["mean"], 1.5);
+  EXPECT_EQ(by["go"]["paired"]["variants"]["b"]["ate_m"]["pairs"], 1);
+}
+
+TEST_F(Summary, MarksOnTheTerminalWhatIsMoreThanChance) {
+  // b - a in mm: 10, 10, 10, 14, so 11 and 3.182446 * 2 / sqrt(4) by t(0.975, 3).
+  const ExperimentResult result =
+      with_errors({0.001, 0.002, 0.003, 0.006, 0.011, 0.012, 0.013, 0.02});
+  const std::string text = describe(result);
+  EXPECT_THAT(text, HasSubstr("difference to a over pairs of runs, 95 % interval"));
+  EXPECT_THAT(text, HasSubstr("\nATE [mm]                     11 +- 3.2 *\n"));
+  EXPECT_THAT(text, HasSubstr("end [mm]                        0 +- 0  \n"));
+  EXPECT_THAT(text, HasSubstr("one core runs 120 times faster than real time; the experiment with "
+                              "2 jobs 60 times\n"));
+  // What was taken over has not been run in this time.
+  ExperimentResult resumed = result;
+  for (std::size_t i = 0; i < 4; ++i) resumed.runs[i].taken_over = true;
+  EXPECT_THAT(describe(resumed), HasSubstr("120 times faster than real time; the experiment with "
+                                           "2 jobs 30 times\n"));
+}
+
+TEST_F(Summary, SaysWhyARunIsNotOk) {
+  summary_of(with_errors({1., 2., 3., 6., 1., 1., 1., kNan}));
+  const std::string csv = text_of(folder_ / "out" / "runs.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 9);
+  EXPECT_THAT(csv.substr(0, csv.find('\n')), ::testing::EndsWith(",epoch_ms,cause"));
+  EXPECT_THAT(csv, ::testing::EndsWith(",\"went, as \"\"they\"\" say, away\"\n"));
+  const std::string page = text_of(folder_ / "out" / "report.html");
+  EXPECT_THAT(page, HasSubstr("Runs that failed or diverged: 1"));
+  EXPECT_THAT(page, HasSubstr("went, as &quot;they&quot; say,"));
+}
+
+TEST_F(Summary, KeepsGoingWhenAPluginThrows) {
+  // A plugin with one drive that throws when it is in that mood.
+  const fs::path plugins = folder_ / "plugins";
+  fs::create_directories(plugins);
+  fs::create_symlink(VIWO_TEST_BINARY_DIR "/tests/plugins_bad/libviwo_kinematics_moody.so",
+                     plugins / "libviwo_kinematics_moody.so");
+  PluginRegistry moody({VIWO_TEST_PLUGIN_DIR, plugins});
+  std::ofstream log(folder_ / "data.csv");
+  log << "#timestamp_ns,drive_1\n";
+  for (int i = 1; i <= 300; ++i) log << i << "0000000,2.0\n";
+  log.close();
+  std::ofstream(folder_ / "run.yaml") << "sensors: {wheels0: {type: asl_encoders, path: .}}\n"
+                                         "kinematics: {type: moody}\n";
+  const auto file = write(
+      "experiment: moods\nbase: run.yaml\nseeds: 2\nvariants:\n"
+      "  fine:\n  bad: {kinematics.mood: rows_std}\n  worse: {kinematics.mood: rows_int}\n");
+  ExperimentOptions options;
+  testing::Told told;
+  options.progress = &told;
+  const ExperimentResult result =
+      run_experiment(read_experiment(file, options), options, moody, folder_ / "out");
+  const std::string lines = told.text();
+  ASSERT_EQ(result.runs.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(result.runs[i].result.status, i < 2 ? RunStatus::kOk : RunStatus::kFailed) << i;
+  }
+  EXPECT_THAT(result.runs[2].result.cause, HasSubstr("no such row"));
+  EXPECT_THAT(lines, HasSubstr("bad  seed 1  failed: "));
+  // Those that failed are run again: their cause may have been mended. They are collected all the
+  // same.
+  const auto taken_over = [&](const ExperimentOptions& how) {
+    const ExperimentResult again =
+        run_experiment(read_experiment(file, how), how, moody, folder_ / "out");
+    return std::count_if(again.runs.begin(), again.runs.end(),
+                         [](const ExperimentRun& run) { return run.taken_over; });
+  };
+  options.resume = true;
+  EXPECT_EQ(taken_over(options), 2);
+  options.resume = false;
+  options.collect = true;
+  EXPECT_EQ(taken_over(options), 6);
+  write_experiment(folder_ / "out", result);
+  EXPECT_THAT(text_of(folder_ / "out" / "runs.csv"), HasSubstr("no such row"));
+  EXPECT_THAT(text_of(folder_ / "out" / "report.html"), HasSubstr("no such row"));
+}
+
+/// Number of plots of a document, and how many of them have nothing in them.
+std::pair<int, int> plots_of(const report::Document& document) {
+  int plots = 0, empty = 0;
+  for (const report::Section& section : document.sections) {
+    for (const report::Block& block : section.blocks) {
+      if (const auto* plot = std::get_if<report::Plot>(&block)) {
+        ++plots;
+        empty += plot->series.empty() && !plot->heat_map;
+      }
+    }
+  }
+  return {plots, empty};
+}
+
+TEST_F(Summary, HasThePlotsThatThereIsSomethingToShowFor) {
+  const ExperimentOptions options;
+  const auto result =
+      run_experiment(read_experiment(write(kVariants), options), options, registry(), {});
+  // Dead reckoning on two motions: above, the ends, position and yaw error of each.
+  EXPECT_EQ(plots_of(report_of(result)), std::make_pair(8, 0));
+}
+
+TEST_F(Summary, ShowsTheCalibrationOfTheFilterBesideItsTruth) {
+  ExperimentOptions options;
+  options.seeds = 2;
+  options.assignments = {"sensors.simulator0.duration_s=4"};
+  const auto result = run_experiment(
+      read_experiment(VIWO_TEST_SOURCE_DIR "/configs/experiments/paper_accuracy.yaml", options),
+      options, registry(), {});
+  const report::Document document = report_of(result);
+  // Above, consistency, position, yaw; the map of what is left of the sigmas; a plot for each of
+  // 6 + 1 + 4 + 3 + 3 + 3 parameters; the stages.
+  EXPECT_EQ(plots_of(document), std::make_pair(4 + 1 + 20 + 1, 0));
+  const report::Plot* radius = nullptr;
+  for (const report::Section& section : document.sections) {
+    for (const report::Block& block : section.blocks) {
+      const auto* plot = std::get_if<report::Plot>(&block);
+      if (plot != nullptr && plot->title == "r_1") radius = plot;
+    }
+  }
+  ASSERT_NE(radius, nullptr);
+  EXPECT_EQ(radius->y_label, "error [mm]");
+  // Four variants estimate it: two seeds and two lines of three sigma each.
+  ASSERT_EQ(radius->series.size(), 16u);
+  const RunResult& run = result.runs[0].result;
+  const auto track =
+      std::find_if(run.calibration.begin(), run.calibration.end(),
+                   [](const CalibrationTrack& candidate) { return candidate.name == "r_1"; });
+  EXPECT_NEAR(radius->series[0].y.back(), 1e3 * (track->estimate.back() - track->truth), 1e-5);
+  EXPECT_EQ(radius->series[2].dash, report::Dash::kDotted);
+  EXPECT_NEAR(radius->series[2].y.back(), -3e3 * track->sigma.back(), 0.1 * track->sigma.back());
+}
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,54 @@
+// Whether the encoders of a base fit each other: units of the steering angles, and signs and order
+// of the channels, tried one change at a time.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viwo/api/rig.hpp"
+#include "viwo/plausibility/finding.hpp"
+#include "viwo/wheel/twist_solver.hpp"
+
+namespace viwo {
+
+class EncoderCheck {
+ public:
+  EncoderCheck(std::string name, std::shared_ptr<const WheelModel> model, const WheelsPrior& prior);
+
+  /// Samples in time order; the twist that they say, if they say one.
+  std::optional<Twist> add(const EncoderSample& sample);
+  void findings(Findings& out) const;
+
+ private:
+  /// What may have been done to the channels.
+  struct Change {
+    enum Kind { kNone, kDriveSign, kDrivesExchanged, kSteerSign, kSteersExchanged, kSteerSigns };
+    Kind kind = kNone;
+    std::size_t a = 0, b = 0;
+    double residual = 0.;  ///< sum of the squares of the parity residuals
+    double signal = 0.;    ///< of what the rows say, (m/s)^2
+    void undo(EncoderSample& sample) const;
+    std::string text() const;
+  };
+
+  void watch_steering(const EncoderSample& sample);
+  void try_changes(const EncoderSample& sample);
+  void find_degrees(Findings& out) const;
+  void find_change(Findings& out) const;
+
+  std::string name_;
+  TwistSolver solver_;
+  TwistSolution solution_;
+  int n_steer_;
+  std::vector<Change> changes_;  ///< the first is none
+  std::int64_t samples_ = 0;
+  std::int64_t tried_ = 0;
+  std::optional<EncoderSample> last_;
+  std::int64_t beyond_turn_ = 0, too_fast_ = 0;  ///< samples with such steering angles
+  double largest_steer_ = 0.;
+};
+
+}  // namespace viwo

@@ -1,0 +1,219 @@
+#include "viwo/plausibility/plausibility.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "encoder_check.hpp"
+#include "imu_check.hpp"
+#include "stereo_check.hpp"
+#include "stream_watch.hpp"
+#include "twist_check.hpp"
+#include "viwo/math/significant.hpp"
+
+namespace viwo {
+
+struct Plausibility::Checks {
+  /// A wheel set, and the IMU against it.
+  struct WheelsCheck {
+    std::string sensor;
+    EncoderCheck encoders;
+    TwistCheck twist;
+    bool has_failed = false;  ///< what its model throws is told by those who need it
+  };
+
+  /// What the estimator takes of a sensor.
+  struct Watched {
+    std::string sensor;
+    const SampleType* type;
+    StreamWatch watch;
+
+    /// How far its stamps are ahead of those of the IMU, which the estimator's time is.
+    double ahead_s(const StreamWatch& imu_watch) const {
+      if (!imu_watch.has_begun() || !watch.has_begun()) return 0.;
+      return 1e-9 * (static_cast<double>(imu_watch.first_offset_ns()) -
+                     static_cast<double>(watch.first_offset_ns()));
+    }
+  };
+
+  std::string imu_name;
+  ImuCheck imu;
+  std::vector<WheelsCheck> wheels;
+  StereoCheck stereo;
+  std::vector<Watched> streams;  ///< the IMU's first
+  bool moves = false;            ///< the wheels turn
+
+  /// Nothing of what it gives is of the time of the run.
+  bool is_of_another_clock(const Watched& stream) const {
+    constexpr double kFar_s = 10.;
+    return std::abs(stream.ahead_s(streams.front().watch)) > kFar_s;
+  }
+
+  void add(WheelsCheck& check, const EncoderSample& sample) {
+    try {
+      const std::optional<Twist> xi = check.encoders.add(sample);
+      constexpr double kLeast = 0.05;  // m/s, rad/s
+      moves = xi && xi->norm() > kLeast;
+      if (xi) check.twist.add_wheels({sample.t_ns, sample.begin_ns, sample.end_ns}, *xi);
+    } catch (const std::exception&) {
+      check.has_failed = true;
+    }
+  }
+};
+
+namespace {
+
+/// What the filter goes on without for a while: the IMU carries it as far as its biases are known,
+/// and nothing carries it without the IMU (F-27). What only corrects it now and then, such as a
+/// fix, may well be absent.
+double least_gap_s(const Route& route, const FilterSetup& filter) {
+  if (route.consumer == Consumer::kImu) return 0.2;
+  const StreamSpec& spec = filter.streams[route.stream].spec;
+  return spec.awaited || spec.ends_epochs ? 1. : 10.;
+}
+
+/// The sensor whose measurements those of `name` are made of.
+std::string source_of(const std::string& name, const std::vector<SensorEntry>& sensors) {
+  for (const SensorEntry& entry : sensors) {
+    if (entry.name == name && !entry.input.empty()) return source_of(entry.input, sensors);
+  }
+  return name;
+}
+
+Finding of_another_clock(const std::string& name, double ahead_s) {
+  return {name + " clock",
+          name + ": its stamps are " + significant(std::abs(ahead_s), 2) + " s " +
+              (ahead_s > 0. ? "ahead of" : "behind") +
+              " those of the IMU: of another clock, or of another recording - none of its samples "
+              "can be used"};
+}
+
+}  // namespace
+
+Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
+  if (!setup.filter) return;
+  const FilterSetup& filter = *setup.filter;
+  const std::string imu = setup.routes.sensor_of(Consumer::kImu);
+  // A simulator is all of them.
+  const auto told = [&](const std::string& sensor, const std::string& kind) {
+    return sensor == imu && setup.routes.sensor_of(Consumer::kWheels) == imu
+               ? kind + " of " + sensor
+               : sensor;
+  };
+  checks_ = std::make_unique<Checks>(
+      Checks{imu,
+             ImuCheck(told(imu, "imu"), filter.options.filter.gravity_m_per_s2),
+             {},
+             StereoCheck(filter.cameras),
+             {}});
+  watch_streams(setup);
+  for (const WheelSet& set : filter.wheels) {
+    std::string sensor = set.prior.sensor;
+    if (sensor.empty()) sensor = setup.routes.sensor_of(Consumer::kWheels);
+    if (sensor.empty()) continue;
+    try {
+      checks_->wheels.push_back({sensor, EncoderCheck(told(sensor, "wheels"), set.model, set.prior),
+                                 TwistCheck(told(imu, "imu"), told(sensor, "wheels"), set.prior)});
+    } catch (const std::exception&) {
+      continue;
+    }
+  }
+}
+
+/// One watch for each kind of each sensor that the estimator takes something from.
+void Plausibility::watch_streams(const RunSetup& setup) {
+  std::vector<const Route*> taken;
+  for (const Route& route : setup.routes.all()) {
+    if (route.consumer != Consumer::kImu && route.consumer != Consumer::kStream) continue;
+    const bool is_known = std::any_of(taken.begin(), taken.end(), [&](const Route* other) {
+      return other->sensor == route.sensor && *other->type == *route.type;
+    });
+    if (!is_known) taken.push_back(&route);
+  }
+  std::stable_partition(taken.begin(), taken.end(),
+                        [](const Route* route) { return route->consumer == Consumer::kImu; });
+  for (const Route* route : taken) {
+    std::string name = source_of(route->sensor, setup.sensors);
+    const auto of_it = std::count_if(taken.begin(), taken.end(), [&](const Route* other) {
+      return source_of(other->sensor, setup.sensors) == name;
+    });
+    if (of_it > 1) name = std::string(route->type->name) + " of " + name;
+    checks_->streams.push_back(
+        {route->sensor, route->type, StreamWatch(name, least_gap_s(*route, *setup.filter))});
+  }
+}
+
+Plausibility::~Plausibility() = default;
+
+void Plausibility::add(const std::string& sensor, SampleView sample) {
+  if (!checks_) return;
+  if (const auto* imu = sample.get_if<ImuSample>(); imu != nullptr && sensor == checks_->imu_name) {
+    checks_->imu.add(*imu, checks_->moves);
+    for (auto& wheels : checks_->wheels) wheels.twist.add_imu(*imu);
+  } else if (const auto* encoders = sample.get_if<EncoderSample>()) {
+    for (auto& wheels : checks_->wheels) {
+      if (wheels.sensor == sensor && !wheels.has_failed) checks_->add(wheels, *encoders);
+    }
+  } else if (const auto* features = sample.get_if<FeatureSample>()) {
+    checks_->stereo.add(sensor, *features);
+  }
+  watch(sensor, sample);
+}
+
+void Plausibility::watch(const std::string& sensor, SampleView sample) {
+  for (Checks::Watched& stream : checks_->streams) {
+    if (stream.sensor != sensor || !(*stream.type == sample.type())) continue;
+    const std::int64_t t_ns = sample.t_ns();
+    if (!now_ns_) now_ns_ = next_look_ns_ = t_ns;
+    if (!zero_ns_) zero_ns_ = now_ns_;
+    stream.watch.add(t_ns, sample.type().channel(sample.data()), *now_ns_);
+    if (stream.watch.has_begun() && !checks_->is_of_another_clock(stream)) {
+      now_ns_ = std::max(*now_ns_, stream.watch.newest_ns());
+    }
+    waited_ns_ = 0;
+    look_now_and_then();
+    return;
+  }
+}
+
+void Plausibility::wait(double seconds) {
+  if (!checks_ || !now_ns_) return;
+  waited_ns_ += std::llround(1e9 * seconds);
+  look_now_and_then();
+}
+
+void Plausibility::look_now_and_then() {
+  constexpr std::int64_t kPeriodNs = 1'000'000'000;
+  const std::int64_t now_ns = *now_ns_ + waited_ns_;
+  if (now_ns < next_look_ns_ && now_ns > next_look_ns_ - 2 * kPeriodNs) return;
+  next_look_ns_ = now_ns + kPeriodNs;
+  look(false);
+}
+
+void Plausibility::finish() {
+  if (checks_) look(true);
+}
+
+void Plausibility::look(bool at_end) {
+  findings_.clear();
+  if (!now_ns_) return;
+  checks_->imu.findings(*zero_ns_, findings_);
+  for (const auto& wheels : checks_->wheels) {
+    const std::size_t before = findings_.size();
+    wheels.encoders.findings(findings_);
+    // Wheels that contradict themselves say nothing of the IMU.
+    if (findings_.size() == before) wheels.twist.findings(checks_->imu.up(), findings_);
+  }
+  checks_->stereo.findings(findings_);
+  const StreamWatch& imu = checks_->streams.front().watch;
+  for (const auto& stream : checks_->streams) {
+    if (checks_->is_of_another_clock(stream)) {
+      findings_.push_back(of_another_clock(stream.watch.name(), stream.ahead_s(imu)));
+    } else if (at_end) {
+      stream.watch.findings(*now_ns_, *zero_ns_, live_ ? "run" : "recording", findings_);
+    } else {
+      stream.watch.findings(*now_ns_ + waited_ns_, *zero_ns_, findings_);
+    }
+  }
+}
+
+}  // namespace viwo

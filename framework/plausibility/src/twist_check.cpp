@@ -1,0 +1,363 @@
+#include "twist_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <Eigen/Cholesky>
+
+#include "viwo/math/arrays.hpp"
+#include "viwo/math/significant.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr std::int64_t kFewestWindows = 50;  ///< 10 s
+constexpr std::int64_t kFewestUpright = 15;  ///< of them, for a verdict on gravity
+constexpr double kLeastRate = 0.05;          ///< rad/s, standard deviation about the mean
+constexpr double kLeastForce = 0.1;          ///< m/s^2, likewise
+constexpr double kAlike = 0.9;               ///< correlation
+constexpr double kVeryAlike = 0.98;
+constexpr double kFactorTolerance = 0.15;
+
+bool is_about(double value, double wanted) {
+  return std::abs(value / wanted - 1.) < kFactorTolerance;
+}
+
+/// The largest entry of a direction: "+x", "-z".
+std::string axis_of(const Eigen::Vector3d& direction) {
+  int i = 0;
+  direction.cwiseAbs().maxCoeff(&i);
+  return std::string(direction[i] < 0. ? "-" : "+") + "xyz"[i];
+}
+
+/// Which axis of the base each of the accelerometer's is, and its sign.
+struct Mounting {
+  Eigen::Matrix2d P;
+  const char* text;
+};
+
+Eigen::Matrix2d matrix(double a, double b, double c, double d) {
+  return (Eigen::Matrix2d() << a, b, c, d).finished();
+}
+
+}  // namespace
+
+template <int kSize>
+void CellMeans<kSize>::add(std::int64_t begin_ns, std::int64_t end_ns, const Vector& value) {
+  if (end_ns <= begin_ns) return;
+  end_ = std::max(end_, end_ns / kCellNs);
+  if (end_ns - begin_ns > kLongestNs) return;
+  for (std::int64_t i = begin_ns / kCellNs; i * kCellNs < end_ns; ++i) {
+    Cell& cell = cells_[static_cast<std::size_t>(i % kCells)];
+    if (cell.index > i) continue;  // long gone
+    if (cell.index != i) cell = {i, 0, Vector::Zero()};
+    const std::int64_t part_ns =
+        std::min(end_ns, (i + 1) * kCellNs) - std::max(begin_ns, i * kCellNs);
+    cell.covered_ns += part_ns;
+    cell.sum += static_cast<double>(part_ns) * value;
+  }
+}
+
+template <int kSize>
+auto CellMeans<kSize>::mean(std::int64_t cell) const -> std::optional<Vector> {
+  const Cell& found = cells_[static_cast<std::size_t>(cell % kCells)];
+  if (found.index != cell || 10 * found.covered_ns < 9 * kCellNs) return {};
+  return found.sum / static_cast<double>(found.covered_ns);
+}
+
+TwistCheck::TwistCheck(std::string imu, std::string wheels, const WheelsPrior& prior)
+    : imu_(std::move(imu)),
+      wheels_(std::move(wheels)),
+      R_ItoO_(prior.wheels.R_ItoO),
+      p_IinO_(prior.wheels.p_IinO.head<2>()),
+      t_OtoI_s_(prior.wheels.t_OtoI_s),
+      sigma_t_OtoI_s_(prior.sigma_time_offset_s) {}
+
+void TwistCheck::add_imu(const ImuSample& sample) {
+  if (sample.fault() != nullptr || sample.t_ns < 0) return;
+  const auto values = [this](const ImuSample& s) {
+    Eigen::Matrix<double, 6, 1> v;
+    v << R_ItoO_ * to_vector(s.gyro_rad_per_s), R_ItoO_ * to_vector(s.accel_m_per_s2);
+    return v;
+  };
+  // Behind a gap, or a step back, the clock may be another one.
+  if (last_ && std::abs(sample.t_ns - last_->t_ns) > CellMeans<6>::kLongestNs) {
+    lag_cells_ = lag_count_ = 0;
+    lags_.fill({});
+    lag_products_.setZero();
+  }
+  if (last_) {
+    imu_means_.add(last_->t_ns, sample.t_ns, 0.5 * (values(*last_) + values(sample)));
+  }
+  last_ = sample;
+  advance();
+}
+
+void TwistCheck::add_wheels(const SampleExtent& extent, const Twist& xi) {
+  const auto offset_ns = static_cast<std::int64_t>(std::llround(1e9 * t_OtoI_s_));
+  if (extent.begin_ns + offset_ns < 0 || !xi.allFinite()) return;
+  twist_means_.add(extent.begin_ns + offset_ns, extent.end_ns + offset_ns, xi);
+  advance();
+}
+
+/// Takes the cells that both have passed.
+void TwistCheck::advance() {
+  const std::int64_t end = std::min(imu_means_.end(), twist_means_.end());
+  next_ = std::max(next_, end - CellMeans<6>::kCells);
+  for (; next_ < end; ++next_) {
+    const auto imu = imu_means_.mean(next_);
+    const auto xi = twist_means_.mean(next_);
+    if (imu && xi) {
+      add_cell(*imu, *xi);
+    } else {
+      window_ = before_ = {};
+      lag_cells_ = 0;
+    }
+  }
+}
+
+void TwistCheck::add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi) {
+  add_to_lags(imu[2], xi);
+  // Of the IMU's place.
+  const Eigen::Vector2d v(xi[0] - xi[2] * p_IinO_.y(), xi[1] + xi[2] * p_IinO_.x());
+  Entries entries = Entries::Zero();
+  entries[kGyro] = imu[2];
+  entries[kWheels] = xi[2];
+  entries.segment<2>(kForce) = imu.segment<2>(3);
+  entries.segment<2>(kTurn) << -xi[2] * v.y(), xi[2] * v.x();
+  window_.mean += entries / kWindow;
+  window_.v += v / kWindow;
+  if (++window_.cells == kWindow) end_window();
+}
+
+/// Means of this window and the last one go with the change of velocity between them.
+void TwistCheck::end_window() {
+  if (before_.cells == kWindow) {
+    Entries entries = 0.5 * (before_.mean + window_.mean);
+    constexpr double kWindow_s = 1e-9 * kWindow * CellMeans<6>::kCellNs;
+    entries.segment<2>(kChange) = (window_.v - before_.v) / kWindow_s;
+    sum_ += entries;
+    products_ += entries * entries.transpose();
+    ++windows_;
+  }
+  before_ = std::exchange(window_, {});
+}
+
+/// Differences of the gyro's rates, half a second before to after it, and one of the wheels.
+void TwistCheck::add_to_lags(double gyro, const Twist& xi) {
+  const auto place = [](std::int64_t cell) { return static_cast<std::size_t>(cell % kLags); };
+  gyro_[place(lag_cells_)] = gyro;
+  wheel_[place(lag_cells_)] = xi;
+  ++lag_cells_;
+  if (lag_cells_ < kLags) return;
+  const std::int64_t middle = lag_cells_ - 1 - kMostLag;
+  const Twist& w = wheel_[place(middle)];
+  const Eigen::Vector4d by(1., w[0], w[1], w[2]);
+  lag_products_ += by * by.transpose();
+  for (int i = 0; i < kLags; ++i) {
+    const double difference = gyro_[place(middle + i - kMostLag)] - w[2];
+    Lag& lag = lags_[static_cast<std::size_t>(i)];
+    lag.products += difference * by;
+    lag.squares += difference * difference;
+  }
+  ++lag_count_;
+}
+
+void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
+  const double n = static_cast<double>(std::max<std::int64_t>(windows_, 1));
+  const Entries mean = sum_ / n;
+  const Eigen::MatrixXd C = products_ / n - mean * mean.transpose();  // covariance
+  const bool turns = windows_ >= kFewestUpright && C(kWheels, kWheels) > 0. &&
+                     std::max(C(kGyro, kGyro), C(kWheels, kWheels)) > kLeastRate * kLeastRate;
+  const double r =
+      turns ? C(kGyro, kWheels) / std::sqrt(C(kGyro, kGyro) * C(kWheels, kWheels)) : 0.;
+  // Both have noise: the ratio of what they scatter.
+  const double slope = turns && std::abs(r) > kAlike
+                           ? std::copysign(std::sqrt(C(kGyro, kGyro) / C(kWheels, kWheels)), r)
+                           : 0.;
+  if (finds_gravity(up, slope, out)) return;
+  if (slope == 0. || windows_ < kFewestWindows) return;
+  const std::string fast = significant(std::abs(slope), 3) + " times as fast as the wheels";
+  const std::string slow = significant(1. / std::abs(slope), 3) + " times as fast as the gyro";
+  constexpr double kDeg = 180. / std::numbers::pi;
+  const std::string key = imu_ + " rate";
+  if (is_about(std::abs(slope), kDeg)) {
+    out.push_back({key, imu_ + ": the gyro turns " + fast + ": it is in deg/s"});
+  } else if (is_about(std::abs(slope), 1. / kDeg)) {
+    out.push_back({key, wheels_ + ": turn " + slow + ": drives are in deg/s"});
+  } else if (is_about(std::abs(slope), std::numbers::pi / 30.)) {
+    out.push_back({key, wheels_ + ": turn " + slow + ": drives are in revolutions per minute"});
+  } else if (is_about(std::abs(slope), 2. * std::numbers::pi)) {
+    out.push_back({key, wheels_ + ": turn " + slow + ": drives are in revolutions per second"});
+  } else if (is_about(slope, -1.)) {
+    find_reversed(C, out);
+  } else if (!is_about(slope, 1.) && std::abs(r) > kVeryAlike) {
+    out.push_back({key, imu_ + ": the gyro turns " + significant(slope, 3) +
+                            " times as fast as the wheels (correlation " + significant(r, 3) +
+                            "): unit or scale of the drives, radii and track of the kinematics, "
+                            "or scale of the gyro"});
+  } else {
+    find_axes(C, out);
+    find_lag(C(kGyro, kGyro), out);
+  }
+}
+
+/// A base that drives on the ground is level on average, to the 30 deg of the worst ramp.
+bool TwistCheck::finds_gravity(const Eigen::Vector3d& up, double slope, Findings& out) const {
+  const Eigen::Vector3d is = R_ItoO_ * up;
+  if (windows_ < kFewestUpright || up.norm() < 0.7 || is.z() > std::sqrt(0.75) * up.norm()) {
+    return false;
+  }
+  std::string text = imu_ + ": gravity is on " + axis_of(up) +
+                     " where wheels.rpy_ItoO_rad puts it on " + axis_of(R_ItoO_.row(2)) + ": ";
+  const bool is_opposite = is.z() < -std::sqrt(0.75) * up.norm();
+  if (is_opposite && slope < 0.) {
+    text += "the IMU is mounted upside down, or its axes are exchanged";
+  } else if (is_opposite && slope > 0.) {
+    text += "the gyro turns as the wheels do: sign of the accelerometer (at rest it reads upwards)";
+  } else {
+    text += "the IMU is mounted otherwise, its axes are exchanged or reversed";
+  }
+  out.push_back({imu_ + " up", text});
+  return true;
+}
+
+/// The gyro turns opposite to the wheels: the accelerometer says which of them is right, by the
+/// sign that the change of velocity, and its turning, need to have.
+void TwistCheck::find_reversed(const Eigen::MatrixXd& C, Findings& out) const {
+  const auto left = [&C](double change, double turn) {
+    double variance = 0.;
+    for (int i = 0; i < 2; ++i) {
+      Entries h = Entries::Zero();
+      h[kForce + i] = 1.;
+      h[kChange + i] = -change;
+      h[kTurn + i] = -turn;
+      variance += h.dot(C * h);
+    }
+    return variance;
+  };
+  const std::array<double, 3> variances = {left(1., 1.), left(-1., 1.), left(1., -1.)};
+  const std::array<std::string, 3> texts = {
+      imu_ +
+          ": the gyro turns opposite to the wheels, the accelerometer agrees with them: sign of "
+          "the gyro's z",
+      wheels_ + ": drives turn and accelerate opposite to the IMU: sign of all drives",
+      wheels_ +
+          ": turn opposite to the IMU, and accelerate with it: drives on the left and on the "
+          "right are exchanged"};
+  std::array<std::size_t, 3> order = {0, 1, 2};
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return variances[a] < variances[b]; });
+  const double all = C(kForce, kForce) + C(kForce + 1, kForce + 1);
+  const bool is_clear = all > kLeastForce * kLeastForce && variances[order[0]] < 0.7 * all &&
+                        variances[order[1]] - variances[order[0]] > 0.1 * all;
+  out.push_back({imu_ + " rate",
+                 is_clear ? texts[order[0]]
+                          : imu_ + ": the gyro turns opposite to " + wheels_ +
+                                ": sign of the gyro's z, sign of all drives, or drives on the left "
+                                "and on the right exchanged"});
+}
+
+/// The rates agree: so should the accelerometer and what the wheels' velocity takes.
+void TwistCheck::find_axes(const Eigen::MatrixXd& C, Findings& out) const {
+  static const std::array<Mounting, 8> kMountings = {{
+      {matrix(1, 0, 0, 1), ""},
+      {matrix(-1, 0, 0, -1),
+       "the IMU is turned: add 3.1416 to the yaw of wheels.rpy_ItoO_rad, or the base's x points "
+       "backwards"},
+      {matrix(0, 1, -1, 0), "the IMU is turned: add 1.5708 to the yaw of wheels.rpy_ItoO_rad"},
+      {matrix(0, -1, 1, 0), "the IMU is turned: add -1.5708 to the yaw of wheels.rpy_ItoO_rad"},
+      {matrix(0, 1, 1, 0), "axes exchanged; determinant -1: not a rotation"},
+      {matrix(0, -1, -1, 0), "axes exchanged and reversed; determinant -1: not a rotation"},
+      {matrix(-1, 0, 0, 1), "sign of the accelerometer's x"},
+      {matrix(1, 0, 0, -1), "sign of the accelerometer's y, or of the base's"},
+  }};
+  Eigen::Matrix<double, 4, kEntries> S = Eigen::Matrix<double, 4, kEntries>::Zero();
+  for (int i = 0; i < 2; ++i) {
+    S(i, kForce + i) = 1.;
+    S(2 + i, kChange + i) = S(2 + i, kTurn + i) = 1.;
+  }
+  const Eigen::Matrix4d M = S * C * S.transpose();  // force, and what the wheels say of it
+  const double all = M(0, 0) + M(1, 1);
+  std::array<double, 8> left{};
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    Eigen::Matrix<double, 2, 4> h;
+    h << Eigen::Matrix2d::Identity(), -kMountings[i].P;
+    left[i] = (h * M * h.transpose()).trace();
+  }
+  const std::size_t best =
+      static_cast<std::size_t>(std::min_element(left.begin(), left.end()) - left.begin());
+  double second = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    if (i != best) second = std::min(second, left[i]);
+  }
+  const double least = kLeastForce * kLeastForce;
+  if (best == 0 || M(2, 2) < least || M(3, 3) < least || left[best] > 0.7 * all || left[0] < all ||
+      second - left[best] < 0.1 * all) {
+    return;
+  }
+  const auto follows = [&](int axis) {
+    const int other = kMountings[best].P(axis, 0) != 0. ? 0 : 1;
+    const double r = M(axis, 2 + other) / std::sqrt(M(axis, axis) * M(2 + other, 2 + other));
+    return std::string(1, "xy"[axis]) +
+           (axis == 0 ? " of the accelerometer follows " : " follows ") + "xy"[other] +
+           " of the wheels (correlation " + significant(r, 2) + ")";
+  };
+  out.push_back({imu_ + " axes", imu_ + ": in the base's frame " + follows(0) + ", " + follows(1) +
+                                     ": " + kMountings[best].text});
+}
+
+/// What is left of the squared differences, for each lag, `information` being what is known of the
+/// parts of [1, twist] in them.
+auto TwistCheck::left_by_lag(const Eigen::Vector4d& information) const
+    -> std::array<double, kLags> {
+  const Eigen::Matrix4d N = lag_products_ + Eigen::Matrix4d(information.asDiagonal());
+  const Eigen::LDLT<Eigen::Matrix4d> solver(N);
+  std::array<double, kLags> left{};
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    left[i] = lags_[i].squares - lags_[i].products.dot(solver.solve(lags_[i].products));
+    left[i] /= static_cast<double>(lag_count_);
+  }
+  return left;
+}
+
+/// By how much the wheels' rate is before the gyro's: where the two differ least, whatever the
+/// bias, and whatever wheels that are not quite as configured make of the base's motion.
+void TwistCheck::find_lag(double rate_variance, Findings& out) const {
+  constexpr double kCell_s = 1e-9 * CellMeans<6>::kCellNs;
+  // What makes them differ, slopes of the ground or slip, lasts for half a second.
+  constexpr double kSame = 0.5 / kCell_s;
+  constexpr double kPart = 0.05;  // of the turn; rad/m of the velocity
+  const double n = static_cast<double>(lag_count_);
+  if (n * kCell_s < 10.) return;
+  std::array<double, kLags> left = left_by_lag(Eigen::Vector4d::Zero());
+  const double noise = *std::min_element(left.begin(), left.end());
+  Eigen::Vector4d information = Eigen::Vector4d::Constant(kSame * noise / (kPart * kPart));
+  information[0] = 0.;
+  left = left_by_lag(information);
+  const auto least =
+      static_cast<std::size_t>(std::min_element(left.begin(), left.end()) - left.begin());
+  if (least == 0 || least + 1 == left.size()) return;
+  const double bend = left[least - 1] - 2. * left[least] + left[least + 1];  // per cell^2
+  // Without the lag they are alike.
+  if (!(bend > 0.) || left[kMostLag] < 1.5 * left[least] || left[least] > 0.05 * rate_variance) {
+    return;
+  }
+  const double lag_s = kCell_s * (static_cast<double>(least) - kMostLag +
+                                  0.5 * (left[least - 1] - left[least + 1]) / bend);
+  const double sigma_s = kCell_s * std::sqrt(2. * left[least] / (bend * n / kSame));
+  constexpr double kLeastLag_s = 0.01;
+  if (std::abs(lag_s) < kLeastLag_s + 3. * std::hypot(sigma_t_OtoI_s_, sigma_s)) return;
+  const auto ms = [](double seconds) { return std::to_string(std::lround(1e3 * seconds)) + " ms"; };
+  std::string text = wheels_ + (lag_s < 0. ? ": lags behind " : ": is ahead of ") + imu_ + " by " +
+                     ms(std::abs(lag_s)) + ", t_OtoI_s says " + ms(t_OtoI_s_);
+  if (sigma_t_OtoI_s_ > 0.) text += " +- " + ms(sigma_t_OtoI_s_);
+  text += " - wheels.t_OtoI_s: " + significant(1e-3 * std::round(1e3 * (t_OtoI_s_ + lag_s)), 6);
+  out.push_back({wheels_ + " clock", text});
+}
+
+}  // namespace viwo

@@ -1,0 +1,111 @@
+// Whether IMU and wheels move alike: the gyro's rate about the base's z and the twist of the
+// wheels, the accelerometer and its change.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <Eigen/Core>
+
+#include "viwo/api/rig.hpp"
+#include "viwo/plausibility/finding.hpp"
+
+namespace viwo {
+
+/// Means over the cells of a grid in time of what holds over times of its own; the last seconds.
+template <int kSize>
+class CellMeans {
+ public:
+  using Vector = Eigen::Matrix<double, kSize, 1>;
+  static constexpr std::int64_t kCellNs = 20'000'000;
+  static constexpr std::int64_t kCells = 256;
+
+  /// What is longer than this is a gap.
+  static constexpr std::int64_t kLongestNs = 200'000'000;
+
+  void add(std::int64_t begin_ns, std::int64_t end_ns, const Vector& value);
+  /// The cell up to which nothing is to come any more.
+  std::int64_t end() const { return end_; }
+  std::optional<Vector> mean(std::int64_t cell) const;
+
+ private:
+  struct Cell {
+    std::int64_t index = -1;
+    std::int64_t covered_ns = 0;
+    Vector sum = Vector::Zero();
+  };
+  std::array<Cell, kCells> cells_;
+  std::int64_t end_ = 0;
+};
+
+class TwistCheck {
+ public:
+  TwistCheck(std::string imu, std::string wheels, const WheelsPrior& prior);
+
+  void add_imu(const ImuSample& sample);
+  /// `xi`: twist of O over the time of a sample of the wheels.
+  void add_wheels(const SampleExtent& extent, const Twist& xi);
+  /// `up`: direction of the specific force in I (ImuCheck).
+  void findings(const Eigen::Vector3d& up, Findings& out) const;
+
+ private:
+  static constexpr int kMostLag = 25;  ///< cells
+  static constexpr int kLags = 2 * kMostLag + 1;
+  static constexpr int kWindow = 10;  ///< cells
+
+  // What moves in a window, along the axes of O, m/s^2 but for the first two, rad/s: rates about z
+  // of gyro and wheels, specific force, change of the wheels' velocity, and what it takes to turn
+  // that velocity.
+  enum Entry { kGyro, kWheels, kForce, kChange = 4, kTurn = 6, kEntries = 8 };
+  using Entries = Eigen::Matrix<double, kEntries, 1>;
+
+  /// Sums of one window.
+  struct Window {
+    int cells = 0;
+    Entries mean = Entries::Zero();
+    Eigen::Vector2d v = Eigen::Vector2d::Zero();
+  };
+
+  void advance();
+  void add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi);
+  void add_to_lags(double gyro, const Twist& xi);
+  void end_window();
+  bool finds_gravity(const Eigen::Vector3d& up, double slope, Findings& out) const;
+  void find_reversed(const Eigen::MatrixXd& C, Findings& out) const;
+  void find_axes(const Eigen::MatrixXd& C, Findings& out) const;
+  std::array<double, kLags> left_by_lag(const Eigen::Vector4d& information) const;
+  void find_lag(double rate_variance, Findings& out) const;
+
+  std::string imu_, wheels_;
+  Eigen::Matrix3d R_ItoO_;
+  Eigen::Vector2d p_IinO_;
+  double t_OtoI_s_, sigma_t_OtoI_s_;
+
+  CellMeans<6> imu_means_;
+  CellMeans<3> twist_means_;
+  std::optional<ImuSample> last_;
+  std::int64_t next_ = 0;  ///< cell
+
+  Window window_, before_;
+  std::int64_t windows_ = 0;
+  Entries sum_ = Entries::Zero();
+  Eigen::Matrix<double, kEntries, kEntries> products_ =
+      Eigen::Matrix<double, kEntries, kEntries>::Zero();
+
+  // Gyro minus wheels by lag, and what a bias and wheels that are not as configured make of it:
+  // a part of the turn and of the velocity that they tell.
+  struct Lag {
+    Eigen::Vector4d products = Eigen::Vector4d::Zero();  ///< of the difference with [1, twist]
+    double squares = 0.;
+  };
+  std::array<double, kLags> gyro_{};  ///< of the last cells, in turn
+  std::array<Twist, kLags> wheel_;    ///< likewise
+  std::int64_t lag_cells_ = 0;        ///< without a break
+  std::int64_t lag_count_ = 0;
+  std::array<Lag, kLags> lags_;
+  Eigen::Matrix4d lag_products_ = Eigen::Matrix4d::Zero();  ///< of [1, twist] with itself
+};
+
+}  // namespace viwo

@@ -1,0 +1,94 @@
+#include "viwo/results/run_stream.hpp"
+
+#include <cmath>
+#include <exception>
+
+namespace viwo {
+
+void write_calibration_head(log::TextWriter& out) { out << "time_s,name,estimate,sigma,truth\n"; }
+
+void write_calibration_rows(log::TextWriter& out, const RunResult& result, std::size_t k) {
+  for (const CalibrationTrack& track : result.calibration) {
+    out << result.epoch_t_s[k] << "," << track.name << "," << track.estimate[k] << ","
+        << track.sigma[k] << ",";
+    if (std::isfinite(track.truth)) out << track.truth;
+    out << "\n";
+  }
+}
+
+void write_timing_head(log::TextWriter& out) { out << "time_s,epoch_ms\n"; }
+
+void write_timing_row(log::TextWriter& out, const RunResult& result, std::size_t k) {
+  out << result.epoch_ms[k].first << "," << result.epoch_ms[k].second << "\n";
+}
+
+std::filesystem::path piece_file(const std::filesystem::path& folder, std::size_t k) {
+  return folder / ("trajectory_" + std::to_string(k + 1) + ".tum");
+}
+
+void remove_piece_files(const std::filesystem::path& folder) {
+  for (std::size_t k = 0; std::filesystem::remove(piece_file(folder, k)); ++k) {
+  }
+}
+
+RunStream::RunStream(const std::filesystem::path& folder)
+    : folder_(folder),
+      trajectory_(folder / "trajectory.tum"),
+      calibration_(folder / "calibration.csv"),
+      timing_(folder / "timing.csv") {
+  remove_piece_files(folder);
+  write_calibration_head(calibration_);
+  write_timing_head(timing_);
+}
+
+void RunStream::epoch(const RunResult& result) {
+  if (!failure_.empty()) return;
+  try {
+    write(result);
+  } catch (const std::exception& error) {
+    failure_ = error.what();
+  }
+}
+
+void RunStream::write(const RunResult& result) {
+  if (result.pieces.size() > pieces_) {
+    // Up to now that was the first one.
+    if (pieces_ == 1) {
+      std::filesystem::copy_file(folder_ / "trajectory.tum", piece_file(folder_, 0),
+                                 std::filesystem::copy_options::overwrite_existing);
+    }
+    if (piece_) piece_->close();
+    pieces_ = result.pieces.size();
+    piece_.emplace(piece_file(folder_, pieces_ - 1));
+  }
+  const StampedPose& pose = result.estimate.back();
+  if (!last_ns_ || pose.t_ns > *last_ns_) {
+    trajectory_.add(pose);
+    last_ns_ = pose.t_ns;
+  }
+  trajectory_.flush();
+  if (piece_) {
+    piece_->add(pose);
+    piece_->flush();
+  }
+  const std::size_t newest = result.epoch_t_s.size() - 1;
+  write_calibration_rows(calibration_, result, newest);
+  calibration_.flush();
+  write_timing_row(timing_, result, newest);
+  timing_.flush();
+}
+
+std::string RunStream::finish() {
+  if (!failure_.empty()) return failure_;
+  try {
+    trajectory_.close();
+    if (piece_) piece_->close();
+    calibration_.close();
+    timing_.close();
+  } catch (const std::exception& error) {
+    failure_ = error.what();
+  }
+  return failure_;
+}
+
+}  // namespace viwo

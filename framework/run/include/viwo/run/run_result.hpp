@@ -1,0 +1,135 @@
+// What a run leaves: trajectory, accuracy, calibration, what became of its measurements.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "viwo/eval/accuracy.hpp"
+#include "viwo/filter/estimator.hpp"
+#include "viwo/math/trajectory.hpp"
+#include "viwo/wheel/preintegration.hpp"
+
+namespace viwo {
+
+/// Statistics of the time that a stage took per epoch.
+struct StageTime {
+  double mean_ms = 0.;
+  double p95_ms = 0.;
+  double max_ms = 0.;
+};
+
+enum class RunStatus { kOk, kDiverged, kFailed };
+const char* name(RunStatus status);
+
+/// One calibration parameter over a run.
+struct CalibrationTrack {
+  std::string name;
+  std::string unit;              ///< "m", "rad", ...; "" for none
+  std::vector<double> estimate;  ///< at RunResult::epoch_t_s
+  std::vector<double> sigma;
+  /// In the gauge that the estimate holds; NaN: not known.
+  double truth = std::numeric_limits<double>::quiet_NaN();
+  /// Last estimate minus truth in the filter's own error convention; NaN without truth.
+  double final_error = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// Mean over the epochs of the squared normalised error, in the filter's own error convention.
+struct PoseNees {
+  double pose = std::numeric_limits<double>::quiet_NaN();         ///< 6 = consistent
+  double position = std::numeric_limits<double>::quiet_NaN();     ///< 3
+  double orientation = std::numeric_limits<double>::quiet_NaN();  ///< 3
+  /// Of the pose as seen from the oldest clone: what the start has to do with it is gone. 6.
+  double relative = std::numeric_limits<double>::quiet_NaN();
+  std::vector<std::pair<double, double>> series;  ///< time [s], pose
+};
+
+/// Error of the filter's estimate at an epoch, with its own sigmas.
+struct PoseError {
+  double t_s = 0.;
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< estimate - truth, in G
+  Eigen::Vector3d position_sigma_m = Eigen::Vector3d::Zero();
+  double yaw_rad = 0.;  ///< estimate - truth, about the vertical
+  double yaw_sigma_rad = 0.;
+};
+
+/// What became of the factors of one update.
+struct UpdateTrack {
+  std::string name;
+  UpdateCounts total;
+  std::vector<int> applied;   ///< in each epoch, at RunResult::epoch_t_s
+  std::vector<int> rejected;  ///< likewise: by a gate, or not finite
+  UpdateFailures failures{};
+};
+
+/// Something that the estimator has to tell its user while it runs.
+struct MonitorWarning {
+  double t_s = 0.;
+  std::string text;                     ///< "no yaw rate for 5 s: ... - turn"
+  std::vector<std::string> parameters;  ///< which of the calibration it concerns
+};
+
+/// What the recent motion told about the calibration, now and then.
+struct MonitorTrack {
+  std::vector<double> t_s;
+  std::vector<std::string> parameters;
+  /// For each parameter over time: the sigma that the window alone would leave of the prior sigma,
+  /// 1: nothing was learned.
+  std::vector<std::vector<double>> sigma_ratio;
+  std::vector<int> held;  ///< over time: how many directions are held
+  std::vector<MonitorWarning> warnings;
+};
+
+/// A picture of a run at one instant (pictures.hpp).
+struct RunPicture {
+  double t_s = 0.;
+  std::string png;  ///< the bytes of the file
+};
+
+/// What the filter estimated without starting anew.
+struct RunPiece {
+  std::int64_t begin_ns = 0, end_ns = 0;  ///< stamps of the first and the last epoch
+  std::int64_t epochs = 0;
+  std::string failure;  ///< why it ended; "" for one that came to the end of the run
+};
+
+struct RunResult {
+  RunStatus status = RunStatus::kOk;
+  std::string cause;  ///< of a run that is not ok
+  std::int64_t epochs = 0;
+  double duration_s = 0.;
+  double wall_s = 0.;    ///< of the odometry, without reading
+  bool live = false;     ///< from sensors that gave what happened just then
+  Trajectory estimate;   ///< of the reference body B
+  Trajectory reference;  ///< planar
+  std::optional<eval::Accuracy> accuracy;
+  double nees_planar =
+      std::numeric_limits<double>::quiet_NaN();  ///< mean over epochs, 3 = consistent
+  PreintegratedPose total;  ///< from the first to the last epoch, without the parity information
+  std::vector<std::pair<double, double>> epoch_ms;        ///< time since start [s], time spent [ms]
+  std::vector<std::pair<std::string, StageTime>> stages;  ///< without the total
+  StageTime total_ms;                                     ///< of an epoch
+  std::vector<std::pair<std::string, RejectionCount>> rejections;
+  std::vector<NoiseFound> noises;     ///< "UPDATE.NAME", by updates that look for them
+  std::vector<std::string> warnings;  ///< what is suspicious of the run as a whole
+
+  // Of the filter.
+  PoseNees nees;
+  std::vector<PoseError> errors;  ///< where the reference is in the frame of the estimate
+  std::vector<double> epoch_t_s;
+  std::vector<CalibrationTrack> calibration;
+  std::vector<UpdateTrack> updates;
+  MonitorTrack monitor;
+  /// More than one: it diverged and was started again. Those without an epoch are not here.
+  std::vector<RunPiece> pieces;
+  /// Whether a RunStream has written trajectory, calibration and times; here they are thinned.
+  bool on_disk = false;
+  std::vector<RunPicture> pictures;  ///< for the page, in time order
+};
+
+StageTime stage_time(std::vector<double> ms);
+
+}  // namespace viwo

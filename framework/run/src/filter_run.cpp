@@ -1,0 +1,245 @@
+// A run of the filter: feed, record, evaluate.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "feed.hpp"
+#include "filter_start.hpp"
+#include "recorder.hpp"
+#include "restart.hpp"
+#include "running_warnings.hpp"
+#include "viwo/math/time_text.hpp"
+#include "viwo/plausibility/plausibility.hpp"
+#include "viwo/run/run.hpp"
+#include "viwo/run/warnings.hpp"
+
+namespace viwo {
+namespace {
+
+/// Feed::next(); once there are results, a sensor that breaks is the cause of a run that failed.
+bool next(Feed& feed, Estimator& estimator, std::string& cause) {
+  try {
+    return feed.next(estimator);
+  } catch (const std::exception& error) {
+    if (estimator.epochs() == 0) throw;
+    cause = error.what();
+    return false;
+  }
+}
+
+/// Estimator::step(); what a kinematic model throws becomes the cause of a run that failed.
+bool step(Estimator& estimator, std::string& cause) {
+  try {
+    return estimator.step();
+  } catch (const PluginFailure& failure) {
+    cause = std::string(failure.what()) + " (epoch " + std::to_string(estimator.epochs() + 1) + ")";
+    return false;
+  }
+}
+
+/// Why a run did not begin: what was in the way of its start, the most frequent first.
+std::string no_epoch(const FilterSetup& setup, const Estimator& estimator) {
+  if (setup.start.mode == StartMode::kReference || estimator.filter().initialized()) {
+    return "the measurements do not make a single epoch";
+  }
+  std::vector<StartObstacle> obstacles(estimator.start_obstacles().begin(),
+                                       estimator.start_obstacles().end());
+  std::stable_sort(obstacles.begin(), obstacles.end(),
+                   [](const auto& a, const auto& b) { return a.count > b.count; });
+  std::int64_t attempts = 0;
+  for (const StartObstacle& obstacle : obstacles) attempts += obstacle.count;
+  std::string text = "no state to start from was found in the measurements";
+  const char* separator = ": ";
+  for (const StartObstacle& obstacle : obstacles) {
+    text += separator + std::string(obstacle.text) + " (" + std::to_string(obstacle.count) +
+            " of " + std::to_string(attempts) + " attempts)";
+    separator = ", ";
+  }
+  if (setup.start.mode == StartMode::kStandstill) {
+    const bool sees_motion = !setup.wheels.empty() || !setup.cameras.empty();
+    text += sees_motion ? " - choose start: moving, or reference" : " - choose start: reference";
+  }
+  return text;
+}
+
+/// How a run has ended, and how accurate it was.
+void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& result) {
+  if (!result.epoch_t_s.empty()) result.duration_s = result.epoch_t_s.back();
+  const auto lost = std::find_if(result.pieces.begin(), result.pieces.end(),
+                                 [](const RunPiece& piece) { return !piece.failure.empty(); });
+  if (!result.cause.empty()) {
+    result.status = RunStatus::kFailed;
+  } else if (!estimator.failure().empty() && result.pieces.size() <= 1) {
+    result.status = RunStatus::kDiverged;
+    result.cause = estimator.failure() + " (epoch " + std::to_string(result.epochs) + ", " +
+                   std::to_string(result.duration_s) + " s)";
+  } else if (lost != result.pieces.end()) {
+    const double lost_s = seconds_between(result.pieces.front().begin_ns, lost->end_ns);
+    result.status = RunStatus::kDiverged;
+    result.cause = lost->failure + " (" + std::to_string(lost_s) + " s); started anew, in " +
+                   std::to_string(result.pieces.size()) + " pieces";
+  } else if (result.epochs == 0) {
+    result.status = RunStatus::kFailed;
+    result.cause = no_epoch(*setup.filter, estimator);
+  }
+  for (std::string& line : contradictions(result.updates)) {
+    result.warnings.push_back(std::move(line));
+  }
+  const std::vector<RejectionCount> rejections = estimator.rejections();
+  const std::int64_t begin_ns = result.pieces.empty() ? 0 : result.pieces.front().begin_ns;
+  for (std::string& line : suspicions(rejections, result.noises, begin_ns)) {
+    result.warnings.push_back(std::move(line));
+  }
+  for (std::string& line : far_from_prior(result.calibration)) {
+    result.warnings.push_back(std::move(line));
+  }
+  if (result.status == RunStatus::kOk && !result.reference.empty()) {
+    result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);
+  }
+}
+
+/// One run, with as many estimators as it takes.
+class FilterRun {
+ public:
+  FilterRun(const RunSetup& setup, const RunData& data, const RunHooks& hooks)
+      : setup_(setup),
+        data_(data),
+        hooks_(hooks),
+        live_(!data.live.empty()),
+        warnings_(hooks),
+        plausibility_(setup, live_) {
+    result_.rejections = data.rejections;
+    result_.warnings = setup.warnings;
+    result_.live = live_;
+    // Made where it stays: those who watch it keep references.
+    estimator_.reset(new Estimator(make_estimator(*setup.filter, live_)));
+    start(*estimator_, setup, data);
+    if (hooks.on_start) observer_ = hooks.on_start(*estimator_);
+    estimator_->observe(observer_);
+    recorder_.emplace(setup, data, estimator_->filter(), result_);
+    if (restarts()) healthy_.emplace(estimator_->filter());
+    feed_ = live_ ? feed_live(setup, data, hooks, plausibility_)
+                  : feed_recorded(setup, data, plausibility_);
+  }
+
+  RunResult run() {
+    const auto begin = Clock::now();
+    bool more = true;
+    while (more && result_.cause.empty() && !is_interrupted()) {
+      more = next(*feed_, *estimator_, result_.cause);
+      if (!more) estimator_->finish();
+      make_epochs();
+      warnings_.say(now_s(), plausibility_.findings());
+      if (!estimator_->failure().empty() && !begin_anew(more)) break;
+    }
+    feed_->finish(result_);
+    recorder_->end_piece(*estimator_, estimator_->failure());
+    recorder_->finish(*estimator_);
+    // Beside sensors that work while it runs, the filter's own time says little.
+    result_.wall_s = data_.streams.empty() && !live_ ? wall_s_ : seconds_since(begin);
+    plausibility_.finish();
+    for (const Finding& finding : plausibility_.findings()) {
+      result_.warnings.push_back(finding.text);
+    }
+    conclude(setup_, *estimator_, result_);
+    return std::move(result_);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// Who has been started anew this often is not going to do better.
+  static constexpr std::size_t kMostPieces = 1000;
+
+  static double seconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+  }
+
+  double now_s() const { return result_.epoch_t_s.empty() ? 0. : result_.epoch_t_s.back(); }
+
+  bool restarts() const {
+    const Restart restart = setup_.filter->restart;
+    return restart == Restart::kAlways || (restart == Restart::kLive && live_);
+  }
+
+  /// A live run is ended by its feed.
+  bool is_interrupted() {
+    if (live_ || !hooks_.interrupted || !hooks_.interrupted()) return false;
+    result_.warnings.push_back("interrupted at " + time_text(std::llround(1e9 * now_s())) +
+                               ": the rest of the recording was not used");
+    return true;
+  }
+
+  void make_epochs() {
+    while (!feed_->is_over()) {
+      const auto begin = Clock::now();
+      const bool stepped = step(*estimator_, result_.cause);
+      wall_s_ += seconds_since(begin);
+      if (!stepped) break;
+      recorder_->record(*estimator_);
+      if (healthy_) healthy_->epoch(*estimator_);
+      if (result_.epochs == 1) plausibility_.begin_at(result_.pieces.front().begin_ns);
+      warnings_.epoch(result_, *estimator_);
+      if (live_) {
+        const int piece = static_cast<int>(result_.pieces.size()) - 1;
+        feed_->on_epoch(*estimator_, piece, warnings_.now(now_s()));
+      }
+      if (hooks_.on_epoch) hooks_.on_epoch(result_);
+      tell_progress();
+    }
+  }
+
+  void tell_progress() {
+    if (!hooks_.progress || live_) return;
+    const auto imu = data_.imu();
+    const double log_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
+    if (!(log_s > 0.)) return;
+    hooks_.progress(seconds_between(imu.front().t_ns, estimator_->filter().t_ns()) / log_s);
+  }
+
+  /// The estimator has failed. False where the run is to end with that.
+  bool begin_anew(bool more) {
+    const std::string failure = estimator_->failure();
+    if (!healthy_ || !more || result_.pieces.size() >= kMostPieces) return false;
+    std::unique_ptr<Estimator> next;
+    try {
+      const std::optional<FilterSetup> setup = again(*setup_.filter, healthy_->after_failure());
+      if (!setup) return false;
+      next.reset(new Estimator(make_estimator(*setup, live_)));
+      constexpr std::int64_t kLaterNs = 1'000'000'000;  // than what it has been given already
+      start(*next, setup_, data_, estimator_->filter().t_ns() + kLaterNs);
+    } catch (const std::exception& error) {
+      result_.warnings.push_back(std::string("it could not be started anew: ") + error.what());
+      return false;
+    }
+    warnings_.tell(now_s(), failure + "; starting anew");
+    recorder_->end_piece(*estimator_, failure);
+    estimator_ = std::move(next);
+    estimator_->observe(observer_);
+    return true;
+  }
+
+  const RunSetup& setup_;
+  const RunData& data_;
+  const RunHooks& hooks_;
+  bool live_;
+  RunResult result_;
+  std::unique_ptr<Estimator> estimator_;
+  EstimatorObserver* observer_ = nullptr;
+  std::optional<Recorder> recorder_;
+  std::optional<HealthyState> healthy_;  ///< of a run that may start anew
+  RunningWarnings warnings_;
+  Plausibility plausibility_;  ///< outlives the feed
+  std::unique_ptr<Feed> feed_;
+  double wall_s_ = 0.;
+};
+
+}  // namespace
+
+RunResult run_filter(const RunSetup& setup, const RunData& data, const RunHooks& hooks) {
+  return FilterRun(setup, data, hooks).run();
+}
+
+}  // namespace viwo

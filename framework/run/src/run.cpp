@@ -1,0 +1,183 @@
+#include "viwo/run/run.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cinttypes>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <numeric>
+#include <string>
+
+#include <Eigen/Dense>
+
+#include "viwo/eval/consistency.hpp"
+#include "viwo/math/se2.hpp"
+#include "viwo/math/time_text.hpp"
+
+namespace viwo {
+
+const char* name(RunStatus status) {
+  switch (status) {
+    case RunStatus::kOk:
+      return "ok";
+    case RunStatus::kDiverged:
+      return "diverged";
+    case RunStatus::kFailed:
+      break;
+  }
+  return "failed";
+}
+
+namespace {
+
+StampedPose stamped(std::int64_t t_ns, const Eigen::Vector3d& pose) {
+  const Eigen::AngleAxisd about_z(pose[0], Eigen::Vector3d::UnitZ());
+  return {t_ns, {pose[1], pose[2], 0.}, Eigen::Quaterniond(about_z)};
+}
+
+/// Instants of the estimate, in the wheel clock: every epoch_s from the first to the last instant
+/// that wheels (and reference) cover.
+std::vector<std::int64_t> epoch_stamps(const RunSetup& setup, const RunData& data,
+                                       std::int64_t offset_ns) {
+  std::int64_t begin_ns = data.wheels().front().begin_ns;
+  std::int64_t end_ns = data.wheels().back().end_ns;
+  if (!data.reference.empty()) {
+    begin_ns = std::max(begin_ns, data.reference.front().t_ns - offset_ns);
+    end_ns = std::min(end_ns, data.reference.back().t_ns - offset_ns);
+  }
+  if (begin_ns >= end_ns) {
+    throw InputError("the encoder samples of '" + data.wheels_name +
+                     "' and the reference have no time in common");
+  }
+  const auto period_ns = static_cast<std::int64_t>(std::llround(setup.epoch_s * 1e9));
+  std::vector<std::int64_t> stamps;
+  for (std::int64_t t_ns = begin_ns; t_ns < end_ns; t_ns += std::max<std::int64_t>(period_ns, 1)) {
+    stamps.push_back(t_ns);
+  }
+  stamps.push_back(end_ns);
+  return stamps;
+}
+
+/// Mean over the epochs of the squared error of the odometry since the start, normalised by what
+/// encoder noise and the uncertainty of the intrinsics explain. The error is the logarithm of the
+/// estimate seen from the truth, in which the bent clouds of dead reckoning are nearly Gaussian.
+class PlanarNees {
+ public:
+  /// P is the covariance of `estimate` as [theta, x, y].
+  void add(const Eigen::Vector3d& estimate, const Eigen::Vector3d& reference,
+           const Eigen::Matrix3d& P) {
+    Eigen::Matrix3d into_body = Eigen::Matrix3d::Identity();
+    into_body.block<2, 2>(1, 1) = R2(-estimate[0]);
+    const double value =
+        eval::nees(log_se2(between(reference, estimate)), into_body * P * into_body.transpose());
+    if (!std::isfinite(value)) return;
+    sum_ += value;
+    ++count_;
+  }
+  double mean() const { return count_ > 0 ? sum_ / count_ : std::nan(""); }
+
+ private:
+  double sum_ = 0.;
+  int count_ = 0;
+};
+
+}  // namespace
+
+StageTime stage_time(std::vector<double> ms) {
+  StageTime stage;
+  if (ms.empty()) return stage;
+  stage.mean_ms = std::accumulate(ms.begin(), ms.end(), 0.) / static_cast<double>(ms.size());
+  std::sort(ms.begin(), ms.end());
+  stage.p95_ms = ms[(ms.size() - 1) * 95 / 100];
+  stage.max_ms = ms.back();
+  return stage;
+}
+
+RunResult run_odometry(const RunSetup& setup, const RunData& data) {
+  RunResult result;
+  result.rejections = data.rejections;
+  result.reference = data.reference;
+  const auto offset_ns =
+      static_cast<std::int64_t>(std::llround(setup.reference_time_offset_s * 1e9));
+  const auto stamps = epoch_stamps(setup, data, offset_ns);
+  const Eigen::Vector3d O_in_B(setup.extrinsics[2], setup.extrinsics[0], setup.extrinsics[1]);
+  const Eigen::Vector3d B_in_O = between(O_in_B, Eigen::Vector3d::Zero());
+  const auto reference_at = [&](std::int64_t t_ns) {
+    return interpolate(data.reference, t_ns + offset_ns, setup.reference_max_gap_s);
+  };
+  const auto start = reference_at(stamps.front());
+  const Eigen::Vector3d B_start = start ? planar(*start) : Eigen::Vector3d::Zero();
+  const Eigen::Vector3d O_start = compose(B_start, O_in_B);
+
+  const auto wheels = data.wheels();
+  Preintegrator preintegrator(setup.model, setup.preintegration);
+  preintegrator.set_intrinsics(setup.x_WI);
+  PreintegratedPose interval;
+  result.total.reset(setup.model->n_intrinsics());
+  PlanarNees nees;
+  result.estimate.push_back(stamped(stamps.front() + offset_ns, B_start));
+  const auto wall_begin = std::chrono::steady_clock::now();
+  for (std::size_t k = 1; k < stamps.size() && result.status == RunStatus::kOk; ++k) {
+    const auto epoch_begin = std::chrono::steady_clock::now();
+    try {
+      preintegrator.integrate(wheels, stamps[k - 1], stamps[k], interval);
+    } catch (const PluginFailure& failure) {
+      result.status = RunStatus::kFailed;
+      result.cause = std::string(failure.what()) + " (epoch " + std::to_string(k) + ")";
+      break;
+    }
+    append(result.total, interval);
+    const std::chrono::duration<double, std::milli> spent =
+        std::chrono::steady_clock::now() - epoch_begin;
+    const double t_s = seconds_between(stamps.front(), stamps[k]);
+    result.epoch_ms.emplace_back(t_s, spent.count());
+    ++result.epochs;
+    if (!result.total.g.allFinite() || !result.total.P_g.allFinite()) {
+      result.status = RunStatus::kDiverged;
+      result.cause = "the pose is not finite after epoch " + std::to_string(k) + " (" +
+                     std::to_string(t_s) + " s)";
+      break;
+    }
+    const Eigen::Vector3d O_now = compose(O_start, result.total.g);
+    result.estimate.push_back(stamped(stamps[k] + offset_ns, compose(O_now, B_in_O)));
+    if (const auto truth = reference_at(stamps[k]); truth && start) {
+      const auto scaled = (result.total.J_g_WI * setup.sigma.asDiagonal()).eval();
+      const Eigen::Matrix3d P = result.total.P_g + scaled * scaled.transpose();
+      nees.add(result.total.g, between(O_start, compose(planar(*truth), O_in_B)), P);
+    }
+  }
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - wall_begin;
+  result.wall_s = wall.count();
+  result.duration_s = seconds_between(stamps.front(), stamps.back());
+  std::vector<double> spent_ms;
+  for (const auto& [t_s, ms] : result.epoch_ms) spent_ms.push_back(ms);
+  result.total_ms = stage_time(spent_ms);
+  result.stages = {{"preintegration", result.total_ms}};
+  // Nothing is estimated while running here: the same at the start and at the end.
+  result.epoch_t_s = {0., result.duration_s};
+  for (int i = 0; i < setup.model->n_intrinsics(); ++i) {
+    CalibrationTrack track;
+    const IntrinsicSpec& spec = setup.model->description().intrinsics[static_cast<std::size_t>(i)];
+    track.name = spec.name;
+    track.unit = spec.unit;
+    track.estimate.assign(2, setup.x_WI[i]);
+    track.sigma.assign(2, setup.sigma[i]);
+    if (const auto truth = data.calibration.find(track.name); truth != data.calibration.end()) {
+      track.truth = truth->second;
+      track.final_error = setup.x_WI[i] - truth->second;
+    }
+    result.calibration.push_back(std::move(track));
+  }
+  if (result.status == RunStatus::kOk && result.total.rejected >= result.total.samples) {
+    result.status = RunStatus::kFailed;
+    result.cause = "none of the encoder samples could be used";
+  }
+  if (result.status == RunStatus::kOk && !data.reference.empty()) {
+    result.accuracy = eval::evaluate(data.reference, result.estimate, setup.evaluation);
+    result.nees_planar = nees.mean();
+  }
+  return result;
+}
+
+}  // namespace viwo

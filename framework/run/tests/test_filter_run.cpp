@@ -1,0 +1,210 @@
+// Runs of the filter: their progress, and what is written of what their sensors give.
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "held_gauge.hpp"
+#include "sensors_in_memory.hpp"
+#include "simulated.hpp"
+#include "viwo/math/so3.hpp"
+#include "viwo/math/time_text.hpp"
+#include "viwo/run/simulate.hpp"
+#include "viwo/run/warnings.hpp"
+
+namespace viwo {
+namespace {
+
+using testing::InMemory;
+using testing::registry;
+using testing::set_sensors;
+
+/// A simulated swerve robot for ten seconds; nobody takes the images.
+RunSetup inertia_and_wheels() {
+  const config::Node run = config::parse(
+      testing::swerve_with_camera(10) + "updates: {wheel_odometry: {}}\n", "run.yaml");
+  return read_run(run, registry(), 1);
+}
+
+TEST(FilterRun, TellsItsProgressAsPartOfTheTimeOfTheLog) {
+  RunSetup setup = inertia_and_wheels();
+  const RunData data = collect(setup);
+  std::vector<double> fractions;
+  RunHooks hooks;
+  hooks.progress = [&](double fraction) { fractions.push_back(fraction); };
+  const RunResult result = viwo::run(setup, data, hooks);
+  ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
+  ASSERT_EQ(fractions.size(), static_cast<std::size_t>(result.epochs));
+  const auto imu = data.imu();
+  const double log_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
+  for (std::size_t i = 0; i < fractions.size(); ++i) {
+    const double t_s = seconds_between(imu.front().t_ns, result.estimate[i].t_ns);
+    EXPECT_DOUBLE_EQ(fractions[i], t_s / log_s);
+  }
+  EXPECT_GT(fractions.back(), 0.95);
+  EXPECT_LE(fractions.back(), 1.);
+}
+
+TEST(FilterRun, TellsTheErrorOfTheCalibrationFromItsFirstEpochOn) {
+  RunSetup setup = inertia_and_wheels();
+  const RunData data = collect(setup);
+  RunHooks hooks;
+  std::int64_t epochs = 0;
+  hooks.on_epoch = [&](const RunResult& result) {
+    ++epochs;
+    for (const CalibrationTrack& track : result.calibration) {
+      EXPECT_TRUE(std::isfinite(track.truth)) << track.name << " at epoch " << epochs;
+      EXPECT_TRUE(std::isfinite(track.final_error)) << track.name << " at epoch " << epochs;
+    }
+  };
+  const RunResult result = viwo::run(setup, data, hooks);
+  EXPECT_EQ(result.calibration.size(), 23U);
+  EXPECT_EQ(epochs, result.epochs);
+  EXPECT_GT(epochs, 30);
+}
+
+TEST(FilterRun, EndsWithItsResultsWhenItIsInterrupted) {
+  RunSetup setup = inertia_and_wheels();
+  const RunData data = collect(setup);
+  bool interrupted = false;
+  RunHooks hooks;
+  hooks.interrupted = [&] { return interrupted; };
+  hooks.on_epoch = [&](const RunResult& result) {
+    if (result.epochs == 20) interrupted = true;
+  };
+  const RunResult result = viwo::run(setup, data, hooks);
+  EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
+  EXPECT_EQ(result.epochs, 20);
+  EXPECT_EQ(result.estimate.size(), 20U);
+  EXPECT_TRUE(result.accuracy);
+  ASSERT_EQ(result.warnings.size(), 1U);
+  EXPECT_EQ(result.warnings[0],
+            "interrupted at " +
+                time_text(result.estimate.back().t_ns - result.estimate.front().t_ns) +
+                ": the rest of the recording was not used");
+}
+
+TEST(FilterRun, RefusesASensorThatGivesNothingOfWhatAnUpdateNeeds) {
+  RunSetup setup = inertia_and_wheels();
+  const RunData data = collect(setup);
+  const auto imu = std::make_shared<InMemory>(sample_types<ImuSample, StateSample>(),
+                                              std::vector<Measurement>{ImuSample(), StateSample()});
+  const auto silent =
+      std::make_shared<InMemory>(sample_types<EncoderSample>(), std::vector<Measurement>());
+  set_sensors(setup, {{"imu0", imu}, {"wheels0", silent}});
+  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
+            "run.yaml:2:3  sensor 'wheels0' gave no encoders, which wheel_odometry needs");
+}
+
+TEST(FilterRun, RefusesASensorThatGivesWhatItDoesNotYield) {
+  RunSetup setup = inertia_and_wheels();
+  const auto imu = std::make_shared<InMemory>(sample_types<ImuSample, EncoderSample>(),
+                                              std::vector<Measurement>{ImuSample(), PoseSample()});
+  set_sensors(setup, {{"imu0", imu}});
+  EXPECT_EQ(testing::error_of([&] { collect(setup); }),
+            "sensor 'imu0' gives poses, which it does not say it yields");
+}
+
+TEST(FilterRun, AStartFromMotionHasTheWheelsWithoutAnyUpdate) {
+  const config::Node run = config::parse(
+      testing::swerve_with_camera(10) + "estimator: {type: msckf, start: moving}\n", "run.yaml");
+  RunSetup setup = read_run(run, registry(), 1);
+  const RunResult result = viwo::run(setup, collect(setup));
+  EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
+  EXPECT_GT(result.epochs, 30);
+}
+
+/// The same robot without its wheels.
+std::string swerve_without_wheels(int features) {
+  std::string all = testing::swerve_with_camera(features);
+  // A circle tells one camera little of its scale.
+  all.replace(all.find("motion: circle"), 14, "motion: icr_sweep");
+  return all.substr(0, all.find("kinematics:"));
+}
+
+TEST(FilterRun, AStartFromMotionHasImagesWhereThereAreNoWheels) {
+  const config::Node run = config::parse(
+      swerve_without_wheels(60) + "cameras: {kalibr: " VIWO_TEST_SOURCE_DIR
+                                  "/configs/cameras/pinhole.yaml, calibrate: false}\n"
+                                  "estimator: {start: moving}\nupdates: {visual_features: {}}\n",
+      "run.yaml");
+  RunSetup setup = read_run(run, registry(), 1);
+  const RunData data = collect(setup);
+  const RunResult result = viwo::run(setup, data);
+  ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
+  EXPECT_LT(seconds_between(data.imu().front().t_ns, result.estimate.front().t_ns), 2.5);
+}
+
+TEST(FilterRun, AStartFromMotionNeedsWheelsOrTracks) {
+  const config::Node run = config::parse(
+      swerve_without_wheels(10) + "estimator: {type: msckf, start: moving}\n", "run.yaml");
+  RunSetup setup = read_run(run, registry(), 1);
+  const RunData data = collect(setup);
+  EXPECT_EQ(testing::error_of([&] { viwo::run(setup, data); }),
+            "estimator.start: moving needs wheels, or cameras and an update that takes their "
+            "tracks - choose standstill or reference");
+}
+
+TEST(HeldGauge, BringsATruthOfAnotherFrameIntoTheOneThatTheEstimateHolds) {
+  const RunSetup setup = inertia_and_wheels();
+  const WheelModel& model = *setup.model;
+  WheelsView here;
+  here.x_WI = model.nominal();
+  here.R_ItoO = exp_so3({0.02, -0.01, 0.3});
+  here.p_IinO = {0.1, -0.05, 0.2};
+  // The same base told in a frame that is turned by 0.2 rad and shifted.
+  const Eigen::Vector3d g(0.2, 0.03, -0.02);
+  WheelsView there = here;
+  ASSERT_EQ(model.model().move_frame(g, there.x_WI), Status::kOk);
+  there.R_ItoO = exp_so3({0., 0., -0.2}) * here.R_ItoO;
+  there.p_IinO = exp_so3({0., 0., -0.2}) * (here.p_IinO - Eigen::Vector3d(0.03, -0.02, 0.));
+  EXPECT_GT((there.x_WI - here.x_WI).norm(), 0.1);
+  ASSERT_TRUE(move_to_held_gauge(model, here.x_WI, there));
+  EXPECT_LT((there.x_WI - here.x_WI).norm(), 1e-9);
+  EXPECT_LT((there.R_ItoO - here.R_ItoO).norm(), 1e-9);
+  EXPECT_LT((there.p_IinO - here.p_IinO).norm(), 1e-9);
+}
+
+TEST(SimulateResult, IsDescribedByWhatThereIs) {
+  SimulateResult result;
+  result.counts["imu"] = 2001;
+  EXPECT_EQ(describe(result), "2001 IMU samples");
+  result.counts["tracks"] = 1;
+  EXPECT_EQ(describe(result), "2001 IMU samples and 1 tracked image");
+  result.counts["encoders"] = 11;
+  result.counts["poses"] = 12;
+  EXPECT_EQ(describe(result),
+            "2001 IMU samples, 1 tracked image, 11 encoder samples and 12 reference poses");
+  result.counts["reference states"] = 13;  // the truth: poses are measured
+  result.counts["true calibration"] = 14;
+  EXPECT_EQ(
+      describe(result),
+      "2001 IMU samples, 1 tracked image, 11 encoder samples, 12 measured poses, 13 reference "
+      "states and 14 true parameters");
+  result.counts = {{"imu", 1}};
+  result.left_out["gnss fixes"] = 15;  // there is no table for them
+  EXPECT_EQ(describe(result),
+            "1 IMU sample; not written, as there is no table for them: 15 gnss fixes");
+}
+
+TEST(Suspicions, HaveTimesSinceTheStartOfTheRun) {
+  const auto place = [](const std::string& first) {
+    const RejectionCount count{"what", 30, first, 100};
+    const std::string line = suspicions({&count, 1}, {}, 1'400'000'000'500'000'000).at(0);
+    return line.substr(0, line.find(": check"));
+  };
+  EXPECT_EQ(place("stamp 1400000003000000000 ns"), "what - 30 of 100, t = 2.500 s");
+  EXPECT_EQ(place("t = 1400000003.000 s .. t = 1400000010.125 s"),
+            "what - 30 of 100, t = 2.500 s .. t = 9.625 s");
+  EXPECT_EQ(place("t = 0.25"), "what - 30 of 100, t = -1400000000.250 s");
+  EXPECT_EQ(place("data.csv:17"), "what - 30 of 100, data.csv:17");
+}
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,58 @@
+// A run configuration that has been read and checked.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viwo/config/node.hpp"
+#include "viwo/eval/accuracy.hpp"
+#include "viwo/plugin_host/registry.hpp"
+#include "viwo/setup/filter_setup.hpp"
+#include "viwo/setup/routes.hpp"
+#include "viwo/wheel/preintegration.hpp"
+
+namespace viwo {
+
+/// Where the reference body B is on the base: pose [x_m, y_m, yaw_rad] of O in B.
+using PlanarExtrinsics = Eigen::Vector3d;
+
+/// A sensor of a run. Its `input`, if it takes one, is a sensor before it.
+struct SensorEntry {
+  std::string name;
+  Loaded<Sensor> sensor;
+  std::string input;  ///< name of the sensor whose measurements it is given; "" for none
+};
+
+/// A run configuration that has been read and checked, its plugins loaded and its model ready.
+struct RunSetup {
+  std::string name;
+  std::uint64_t seed = 1;
+  Loaded<KinematicModel> kinematics;        ///< without object in a run without wheels
+  std::shared_ptr<const WheelModel> model;  ///< likewise null
+  Intrinsics x_WI;                          ///< to run with: nominal, or from a calibration file
+  Intrinsics sigma;  ///< how well they are known; 0 where the gauge holds an entry
+  PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
+  std::optional<PlanarExtrinsics> O_in_I;  ///< of the section `wheels`: where states are reference
+  std::vector<SensorEntry> sensors;        ///< those that take an input behind their input
+  PreintegrationOptions preintegration;
+  double epoch_s = 0.1;
+  double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
+  double reference_max_gap_s = 0.5;
+  eval::Options evaluation;
+  std::optional<FilterSetup> filter;           ///< nothing: dead reckoning from the wheels alone
+  Routes routes;                               ///< who gets what the sensors give
+  config::Mark kinematics_mark, sensors_mark;  ///< where the sections are written
+  config::Node resolved;              ///< all of it, with defaults: a valid run configuration
+  std::vector<std::string> warnings;  ///< what is suspicious in it, for those of the result
+};
+
+/// Reads a run configuration without placeholders. `seed` overrules the configured one; `exact`:
+/// without noise and wrong starts (HostServices::exact). Throws InputError with everything that is
+/// wrong in it.
+RunSetup read_run(const config::Node& run, PluginRegistry& plugins,
+                  std::optional<std::uint64_t> seed = {}, bool exact = false);
+
+}  // namespace viwo

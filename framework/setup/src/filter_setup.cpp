@@ -1,0 +1,398 @@
+#include "viwo/setup/filter_setup.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "filter_params.hpp"
+#include "section.hpp"
+#include "update_setup.hpp"
+#include "viwo/config/params.hpp"
+#include "viwo/config/suggest.hpp"
+#include "viwo/log/kalibr.hpp"
+#include "viwo/math/so3.hpp"
+#include "viwo/sim/body_trajectory.hpp"
+#include "viwo/sim/random.hpp"
+
+namespace viwo {
+namespace {
+
+using config::Errors;
+using config::Node;
+using Eigen::Vector3d;
+
+/// The values of a section, resolved; nothing if something in it is wrong.
+std::optional<ParamSet> read_section(const Node& section, const std::string& path,
+                                     std::span<const ParamSpec> specs, Node& resolved,
+                                     Errors& errors) {
+  const std::size_t before = errors.size();
+  const ParamSet params = config::read_params(section, section.mark(), path, specs, {}, {}, errors);
+  if (errors.size() > before) return std::nullopt;
+  resolved = config::write_params(specs, params);
+  return params;
+}
+
+std::optional<Vector3d> three(const ParamSet& params, const char* key, const Node& section,
+                              Errors& errors) {
+  const auto values = params.numbers(key);
+  if (values.size() == 3) return Vector3d(values[0], values[1], values[2]);
+  const Node* node = section.find(key);
+  errors.add(node != nullptr ? node->mark() : section.mark(),
+             "wheels." + std::string(key) + " needs three numbers");
+  return std::nullopt;
+}
+
+void read_estimator(const ParamSet& p, FilterSetup& setup) {
+  setup.options.filter.clones = static_cast<int>(p.integer("clones"));
+  setup.options.filter.first_estimates = p.flag("first_estimates");
+  setup.options.filter.gravity_m_per_s2 = p.number("gravity_m_per_s2");
+  setup.options.growing_window = p.flag("growing_window");
+  setup.options.schedule.max_epoch_s = p.number("max_epoch_s");
+  setup.options.schedule.max_wait_s = p.number("max_wait_s");
+  setup.options.imu.max_gap_s = p.number("max_imu_gap_s");
+  setup.options.health.max_speed_m_per_s = p.number("max_speed_m_per_s");
+  setup.options.runner.max_update_failures = static_cast<int>(p.integer("max_update_failures"));
+  setup.options.monitor.enabled = p.flag("monitor");
+  setup.options.monitor.window_s = p.number("monitor_window_s");
+  setup.options.monitor.min_information = p.number("monitor_min_information");
+  setup.options.monitor.hold = p.flag("hold_unexcited");
+  setup.restart = p.text("restart") == "always"  ? Restart::kAlways
+                  : p.text("restart") == "never" ? Restart::kNever
+                                                 : Restart::kLive;
+  StartSetup& start = setup.start;
+  start.mode = p.text("start") == "standstill" ? StartMode::kStandstill
+               : p.text("start") == "moving"   ? StartMode::kMoving
+                                               : StartMode::kReference;
+  start.window_s = p.number("start_window_s");
+  start.sigma_orientation_rad = p.number("sigma_start_orientation_rad");
+  start.sigma_position_m = p.number("sigma_start_position_m");
+  start.sigma_velocity_m_per_s = p.number("sigma_start_velocity_m_per_s");
+  start.sigma_gyro_bias_rad_per_s = p.number("sigma_start_gyro_bias_rad_per_s");
+  start.sigma_accel_bias_m_per_s2 = p.number("sigma_start_accel_bias_m_per_s2");
+  start.state_error_scale = p.number("start_error_scale");
+}
+
+/// What `read` reads from the file that `section` names with the key `kalibr`; nothing if it
+/// cannot.
+template <class Read>
+auto from_kalibr(const ParamSet& p, const Node& section, const std::string& path, Read read,
+                 Errors& errors) -> std::optional<decltype(read(p.text("kalibr")))> {
+  try {
+    return read(p.text("kalibr"));
+  } catch (const InputError& error) {
+    errors.add(section.find("kalibr")->mark(), path + ".kalibr: " + error.what());
+    return std::nullopt;
+  }
+}
+
+/// The noises of the section `imu`, as numbers or in a Kalibr file, whose numbers then are written
+/// into the resolved section in its place.
+void read_imu(ParamSet p, const Node& section, FilterSetup& setup, Node& resolved, Errors& errors) {
+  ImuNoise noise;
+  const std::pair<const char*, double&> numbers[] = {
+      {"sigma_gyro_rad_per_s_sqrt_hz", noise.gyro_rad_per_s_sqrt_hz},
+      {"sigma_accel_m_per_s2_sqrt_hz", noise.accel_m_per_s2_sqrt_hz},
+      {"sigma_gyro_walk_rad_per_s2_sqrt_hz", noise.gyro_walk_rad_per_s2_sqrt_hz},
+      {"sigma_accel_walk_m_per_s3_sqrt_hz", noise.accel_walk_m_per_s3_sqrt_hz}};
+  if (!p.text("kalibr").empty()) {
+    for (const auto& [key, value] : numbers) {
+      const Node::Entry* const written = section.find_entry(key);
+      if (written == nullptr) continue;
+      errors.add(written->key_mark,
+                 "imu." + std::string(key) + ": imu.kalibr gives it, too - write either");
+    }
+    const auto from_file = from_kalibr(p, section, "imu", log::read_kalibr_imu, errors);
+    if (!from_file) return;
+    noise = *from_file;
+    for (const auto& [key, value] : numbers) p.set(key, value);
+    p.set("kalibr", std::string());
+    resolved.set("imu", config::write_params(kImuParams, p));
+  }
+  for (const auto& [key, value] : numbers) value = p.number(key);
+  setup.options.filter.imu_noise = noise;
+  setup.options.imu.max_gyro_rad_per_s = p.number("range_gyro_rad_per_s");
+  setup.options.imu.max_accel_m_per_s2 = p.number("range_accel_m_per_s2");
+}
+
+/// How wrong calibration starts, in prior sigmas.
+struct CalibrationError {
+  enum class Draw { kGaussian, kSign, kPlus };
+  double scale = 0.;
+  Draw draw = Draw::kGaussian;
+};
+
+CalibrationError read_calibration_error(const ParamSet& p) {
+  using Draw = CalibrationError::Draw;
+  const std::string_view draw = p.text("calibration_error");
+  return {p.number("calibration_error_scale"), draw == "plus"   ? Draw::kPlus
+                                               : draw == "sign" ? Draw::kSign
+                                                                : Draw::kGaussian};
+}
+
+/// Draws how wrong calibration starts: the same whether it is then calibrated or not.
+class WrongStart {
+ public:
+  WrongStart(CalibrationError error, std::uint64_t seed, std::uint64_t index)
+      : error_(error), random_(seed, sim::Stream::kCalibrationError, index) {}
+  double draw(double sigma) {
+    const double gaussian = random_.gaussian();
+    switch (error_.draw) {
+      case CalibrationError::Draw::kSign:
+        return std::copysign(error_.scale * sigma, gaussian);
+      case CalibrationError::Draw::kPlus:
+        return error_.scale * sigma;
+      default:
+        return error_.scale * sigma * gaussian;
+    }
+  }
+  /// Each axis.
+  Vector3d draw(const Vector3d& sigma) {
+    Vector3d errors;
+    for (int i = 0; i < 3; ++i) errors[i] = draw(sigma[i]);
+    return errors;
+  }
+  bool is_wrong() const { return error_.scale > 0.; }
+
+ private:
+  CalibrationError error_;
+  sim::RandomStream random_;
+};
+
+/// Draws of cameras follow those of any number of wheel sets.
+constexpr std::uint64_t kFirstCameraDraw = 1000;
+
+/// Moves a camera off by draws from its prior; what it was is remembered in `drawn_from`.
+void make_wrong(CameraPrior& prior, std::size_t index, WrongStart& wrong,
+                std::map<std::string, double>& drawn_from) {
+  if (!wrong.is_wrong()) return;
+  const std::string name = "cam" + std::to_string(index) + ".";
+  CameraView& camera = prior.camera;
+  const Vector3d theta = log_so3(camera.R_ItoC);
+  constexpr const char* kAxes[] = {"x", "y", "z"};
+  constexpr const char* kIntrinsics[] = {"fx", "fy", "cx", "cy", "d1", "d2", "d3", "d4"};
+  for (int i = 0; i < 3; ++i) {
+    drawn_from[name + "theta_ItoC_" + kAxes[i]] = theta[i];
+    drawn_from[name + "p_IinC_" + kAxes[i]] = camera.p_IinC[i];
+  }
+  for (int i = 0; i < 8; ++i) drawn_from[name + kIntrinsics[i]] = camera.intrinsics[i];
+  drawn_from[name + "t_CtoI"] = camera.t_CtoI_s;
+  camera.R_ItoC = exp_so3(wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()))) * camera.R_ItoC;
+  camera.p_IinC += wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
+  for (int i = 0; i < 8; ++i) camera.intrinsics[i] += wrong.draw(prior.sigma_intrinsics[i]);
+}
+
+void read_cameras(const ParamSet& p, const Node& section, CalibrationError error,
+                  std::uint64_t seed, FilterSetup& setup, Errors& errors) {
+  auto cameras = from_kalibr(p, section, "cameras", log::read_kalibr_cameras, errors);
+  if (!cameras) return;
+  const auto use = static_cast<std::size_t>(p.integer("use"));
+  if (use > cameras->size()) {
+    errors.add(section.find("use")->mark(), "cameras.use: there are only " +
+                                                std::to_string(cameras->size()) + " in " +
+                                                p.text("kalibr"));
+    return;
+  }
+  if (use > 0) cameras->resize(use);
+  const bool calibrates = p.flag("calibrate");
+  if (!calibrates) error.scale = 0.;
+  WrongStart clock(error, seed, kFirstCameraDraw);
+  const double later_s = clock.draw(p.number("sigma_t_CtoI_s"));
+  for (const CameraView& camera : *cameras) {
+    const std::size_t index = setup.cameras.size();
+    CameraPrior prior;
+    prior.camera = camera;
+    prior.shares_clock = p.flag("synchronised");
+    prior.sigma_extrinsics.head<3>().setConstant(p.number("sigma_orientation_rad"));
+    prior.sigma_extrinsics.tail<3>().setConstant(p.number("sigma_position_m"));
+    prior.sigma_intrinsics.head<4>().setConstant(p.number("sigma_focal_px"));
+    prior.sigma_intrinsics.tail<4>().setConstant(p.number("sigma_distortion"));
+    prior.sigma_clock_s = p.number("sigma_t_CtoI_s");
+    WrongStart wrong(error, seed, kFirstCameraDraw + 1 + index);
+    make_wrong(prior, index, wrong, setup.drawn_from);
+    const double own_s = wrong.draw(prior.sigma_clock_s);
+    if (wrong.is_wrong()) prior.camera.t_CtoI_s += prior.shares_clock ? later_s : own_s;
+    if (!calibrates || !p.flag("calibrate_extrinsics")) prior.sigma_extrinsics.setZero();
+    if (!calibrates || !p.flag("calibrate_intrinsics")) prior.sigma_intrinsics.setZero();
+    if (!calibrates || !p.flag("calibrate_time_offset")) prior.sigma_clock_s = 0.;
+    setup.cameras.push_back(prior);
+  }
+}
+
+/// A wheel set from its section `wheels`; the intrinsics and their sigmas are those of its model.
+void read_wheels(const ParamSet& p, const Node& section, WheelSet set, CalibrationError error,
+                 const ReadContext& context, FilterSetup& setup, Errors& errors) {
+  const auto p_IinO = three(p, "p_IinO_m", section, errors);
+  const auto rpy = three(p, "rpy_ItoO_rad", section, errors);
+  const auto sigma_p = three(p, "sigma_p_IinO_m", section, errors);
+  const auto sigma_R = three(p, "sigma_R_ItoO_rad", section, errors);
+  if (!p_IinO || !rpy || !sigma_p || !sigma_R) return;
+  WheelsPrior& prior = set.prior;
+  prior.sensor = p.text("sensor");
+  prior.wheels.model = &set.model->model();
+  prior.wheels.R_ItoO = sim::rotation_from_euler(rpy->z(), rpy->y(), rpy->x());
+  prior.wheels.p_IinO = *p_IinO;
+  prior.wheels.t_OtoI_s = p.number("t_OtoI_s");
+  prior.sigma_extrinsics << *sigma_R, *sigma_p;
+  prior.sigma_time_offset_s = p.number("sigma_t_OtoI_s");
+  if (!p.flag("hold_gauge")) {
+    for (Eigen::Index i = 0; i < prior.sigma_intrinsics.size(); ++i) {
+      const IntrinsicSpec& spec = set.model->description().intrinsics[static_cast<std::size_t>(i)];
+      if (spec.gauge_fixed) prior.sigma_intrinsics[i] = spec.prior_sigma;
+    }
+  }
+
+  WrongStart wrong(error, context.seed, setup.wheels.size());
+  const Vector3d turn = wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()));
+  const Vector3d shift = wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
+  const double later = wrong.draw(prior.sigma_time_offset_s);
+  if (wrong.is_wrong()) {
+    prior.wheels.R_ItoO = exp_so3(turn) * prior.wheels.R_ItoO;
+    prior.wheels.p_IinO += shift;
+    prior.wheels.t_OtoI_s += later;
+    for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
+      prior.wheels.x_WI[i] += wrong.draw(prior.sigma_intrinsics[i]);
+    }
+  }
+  prior.intrinsics_walk = p.number("intrinsics_walk_per_sqrt_s");
+  if (const double wander = p.number("intrinsics_wander"); wander > 0. && !context.exact) {
+    prior.sigma_wander.resize(prior.wheels.x_WI.size());
+    for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      prior.sigma_wander[i] = wander * set.model->description().intrinsics[k].prior_sigma;
+    }
+    prior.wander_time_s = p.number("intrinsics_wander_time_s");
+  }
+  if (!p.flag("calibrate_extrinsics")) prior.sigma_extrinsics.setZero();
+  if (!p.flag("calibrate_time_offset")) prior.sigma_time_offset_s = 0.;
+  if (!p.flag("calibrate_intrinsics")) prior.sigma_intrinsics.setZero();
+  setup.wheels.push_back(std::move(set));
+}
+
+/// Further wheel sets: NAME: {kinematics: {...}, wheels: {...}}.
+void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext& context,
+                     FilterSetup& setup, Node& resolved, Errors& errors) {
+  const Node* sets = run.find("wheel_sets");
+  if (sets == nullptr) return;
+  if (!sets->is_map()) {
+    errors.add(sets->mark(), "'wheel_sets' is a section NAME: {kinematics: ..., wheels: ...}");
+    return;
+  }
+  Node resolved_sets = Node::empty_map(sets->mark());
+  for (const auto& entry : sets->entries()) {
+    const std::string path = "wheel_sets." + entry.key;
+    const Node* kinematics = entry.value.is_map() ? entry.value.find("kinematics") : nullptr;
+    if (kinematics == nullptr) {
+      errors.add(entry.value.mark(), path + " needs a section 'kinematics'");
+      continue;
+    }
+    for (const auto& part : entry.value.entries()) {
+      if (part.key != "kinematics" && part.key != "wheels") {
+        errors.add(part.key_mark,
+                   path + ": unknown key '" + part.key + "' - known: kinematics, wheels");
+      }
+    }
+    const std::string model_path = path + ".kinematics";
+    const auto model = context.plugins.make_kinematics(
+        *kinematics, model_path, instance_seed(context.seed, "kinematics", model_path), errors);
+    const Node section = section_or_empty(entry.value, "wheels");
+    Node resolved_wheels;
+    const auto params =
+        read_section(section, path + ".wheels", kWheelsParams, resolved_wheels, errors);
+    if (!model.object || !params) continue;
+    WheelSet set;
+    set.prior.name = entry.key;
+    set.model = guarded(model.info, "describe",
+                        [&] { return std::make_shared<const WheelModel>(model.object); });
+    set.prior.wheels.x_WI = set.model->nominal();
+    set.prior.sigma_intrinsics = set.model->prior_sigma();
+    read_wheels(*params, section, std::move(set), error, context, setup, errors);
+    Node resolved_set = Node::empty_map();
+    resolved_set.set("kinematics", model.resolved);
+    resolved_set.set("wheels", resolved_wheels);
+    resolved_sets.set(entry.key, resolved_set);
+  }
+  resolved.set("wheel_sets", resolved_sets);
+}
+
+/// A wheel set whose sensor does not exist would get no samples and never say so.
+void check_wheel_sensors(const Node& run, const FilterSetup& setup, Errors& errors) {
+  const Node* sensors = run.find("sensors");
+  if (sensors == nullptr || !sensors->is_map()) return;
+  std::vector<std::string> names;
+  for (const auto& entry : sensors->entries()) names.push_back(entry.key);
+  for (const WheelSet& set : setup.wheels) {
+    const std::string &name = set.prior.name, &sensor = set.prior.sensor;
+    if (sensor.empty() || sensors->find(sensor) != nullptr) continue;
+    const Node* at = &run;
+    if (!name.empty()) at = at->find("wheel_sets")->find(name);
+    errors.add(at->find("wheels")->find("sensor")->mark(),
+               (name.empty() ? "" : "wheel_sets." + name + ".") + "wheels.sensor: no sensor '" +
+                   sensor + "'" + config::did_you_mean(sensor, names));
+  }
+}
+
+}  // namespace
+
+bool has_filter_sections(const Node& run) {
+  for (const char* key : {"estimator", "imu", "cameras", "wheels", "wheel_sets", "updates"}) {
+    if (run.find(key) != nullptr) return true;
+  }
+  return false;
+}
+
+bool wants_filter(const Node& run) {
+  if (const Node* estimator = run.find("estimator"); estimator != nullptr && estimator->is_map()) {
+    const Node* type = estimator->find("type");
+    if (type != nullptr && type->is_scalar() && type->scalar() != "auto") {
+      return type->scalar() == "msckf";
+    }
+  }
+  return run.find("updates") != nullptr;
+}
+
+FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>& model,
+                        const Intrinsics& x_WI, const Intrinsics& sigma, const ReadContext& context,
+                        Node& resolved, Errors& errors) {
+  FilterSetup setup;
+  const auto read = [&](const char* key, std::span<const ParamSpec> specs) {
+    Node section = Node::empty_map();
+    const auto params = read_section(section_or_empty(run, key), key, specs, section, errors);
+    if (params) resolved.set(key, section);
+    return params;
+  };
+  CalibrationError error;
+  if (const auto params = read("estimator", kEstimatorParams)) {
+    read_estimator(*params, setup);
+    if (setup.options.monitor.hold && !setup.options.monitor.enabled) {
+      errors.add(run.find("estimator")->mark(),
+                 "estimator.hold_unexcited needs estimator.monitor: true");
+    }
+    if (!context.exact) error = read_calibration_error(*params);
+    if (context.exact) setup.start.state_error_scale = 0.;
+  }
+  if (const auto params = read("imu", kImuParams)) {
+    read_imu(*params, section_or_empty(run, "imu"), setup, resolved, errors);
+  }
+  if (run.find("cameras") != nullptr) {
+    if (const auto params = read("cameras", kCamerasParams)) {
+      read_cameras(*params, *run.find("cameras"), error, context.seed, setup, errors);
+    }
+  }
+  if (model != nullptr) {
+    if (const auto params = read("wheels", kWheelsParams)) {
+      WheelSet set;
+      set.model = model;
+      set.prior.wheels.x_WI = x_WI;
+      set.prior.sigma_intrinsics = sigma;
+      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error, context, setup,
+                  errors);
+    }
+  }
+  read_wheel_sets(run, error, context, setup, resolved, errors);
+  check_wheel_sensors(run, setup, errors);
+  read_updates(run, context, setup, resolved, errors);
+  return setup;
+}
+
+}  // namespace viwo

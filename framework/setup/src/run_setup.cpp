@@ -1,0 +1,306 @@
+// Reading a run configuration.
+#include "viwo/setup/run_setup.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "camera_check.hpp"
+#include "section.hpp"
+#include "viwo/config/params.hpp"
+#include "viwo/setup/calibration_file.hpp"
+
+namespace viwo {
+namespace {
+
+using config::Node;
+
+constexpr std::array kRunParams{
+    ParamSpec{.name = "name",
+              .type = ParamType::kString,
+              .fallback = "run",
+              .help = "what tables and pages call this run"},
+    ParamSpec{.name = "seed",
+              .type = ParamType::kInt,
+              .fallback = "1",
+              .min = 0.,
+              .help = "seed of everything random"},
+};
+
+constexpr std::array kOdometryParams{
+    ParamSpec{.name = "twist",
+              .type = ParamType::kString,
+              .fallback = "auto",
+              .choices = "auto|plain|noise_weighted",
+              .help = "rows of the model weighted equally or by their noise; auto: as the "
+                      "calibration file was fitted, plain without one"},
+    ParamSpec{.name = "rank_tolerance",
+              .type = ParamType::kNumber,
+              .fallback = "0.01",
+              .min = 0.,
+              .max = 1.,
+              .min_exclusive = true,
+              .help = "rows whose directions spread less [rad] do not tell the velocity across"},
+    ParamSpec{.name = "parity_gate_probability",
+              .type = ParamType::kNumber,
+              .fallback = "0",
+              .min = 0.,
+              .max = 0.5,
+              .help = "samples whose parity residual is less likely than this are not believed; 0: "
+                      "no gate"},
+    ParamSpec{.name = "epoch_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0.1",
+              .min = 0.001,
+              .help = "time between two poses of the estimate"},
+    ParamSpec{.name = "reference_time_offset_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0",
+              .min = -10.,
+              .max = 10.,
+              .help = "t_reference = t_wheel + offset"},
+};
+
+constexpr std::array kEvaluationParams{
+    ParamSpec{.name = "alignment",
+              .type = ParamType::kString,
+              .fallback = "yaw_position",
+              .choices = "none|start|yaw_position|se3",
+              .help = "how the estimate is brought onto the reference for the absolute error"},
+    ParamSpec{.name = "segment_lengths_m",
+              .type = ParamType::kNumbers,
+              .unit = "m",
+              .fallback = "[]",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "path lengths of the relative pose error; none: two that the path has "
+                      "several of"},
+    ParamSpec{.name = "reference_max_gap_s",
+              .type = ParamType::kNumber,
+              .unit = "s",
+              .fallback = "0.5",
+              .min = 0.,
+              .min_exclusive = true,
+              .help = "longest gap of the reference that is interpolated over"},
+};
+
+/// The key `input` of a sensor's section; "" if there is none, or if it is wrong.
+std::string read_input(const Node::Entry& entry, const Node& sensors, const Loaded<Sensor>& loaded,
+                       config::Errors& errors) {
+  const std::string path = "sensors." + entry.key;
+  const Node* input = entry.value.is_map() ? entry.value.find("input") : nullptr;
+  if (!loaded.object) return "";
+  const bool takes_input =
+      guarded(loaded.info, "takes_input", [&] { return loaded.object->takes_input(); });
+  if (input == nullptr) {
+    if (takes_input) {
+      errors.add(entry.key_mark, path + ": '" + loaded.info.name +
+                                     "' needs 'input', the name of the sensor it works on");
+    }
+    return "";
+  }
+  if (!takes_input) {
+    errors.add(input->mark(), path + ".input: '" + loaded.info.name + "' takes no input");
+    return "";
+  }
+  if (!input->is_scalar() || sensors.find(input->scalar()) == nullptr) {
+    errors.add(input->mark(), path + ".input must be the name of another sensor of this run");
+    return "";
+  }
+  return input->scalar();
+}
+
+/// Every sensor behind its input. Sensors that have each other as inputs are errors.
+void place_behind_inputs(std::vector<SensorEntry> unplaced, const Node& sensors, RunSetup& setup,
+                         config::Errors& errors) {
+  const auto is_unplaced = [&unplaced](const std::string& name) {
+    return std::any_of(unplaced.begin(), unplaced.end(),
+                       [&](const SensorEntry& entry) { return entry.name == name; });
+  };
+  while (!unplaced.empty()) {
+    const auto ready = std::find_if(unplaced.begin(), unplaced.end(), [&](const SensorEntry& e) {
+      return e.input.empty() || !is_unplaced(e.input);
+    });
+    if (ready == unplaced.end()) {
+      errors.add(sensors.mark(), "sensors: '" + unplaced.front().name +
+                                     "' has itself as input, by way of others or not");
+      return;
+    }
+    setup.sensors.push_back(std::move(*ready));
+    unplaced.erase(ready);
+  }
+}
+
+void read_sensors(const Node& run, const ReadContext& context, RunSetup& setup,
+                  config::Errors& errors) {
+  const Node* sensors = run.find("sensors");
+  if (sensors == nullptr || !sensors->is_map() || sensors->entries().empty()) {
+    errors.add(sensors != nullptr ? sensors->mark() : run.mark(),
+               "'sensors' must be a section that names at least one sensor");
+    return;
+  }
+  setup.sensors_mark = sensors->mark();
+  Node resolved = Node::empty_map(sensors->mark());
+  constexpr std::string_view kHostKeys[] = {"input"};
+  std::uint64_t index = 0;
+  std::vector<SensorEntry> unplaced;
+  for (const auto& entry : sensors->entries()) {
+    // Sensors of one run have seeds of their own; the same sensor keeps its own in every variant.
+    const std::uint64_t seed = setup.seed * 1000 + index++;
+    auto loaded = context.plugins.make_sensor(entry.value, "sensors." + entry.key, seed, errors,
+                                              kHostKeys, context.exact);
+    Node section = loaded.resolved;
+    std::string input = read_input(entry, *sensors, loaded, errors);
+    if (!input.empty()) section.set("input", Node::scalar_of(input));
+    resolved.set(entry.key, section, entry.key_mark);
+    if (loaded.object) unplaced.push_back({entry.key, std::move(loaded), std::move(input)});
+  }
+  setup.resolved.set("sensors", resolved);
+  place_behind_inputs(std::move(unplaced), *sensors, setup, errors);
+}
+
+void read_kinematics(const Node& run, PluginRegistry& plugins, RunSetup& setup,
+                     config::Errors& errors) {
+  const Node* section = run.find("kinematics");
+  if (section == nullptr) {
+    if (!wants_filter(run)) {
+      errors.add(run.mark(), "'kinematics' is missing: the section of the kinematic model");
+    }
+    return;
+  }
+  setup.kinematics_mark = section->mark();
+  constexpr std::string_view kHostKeys[] = {"calibration"};
+  const std::uint64_t seed = instance_seed(setup.seed, "kinematics", "kinematics");
+  setup.kinematics = plugins.make_kinematics(*section, "kinematics", seed, errors, kHostKeys);
+  if (!setup.kinematics.object) return;
+  setup.model = guarded(setup.kinematics.info, "describe", [&] {
+    return std::make_shared<const WheelModel>(setup.kinematics.object);
+  });
+  setup.x_WI = setup.model->nominal();
+  setup.sigma = setup.model->prior_sigma();
+  Node resolved = setup.kinematics.resolved;
+  if (const Node* file = section->find("calibration")) {
+    if (!file->is_scalar()) {
+      errors.add(file->mark(), "kinematics.calibration must be the path of a calibration.yaml");
+      return;
+    }
+    const auto path = std::filesystem::absolute(
+        std::filesystem::path(file->mark().line > 0 ? file->mark().file : "").parent_path() /
+        file->scalar());
+    const CalibrationFile calibration =
+        read_calibration(path, *setup.model, setup.kinematics.info.name);
+    setup.x_WI = calibration.x_WI;
+    setup.sigma = calibration.sigma;
+    setup.extrinsics = calibration.extrinsics;
+    setup.preintegration.twist.noise_weighted = calibration.twist == "noise_weighted";
+    resolved.set("calibration", Node::scalar_of(path.lexically_normal().string()));
+  }
+  setup.resolved.set("kinematics", resolved);
+}
+
+void read_options(const Node& run, RunSetup& setup, config::Errors& errors) {
+  const Node odometry = section_or_empty(run, "odometry");
+  const Node evaluation = section_or_empty(run, "evaluation");
+  const std::size_t before = errors.size();
+  const ParamSet o =
+      config::read_params(odometry, odometry.mark(), "odometry", kOdometryParams, {}, {}, errors);
+  const ParamSet e = config::read_params(evaluation, evaluation.mark(), "evaluation",
+                                         kEvaluationParams, {}, {}, errors);
+  if (errors.size() > before) return;
+  if (o.text("twist") != "auto") {
+    setup.preintegration.twist.noise_weighted = o.text("twist") == "noise_weighted";
+  }
+  setup.preintegration.twist.rank_tolerance = o.number("rank_tolerance");
+  setup.preintegration.parity_gate_probability = o.number("parity_gate_probability");
+  setup.preintegration.parity = false;
+  setup.epoch_s = o.number("epoch_s");
+  setup.reference_time_offset_s = o.number("reference_time_offset_s");
+  for (const auto mode : {eval::Alignment::kNone, eval::Alignment::kStart,
+                          eval::Alignment::kYawPosition, eval::Alignment::kSe3}) {
+    if (e.text("alignment") == eval::name(mode)) setup.evaluation.alignment = mode;
+  }
+  const auto lengths = e.numbers("segment_lengths_m");
+  setup.evaluation.segment_lengths_m.assign(lengths.begin(), lengths.end());
+  setup.evaluation.max_reference_gap_s = e.number("reference_max_gap_s");
+  setup.reference_max_gap_s = e.number("reference_max_gap_s");
+  setup.resolved.set("odometry", config::write_params(kOdometryParams, o));
+  setup.resolved.set("evaluation", config::write_params(kEvaluationParams, e));
+}
+
+/// The sensor that the section `wheels` of a run names; "" for none.
+std::string wheels_sensor(const Node& run) {
+  const Node* wheels = run.find("wheels");
+  const Node* sensor = wheels != nullptr && wheels->is_map() ? wheels->find("sensor") : nullptr;
+  return sensor != nullptr && sensor->is_scalar() ? sensor->scalar() : "";
+}
+
+/// Who gets what; all sections have been read.
+Routes read_routes(const Node& run, const RunSetup& setup, std::vector<std::string> measuring,
+                   config::Errors& errors) {
+  std::vector<SensorYield> sensors;
+  for (const SensorEntry& entry : setup.sensors) {
+    SensorYield& sensor = sensors.emplace_back();
+    sensor.name = entry.name;
+    sensor.types =
+        guarded(entry.sensor.info, "yields", [&] { return entry.sensor.object->yields(); });
+  }
+  Wanted wanted;
+  if (setup.filter) wanted.streams = setup.filter->streams;
+  wanted.filter = setup.filter.has_value();
+  wanted.wheels = setup.model != nullptr;
+  wanted.wheels_sensor = wheels_sensor(run);
+  wanted.measuring = std::move(measuring);
+  return Routes::resolve(sensors, wanted, setup.sensors_mark, errors);
+}
+
+/// Pose of O in I, seen from above, as a wheel set's mount says.
+PlanarExtrinsics planar_mount(const WheelsView& wheels) {
+  const Eigen::Matrix3d R_OtoI = wheels.R_ItoO.transpose();
+  const Eigen::Vector3d p_OinI = -(R_OtoI * wheels.p_IinO);
+  return {p_OinI.x(), p_OinI.y(), std::atan2(R_OtoI(1, 0), R_OtoI(0, 0))};
+}
+
+}  // namespace
+
+RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed,
+                  bool exact) {
+  RunSetup setup;
+  config::Errors errors;
+  constexpr std::string_view kSections[] = {"sensors", "kinematics", "odometry",    "evaluation",
+                                            "imu",     "cameras",    "wheels",      "wheel_sets",
+                                            "updates", "estimator",  "placeholders"};
+  const ParamSet top =
+      config::read_params(run, run.mark(), "run", kRunParams, kSections, {}, errors);
+  if (errors.empty()) {
+    setup.name = top.text("name");
+    setup.seed = seed.value_or(static_cast<std::uint64_t>(top.integer("seed")));
+    setup.resolved = config::write_params(kRunParams, top);
+    setup.resolved.set("seed", Node::scalar_of(std::to_string(setup.seed)));
+  } else {
+    setup.resolved = Node::empty_map();
+  }
+  read_kinematics(run, plugins, setup, errors);
+  read_options(run, setup, errors);
+  const ReadContext context{plugins, setup.seed, exact};
+  std::vector<std::string> measuring;
+  if (has_filter_sections(run)) {
+    // Read also when the wheels run alone: what is wrong in it is wrong.
+    FilterSetup filter =
+        read_filter(run, setup.model, setup.x_WI, setup.sigma, context, setup.resolved, errors);
+    if (!filter.wheels.empty()) setup.O_in_I = planar_mount(filter.wheels.front().prior.wheels);
+    measuring = filter.measuring;
+    if (wants_filter(run)) setup.filter = std::move(filter);
+  }
+  read_sensors(run, context, setup, errors);
+  if (errors.empty()) setup.routes = read_routes(run, setup, std::move(measuring), errors);
+  errors.throw_if_any();
+  setup.warnings = compare_cameras(setup);
+  return setup;
+}
+
+}  // namespace viwo
