@@ -1,7 +1,8 @@
 #!/bin/bash
-# install_dependencies.sh [--tests]
+# install_dependencies.sh [--tests | --engines]
 # Installs with apt what building viwo needs and this machine lacks; nothing when all is there.
-# --tests adds what only the tests use. Never asks a question.
+# --tests adds what only the tests use, --engines also Slurm and Open MPI for the nightly tests of
+# campaigns. Never asks a question.
 set -euo pipefail
 
 missing=()
@@ -53,7 +54,10 @@ done
 if ! dpkg-query -W -f '${db:Status-Status}' libgeographic-dev 2> /dev/null | grep -qx installed; then
   need_package libgeographiclib-dev
 fi
-if [ "${1:-}" = --tests ]; then
+if [ "${1:-}" = --engines ]; then
+  for package in slurmctld slurmd slurm-client munge openmpi-bin; do need_package "$package"; done
+fi
+if [ "${1:-}" = --tests ] || [ "${1:-}" = --engines ]; then
   need_command clang-format-14 clang-format-14
   need_command gnuplot-nox gnuplot
   # On Ubuntu Chromium is a snap, which cannot be had in a container: the test is skipped there.

@@ -2,60 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <map>
+#include <utility>
 
 #include "viwo/math/significant.hpp"
 
 namespace viwo::experiment {
-namespace {
-
-const Metric kBeforeRpe[] = {
-    {"end_m", "end [mm]", 1e3,
-     [](const RunResult& r) { return r.accuracy ? r.accuracy->end_m : kNan; }},
-    {"end_yaw_abs_rad", "end yaw [mrad]", 1e3,
-     [](const RunResult& r) {
-       return r.accuracy ? std::abs(r.accuracy->end_yaw_deg) * M_PI / 180. : kNan;
-     }},
-    {"ate_m", "ATE [mm]", 1e3,
-     [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_m : kNan; }},
-    {"ate_deg", "ATE [deg]", 1.,
-     [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_deg : kNan; }},
-};
-
-const Metric kAfterRpe[] = {
-    {"nees_planar", "NEES (3)", 1., [](const RunResult& r) { return r.nees_planar; }, 3.},
-    {"nees_pose", "NEES (6)", 1., [](const RunResult& r) { return r.nees.pose; }, 6.},
-    {"nees_position", "NEES pos (3)", 1., [](const RunResult& r) { return r.nees.position; }, 3.},
-    {"nees_orientation", "NEES ori (3)", 1., [](const RunResult& r) { return r.nees.orientation; },
-     3.},
-    {"nees_relative", "NEES rel (6)", 1., [](const RunResult& r) { return r.nees.relative; }, 6.},
-    {"epoch_ms", "epoch [ms]", 1.,
-     [](const RunResult& r) { return r.updates.empty() ? kNan : r.total_ms.mean_ms; }},
-};
-
-void add_rpe(double length_m, std::vector<Metric>& metrics) {
-  const std::string length = eval::length_text(length_m);
-  metrics.push_back({"rpe_" + length + "_m", "RPE " + length + " m [mm]", 1e3,
-                     [length_m](const RunResult& r) { return rpe(r, length_m, false); }});
-  metrics.push_back({"rpe_" + length + "_deg", "RPE " + length + " m [deg]", 1.,
-                     [length_m](const RunResult& r) { return rpe(r, length_m, true); }});
-}
-
-}  // namespace
 
 std::set<double> segment_lengths_m(const ExperimentResult& result) {
   std::set<double> lengths_m;
   for (const ExperimentRun& run : result.runs) {
-    if (!run.result.accuracy) continue;
-    for (const auto& segment : run.result.accuracy->rpe) lengths_m.insert(segment.length_m);
+    lengths_m.merge(viwo::segment_lengths_m(run.result));
   }
   return lengths_m;
 }
 
 std::vector<Metric> all_metrics(const ExperimentResult& result) {
-  std::vector<Metric> metrics(std::begin(kBeforeRpe), std::end(kBeforeRpe));
-  for (const double length_m : segment_lengths_m(result)) add_rpe(length_m, metrics);
-  metrics.insert(metrics.end(), std::begin(kAfterRpe), std::end(kAfterRpe));
-  return metrics;
+  return metrics_over(segment_lengths_m(result));
 }
 
 std::vector<Metric> metrics_of(const ExperimentResult& result) {
@@ -66,14 +30,6 @@ std::vector<Metric> metrics_of(const ExperimentResult& result) {
     });
   });
   return metrics;
-}
-
-double rpe(const RunResult& run, double length_m, bool degrees) {
-  if (!run.accuracy) return kNan;
-  for (const auto& segment : run.accuracy->rpe) {
-    if (segment.length_m == length_m) return degrees ? segment.mean_deg : segment.mean_m;
-  }
-  return kNan;
 }
 
 std::vector<Group> groups_of(const ExperimentResult& result) {
@@ -122,16 +78,16 @@ RunCounts counts_of(const ExperimentResult& result, std::size_t variant, const G
 eval::PairedDifference paired(const ExperimentResult& result, std::size_t variant,
                               const Metric& metric, const Group& group) {
   std::vector<double> values, baseline;
+  std::map<std::pair<std::size_t, std::uint64_t>, const ExperimentRun*> others;
+  for (const ExperimentRun& run : result.runs) {
+    if (run.variant == result.setup.baseline) others[{run.recording, run.seed}] = &run;
+  }
   for (const ExperimentRun& run : result.runs) {
     if (run.variant != variant || !group.passes(run)) continue;
-    const auto other =
-        std::find_if(result.runs.begin(), result.runs.end(), [&](const ExperimentRun& b) {
-          return b.variant == result.setup.baseline && b.recording == run.recording &&
-                 b.seed == run.seed;
-        });
-    if (other == result.runs.end()) continue;
+    const auto other = others.find({run.recording, run.seed});
+    if (other == others.end()) continue;
     values.push_back(metric.of(run.result));
-    baseline.push_back(metric.of(other->result));
+    baseline.push_back(metric.of(other->second->result));
   }
   return eval::paired_difference(values, baseline, kConfidence);
 }

@@ -9,22 +9,14 @@
 
 #include "viwo/eval/statistics.hpp"
 #include "viwo/experiment/experiment.hpp"
+#include "viwo/results/metrics.hpp"
 
 namespace viwo::experiment {
 
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 inline constexpr double kConfidence = 0.95;  ///< of the intervals of paired differences
 
-/// A number of a run that tables show; NaN where a run has none.
-struct Metric {
-  std::string key;      ///< in summary.json and runs.csv, in SI units
-  std::string heading;  ///< of a table
-  double table_scale;   ///< from SI to the unit of the table
-  std::function<double(const RunResult&)> of;
-  double target = 0.;  ///< best value; 0: the lower the better
-};
-
-/// Path lengths [m] that relative pose errors of a run were evaluated over.
+/// Path lengths [m] that relative pose errors of any run were evaluated over.
 std::set<double> segment_lengths_m(const ExperimentResult& result);
 
 /// In the order of the columns; relative pose errors over every length of any run.
@@ -32,9 +24,6 @@ std::vector<Metric> all_metrics(const ExperimentResult& result);
 
 /// Those that at least one run has.
 std::vector<Metric> metrics_of(const ExperimentResult& result);
-
-/// Mean relative pose error over segments of a length, m or degrees; NaN if it was not evaluated.
-double rpe(const RunResult& run, double length_m, bool degrees);
 
 /// Some of the runs, with a name. Must not outlive the result that it is of.
 struct Group {

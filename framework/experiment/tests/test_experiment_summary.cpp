@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "experiment_file.hpp"
+#include "viwo/results/metrics.hpp"
 #include "viwo/results/run_output.hpp"
+#include "viwo/results/run_record.hpp"
 
 namespace viwo {
 namespace {
@@ -68,6 +70,29 @@ TEST_F(Summary, HasMeanMedianSpreadAndQuantiles) {
   EXPECT_EQ(summary["jobs"], 2);
   EXPECT_DOUBLE_EQ(summary["realtime_factor"], 120.);
   EXPECT_EQ(summary["viwo_version"], viwo_version());
+}
+
+TEST_F(Summary, HasEveryMetricInEveryPlaceAlsoOfARunThatWasTakenOver) {
+  ExperimentResult result = with_errors({1., 2., 3., 6., 2., 4., 6., 7.});
+  RunResult& run = result.runs[0].result;
+  run.accuracy->rpe = {{2.5, 3, 0.01, 0.02, 0.03, 0.04}};
+  run.nees_planar = run.nees.pose = run.nees.position = run.nees.orientation = run.nees.relative =
+      2.25;
+  run.updates = {{"parity", {8, 9}, {}, {}, {}}};
+  const RunResult kept = from_record(to_record(run));
+  const auto summary = summary_of(result);
+  const std::string csv = text_of(folder_ / "out" / "runs.csv");
+  const std::string header = csv.substr(0, csv.find('\n')) + ",";
+  const std::string page = text_of(folder_ / "out" / "report.html"), table = describe(result);
+  for (const Metric& metric : metrics_over({2.5})) {
+    ASSERT_TRUE(std::isfinite(metric.of(run))) << metric.key << ": give the run above one";
+    EXPECT_EQ(metric.of(kept), metric.of(run)) << metric.key;
+    EXPECT_THAT(header, HasSubstr("," + metric.key + ","));
+    EXPECT_TRUE(summary["variants"]["a"]["metrics"].contains(metric.key)) << metric.key;
+    EXPECT_TRUE(summary["paired"]["variants"]["b"].contains(metric.key)) << metric.key;
+    EXPECT_THAT(table, HasSubstr(metric.heading));
+    EXPECT_THAT(page, HasSubstr(metric.heading));
+  }
 }
 
 TEST_F(Summary, PairsTheRunsOfOneRecordingAndSeed) {

@@ -3,14 +3,13 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
-#include <stdexcept>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "viwo/api/status.hpp"
 #include "viwo/image/image_file.hpp"
 #include "viwo/log/asl.hpp"
+#include "viwo/log/files.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_writer.hpp"
 
@@ -87,15 +86,6 @@ void check_is_ours(const fs::path& folder) {
         refuse(folder, name / file.path().filename());
       }
     }
-  }
-}
-
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) {
-    throw std::runtime_error("cannot create the folder " + folder.string() + ": " +
-                             error.message());
   }
 }
 

@@ -3,7 +3,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <stdexcept>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -11,6 +10,22 @@
 #include <unistd.h>
 
 namespace viwo::log {
+namespace {
+
+/// Not all file systems can for folders, nor all files that are none.
+bool sync(int fd) { return ::fsync(fd) == 0 || errno == EINVAL || errno == EROFS; }
+
+bool sync_folder(const std::filesystem::path& folder) {
+  const int fd = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return false;
+  const bool well = sync(fd);
+  const int error = errno;
+  ::close(fd);
+  errno = error;
+  return well;
+}
+
+}  // namespace
 
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
@@ -21,57 +36,52 @@ void make_folder(const std::filesystem::path& folder) {
   }
 }
 
-namespace {
+WholeFile::WholeFile(std::filesystem::path file) : file_(std::move(file)), unfinished_(file_) {
+  std::error_code ignored;
+  if (!std::filesystem::is_other(file_, ignored)) unfinished_ += ".tmp";
+  fd_ = ::open(unfinished_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (fd_ < 0) fail();
+}
 
-/// Closed in any case.
-class Descriptor {
- public:
-  Descriptor(const std::filesystem::path& path, int flags)
-      : fd_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
+WholeFile::WholeFile(WholeFile&& other) noexcept
+    : file_(std::move(other.file_)),
+      unfinished_(std::move(other.unfinished_)),
+      fd_(std::exchange(other.fd_, -1)) {}
+
+WholeFile::~WholeFile() {
+  if (fd_ < 0) return;
+  ::close(fd_);
+  if (unfinished_ != file_) ::unlink(unfinished_.c_str());
+}
+
+void WholeFile::fail() {
+  const std::string reason = std::generic_category().message(errno);
+  if (fd_ >= 0) ::close(std::exchange(fd_, -1));
+  if (unfinished_ != file_) ::unlink(unfinished_.c_str());
+  throw std::runtime_error("cannot write " + file_.string() + ": " + reason);
+}
+
+void WholeFile::write(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd_, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail();
+    bytes.remove_prefix(static_cast<std::size_t>(written));
   }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
+}
 
-  bool is_open() const { return fd_ >= 0; }
-
-  bool write(std::string_view bytes) const {
-    while (!bytes.empty()) {
-      const ssize_t written = ::write(fd_, bytes.data(), bytes.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) return false;
-      bytes.remove_prefix(static_cast<std::size_t>(written));
-    }
-    return true;
-  }
-
-  /// Not all file systems can for folders, nor all files that are none.
-  bool sync() const { return ::fsync(fd_) == 0 || errno == EINVAL || errno == EROFS; }
-
-  /// What is written late may fail late.
-  bool close() { return ::close(std::exchange(fd_, -1)) == 0; }
-
- private:
-  int fd_;
-};
-
-}  // namespace
+void WholeFile::commit() {
+  // What is written late may fail late.
+  if (!sync(fd_) || ::close(std::exchange(fd_, -1)) != 0) fail();
+  if (unfinished_ == file_) return;
+  if (::rename(unfinished_.c_str(), file_.c_str()) != 0) fail();
+  if (!sync_folder(file_.parent_path())) fail();
+}
 
 void write_text(const std::filesystem::path& file, const std::string& text) {
-  std::filesystem::path unfinished = file;
-  unfinished += ".tmp";
-  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  Descriptor out(unfinished, O_WRONLY | O_CREAT | O_TRUNC);
-  if (out.is_open() && out.write(text) && out.sync() && out.close() &&
-      ::rename(unfinished.c_str(), file.c_str()) == 0) {
-    const Descriptor in(folder, O_RDONLY | O_DIRECTORY);
-    if (in.is_open() && in.sync()) return;
-  }
-  const int error = errno;
-  ::unlink(unfinished.c_str());
-  throw std::runtime_error("cannot write " + file.string() + ": " +
-                           std::generic_category().message(error));
+  WholeFile out(file);
+  out.write(text);
+  out.commit();
 }
 
 }  // namespace viwo::log

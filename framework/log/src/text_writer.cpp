@@ -13,7 +13,11 @@ constexpr std::size_t kFlushBytes = std::size_t{1} << 16;
 
 }  // namespace
 
-TextWriter::TextWriter(const std::filesystem::path& file) : file_(file) {
+TextWriter::TextWriter(const std::filesystem::path& file, Appears appears) : file_(file) {
+  if (appears == Appears::kWhole) {
+    whole_.emplace(file);
+    return;
+  }
   errno = 0;
   stream_.open(file, std::ios::binary | std::ios::trunc);
   check();
@@ -22,11 +26,16 @@ TextWriter::TextWriter(const std::filesystem::path& file) : file_(file) {
 void TextWriter::check() const {
   if (stream_.good()) return;
   const int error = errno;
-  throw std::runtime_error(file_.string() + "  cannot be written" +
+  throw std::runtime_error("cannot write " + file_.string() +
                            (error != 0 ? std::string(": ") + std::strerror(error) : ""));
 }
 
 void TextWriter::flush() {
+  if (whole_) {
+    whole_->write(pending_);
+    pending_.clear();
+    return;
+  }
   errno = 0;
   stream_.write(pending_.data(), static_cast<std::streamsize>(pending_.size()));
   pending_.clear();
@@ -52,6 +61,11 @@ TextWriter& TextWriter::operator<<(std::int64_t value) {
 
 void TextWriter::close() {
   flush();
+  if (whole_) {
+    whole_->commit();
+    whole_.reset();
+    return;
+  }
   errno = 0;
   stream_.close();
   check();

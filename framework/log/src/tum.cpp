@@ -86,7 +86,7 @@ Trajectory read_tum(const std::filesystem::path& file) {
   return trajectory;
 }
 
-TumWriter::TumWriter(const std::filesystem::path& file) : out_(file) {
+TumWriter::TumWriter(const std::filesystem::path& file, Appears appears) : out_(file, appears) {
   out_ << "# t[s] x[m] y[m] z[m] qx qy qz qw\n";
 }
 

@@ -217,9 +217,9 @@ TEST_F(TextWriterTest, ReportsAFullDiskAndAMissingFolder) {
               out << "text";
               out.close();
             }),
-            "/dev/full  cannot be written: No space left on device");
+            "cannot write /dev/full: No space left on device");
   EXPECT_EQ(message_of<std::runtime_error>([&] { TextWriter{folder_ / "none" / "a"}; }),
-            (folder_ / "none" / "a").string() + "  cannot be written: No such file or directory");
+            "cannot write " + (folder_ / "none" / "a").string() + ": No such file or directory");
 }
 
 }  // namespace

@@ -89,7 +89,7 @@ TEST_F(TumTest, SaysLineAndWhatIsWrong) {
 
 TEST_F(TumTest, AFailedWriteIsAnError) {
   EXPECT_EQ(message_of<std::runtime_error>([] { write_tum("/dev/full", Trajectory(1)); }),
-            "/dev/full  cannot be written: No space left on device");
+            "cannot write /dev/full: No space left on device");
 }
 
 TEST(Interpolation, IsLinearInPositionAndSlerpInOrientation) {

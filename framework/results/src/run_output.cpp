@@ -12,6 +12,7 @@
 #include "viwo/log/tum.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/report/html.hpp"
+#include "viwo/results/metrics.hpp"
 #include "viwo/results/run_stream.hpp"
 
 namespace viwo {
@@ -121,6 +122,10 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
   accuracy["nees_position"] = number_or_null(result.nees.position);
   accuracy["nees_orientation"] = number_or_null(result.nees.orientation);
   accuracy["nees_relative"] = number_or_null(result.nees.relative);
+  json metrics = json::object();
+  for (const Metric& metric : metrics_over(segment_lengths_m(result))) {
+    metrics[metric.key] = number_or_null(metric.of(result));
+  }
   json rejected = json::object();
   for (const auto& [source, rejection] : result.rejections) {
     rejected[source].push_back(
@@ -157,6 +162,7 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
       {"wall_s", result.wall_s},
       {"pieces", pieces_json(result.pieces)},
       {"accuracy", accuracy},
+      {"metrics", metrics},
       {"calibration", calibration_json(result)},
       {"updates", updates},
       {"rejected_measurements", rejected},

@@ -1,7 +1,26 @@
 #include "viwo/results/run_record.hpp"
 
-// What is kept of each type, in both directions. They are found by the namespace of their type.
+#include <optional>
+
+// What is kept of each type, in both directions: all of its members, in their order. A member that
+// is missing here does not compile, for the names are also those of a binding to all there are.
+#define VIWO_RECORD(Type, ...)                                    \
+  [[maybe_unused]] static void every_member_of(const Type& all) { \
+    [[maybe_unused]] const auto& [__VA_ARGS__] = all;             \
+  }                                                               \
+  NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Type, __VA_ARGS__)
+
 namespace nlohmann {
+
+template <class T>
+struct adl_serializer<std::optional<T>> {
+  static void to_json(json& out, const std::optional<T>& value) {
+    out = value ? json(*value) : json();
+  }
+  static void from_json(const json& in, std::optional<T>& value) {
+    value = in.is_null() ? std::nullopt : std::optional<T>(in.get<T>());
+  }
+};
 
 template <>
 struct adl_serializer<Eigen::Vector3d> {
@@ -15,10 +34,10 @@ struct adl_serializer<Eigen::Vector3d> {
 
 namespace viwo {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RejectionCount, reason, count, first)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(NoiseFound, name, unit, configured, found, count)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateCounts, applied, rejected)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateFailures, count, disabled, cause)
+VIWO_RECORD(RejectionCount, reason, count, first, of)
+VIWO_RECORD(NoiseFound, name, unit, configured, found, count)
+VIWO_RECORD(UpdateCounts, applied, rejected)
+VIWO_RECORD(UpdateFailures, count, disabled, cause)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PreintegratedPose, g, duration_s, path_length_m, bridged_s,
                                    samples, gated, rejected, rank_deficient)
 
@@ -39,43 +58,37 @@ void from_json(const nlohmann::json& in, StampedPose& pose) {
 
 namespace viwo::eval {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SegmentErrors, length_m, count, mean_m, rmse_m, mean_deg,
-                                   rmse_deg)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ErrorSeries, t_s, path_length_m, position_error_m, yaw_error_deg)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Accuracy, alignment, n_poses, n_outside, n_in_gap, duration_s,
-                                   path_length_m, ate_m, ate_deg, rpe, end_m, end_deg, end_yaw_deg,
-                                   series)
+VIWO_RECORD(SegmentErrors, length_m, count, mean_m, rmse_m, mean_deg, rmse_deg)
+VIWO_RECORD(ErrorSeries, t_s, path_length_m, position_error_m, yaw_error_deg)
+VIWO_RECORD(Accuracy, alignment, n_poses, n_outside, n_in_gap, duration_s, path_length_m, ate_m,
+            ate_deg, rpe, end_m, end_deg, end_yaw_deg, series)
 
 }  // namespace viwo::eval
 
 namespace viwo {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StageTime, mean_ms, p95_ms, max_ms)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CalibrationTrack, name, unit, estimate, sigma, truth,
-                                   final_error)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PoseNees, pose, position, orientation, relative, series)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PoseError, t_s, position_m, position_sigma_m, yaw_rad,
-                                   yaw_sigma_rad)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(UpdateTrack, name, total, failures, applied, rejected)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MonitorWarning, t_s, text, parameters)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MonitorTrack, t_s, parameters, sigma_ratio, held, warnings)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunPiece, begin_ns, end_ns, epochs, failure)
-// `accuracy` is optional: see below.
+VIWO_RECORD(StageTime, mean_ms, p95_ms, max_ms)
+VIWO_RECORD(CalibrationTrack, name, unit, estimate, sigma, truth, final_error)
+VIWO_RECORD(PoseNees, pose, position, orientation, relative, series)
+VIWO_RECORD(PoseError, t_s, position_m, position_sigma_m, yaw_rad, yaw_sigma_rad)
+VIWO_RECORD(UpdateTrack, name, total, failures, applied, rejected)
+VIWO_RECORD(MonitorWarning, t_s, text, parameters)
+VIWO_RECORD(MonitorTrack, t_s, parameters, sigma_ratio, held, warnings)
+VIWO_RECORD(RunPiece, begin_ns, end_ns, epochs, failure)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunResult, status, cause, epochs, duration_s, wall_s, estimate,
-                                   reference, nees_planar, total, epoch_ms, stages, total_ms,
-                                   rejections, noises, warnings, nees, errors, epoch_t_s,
+                                   reference, accuracy, nees_planar, total, epoch_ms, stages,
+                                   total_ms, rejections, noises, warnings, nees, errors, epoch_t_s,
                                    calibration, updates, monitor, pieces)
-
-nlohmann::json to_record(const RunResult& run) {
-  nlohmann::json record = run;
-  if (run.accuracy) record["accuracy"] = *run.accuracy;
-  return record;
+// As above, with what is only of a run that is going on (live, on_disk), or for its own page.
+[[maybe_unused]] static void every_member_of(const RunResult& all) {
+  [[maybe_unused]] const auto& [status, cause, epochs, duration_s, wall_s, live, estimate,
+                                reference, accuracy, nees_planar, total, epoch_ms, stages, total_ms,
+                                rejections, noises, warnings, nees, errors, epoch_t_s, calibration,
+                                updates, monitor, pieces, on_disk, pictures] = all;
 }
 
-RunResult from_record(const nlohmann::json& record) {
-  RunResult run = record.get<RunResult>();
-  if (record.contains("accuracy")) run.accuracy = record.at("accuracy").get<eval::Accuracy>();
-  return run;
-}
+nlohmann::json to_record(const RunResult& run) { return run; }
+
+RunResult from_record(const nlohmann::json& record) { return record.get<RunResult>(); }
 
 }  // namespace viwo

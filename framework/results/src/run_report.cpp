@@ -6,6 +6,7 @@
 #include "viwo/config/yaml.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/report/curves.hpp"
+#include "viwo/results/metrics.hpp"
 #include "viwo/results/run_output.hpp"
 
 namespace viwo {
@@ -28,15 +29,7 @@ KeyValues facts_of(const RunSetup& setup, const RunResult& result) {
   }
   facts.entries.push_back({"epoch, mean [ms]", significant(result.total_ms.mean_ms, 3)});
   if (result.accuracy) facts.entries.push_back({"path length [m]", result.accuracy->path_length_m});
-  if (setup.filter) {
-    if (std::isfinite(result.nees.pose)) {
-      facts.entries.push_back({"pose NEES (consistent: 6)", significant(result.nees.pose, 3)});
-    }
-    return facts;
-  }
-  if (std::isfinite(result.nees_planar)) {
-    facts.entries.push_back({"planar NEES (consistent: 3)", significant(result.nees_planar, 3)});
-  }
+  if (setup.filter) return facts;
   const PreintegratedPose& total = result.total;
   facts.entries.push_back({"encoder samples", total.samples});
   facts.entries.push_back({"not believed (parity gate)", total.gated});
@@ -77,6 +70,21 @@ Table accuracy_table(const eval::Accuracy& accuracy) {
   return table;
 }
 
+/// Whatever is declared in metrics.cpp and this run has.
+Table metrics_table(const RunResult& result) {
+  Table table;
+  table.caption = "Numbers of this run, as tables of experiments have them";
+  std::vector<Cell> row;
+  for (const Metric& metric : metrics_over(segment_lengths_m(result))) {
+    const double value = metric.of(result);
+    if (!std::isfinite(value)) continue;
+    table.columns.push_back({metric.heading});
+    row.emplace_back(metric.table_scale * value);
+  }
+  table.rows.push_back(std::move(row));
+  return table;
+}
+
 /// A run that was started anew.
 Table pieces_table(const RunResult& result) {
   Table table;
@@ -102,6 +110,9 @@ void add_result_section(const RunSetup& setup, const RunResult& result, Document
     section.blocks.emplace_back(Paragraph{line, Paragraph::Tone::kWarning});
   }
   section.blocks.emplace_back(facts_of(setup, result));
+  if (Table metrics = metrics_table(result); !metrics.columns.empty()) {
+    section.blocks.emplace_back(std::move(metrics));
+  }
   if (result.pieces.size() > 1) section.blocks.emplace_back(pieces_table(result));
   if (result.accuracy) {
     section.blocks.emplace_back(accuracy_table(*result.accuracy));

@@ -33,9 +33,9 @@ void remove_piece_files(const std::filesystem::path& folder) {
 
 RunStream::RunStream(const std::filesystem::path& folder)
     : folder_(folder),
-      trajectory_(folder / "trajectory.tum"),
-      calibration_(folder / "calibration.csv"),
-      timing_(folder / "timing.csv") {
+      trajectory_(folder / "trajectory.tum", log::Appears::kAtOnce),
+      calibration_(folder / "calibration.csv", log::Appears::kAtOnce),
+      timing_(folder / "timing.csv", log::Appears::kAtOnce) {
   remove_piece_files(folder);
   write_calibration_head(calibration_);
   write_timing_head(timing_);
@@ -59,7 +59,7 @@ void RunStream::write(const RunResult& result) {
     }
     if (piece_) piece_->close();
     pieces_ = result.pieces.size();
-    piece_.emplace(piece_file(folder_, pieces_ - 1));
+    piece_.emplace(piece_file(folder_, pieces_ - 1), log::Appears::kAtOnce);
   }
   const StampedPose& pose = result.estimate.back();
   if (!last_ns_ || pose.t_ns > *last_ns_) {

@@ -15,6 +15,7 @@
 #include "viwo/report/curves.hpp"
 #include "viwo/report/figures.hpp"
 #include "viwo/report/html.hpp"
+#include "viwo/results/metrics.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/run/warnings.hpp"
 
@@ -157,6 +158,25 @@ TEST(Curve, IsThinnedToItsEndsAndScaled) {
   EXPECT_THAT(error.y_low, ElementsAre(-15., -15., -15., -30.));
   EXPECT_THAT(error.y_high, ElementsAre(15., 15., 15., 30.));
   EXPECT_TRUE(report::curve("c", {x, y}).y_low.empty());
+}
+
+TEST(RunReport, HasEveryMetricThatTheRunHas) {
+  const auto& [setup, result] = filter_run();
+  const auto metrics = summary_of(setup, result)["metrics"];
+  const std::string page = report::to_html(report_of(setup, result));
+  int found = 0;
+  for (const Metric& metric : metrics_over(segment_lengths_m(result))) {
+    ASSERT_TRUE(metrics.contains(metric.key)) << metric.key;
+    if (!std::isfinite(metric.of(result))) {
+      EXPECT_TRUE(metrics[metric.key].is_null()) << metric.key;
+      continue;
+    }
+    ++found;
+    EXPECT_EQ(metrics[metric.key], metric.of(result));
+    EXPECT_THAT(page, HasSubstr(metric.heading));
+  }
+  EXPECT_GE(found, 9);
+  EXPECT_EQ(metrics["ate_m"], result.accuracy->ate_m);
 }
 
 TEST(RunReport, ShowsAllOfAFilter) {

@@ -315,7 +315,7 @@ TEST(RunStream, SaysWhatCouldNotBeWrittenAndDoesNotEndTheRun) {
   const RunResult live = robot.live(robot.measurements, hooks);
   EXPECT_EQ(live.status, RunStatus::kOk) << live.cause;
   EXPECT_EQ(files.finish(),
-            (folder / "timing.csv").string() + "  cannot be written: No space left on device");
+            "cannot write " + (folder / "timing.csv").string() + ": No space left on device");
 }
 
 TEST(BoundedSeries, KeepsPointsThatAreEvenlySpread) {

@@ -17,7 +17,7 @@ Trajectory read_tum(const std::filesystem::path& file);
 /// Writes a trajectory pose by pose. std::runtime_error when that fails.
 class TumWriter {
  public:
-  explicit TumWriter(const std::filesystem::path& file);
+  explicit TumWriter(const std::filesystem::path& file, Appears appears = Appears::kWhole);
   /// Seconds with nine decimals and shortest numbers that read back to the same bits.
   void add(const StampedPose& pose);
   /// What was added is in the file.
