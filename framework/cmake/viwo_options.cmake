@@ -16,6 +16,9 @@ if(VIWO_SANITIZE)
   add_link_options(-fsanitize=${VIWO_SANITIZE})
 endif()
 
+# What is linked and not used is not loaded.
+add_link_options(-Wl,--as-needed)
+
 # GCC 12 warns falsely: about its own AVX-512 headers when Eigen is inlined, and about std::string
 # (bug 105651). Plugins of others get these, too (viwo_add_plugin.cmake).
 set(VIWO_NO_FALSE_WARNINGS

@@ -27,6 +27,16 @@ TEST_F(CommandLineTest, PrintsItsVersion) {
   EXPECT_EQ(version.out, "viwo " VIWO_TEST_VERSION "\n");
 }
 
+TEST_F(CommandLineTest, LoadsNothingForImagesWindowsAndVideosUnlessTheyAreWanted) {
+  setenv("LD_TRACE_LOADED_OBJECTS", "1", 1);  // the loader names what it would load
+  const Outcome loaded = viwo({"--version"});
+  unsetenv("LD_TRACE_LOADED_OBJECTS");
+  EXPECT_NE(loaded.out.find("libviwo_api.so"), std::string::npos) << loaded.out;
+  for (const char* part : {"imgcodecs", "videoio", "highgui", "libQt", "libgtk"}) {
+    EXPECT_EQ(loaded.out.find(part), std::string::npos) << loaded.out;
+  }
+}
+
 TEST_F(CommandLineTest, EveryCommandExplainsItself) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> commands = {
       {"run", {"--out", "--seed", "--set"}},

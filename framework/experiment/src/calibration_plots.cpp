@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "experiment_plots.hpp"
 #include "experiment_statistics.hpp"
@@ -12,7 +13,6 @@ namespace {
 
 using namespace report;
 
-constexpr int kMaxSeeds = 6;
 constexpr std::size_t kPoints = 75;  ///< of each line: there are many
 
 const CalibrationTrack* find(const RunResult& run, const std::string& parameter) {
@@ -42,15 +42,16 @@ Series line(const std::string& variant, const RunResult& run, std::size_t size,
 void add_variant(const ExperimentResult& result, std::size_t variant, std::size_t recording,
                  const std::string& parameter, double scale, Plot& plot) {
   const std::string& name = result.setup.variants[variant].name;
-  int seeds = 0;
+  bool is_first = true;
   std::vector<Series> bounds;  // after the lines, whose look is the one of the legend
   for (const ExperimentRun& run : result.runs) {
-    if (run.variant != variant || run.recording != recording || seeds == kMaxSeeds) continue;
+    if (run.variant != variant || run.recording != recording || !is_drawn(result.setup, run))
+      continue;
     const CalibrationTrack* track = find(run.result, parameter);
     if (track == nullptr) continue;
     const double truth = std::isfinite(track->truth) ? track->truth : 0.;
     const auto error = [&](std::size_t k) { return scale * (track->estimate[k] - truth); };
-    if (seeds++ == 0) {
+    if (std::exchange(is_first, false)) {
       for (const double sign : {-1., 1.}) {
         Series bound = line(name, run.result, track->sigma.size(), [&](std::size_t k) {
           const double middle = std::isfinite(track->truth) ? 0. : error(k);

@@ -106,6 +106,9 @@ std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
   return line;
 }
 
+/// Above it the series of runs that are not drawn would need more memory than all the rest.
+constexpr std::size_t kManyRuns = 1000;
+
 /// Thrown out of a run that the user does not wait for any more.
 struct Stopped {};
 
@@ -221,6 +224,7 @@ class Runner {
       fail(run, "something was thrown that is not a std::exception");
     }
     thin(run.result);
+    if (result_.runs.size() > kManyRuns && !is_drawn(setup_, run)) keep_ends(run.result);
     if (!folder_.empty()) journal_.write(key_of(run), run.result);
     ++finished_;
     return true;

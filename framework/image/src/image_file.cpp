@@ -1,9 +1,7 @@
 #include "viwo/image/image_file.hpp"
 
 #include <algorithm>
-#include <array>
 #include <fstream>
-#include <stdexcept>
 #include <string_view>
 #include <system_error>
 
@@ -34,11 +32,6 @@ bool cut_short(std::span<const std::uint8_t> bytes) {
   if (begins("\x89PNG")) return !has_near_end("IEND");
   if (begins("\xff\xd8")) return !has_near_end("\xff\xd9");
   return false;
-}
-
-cv::Mat wrap(const Image& image) {
-  // OpenCV has no matrix of constant data; encoders do not write to it.
-  return {image.height_px, image.width_px, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data())};
 }
 
 }  // namespace
@@ -74,22 +67,6 @@ void read_image(const std::filesystem::path& file, Image& out) {
     refuse();
   }
   decode_image(bytes, file.string(), out);
-}
-
-std::vector<std::uint8_t> encode_png(const Image& image) {
-  std::vector<std::uint8_t> bytes;
-  // Fast: simulated images are noisy, and hardly any smaller with more effort.
-  cv::imencode(".png", wrap(image), bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  return bytes;
-}
-
-void write_png(const std::filesystem::path& file, const Image& image) {
-  const std::vector<std::uint8_t> bytes = encode_png(image);
-  std::ofstream stream(file, std::ios::binary);
-  stream.write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-  stream.close();
-  if (!stream) throw std::runtime_error("cannot write " + file.string());
 }
 
 }  // namespace viwo

@@ -80,6 +80,12 @@ void thin(RunResult& run, std::size_t max_points) {
   run.total.parity = {};
 }
 
+void keep_ends(RunResult& run) {
+  auto nees = std::move(run.nees.series);
+  thin(run, 2);
+  run.nees.series = std::move(nees);
+}
+
 void drop_last_point(RunResult& run) {
   run.estimate.pop_back();
   run.epoch_t_s.pop_back();

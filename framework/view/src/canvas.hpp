@@ -22,7 +22,11 @@ inline const cv::Scalar kReference(190, 180, 170);
 inline const cv::Scalar kBand(110, 78, 40);
 
 /// The pixels of a picture, not copied.
-cv::Mat as_mat(const Picture& picture);
+inline cv::Mat as_mat(const Picture& picture) {
+  // OpenCV has no matrix of constant pixels; nobody writes to this one but draw().
+  return {picture.height_px, picture.width_px, CV_8UC3,
+          const_cast<std::uint8_t*>(picture.bgr.data())};
+}
 
 /// The parts of a picture; a part without content is empty.
 struct Layout {

@@ -2,16 +2,14 @@
 
 #include <stdexcept>
 
-#include <opencv2/imgcodecs.hpp>
-
-#include "canvas.hpp"
+#include "viwo/image/image_file.hpp"
 
 namespace viwo::view {
 
 std::string encode_png(const Picture& picture) {
   if (picture.bgr.empty()) throw std::invalid_argument("view: a picture without pixels");
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", as_mat(picture), bytes);
+  const auto bytes =
+      viwo::encode_png(picture.bgr, picture.width_px, picture.height_px, PngColours::kBgr);
   return {bytes.begin(), bytes.end()};
 }
 

@@ -118,8 +118,8 @@ PictureSinks open_sinks(const RunSetup& setup, bool window, const std::filesyste
                      " shows what the filter does, but this run has none (a section 'updates')");
   }
   PictureSinks sinks;
-  if (!video.empty()) sinks.video = std::make_unique<view::VideoFile>(video);
-  if (window) sinks.window = std::make_unique<view::Window>("viwo: " + setup.name);
+  if (!video.empty()) sinks.video = open_film(video);
+  if (window) sinks.window = open_screen("viwo: " + setup.name);
   return sinks;
 }
 

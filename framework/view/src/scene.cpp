@@ -81,12 +81,6 @@ void draw_legend(cv::Mat& area) {
 
 }  // namespace
 
-cv::Mat as_mat(const Picture& picture) {
-  // OpenCV has no matrix of constant pixels; nobody writes to this one but draw().
-  return {picture.height_px, picture.width_px, CV_8UC3,
-          const_cast<std::uint8_t*>(picture.bgr.data())};
-}
-
 bool has_pixels(const CameraImage& camera) {
   const Image* image = camera.pixels;
   return image != nullptr && image->width_px > 0 && image->height_px > 0 &&

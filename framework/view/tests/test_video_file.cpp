@@ -14,8 +14,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "show/video_file.hpp"
 #include "viwo/api/status.hpp"
-#include "viwo/view/video_file.hpp"
 
 namespace viwo::view {
 namespace {

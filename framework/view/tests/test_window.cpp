@@ -12,8 +12,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "show/window.hpp"
 #include "viwo/api/status.hpp"
-#include "viwo/view/window.hpp"
 #ifdef VIWO_TEST_USER_INPUT
 #include "user_input.hpp"
 #endif

@@ -61,9 +61,14 @@ struct ExperimentRun {
   std::size_t variant = 0;
   std::size_t recording = 0;
   std::uint64_t seed = 1;
-  RunResult result;         ///< its series thinned
+  RunResult result;         ///< its series thinned; of 1000 runs and more only drawn ones
   bool taken_over = false;  ///< from the journal of an interrupted experiment
 };
+
+/// Whether the page draws its series: those of the first six seeds.
+inline bool is_drawn(const ExperimentSetup& setup, const ExperimentRun& run) {
+  return setup.seeds == 1 || run.seed <= 6;
+}
 
 struct ExperimentResult {
   ExperimentSetup setup;

@@ -1,4 +1,4 @@
-// Image files, as OpenCV reads and writes them, to and from grey images.
+// Image files: read by OpenCV, to grey images; PNG written by libpng.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,11 @@ void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, 
 /// Reads an image file. InputError when it is missing, no image, or cut short.
 void read_image(const std::filesystem::path& file, Image& out);
 
-/// The bytes of a PNG with exactly these pixels.
+enum class PngColours { kGrey, kBgr };  ///< 1 byte a pixel, or 3: blue, green, red
+
+/// The bytes of a PNG with exactly these pixels, row after row without padding.
+std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int width_px,
+                                     int height_px, PngColours colours);
 std::vector<std::uint8_t> encode_png(const Image& image);
 
 /// Writes a PNG with exactly these pixels. std::runtime_error when it cannot be written.

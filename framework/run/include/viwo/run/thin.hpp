@@ -14,6 +14,9 @@ inline constexpr std::size_t kRecordPoints = 150;
 /// summed over what is left out. Matrices of the run's odometry are dropped.
 void thin(RunResult& run, std::size_t max_points = kRecordPoints);
 
+/// For a run whose series are not drawn by themselves: no more than their ends but for the NEES.
+void keep_ends(RunResult& run);
+
 /// The series of the monitor alone.
 void thin(MonitorTrack& monitor, std::size_t max_points);
 

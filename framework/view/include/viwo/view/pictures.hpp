@@ -14,16 +14,15 @@
 
 #include "viwo/run/run.hpp"
 #include "viwo/view/scene.hpp"
+#include "viwo/view/show.hpp"
 #include "viwo/view/tracks.hpp"
-#include "viwo/view/video_file.hpp"
-#include "viwo/view/window.hpp"
 
 namespace viwo::view {
 
 /// Where pictures go besides the page; null: nowhere.
 struct PictureSinks {
-  std::unique_ptr<view::Window> window;
-  std::unique_ptr<view::VideoFile> video;
+  std::unique_ptr<Screen> window;
+  std::unique_ptr<Film> video;
 };
 
 /// Opens what is asked for (an empty path: no video), so that what cannot work shows before the

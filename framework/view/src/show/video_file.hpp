@@ -1,4 +1,4 @@
-// A video file of pictures.
+// A video file by OpenCV's codecs.
 #pragma once
 
 #include <cstdint>
@@ -7,29 +7,21 @@
 #include <string>
 #include <vector>
 
-#include "viwo/view/picture.hpp"
+#include "viwo/view/show.hpp"
 
 namespace viwo::view {
 
 /// Written under another name beside the file and moved there by close(), so that a video that is
 /// there is whole.
-class VideoFile {
+class VideoFile final : public Film {
  public:
-  /// `file` ends in .mp4 (MPEG-4) or .avi (Motion JPEG); its folder is made if need be. Throws
-  /// InputError for other endings, and when a video cannot be written there.
   explicit VideoFile(std::filesystem::path file);
-  /// Without close() nothing is left behind.
-  ~VideoFile();
+  ~VideoFile() override;
   VideoFile(const VideoFile&) = delete;
   VideoFile& operator=(const VideoFile&) = delete;
 
-  /// The next picture, taken at `t_s`; all are of one size (std::invalid_argument). The pictures of
-  /// a second follow from the first eleven: the median of the times between them. Never fails
-  /// because of the disk: close() tells.
-  void add(const Picture& picture, double t_s);
-  /// Ends the video; without any picture there is none. std::runtime_error when not all of it could
-  /// be written; then there is no file.
-  void close();
+  void add(const Picture& picture, double t_s) override;
+  void close() override;
 
  private:
   class Writer;  // hides OpenCV

@@ -1,4 +1,4 @@
-#include "viwo/view/video_file.hpp"
+#include "video_file.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "viwo/view/window.hpp"
+#include "window.hpp"
 
 #include <cstdlib>
 #include <utility>
