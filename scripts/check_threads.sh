@@ -23,7 +23,7 @@ failed=0
 for model in "${models[@]}"; do
   # An older build may have left one of another version of the API.
   library=$(printf '%s\n' build-tsan/lib/viwo/plugins/v*/libviwo_kinematics_"$model".so | sort -V | tail -n 1)
-  config=tests/conformance/configs/kinematics_$model.yaml
+  config=framework/conformance/tests/configs/kinematics_$model.yaml
   arguments=()
   if [ -e "$config" ]; then arguments=(--config "$config"); fi
   if output=$(build-tsan/bin/viwo_conformance "$library" "${arguments[@]}" 2>&1); then

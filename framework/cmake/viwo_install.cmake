@@ -50,7 +50,7 @@ install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/NOTICE
   DESTINATION ${viwo_doc_dir})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/plugins
   DESTINATION ${viwo_doc_dir} FILES_MATCHING PATTERN "*.md"
-  PATTERN "images" EXCLUDE PATTERN "tests" EXCLUDE PATTERN "*_common" EXCLUDE)
+  PATTERN "images" EXCLUDE PATTERN "tests" EXCLUDE PATTERN "shared" EXCLUDE)
 
 # Debian package: cmake --preset package && cmake --build --preset package, then cpack in build-package
 set(CPACK_GENERATOR DEB)

@@ -19,14 +19,15 @@ function(viwo_add_module name)
   add_library(viwo::${name} ALIAS ${target})
 endfunction()
 
-# viwo_add_test(NAME SOURCES a.cpp ... LINKS target ... LABELS label ... DEPENDS target ...)
-# A GoogleTest executable, each of its tests known to ctest. Plugins of this build are found through
+# viwo_add_test(NAME [WHOLE] SOURCES a.cpp ... LINKS target ... LABELS label ... DEPENDS target ...)
+# A GoogleTest executable, each of its tests known to ctest, in a process of its own; with WHOLE all of
+# them are one, which share what is expensive. Plugins of this build are found through
 # VIWO_TEST_PLUGIN_DIR, real recordings through VIWO_TEST_SHARED_DIR (which may not exist).
 function(viwo_add_test name)
   if(NOT VIWO_BUILD_TESTS)
     return()
   endif()
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINKS;LABELS;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "WHOLE" "TIMEOUT" "SOURCES;LINKS;LABELS;DEPENDS" ${ARGN})
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)
   endif()
@@ -44,6 +45,11 @@ function(viwo_add_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} GTest::gtest_main GTest::gmock)
   if(ARG_DEPENDS)
     add_dependencies(${name} ${ARG_DEPENDS})
+  endif()
+  if(ARG_WHOLE)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+    return()
   endif()
   gtest_discover_tests(${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
     PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})

@@ -129,7 +129,7 @@ RunPictures::RunPictures(const RunSetup& setup, const RunData& data, PictureSink
       reference_(reference_of(data)),
       live_(!data.live.empty()) {
   if (setup.filter) cameras_.resize(setup.filter->cameras.size());
-  for (const ImageSample& image : data.pixels()) {
+  for (const ImageSample& image : data.images()) {
     const auto index = static_cast<std::size_t>(image.camera);
     if (index < cameras_.size()) cameras_[index].images.push_back(image);
   }

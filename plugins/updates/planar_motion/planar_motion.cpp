@@ -70,7 +70,7 @@ class PlanarMotion final : public Update {
     const CloneView& first = filter.clones[filter.clones.size() - 2];
     const CloneView& last = filter.clones.back();
     const WheelsView wheels = blocks_.view(filter);
-    const Mount mount{wheels.R_ItoO, wheels.p_IinO};
+    const Extrinsics mount{wheels.R_ItoO, wheels.p_IinO};
     double path_m = 0.;
     const ImuPose at_first{first.R_GtoI, first.p_IinG};
     const ImuPose at_last{last.R_GtoI, last.p_IinG};

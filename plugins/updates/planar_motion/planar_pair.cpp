@@ -17,7 +17,7 @@ struct Geometry {
   Vector3d up;      ///< how O moves in G
   Vector3d d;       ///< the same in the first O
 
-  Geometry(const ImuPose& first, const ImuPose& last, const Mount& mount)
+  Geometry(const ImuPose& first, const ImuPose& last, const Extrinsics& mount)
       : D0(mount.R_ItoO * first.R_GtoI), D1(mount.R_ItoO * last.R_GtoI) {
     M = D1 * D0.transpose();  // (PM-1)
     l = -mount.R_ItoO.transpose() * mount.p_IinO;
@@ -29,14 +29,14 @@ struct Geometry {
 
 }  // namespace
 
-Rows off_plane(const ImuPose& first, const ImuPose& last, const Mount& mount, double* path_m) {
+Rows off_plane(const ImuPose& first, const ImuPose& last, const Extrinsics& mount, double* path_m) {
   const Geometry g(first, last, mount);
   if (path_m != nullptr) *path_m = g.d.head<2>().norm();
   const Vector3d turn = -log_so3(g.M);
   return {turn.x(), turn.y(), g.d.z(), g.up.z()};  // (PM-3)
 }
 
-void poses_jacobian(const ImuPose& first, const ImuPose& last, const Mount& mount,
+void poses_jacobian(const ImuPose& first, const ImuPose& last, const Extrinsics& mount,
                     PairJacobian& J) {
   const Geometry g(first, last, mount);
   const Matrix3d& C = mount.R_ItoO;
@@ -61,7 +61,7 @@ void poses_jacobian(const ImuPose& first, const ImuPose& last, const Mount& moun
   J(3, 11) = 1.;
 }
 
-void mount_jacobian(const ImuPose& first, const ImuPose& last, const Mount& mount,
+void mount_jacobian(const ImuPose& first, const ImuPose& last, const Extrinsics& mount,
                     PairJacobian& J) {
   const Geometry g(first, last, mount);
   J.rightCols<3>().setZero();

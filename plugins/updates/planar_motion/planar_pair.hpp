@@ -12,7 +12,7 @@ struct ImuPose {
 };
 
 /// Where the IMU sits in O.
-struct Mount {
+struct Extrinsics {
   Eigen::Matrix3d R_ItoO = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_IinO = Eigen::Vector3d::Zero();
 };
@@ -28,15 +28,17 @@ using PairJacobian = Eigen::Matrix<double, kRows, kColumns>;
 
 /// What is off the plane between two poses; `path_m`, if not null, becomes the distance that O
 /// moves along the plane.
-Rows off_plane(const ImuPose& first, const ImuPose& last, const Mount& mount,
+Rows off_plane(const ImuPose& first, const ImuPose& last, const Extrinsics& mount,
                double* path_m = nullptr);
 
 /// Its derivative by the errors of the two poses (R = Exp(-dtheta) R_hat): the first twelve
 /// columns.
-void poses_jacobian(const ImuPose& first, const ImuPose& last, const Mount& mount, PairJacobian& J);
+void poses_jacobian(const ImuPose& first, const ImuPose& last, const Extrinsics& mount,
+                    PairJacobian& J);
 
 /// The columns of the mount: those of the motion along the plane that is next to the given one, so
 /// that noise of the poses does not count as motion off the plane.
-void mount_jacobian(const ImuPose& first, const ImuPose& last, const Mount& mount, PairJacobian& J);
+void mount_jacobian(const ImuPose& first, const ImuPose& last, const Extrinsics& mount,
+                    PairJacobian& J);
 
 }  // namespace viwo::planar_motion

@@ -57,7 +57,7 @@ TEST(PlanarPair, HasTheDerivativesOfCentralDifferencesByThePosesAtRandomStates) 
     const ImuPose first{exp_so3(n.segment<3>(0)), n.segment<3>(3)};
     const ImuPose last{exp_so3(0.3 * n.segment<3>(6)) * first.R_GtoI,
                        first.p_IinG + 0.3 * n.segment<3>(9)};
-    const Mount mount{exp_so3(n.segment<3>(12)), n.segment<3>(15)};
+    const Extrinsics mount{exp_so3(n.segment<3>(12)), n.segment<3>(15)};
     const auto predict = [&](const VectorXd& d) -> VectorXd {
       const ImuPose a{exp_so3(-d.segment<3>(0)) * first.R_GtoI, first.p_IinG + d.segment<3>(3)};
       const ImuPose b{exp_so3(-d.segment<3>(6)) * last.R_GtoI, last.p_IinG + d.segment<3>(9)};

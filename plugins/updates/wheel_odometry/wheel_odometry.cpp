@@ -51,7 +51,7 @@ constexpr double kCloser = 0.25;
 /// Where a factor is linearised.
 struct Point {
   MovingPose first, last;
-  Mount mount;
+  Extrinsics mount;
   Intrinsics x_WI;
 };
 
@@ -378,7 +378,7 @@ class WheelOdometry final : public Update {
     for (GeometryMatrix& D : second) D.setZero();
     const PoseJacobian here = relative_pose_jacobian(at_.first, at_.last, at_.mount);
     for (int k = kMountTheta; k < kGeometrySize; ++k) {
-      Mount mount = at_.mount;
+      Extrinsics mount = at_.mount;
       MovingPose first = at_.first;
       MovingPose last = at_.last;
       Eigen::Vector3d d = Eigen::Vector3d::Zero();

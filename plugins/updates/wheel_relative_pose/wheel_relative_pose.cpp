@@ -149,7 +149,7 @@ class WheelRelativePose final : public Update {
   /// (RP-9)
   void add_factor(const WheelsView& wheels, const CloneView& first, const CloneView& last,
                   ResidualFactor& factor) {
-    const Mount mount{wheels.R_ItoO, wheels.p_IinO};
+    const Extrinsics mount{wheels.R_ItoO, wheels.p_IinO};
     const PoseJacobian by_state = relative_pose_jacobian(
         moving_pose(first, 0., true), moving_pose(last, 0., true), mount);  // (RP-8)
     factor.columns.add(first.column, kPoseSize);

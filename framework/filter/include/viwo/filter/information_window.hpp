@@ -17,7 +17,7 @@ namespace viwo {
 /// is allocated after construction.
 class InformationWindow {
  public:
-  /// Mount, clock and intrinsics of a wheel set.
+  /// Extrinsics, clock and intrinsics of a wheel set.
   static constexpr int kMaxParameters = kPoseSize + 1 + kMaxIntrinsics;
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor,
                                kMaxParameters, kMaxParameters>;

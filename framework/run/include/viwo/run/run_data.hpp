@@ -38,8 +38,8 @@ struct RunData {
   std::span<const EncoderSample> wheels() const { return recorded.of<EncoderSample>(wheels_name); }
   /// Truth of the inertial state, if there is one.
   std::span<const StateSample> states() const { return recorded.of<StateSample>(); }
-  /// Of images, for pictures.
-  std::span<const ImageSample> pixels() const { return recorded.of<ImageSample>(); }
+  /// For pictures: what has not been read by a tracker while it ran.
+  std::span<const ImageSample> images() const { return recorded.of<ImageSample>(); }
 };
 
 /// Whether measurements may still be to happen; then none may have been recorded.

@@ -21,7 +21,7 @@ struct MovingPose {
 MovingPose moving_pose(const CloneView& clone, double after_s, bool first_estimate);
 
 /// Where the IMU sits in O.
-struct Mount {
+struct Extrinsics {
   Eigen::Matrix3d R_ItoO = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_IinO = Eigen::Vector3d::Zero();
 };
@@ -40,13 +40,13 @@ using PoseJacobian = Eigen::Matrix<double, 3, kGeometrySize>;
 /// [yaw, x, y] of O at `last` in O at `first`: rad, m, m. Yaw in (-pi, pi). `tilt`, if not null,
 /// becomes [roll, pitch] that O turns by on the side: the first two entries of the rotation vector
 /// that yaw is the last one of.
-Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last, const Mount& mount,
-                              Eigen::Vector2d* tilt = nullptr);
+Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last,
+                              const Extrinsics& mount, Eigen::Vector2d* tilt = nullptr);
 
 /// Its derivative by the errors of both poses (R = Exp(-dtheta) R_hat), of the mount, and by the
 /// time offset that moves both instants; rates and velocities are held.
 PoseJacobian relative_pose_jacobian(const MovingPose& first, const MovingPose& last,
-                                    const Mount& mount);
+                                    const Extrinsics& mount);
 
 /// Motion of O over an interval.
 struct Motion {
@@ -74,6 +74,7 @@ CalibrationJacobian calibration_jacobian(const Eigen::Vector3d& g, const Eigen::
 /// Derivative of [roll, pitch] that O turns by from one clone to the other, where it turns little,
 /// by the errors of both clones (WO-6).
 Eigen::Matrix<double, 2, kGeometrySize> tilt_jacobian(const MovingPose& first,
-                                                      const MovingPose& last, const Mount& mount);
+                                                      const MovingPose& last,
+                                                      const Extrinsics& mount);
 
 }  // namespace viwo::wheel_motion

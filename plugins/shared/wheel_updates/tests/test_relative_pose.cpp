@@ -26,7 +26,7 @@ TEST(RelativePose, HasTheDerivativesOfCentralDifferencesAtRandomStates) {
     last.v_IinI = n.segment<3>(21);
     first.after_s = 0.02 * n[24];
     last.after_s = 0.02 * n[25];
-    const Mount mount{exp_so3(n.segment<3>(26)), n.segment<3>(0)};
+    const Extrinsics mount{exp_so3(n.segment<3>(26)), n.segment<3>(0)};
     const auto predict = [&](const VectorXd& d) -> VectorXd {
       MovingPose a = first, b = last;
       a.R_GtoI = exp_so3(-d.segment<3>(kFirstTheta)) * a.R_GtoI;
@@ -35,8 +35,8 @@ TEST(RelativePose, HasTheDerivativesOfCentralDifferencesAtRandomStates) {
       b.p_IinG += d.segment<3>(kLastPosition);
       a.after_s += d[kTimeOffset];
       b.after_s += d[kTimeOffset];
-      const Mount m{exp_so3(-d.segment<3>(kMountTheta)) * mount.R_ItoO,
-                    mount.p_IinO + d.segment<3>(kMountPosition)};
+      const Extrinsics m{exp_so3(-d.segment<3>(kMountTheta)) * mount.R_ItoO,
+                         mount.p_IinO + d.segment<3>(kMountPosition)};
       return relative_pose(a, b, m);
     };
     EXPECT_EQ(testing::jacobian_mismatch(
@@ -53,7 +53,7 @@ TEST(RelativePose, HasTheDerivativesOfItsTiltWhereItTurnsLittle) {
     MovingPose first, last;
     first.R_GtoI = exp_so3(n.segment<3>(0));
     last.R_GtoI = exp_so3(1e-4 * n.segment<3>(3)) * first.R_GtoI;
-    const Mount mount{exp_so3(n.segment<3>(6)), n.segment<3>(9)};
+    const Extrinsics mount{exp_so3(n.segment<3>(6)), n.segment<3>(9)};
     const auto predict = [&](const VectorXd& d) -> VectorXd {
       MovingPose a = first, b = last;
       a.R_GtoI = exp_so3(-d.segment<3>(kFirstTheta)) * a.R_GtoI;

@@ -33,8 +33,8 @@ std::string short_name(const fs::path& file) {
 
 Options options_for(const fs::path& file) {
   Options options;
-  const fs::path config =
-      fs::path(VIWO_TEST_SOURCE_DIR) / "tests/conformance/configs" / (short_name(file) + ".yaml");
+  const fs::path config = fs::path(VIWO_TEST_SOURCE_DIR) / "framework/conformance/tests/configs" /
+                          (short_name(file) + ".yaml");
   if (fs::exists(config)) options.config = config;
   return options;
 }

@@ -37,7 +37,7 @@ std::string output_of(const std::string& command) {
 }
 
 std::string record_name(int version) {
-  return "tests/api/plugin_api_v" + std::to_string(version) + ".txt";
+  return "framework/plugin_api/tests/plugin_api_v" + std::to_string(version) + ".txt";
 }
 
 /// Empty if the two are the same; else the first line that differs, and what to do.
@@ -83,7 +83,8 @@ TEST(PluginApi, HasNoTypeThatTheRecordDoesNotKnow) {
       if (name == "RecordText" || name == "PluginKind" || name == "TypedBuffer") continue;
       ++types;
       EXPECT_NE(recorded.find("\n" + name + "  size "), std::string::npos)
-          << name << " of " << entry.path().filename() << " is not in tests/api/api_record.cpp";
+          << name << " of " << entry.path().filename()
+          << " is not in framework/plugin_api/tests/api_record.cpp";
     }
   }
   EXPECT_GT(types, 70);
@@ -107,8 +108,9 @@ class ChangedApi : public ::testing::Test {
     std::ofstream(file) << text.replace(at, from.size(), to);
     const std::string program = (folder_ / "api_record").string();
     const std::string compile = VIWO_API_COMPILE " -I" + (folder_ / "include").string() + " " +
-                                VIWO_TEST_SOURCE_DIR "/tests/api/api_record.cpp -o " + program +
-                                " " VIWO_API_LIBRARY " -Wl,-rpath," +
+                                VIWO_TEST_SOURCE_DIR
+                                "/framework/plugin_api/tests/api_record.cpp -o " +
+                                program + " " VIWO_API_LIBRARY " -Wl,-rpath," +
                                 fs::path(VIWO_API_LIBRARY).parent_path().string() + " 2>&1";
     return output_of(compile + " && " + program);
   }

@@ -20,7 +20,7 @@ struct Geometry {
   Vector3d y;       ///< from I to O at the last instant, in I at the first one
   Vector3d d;       ///< origin of O at the last instant, in O at the first one
 
-  Geometry(const MovingPose& first, const MovingPose& last, const Mount& mount)
+  Geometry(const MovingPose& first, const MovingPose& last, const Extrinsics& mount)
       : E0(exp_so3(-first.after_s * first.w_IinI)), E1(exp_so3(-last.after_s * last.w_IinI)) {
     const Matrix3d& C = mount.R_ItoO;
     D = C * E0 * first.R_GtoI;
@@ -41,8 +41,8 @@ MovingPose moving_pose(const CloneView& clone, double after_s, bool first_estima
           clone.R_GtoI_fej * clone.v_IinG, after_s};
 }
 
-Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last, const Mount& mount,
-                              Eigen::Vector2d* tilt) {
+Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last,
+                              const Extrinsics& mount, Eigen::Vector2d* tilt) {
   const Geometry g(first, last, mount);
   const Vector3d turn = -log_so3(g.M);
   if (tilt != nullptr) *tilt = turn.head<2>();
@@ -50,7 +50,7 @@ Eigen::Vector3d relative_pose(const MovingPose& first, const MovingPose& last, c
 }
 
 PoseJacobian relative_pose_jacobian(const MovingPose& first, const MovingPose& last,
-                                    const Mount& mount) {
+                                    const Extrinsics& mount) {
   const Geometry g(first, last, mount);
   const Matrix3d& C = mount.R_ItoO;
   PoseJacobian J = PoseJacobian::Zero();
@@ -106,7 +106,8 @@ CalibrationJacobian calibration_jacobian(const Vector3d& g, const Eigen::Vector2
 }
 
 Eigen::Matrix<double, 2, kGeometrySize> tilt_jacobian(const MovingPose& first,
-                                                      const MovingPose& last, const Mount& mount) {
+                                                      const MovingPose& last,
+                                                      const Extrinsics& mount) {
   const Matrix3d& C = mount.R_ItoO;
   Eigen::Matrix<double, 2, kGeometrySize> J = Eigen::Matrix<double, 2, kGeometrySize>::Zero();
   J.middleCols<3>(kFirstTheta) = -(C * last.R_GtoI * first.R_GtoI.transpose()).topRows<2>();
