@@ -186,7 +186,7 @@ int observability_command(const Arguments& arguments) {
   const Figures figures(arguments, folder);
   const observability::ObservabilityReport report = [&] {
     Progress progress;
-    return observability::analyse(setup, plugins, &progress);
+    return observability::analyse(setup, plugins, progress);
   }();
   write_observability(folder, report);
   figures.write(report_of(report));
@@ -204,7 +204,7 @@ int calibrate_command(const Arguments& arguments) {
   make_folder(folder);
   const calibration::CalibrationResult result = [&] {
     Progress progress;
-    return calibrate(setup, &progress);
+    return calibrate(setup, progress);
   }();
   write_calibration(folder, result);
   std::cout << describe(result) << "\ncalibration: " << (folder / "calibration.yaml").string()

@@ -168,9 +168,9 @@ Intrinsics spread_of(const std::string& label, const std::vector<FitOf>& fits,
 
 }  // namespace
 
-CalibrationResult calibrate(const CalibrationSetup& setup, WorkProgress* progress) {
+CalibrationResult calibrate(const CalibrationSetup& setup, WorkProgress& progress) {
   const std::vector<FitOf> fits = fits_of(setup);
-  if (progress != nullptr) progress->begin("fits", static_cast<int>(fits.size()));
+  progress.begin("fits", static_cast<int>(fits.size()));
   std::vector<CalibrationEstimate> estimates(fits.size());
   tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t f) {
     std::vector<std::size_t> used;
@@ -178,10 +178,9 @@ CalibrationResult calibrate(const CalibrationSetup& setup, WorkProgress* progres
       if (!fits[f].leaves_out(setup.recordings[i])) used.push_back(i);
     }
     estimates[f] = fit(setup, used);
-    if (progress == nullptr) return;
-    progress->done((fits[f].label.empty() ? "all recordings"
-                                          : "without " + fits[f].label + " " + fits[f].value) +
-                   ": " + std::to_string(estimates[f].iterations) + " iterations");
+    progress.done((fits[f].label.empty() ? "all recordings"
+                                         : "without " + fits[f].label + " " + fits[f].value) +
+                  ": " + std::to_string(estimates[f].iterations) + " iterations");
   });
   CalibrationResult result;
   result.setup = &setup;

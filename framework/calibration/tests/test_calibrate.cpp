@@ -153,7 +153,7 @@ TEST(Calibrate, ReadsItsFileLeavesOutAndWritesACalibrationThatARunIncludes) {
          "motions: [icr_sweep, figure_eight]\n";
   const auto setup = read_calibration_setup(folder / "calibration.yaml", {}, registry());
   testing::Told told;
-  const auto result = calibrate(setup, &told);
+  const auto result = calibrate(setup, told);
   EXPECT_EQ(told.total(), 3);
   for (const char* fit :
        {"all recordings: ", "without motion figure_eight: ", "without motion icr_sweep: "}) {

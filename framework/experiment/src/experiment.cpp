@@ -344,8 +344,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
   result.jobs = options.jobs > 0 ? options.jobs : tbb::this_task_arena::max_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(result.jobs));
-  WorkProgress nobody;
-  WorkProgress& progress = options.progress != nullptr ? *options.progress : nobody;
+  WorkProgress& progress = *options.progress;
   progress.begin(setup.name, runner.cells());
   runner.open_journal(progress);
   if (options.collect) runner.require_all();

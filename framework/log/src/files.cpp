@@ -36,32 +36,35 @@ void make_folder(const std::filesystem::path& folder) {
   }
 }
 
-WholeFile::WholeFile(std::filesystem::path file) : file_(std::move(file)), unfinished_(file_) {
+FileWriter::FileWriter(std::filesystem::path file, Appears appears)
+    : file_(std::move(file)), unfinished_(file_) {
   std::error_code ignored;
-  if (!std::filesystem::is_other(file_, ignored)) unfinished_ += ".tmp";
+  if (appears == Appears::kWhole && !std::filesystem::is_other(file_, ignored)) {
+    unfinished_ += ".tmp";
+  }
   fd_ = ::open(unfinished_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (fd_ < 0) fail();
 }
 
-WholeFile::WholeFile(WholeFile&& other) noexcept
+FileWriter::FileWriter(FileWriter&& other) noexcept
     : file_(std::move(other.file_)),
       unfinished_(std::move(other.unfinished_)),
       fd_(std::exchange(other.fd_, -1)) {}
 
-WholeFile::~WholeFile() {
+FileWriter::~FileWriter() {
   if (fd_ < 0) return;
   ::close(fd_);
   if (unfinished_ != file_) ::unlink(unfinished_.c_str());
 }
 
-void WholeFile::fail() {
+void FileWriter::fail() {
   const std::string reason = std::generic_category().message(errno);
   if (fd_ >= 0) ::close(std::exchange(fd_, -1));
   if (unfinished_ != file_) ::unlink(unfinished_.c_str());
   throw std::runtime_error("cannot write " + file_.string() + ": " + reason);
 }
 
-void WholeFile::write(std::string_view bytes) {
+void FileWriter::write(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(fd_, bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
@@ -70,7 +73,7 @@ void WholeFile::write(std::string_view bytes) {
   }
 }
 
-void WholeFile::commit() {
+void FileWriter::commit() {
   // What is written late may fail late.
   if (!sync(fd_) || ::close(std::exchange(fd_, -1)) != 0) fail();
   if (unfinished_ == file_) return;
@@ -79,7 +82,7 @@ void WholeFile::commit() {
 }
 
 void write_text(const std::filesystem::path& file, const std::string& text) {
-  WholeFile out(file);
+  FileWriter out(file);
   out.write(text);
   out.commit();
 }

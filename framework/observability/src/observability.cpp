@@ -253,13 +253,11 @@ ExperimentSetup read_observability(const std::filesystem::path& path,
 }
 
 ObservabilityReport analyse(const ExperimentSetup& setup, PluginRegistry& plugins,
-                            WorkProgress* told, double tolerance) {
+                            WorkProgress& progress, double tolerance) {
   ObservabilityReport report;
   report.setup = setup;
   report.tolerance = tolerance;
   const auto begin = std::chrono::steady_clock::now();
-  WorkProgress nobody;
-  WorkProgress& progress = told != nullptr ? *told : nobody;
   progress.begin(setup.name, static_cast<int>(setup.recordings.size() * setup.variants.size()));
   for (std::size_t m = 0; m < setup.recordings.size(); ++m) {
     for (std::size_t v = 0; v < setup.variants.size(); ++v) {

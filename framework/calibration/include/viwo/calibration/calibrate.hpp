@@ -107,7 +107,7 @@ CalibrationEstimate fit(const CalibrationSetup& setup, const std::vector<std::si
 
 /// All of the data, and without what is left out in turn. Throws InputError where nothing is left
 /// to fit.
-CalibrationResult calibrate(const CalibrationSetup& setup, WorkProgress* progress = nullptr);
+CalibrationResult calibrate(const CalibrationSetup& setup, WorkProgress& progress = no_progress());
 
 /// Writes calibration.yaml, summary.json and report.html.
 void write_calibration(const std::filesystem::path& folder, const CalibrationResult& result);

@@ -10,16 +10,23 @@ namespace viwo::log {
 
 void make_folder(const std::filesystem::path& folder);
 
-/// A file that has its name once it is whole and on the disk: until commit() it is FILE.tmp, which
-/// goes if nobody commits. What is there and is no file (a device, a pipe) is written to at once.
-class WholeFile {
+/// When what is written is under the name of the file.
+enum class Appears {
+  kWhole,   ///< all of it, once it is on the disk; what is no file (a device, a pipe) at once
+  kAtOnce,  ///< as it is written: what has been stays when the process is killed
+};
+
+/// A file that is written. One that appears whole is FILE.tmp until commit(), and goes if nobody
+/// commits.
+class FileWriter {
  public:
-  explicit WholeFile(std::filesystem::path file);
-  ~WholeFile();
-  WholeFile(WholeFile&& other) noexcept;
-  WholeFile& operator=(WholeFile&&) = delete;
+  explicit FileWriter(std::filesystem::path file, Appears appears = Appears::kWhole);
+  ~FileWriter();
+  FileWriter(FileWriter&& other) noexcept;
+  FileWriter& operator=(FileWriter&&) = delete;
 
   void write(std::string_view bytes);
+  /// It is on the disk, under its name.
   void commit();
 
  private:

@@ -91,7 +91,7 @@ ExperimentSetup read_observability(const std::filesystem::path& file,
 /// estimate is frozen at the truth. Throws InputError for a run without filter or without true
 /// states.
 ObservabilityReport analyse(const ExperimentSetup& setup, PluginRegistry& plugins,
-                            WorkProgress* progress = nullptr, double tolerance = 5e-5);
+                            WorkProgress& progress = no_progress(), double tolerance = 5e-5);
 
 /// Writes observability.json and report.html.
 void write_observability(const std::filesystem::path& folder, const ObservabilityReport& report);

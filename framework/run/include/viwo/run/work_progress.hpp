@@ -19,4 +19,10 @@ class WorkProgress {
   virtual void note(const std::string& /*line*/) {}
 };
 
+/// For work that nobody waits for.
+inline WorkProgress& no_progress() {
+  static WorkProgress nobody;
+  return nobody;
+}
+
 }  // namespace viwo
