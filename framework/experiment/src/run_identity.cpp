@@ -6,8 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include <zlib.h>
-
+#include "checksum.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/results/run_output.hpp"
 
@@ -16,15 +15,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-unsigned long crc_of(std::string_view bytes, unsigned long before) {
-  return crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
-}
-
 /// "SIZE bytes, crc NUMBER"
 std::string checksum_of(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::vector<char> buffer(std::size_t{1} << 20);
-  unsigned long crc = 0;
+  std::uint32_t crc = 0;
   std::uintmax_t size = 0;
   while (in) {
     in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
@@ -50,7 +45,7 @@ std::string checksums_of(const fs::path& folder, const fs::path& results) {
   for (const fs::path& file : files) {
     text += file.lexically_relative(folder).string() + ": " + checksum_of(file) + "\n";
   }
-  return std::to_string(files.size()) + " files, crc " + std::to_string(crc_of(text, 0));
+  return std::to_string(files.size()) + " files, crc " + std::to_string(crc_of(text));
 }
 
 }  // namespace

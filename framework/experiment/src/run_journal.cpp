@@ -6,8 +6,7 @@
 #include <system_error>
 #include <vector>
 
-#include <zlib.h>
-
+#include "checksum.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/results/run_record.hpp"
 
@@ -21,7 +20,7 @@ constexpr std::string_view kUnfinished = ".cbor.tmp";
 constexpr std::size_t kChecksumBytes = 4;
 
 std::string checksum(std::string_view bytes) {
-  const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  const std::uint32_t crc = crc_of(bytes);
   std::string text;
   for (std::size_t i = 0; i < kChecksumBytes; ++i) {
     text.push_back(static_cast<char>((crc >> (8 * i)) & 0xff));

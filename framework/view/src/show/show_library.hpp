@@ -14,8 +14,7 @@ struct ShowLibrary {
   std::unique_ptr<Film> (*open_film)(const std::filesystem::path& file);
 };
 
-/// The one name that it exports, a `const ShowLibrary*()`. With the version of the program: both
-/// are of one build.
+/// The one name that it exports, a `const ShowLibrary*()`. Program and library are of one build.
 inline constexpr const char* kShowLibraryEntry = "viwo_show_library";
 
 }  // namespace viwo::view
