@@ -130,7 +130,10 @@ TEST_F(FilterTest, RefusesUnknownKeysInEachSection) {
 TEST_F(FilterTest, RefusesWrongValuesInEachSection) {
   refuse("imu: {}", "imu: 3",
          "run.yaml:17:6  imu: expected a section (lines of 'key: value'), got a single value");
-  refuse("t_OtoI_s: 0", "p_IinO_m: [1, 2]", "run.yaml:18:20  wheels.p_IinO_m needs three numbers");
+  refuse(
+      "t_OtoI_s: 0", "p_IinO_m: [1, 2]",
+      "run.yaml:18:20  wheels.p_IinO_m: needs 3 numbers, not 2 (origin of the IMU in the odometry "
+      "frame O, m)");
   refuse("clones: 11", "clones: 1",
          "run.yaml:19:21  estimator.clones: 1 violates 2 <= clones <= 100 (past poses kept in the "
          "state)");

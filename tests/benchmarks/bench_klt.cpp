@@ -98,7 +98,7 @@ enum class Part { kAll, kPrepare, kFollow, kRefill, kMatch };
 
 void stereo(benchmark::State& state, Part part, Histogram histogram) {
   TrackerOptions options;
-  options.histogram = histogram;
+  options.histogram_method = histogram;
   Tracking tracking(options);
   std::size_t next = kPairs, left = 0, right = 0;
   double seconds = 0.;

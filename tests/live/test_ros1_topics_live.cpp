@@ -148,7 +148,7 @@ TEST_F(Ros1Topics, RefusesParametersThatContradictEachOther) {
   EXPECT_THAT(error_of(", pose_topic: /p, odometry_topic: /o"),
               HasSubstr("sensor.odometry_topic: pose_topic and odometry_topic both give poses"));
   EXPECT_THAT(error_of(", imu_topic: /i, p_IinB_m: [1, 2]"),
-              HasSubstr("sensor.p_IinB_m: expected 3 numbers, got 2"));
+              HasSubstr("sensor.p_IinB_m: needs 3 numbers, not 2"));
   EXPECT_THAT(error_of(", imu_topic: /i, body_frame: odom"),
               HasSubstr("sensor.body_frame: 'odom' is the world_frame, too"));
   EXPECT_THAT(error_of(", imu_topic: /i, master_uri: here"),

@@ -1,4 +1,6 @@
 // A descriptor written by hand, wrong where the build says so.
+#include <vector>
+
 #include "viwo/api/plugin.hpp"
 
 #ifndef BAD_STRUCT_SIZE
@@ -17,13 +19,21 @@
 #define BAD_PARAM "r_m"
 #endif
 #ifndef BAD_FALLBACK
-#define BAD_FALLBACK "1"
+#define BAD_FALLBACK 1.
 #endif
 
 namespace {
 
-constexpr viwo::ParamSpec kParams[] = {
-    {.name = BAD_PARAM, .type = viwo::ParamType::kNumber, .fallback = BAD_FALLBACK, .min = 0.}};
+const std::vector<viwo::ParamSpec>& params() {
+  static const std::vector<viwo::ParamSpec> specs = [] {
+    double value = BAD_FALLBACK;
+    std::vector<viwo::ParamSpec> out;
+    viwo::ParamBinder binder(out);
+    binder(BAD_PARAM, value, {.min = 0.});
+    return out;
+  }();
+  return specs;
+}
 
 [[maybe_unused]] void* give_nothing(const viwo::ParamSet*, const viwo::HostServices*,
                                     viwo::ErrorText*) noexcept {
@@ -43,7 +53,6 @@ extern "C" const viwo::PluginDescriptor viwo_plugin = {BAD_STRUCT_SIZE,
                                                        "1",
                                                        "",
                                                        "",
-                                                       kParams,
-                                                       1,
+                                                       &params,
                                                        BAD_CREATE,
                                                        &destroy_nothing};

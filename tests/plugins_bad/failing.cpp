@@ -1,6 +1,5 @@
 // An update that throws in every second epoch. With `what: seed` it is one of wheels that logs its
 // seed.
-#include <array>
 #include <stdexcept>
 #include <string>
 
@@ -10,17 +9,18 @@ namespace {
 
 using namespace viwo;
 
-constexpr std::array<ParamSpec, 1> kParams = {{
-    {.name = "what",
-     .type = ParamType::kString,
-     .fallback = "std",
-     .choices = "std|int|contract|declare|input|start|seed",
-     .help = "seed: that is logged; else what is thrown"},
-}};
+struct Params {
+  std::string what = "std";
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(what), {.choices = "std|int|contract|declare|input|start|seed",
+                         .help = "seed: that is logged; else what is thrown"});
+  }
+};
 
 class Failing final : public Update {
  public:
-  Failing(const ParamSet& params, const HostServices& services) : what_(params.text("what")) {
+  Failing(const Params& params, const HostServices& services) : what_(params.what) {
     if (what_ == "seed") services.log(LogLevel::kInfo, std::to_string(services.seed));
   }
 
@@ -51,4 +51,4 @@ class Failing final : public Update {
 
 }  // namespace
 
-VIWO_REGISTER(Update, Failing, "failing", "0.1.0", "throws", "Apache-2.0", kParams);
+VIWO_REGISTER(Update, Failing, "failing", "0.1.0", "throws", "Apache-2.0", Params);

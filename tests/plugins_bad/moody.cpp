@@ -1,5 +1,4 @@
 // A good plugin (a base with one drive channel that sees v_x), as long as its mood is fine.
-#include <array>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -10,25 +9,22 @@ namespace {
 
 using namespace viwo;
 
-constexpr std::array<ParamSpec, 2> kParams = {{
-    {.name = "radius_m",
-     .type = ParamType::kNumber,
-     .unit = "m",
-     .fallback = "0.1",
-     .min = 0.,
-     .min_exclusive = true,
-     .help = "wheel radius"},
-    {.name = "mood",
-     .type = ParamType::kString,
-     .fallback = "fine",
-     .choices = "fine|seed|param|input|std|int|bad_alloc|rows_std|rows_int|rows_input",
-     .help = "seed: that is logged; else what is thrown, and where"},
-}};
+struct Params {
+  double radius_m = 0.1;
+  std::string mood = "fine";
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(radius_m), {.unit = "m", .above = 0., .help = "wheel radius"});
+    b(VIWO_PARAM(mood),
+      {.choices = "fine|seed|param|input|std|int|bad_alloc|rows_std|rows_int|rows_input",
+       .help = "seed: that is logged; else what is thrown, and where"});
+  }
+};
 
 class Moody final : public KinematicModel {
  public:
-  Moody(const ParamSet& params, const HostServices& services)
-      : radius_(params.number("radius_m")), mood_(params.text("mood")) {
+  Moody(const Params& params, const HostServices& services)
+      : radius_(params.radius_m), mood_(params.mood) {
     if (mood_ == "seed") services.log(LogLevel::kInfo, std::to_string(services.seed));
     if (mood_ == "param") throw ParamError("radius_m", "is too round");
     if (mood_ == "input") throw InputError("wheels.csv:3: not a wheel");
@@ -79,4 +75,4 @@ class Moody final : public KinematicModel {
 
 }  // namespace
 
-VIWO_REGISTER(KinematicModel, Moody, "moody", "1.2.0", "one wheel", "Apache-2.0", kParams);
+VIWO_REGISTER(KinematicModel, Moody, "moody", "1.2.0", "one wheel", "Apache-2.0", Params);

@@ -1,6 +1,4 @@
 // A sensor of ranges.
-#include <array>
-
 #include "range.hpp"
 #include "viwo/api/plugin.hpp"
 
@@ -8,11 +6,9 @@ namespace {
 
 using namespace viwo;
 
-constexpr std::array<ParamSpec, 0> kParams = {};
-
 class Ranges final : public Sensor {
  public:
-  Ranges(const ParamSet&, const HostServices&) {}
+  Ranges(const NoParams&, const HostServices&) {}
   SampleTypes yields() const override { return sample_types<bad::RangeSample>(); }
   Status next(Measurement& out) override {
     if (++given_ > 2) return Status::kEnd;
@@ -26,4 +22,4 @@ class Ranges final : public Sensor {
 
 }  // namespace
 
-VIWO_REGISTER(Sensor, Ranges, BAD_NAME, "0.1.0", "ranges", "Apache-2.0", kParams);
+VIWO_REGISTER(Sensor, Ranges, BAD_NAME, "0.1.0", "ranges", "Apache-2.0", NoParams);

@@ -1,6 +1,4 @@
 // An update that takes ranges, and makes nothing of them.
-#include <array>
-
 #include "range.hpp"
 #include "viwo/api/plugin.hpp"
 
@@ -8,11 +6,9 @@ namespace {
 
 using namespace viwo;
 
-constexpr std::array<ParamSpec, 0> kParams = {};
-
 class Ranging final : public Update {
  public:
-  Ranging(const ParamSet&, const HostServices&) {}
+  Ranging(const NoParams&, const HostServices&) {}
   void declare(Declarations& host) override {
     ranges_ = host.stream({.type = &sample_type<bad::RangeSample>()});
   }
@@ -26,4 +22,4 @@ class Ranging final : public Update {
 
 }  // namespace
 
-VIWO_REGISTER(Update, Ranging, BAD_NAME, "0.1.0", "takes ranges", "Apache-2.0", kParams);
+VIWO_REGISTER(Update, Ranging, BAD_NAME, "0.1.0", "takes ranges", "Apache-2.0", NoParams);

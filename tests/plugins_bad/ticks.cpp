@@ -1,6 +1,6 @@
 // A good sensor: a few samples at the radius of its kinematic model times the seed.
-#include <array>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 
 #include "viwo/api/plugin.hpp"
@@ -9,17 +9,23 @@ namespace {
 
 using namespace viwo;
 
-constexpr std::array<ParamSpec, 3> kParams = {{
-    {.name = "count", .type = ParamType::kInt, .fallback = "2", .min = 0.},
-    {.name = "kinematics", .type = ParamType::kKinematics, .fallback = "{type: moody}"},
-    {.name = "file", .type = ParamType::kPath, .fallback = ""},
-}};
+struct Params {
+  std::int64_t count = 2;
+  NestedKinematics kinematics{"{type: moody}"};
+  std::filesystem::path file;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(count), {.min = 0.});
+    b(VIWO_PARAM(kinematics), {});
+    b(VIWO_PARAM(file), {});
+  }
+};
 
 class Ticks final : public Sensor {
  public:
-  Ticks(const ParamSet& params, const HostServices& services)
-      : params_(params), services_(services), model_(params.kinematics("kinematics")) {
-    services.log(LogLevel::kWarning, "file " + params.text("file"));
+  Ticks(const Params& params, const HostServices& services)
+      : count_(params.count), services_(services), model_(*params.kinematics.model) {
+    services.log(LogLevel::kWarning, "file " + params.file.string());
   }
 
   // Everything the host gave must still be there.
@@ -32,7 +38,7 @@ class Ticks final : public Sensor {
   SampleTypes yields() const override { return sample_types<EncoderSample>(); }
 
   Status next(Measurement& out) override {
-    if (given_ == params_.integer("count")) return Status::kEnd;
+    if (given_ == count_) return Status::kEnd;
     ModelDescription description;
     model_.describe(description);
     EncoderSample sample;
@@ -45,7 +51,7 @@ class Ticks final : public Sensor {
   }
 
  private:
-  const ParamSet& params_;
+  std::int64_t count_;
   const HostServices& services_;
   const KinematicModel& model_;
   std::int64_t given_ = 0;
@@ -53,4 +59,4 @@ class Ticks final : public Sensor {
 
 }  // namespace
 
-VIWO_REGISTER(Sensor, Ticks, "ticks", "0.1.0", "counts", "Apache-2.0", kParams);
+VIWO_REGISTER(Sensor, Ticks, "ticks", "0.1.0", "counts", "Apache-2.0", Params);

@@ -15,64 +15,55 @@ namespace {
 
 using config::Node;
 
-constexpr std::array kCalibrationParams{
-    ParamSpec{.name = "calibration", .type = ParamType::kString, .help = "name of the calibration"},
-    ParamSpec{.name = "base",
-              .type = ParamType::kString,
-              .help = "run configuration, relative to this file"},
-    ParamSpec{.name = "leave_out_by",
-              .type = ParamType::kStrings,
-              .fallback = "[]",
-              .help = "labels of the recordings whose values are left out of the fit in turn"},
-    ParamSpec{.name = "report_by",
-              .type = ParamType::kStrings,
-              .fallback = "[]",
-              .help = "labels of the recordings to break the tables down by"},
-    ParamSpec{.name = "segment_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0",
-              .min = 0.,
-              .help = "length of the segments that are compared; 0: whole recordings"},
-    ParamSpec{.name = "parity",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "use the parity residual beside the relative poses"},
-    ParamSpec{.name = "estimate_extrinsics",
-              .type = ParamType::kBool,
-              .fallback = "false",
-              .help = "estimate where O is in the reference body; then the gauge entries are held"},
-    ParamSpec{.name = "prior_sigma_extrinsics_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.01",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the position of O in the reference body is known to be zero"},
-    ParamSpec{.name = "prior_sigma_extrinsics_rad",
-              .type = ParamType::kNumber,
-              .unit = "rad",
-              .fallback = "0.02",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the yaw of O in the reference body is known to be zero"},
-    ParamSpec{.name = "prior_sigma_clock_offset_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0",
-              .min = 0.,
-              .max = 1.,
-              .help = "prior of one clock offset per recording; 0: none is estimated"},
+struct CalibrationParams {
+  std::string calibration;
+  std::string base;
+  std::vector<std::string> leave_out_by;
+  std::vector<std::string> report_by;
+  double segment_s = 0.;
+  bool parity = true;
+  bool estimate_extrinsics = false;
+  double prior_sigma_extrinsics_m = 0.01;
+  double prior_sigma_extrinsics_rad = 0.02;
+  double prior_sigma_clock_offset_s = 0.;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(calibration), {.required = true, .help = "name of the calibration"});
+    b(VIWO_PARAM(base), {.required = true, .help = "run configuration, relative to this file"});
+    b(VIWO_PARAM(leave_out_by),
+      {.help = "labels of the recordings whose values are left out of the fit in turn"});
+    b(VIWO_PARAM(report_by), {.help = "labels of the recordings to break the tables down by"});
+    b(VIWO_PARAM(segment_s),
+      {.unit = "s",
+       .min = 0.,
+       .help = "length of the segments that are compared; 0: whole recordings"});
+    b(VIWO_PARAM(parity), {.help = "use the parity residual beside the relative poses"});
+    b(VIWO_PARAM(estimate_extrinsics),
+      {.help = "estimate where O is in the reference body; then the gauge entries are held"});
+    b(VIWO_PARAM(prior_sigma_extrinsics_m),
+      {.unit = "m",
+       .above = 0.,
+       .help = "how well the position of O in the reference body is known to be zero"});
+    b(VIWO_PARAM(prior_sigma_extrinsics_rad),
+      {.unit = "rad",
+       .above = 0.,
+       .help = "how well the yaw of O in the reference body is known to be zero"});
+    b(VIWO_PARAM(prior_sigma_clock_offset_s),
+      {.unit = "s",
+       .min = 0.,
+       .max = 1.,
+       .help = "prior of one clock offset per recording; 0: none is estimated"});
+  }
 };
 
-CalibrationOptions options_of(const ParamSet& params) {
+CalibrationOptions options_of(const CalibrationParams& params) {
   CalibrationOptions options;
-  options.segment_s = params.number("segment_s");
-  options.parity = params.flag("parity");
-  options.estimate_extrinsics = params.flag("estimate_extrinsics");
-  options.extrinsics_sigma_m = params.number("prior_sigma_extrinsics_m");
-  options.extrinsics_sigma_rad = params.number("prior_sigma_extrinsics_rad");
-  options.clock_offset_sigma_s = params.number("prior_sigma_clock_offset_s");
+  options.segment_s = params.segment_s;
+  options.parity = params.parity;
+  options.estimate_extrinsics = params.estimate_extrinsics;
+  options.extrinsics_sigma_m = params.prior_sigma_extrinsics_m;
+  options.extrinsics_sigma_rad = params.prior_sigma_extrinsics_rad;
+  options.clock_offset_sigma_s = params.prior_sigma_clock_offset_s;
   return options;
 }
 
@@ -84,16 +75,14 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   const Node file = config::load_file(path);
   config::Errors errors;
   constexpr std::string_view kSections[] = {"recordings", "motions", "set"};
-  const ParamSet params = config::read_params(file, file.mark(), "calibration", kCalibrationParams,
-                                              kSections, {}, errors);
+  const auto params =
+      config::read_section<CalibrationParams>(file, file.mark(), "calibration", errors, kSections);
   errors.throw_if_any();
   CalibrationSetup setup;
-  setup.name = params.text("calibration");
+  setup.name = params.calibration;
   setup.options = options_of(params);
-  const auto leave_out_by = params.texts("leave_out_by");
-  setup.leave_out_by.assign(leave_out_by.begin(), leave_out_by.end());
-  const auto report_by = params.texts("report_by");
-  setup.report_by.assign(report_by.begin(), report_by.end());
+  setup.leave_out_by = params.leave_out_by;
+  setup.report_by = params.report_by;
   const std::vector<Recording> recordings = read_recordings(file);
   const Node base = load_base(file, assignments);
   require_labels(setup.report_by, recordings, file, "report_by");

@@ -64,16 +64,10 @@ std::string resolve_path(const std::string& text, const Mark& mark) {
 /// Reads the value of one row of the table.
 class ValueReader {
  public:
-  ValueReader(const ParamSpec& spec, std::string path, bool is_fallback, const ReadContext& context,
-              Errors& errors)
-      : spec_(spec),
-        path_(std::move(path)),
-        is_fallback_(is_fallback),
-        context_(context),
-        errors_(errors) {}
+  ValueReader(const ParamSpec& spec, std::string path, const ReadContext& context, Errors& errors)
+      : spec_(spec), path_(std::move(path)), context_(context), errors_(errors) {}
 
-  /// `base` stands for the position of a fallback when it is a relative path.
-  std::optional<ParamSet::Value> read(const Node& node, const Mark& base) {
+  std::optional<ParamValue> read(const Node& node) {
     switch (spec_.type) {
       case ParamType::kBool:
         if (expect_scalar(node)) return accept(node, path_, parse_bool(node.scalar()));
@@ -87,15 +81,12 @@ class ValueReader {
           return read_bounded(node, path_, parse_number(node.scalar(), spec_));
         return std::nullopt;
       case ParamType::kString:
-        if (is_fallback_ && node.is_null()) return std::string();
         if (expect_scalar(node)) return read_choice(node, path_);
         return std::nullopt;
       case ParamType::kPath:
-        return read_path(node, base);
+        return read_path(node);
       case ParamType::kNumbers:
-        return read_list<double>(node, [this](const Node& item, const std::string& path) {
-          return read_bounded(item, path, parse_number(item.scalar(), spec_));
-        });
+        return read_numbers(node);
       case ParamType::kStrings:
         return read_list<std::string>(node, [this](const Node& item, const std::string& path) {
           return read_choice(item, path);
@@ -113,8 +104,9 @@ class ValueReader {
 
   void wrong_kind(const Node& node) {
     error(node, path_,
-          "expected " + std::string(type_text(spec_.type)) + ", got " +
-              std::string(node.kind_text()) + meaning_text(spec_));
+          "expected " +
+              (spec_.size > 0 ? std::to_string(spec_.size) + " numbers" : type_text(spec_.type)) +
+              ", got " + std::string(node.kind_text()) + meaning_text(spec_));
   }
 
   bool expect_scalar(const Node& node) {
@@ -147,24 +139,30 @@ class ValueReader {
     return std::nullopt;
   }
 
-  static bool is_empty(const Node& node) {
-    return node.is_null() || (node.is_scalar() && node.scalar().empty());
-  }
-
   /// An empty path means "none", where that is the default.
-  std::optional<ParamSet::Value> read_path(const Node& node, const Mark& base) {
-    if (is_fallback_ && is_empty(node)) return std::string();
-    if (!expect_scalar(node)) return std::nullopt;
-    if (!is_empty(node)) return resolve_path(node.scalar(), is_fallback_ ? base : node.mark());
-    if (spec_.fallback != nullptr && is_empty(parse_text(spec_.fallback, "", false))) {
-      return std::string();
-    }
+  std::optional<ParamValue> read_path(const Node& node) {
+    if (!node.is_null() && !expect_scalar(node)) return std::nullopt;
+    const bool is_empty = node.is_null() || node.scalar().empty();
+    if (!is_empty) return resolve_path(node.scalar(), node.mark());
+    if (!spec_.required && std::get<std::string>(spec_.fallback).empty()) return std::string();
     error(node, path_, "is empty" + meaning_text(spec_));
     return std::nullopt;
   }
 
+  std::optional<ParamValue> read_numbers(const Node& node) {
+    auto values = read_list<double>(node, [this](const Node& item, const std::string& path) {
+      return read_bounded(item, path, parse_number(item.scalar(), spec_));
+    });
+    const auto n = values ? std::get<std::vector<double>>(*values).size() : 0;
+    if (!values || spec_.size == 0 || n == static_cast<std::size_t>(spec_.size)) return values;
+    error(node, path_,
+          "needs " + std::to_string(spec_.size) + " numbers, not " + std::to_string(n) +
+              meaning_text(spec_));
+    return std::nullopt;
+  }
+
   template <class T, class ReadItem>
-  std::optional<ParamSet::Value> read_list(const Node& node, const ReadItem& read_item) {
+  std::optional<ParamValue> read_list(const Node& node, const ReadItem& read_item) {
     std::vector<T> values;
     if (node.is_scalar()) {
       const auto value = read_item(node, path_);
@@ -192,7 +190,7 @@ class ValueReader {
     return values;
   }
 
-  std::optional<ParamSet::Value> read_kinematics(const Node& node) {
+  std::optional<ParamValue> read_kinematics(const Node& node) {
     if (!node.is_map()) {
       wrong_kind(node);
       return std::nullopt;
@@ -207,7 +205,6 @@ class ValueReader {
 
   const ParamSpec& spec_;
   std::string path_;
-  bool is_fallback_;
   const ReadContext& context_;
   Errors& errors_;
 };
@@ -218,7 +215,7 @@ std::string unit_advice(const std::string& key, std::span<const ParamSpec> specs
   for (const ParamSpec& spec : specs) {
     const KeyUnit known = split_unit(spec.name);
     if (known.suffix.empty() || known.base != given.base) continue;
-    const std::string unit = spec.unit[0] != '\0' ? spec.unit : unit_text(known.suffix);
+    const std::string unit = !spec.unit.empty() ? spec.unit : unit_text(known.suffix);
     return " - " + std::string(known.base) + " is in " + unit + ", did you mean '" + spec.name +
            "'?";
   }
@@ -239,29 +236,63 @@ void check_keys(const Node& map, std::string_view what, std::span<const ParamSpe
   }
 }
 
-std::string fallback_origin(const ParamSpec& spec) {
-  return "default of '" + std::string(spec.name) + "'";
-}
-
-/// The fallback as a tree. Throws std::logic_error if it is not YAML.
-Node parse_fallback(const ParamSpec& spec) {
+/// The default section of a nested model. Throws std::logic_error if it is not YAML.
+Node fallback_section(const ParamSpec& spec) {
   try {
-    return parse_text(spec.fallback, fallback_origin(spec), false);
+    return parse_text(spec.fallback_section, "default of '" + spec.name + "'", false);
   } catch (const InputError& error) {
     throw std::logic_error(error.what());
   }
 }
 
-/// Throws std::logic_error if the table refuses its own fallback. Only a nested model may fail for
-/// reasons that are the user's, e.g. a plugin that is not installed: those go into `user_errors`.
-std::optional<ParamSet::Value> read_fallback(const ParamSpec& spec, const std::string& path,
-                                             const Mark& where, const ReadContext& context,
-                                             Errors& user_errors) {
-  Errors own_errors;
-  Errors& errors = spec.type == ParamType::kKinematics ? user_errors : own_errors;
-  auto value = ValueReader(spec, path, true, context, errors).read(parse_fallback(spec), where);
-  if (!own_errors.empty()) throw std::logic_error(own_errors.text());
-  return value;
+/// What a configuration that is silent means. Only a nested model may fail: its plugin is not
+/// installed.
+std::optional<ParamValue> read_fallback(const ParamSpec& spec, const std::string& path,
+                                        const Mark& where, const ReadContext& context,
+                                        Errors& errors) {
+  if (spec.type == ParamType::kKinematics) {
+    return ValueReader(spec, path, context, errors).read(fallback_section(spec));
+  }
+  if (spec.type != ParamType::kPath || std::get<std::string>(spec.fallback).empty()) {
+    return spec.fallback;
+  }
+  return resolve_path(std::get<std::string>(spec.fallback), where);
+}
+
+/// Throws std::logic_error when a table refuses its own default.
+void check_fallback(const ParamSpec& spec) {
+  const auto refuse = [&](const std::string& text) {
+    throw std::logic_error("default of '" + spec.name + "': " + text);
+  };
+  const auto check_number = [&](double value) {
+    if (!within_bounds(value, spec)) refuse(number_text(value) + " violates " + bounds_text(spec));
+  };
+  const auto check_choice = [&](const std::string& text) {
+    const auto choices = split(spec.choices, '|');
+    if (!choices.empty() && std::find(choices.begin(), choices.end(), text) == choices.end()) {
+      refuse("'" + text + "' is none of " + spec.choices);
+    }
+  };
+  switch (spec.type) {
+    case ParamType::kInt:
+      return check_number(static_cast<double>(std::get<std::int64_t>(spec.fallback)));
+    case ParamType::kNumber:
+      return check_number(std::get<double>(spec.fallback));
+    case ParamType::kNumbers:
+      for (const double value : std::get<std::vector<double>>(spec.fallback)) check_number(value);
+      return;
+    case ParamType::kString:
+      return check_choice(std::get<std::string>(spec.fallback));
+    case ParamType::kStrings:
+      for (const auto& t : std::get<std::vector<std::string>>(spec.fallback)) check_choice(t);
+      return;
+    case ParamType::kKinematics:
+      if (!fallback_section(spec).is_map()) refuse("not a section");
+      return;
+    case ParamType::kBool:
+    case ParamType::kPath:
+      return;
+  }
 }
 
 }  // namespace
@@ -281,11 +312,11 @@ ParamSet read_params(const Node& map, const Mark& where, std::string_view what,
   for (const ParamSpec& spec : specs) {
     const std::string path = join(section, spec.name);
     if (const Node* node = map.find(spec.name)) {
-      auto value = ValueReader(spec, path, false, context, errors).read(*node, where);
-      if (value) params.set(spec.name, *std::move(value));
-    } else if (spec.fallback != nullptr) {
+      auto value = ValueReader(spec, path, context, errors).read(*node);
+      if (value) params.insert_or_assign(spec.name, *std::move(value));
+    } else if (!spec.required) {
       auto value = read_fallback(spec, path, where, context, errors);
-      if (value) params.set(spec.name, *std::move(value));
+      if (value) params.insert_or_assign(spec.name, *std::move(value));
     } else {
       errors.add(where, (what.empty() ? "" : std::string(what) + ": ") + "'" + spec.name +
                             "' is missing" + meaning_text(spec));
@@ -297,22 +328,11 @@ ParamSet read_params(const Node& map, const Mark& where, std::string_view what,
 void check_specs(std::span<const ParamSpec> specs) {
   std::set<std::string_view> names;
   for (const ParamSpec& spec : specs) {
-    if (spec.name == nullptr || spec.name[0] == '\0') {
-      throw std::logic_error("a parameter without a name");
+    if (spec.name.empty()) throw std::logic_error("a parameter without a name");
+    if (!names.insert(spec.name).second) {
+      throw std::logic_error("parameter '" + spec.name + "' is in the table twice");
     }
-    const std::string name = "parameter '" + std::string(spec.name) + "'";
-    if (spec.unit == nullptr || spec.choices == nullptr || spec.help == nullptr) {
-      throw std::logic_error(name + ": unit, choices or help is a null pointer");
-    }
-    if (!names.insert(spec.name).second) throw std::logic_error(name + " is in the table twice");
-    if (spec.type > ParamType::kKinematics) throw std::logic_error(name + ": unknown type");
-    if (spec.fallback == nullptr) continue;
-    if (spec.type != ParamType::kKinematics) {
-      Errors none;
-      read_fallback(spec, spec.name, Mark{}, ReadContext{}, none);
-    } else if (!parse_fallback(spec).is_map()) {
-      throw std::logic_error(fallback_origin(spec) + "  is not a section");
-    }
+    if (!spec.required) check_fallback(spec);
   }
 }
 

@@ -12,7 +12,7 @@
 namespace viwo::config {
 namespace {
 
-Node value_node(const ParamSet::Value& value,
+Node value_node(const ParamValue& value,
                 const std::function<Node(const KinematicModel&)>& write_kinematics) {
   return std::visit(
       [&](const auto& v) {
@@ -61,14 +61,14 @@ const char* short_type_text(ParamType type) {
 
 /// "required number, m, > 0, a or b: help".
 std::string comment_text(const ParamSpec& spec) {
-  std::string text = spec.fallback == nullptr ? "required " : "";
-  text += short_type_text(spec.type);
-  if (spec.unit[0] != '\0') text += std::string(", ") + spec.unit;
-  if (std::isfinite(spec.min)) {
-    text += (spec.min_exclusive ? ", > " : ", >= ") + number_text(spec.min);
+  std::string text = spec.required ? "required " : "";
+  text += spec.size > 0 ? std::to_string(spec.size) + " numbers" : short_type_text(spec.type);
+  if (!spec.unit.empty()) text += ", " + spec.unit;
+  if (std::isfinite(spec.lowest())) {
+    text += (spec.excludes_lowest() ? ", > " : ", >= ") + number_text(spec.lowest());
   }
   if (std::isfinite(spec.max)) text += ", <= " + number_text(spec.max);
-  if (spec.choices[0] != '\0') {
+  if (!spec.choices.empty()) {
     std::string choices = spec.choices;
     for (std::size_t bar = 0; (bar = choices.find('|', bar)) != std::string::npos;) {
       choices.replace(bar, 1, " | ");
@@ -76,19 +76,31 @@ std::string comment_text(const ParamSpec& spec) {
     }
     text += ", " + choices;
   }
-  if (spec.help[0] != '\0') text += std::string(": ") + spec.help;
+  if (!spec.help.empty()) text += ": " + spec.help;
   return text;
 }
 
+/// The default as YAML; an empty text is a value here, nothing at all would read as "no value".
+std::string fallback_text(const ParamSpec& spec) {
+  if (spec.type == ParamType::kKinematics) return spec.fallback_section;
+  const Node value = value_node(spec.fallback, {});
+  if (value.is_scalar()) return value.scalar().empty() ? "\"\"" : value.scalar();
+  std::string text;
+  for (const Node& item : value.items()) text += (text.empty() ? "" : ", ") + item.scalar();
+  return "[" + text + "]";
+}
+
 }  // namespace
+
+Node value_node(const ParamValue& value) { return value_node(value, {}); }
 
 Node write_params(std::span<const ParamSpec> specs, const ParamSet& params,
                   const std::function<Node(const KinematicModel&)>& write_kinematics) {
   Node section = Node::empty_map();
   for (const ParamSpec& spec : specs) {
-    const auto value = params.values().find(spec.name);
-    if (value == params.values().end()) {
-      throw std::logic_error("write_params: no value for '" + std::string(spec.name) + "'");
+    const auto value = params.find(spec.name);
+    if (value == params.end()) {
+      throw std::logic_error("write_params: no value for '" + spec.name + "'");
     }
     section.set(spec.name, value_node(value->second, write_kinematics));
   }
@@ -101,11 +113,7 @@ std::string describe_params(std::span<const ParamSpec> specs) {
   for (const ParamSpec& spec : specs) {
     std::string& line = assignments.emplace_back(spec.name);
     line += ':';
-    if (spec.fallback != nullptr) {
-      // An empty text is a value here, nothing at all would read as "no value".
-      line += ' ';
-      line += std::string_view(spec.fallback).empty() ? "\"\"" : spec.fallback;
-    }
+    if (!spec.required) line += ' ' + fallback_text(spec);
     width = std::max(width, line.size());
   }
   std::string text;

@@ -76,23 +76,23 @@ std::string number_text(double value) {
 
 std::string bounds_text(const ParamSpec& spec) {
   const std::string name = spec.name;
-  const bool has_min = std::isfinite(spec.min);
+  const bool has_min = std::isfinite(spec.lowest());
   const bool has_max = std::isfinite(spec.max);
   if (!has_min && !has_max) return "";
   const std::string max = has_max ? " <= " + number_text(spec.max) : "";
   if (!has_min) return name + max;
-  if (!has_max) return name + (spec.min_exclusive ? " > " : " >= ") + number_text(spec.min);
-  return number_text(spec.min) + (spec.min_exclusive ? " < " : " <= ") + name + max;
+  if (!has_max)
+    return name + (spec.excludes_lowest() ? " > " : " >= ") + number_text(spec.lowest());
+  return number_text(spec.lowest()) + (spec.excludes_lowest() ? " < " : " <= ") + name + max;
 }
 
 bool within_bounds(double value, const ParamSpec& spec) {
-  const bool above = spec.min_exclusive ? value > spec.min : value >= spec.min;
-  return above && value <= spec.max;
+  return value >= spec.min && value > spec.above && value <= spec.max;
 }
 
 std::string meaning_text(const ParamSpec& spec) {
   std::string text = spec.help;
-  if (spec.unit[0] != '\0') text += (text.empty() ? "" : ", ") + std::string(spec.unit);
+  if (!spec.unit.empty()) text += (text.empty() ? "" : ", ") + spec.unit;
   return text.empty() ? text : " (" + text + ")";
 }
 

@@ -12,29 +12,52 @@
 namespace viwo::config {
 namespace {
 
-// clang-format off
-constexpr std::array<ParamSpec, 9> kSpecs = {{
-    {.name = "track_m", .type = ParamType::kNumber, .unit = "m", .min = 0., .min_exclusive = true,
-     .help = "distance between wheel contact lines"},
-    {.name = "sigma_drive_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
-     .fallback = "0.001", .min = 0., .help = "drive encoder noise"},
-    {.name = "sigma_lateral_m_per_s", .type = ParamType::kNumber, .fallback = "0.1"},
-    {.name = "wheels", .type = ParamType::kInt, .fallback = "4", .min = 2., .max = 8.},
-    {.name = "radii_m", .type = ParamType::kNumbers, .unit = "m", .fallback = "[0.1, 0.2]",
-     .min = 0., .max = 1., .min_exclusive = true, .help = "wheel radii"},
-    {.name = "solve", .type = ParamType::kString, .fallback = "plain", .choices = "plain|weighted"},
-    {.name = "log", .type = ParamType::kPath, .fallback = ""},
-    {.name = "channels", .type = ParamType::kStrings, .fallback = "[]", .choices = "drive|steer"},
-    {.name = "enabled", .type = ParamType::kBool, .fallback = "true"},
-}};
-// clang-format on
+enum class Solve { kPlain, kWeighted };
+
+struct Section {
+  double track_m = 0.;
+  double sigma_drive_rad_per_s = 0.001;
+  double sigma_lateral_m_per_s = 0.1;
+  int wheels = 4;
+  std::vector<double> radii_m{0.1, 0.2};
+  Solve solve = Solve::kPlain;
+  std::filesystem::path log;
+  std::vector<std::string> channels;
+  bool enabled = true;
+  Eigen::Vector3d mount_m{0., 0., 0.5};
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(track_m),
+      {.unit = "m", .above = 0., .required = true, .help = "distance between wheel contact lines"});
+    b(VIWO_PARAM(sigma_drive_rad_per_s),
+      {.unit = "rad/s", .min = 0., .help = "drive encoder noise"});
+    b(VIWO_PARAM(sigma_lateral_m_per_s), {});
+    b(VIWO_PARAM(wheels), {.min = 2., .max = 8.});
+    b(VIWO_PARAM(radii_m), {.unit = "m", .above = 0., .max = 1., .help = "wheel radii"});
+    b(VIWO_PARAM(solve), {{"plain", Solve::kPlain}, {"weighted", Solve::kWeighted}}, {});
+    b(VIWO_PARAM(log), {});
+    b(VIWO_PARAM(channels), {.choices = "drive|steer"});
+    b(VIWO_PARAM(enabled), {});
+    b(VIWO_PARAM(mount_m), {.unit = "m"});
+  }
+};
 
 constexpr std::array<std::string_view, 1> kOther = {"type"};
 
-ParamSet read(std::string_view yaml, Errors& errors, std::span<const ParamSpec> specs = kSpecs) {
+Section read(std::string_view yaml, Errors& errors) {
   const Node root = parse("kinematics: " + std::string(yaml), "configs/x.yaml");
   const Node& section = *root.find("kinematics");
-  return read_params(section, section.mark(), "kinematics (diff_drive)", specs, kOther, {}, errors);
+  return read_section<Section>(section, section.mark(), "kinematics (diff_drive)", errors, kOther);
+}
+
+/// One parameter.
+ParamSpec spec(const char* name, ParamType type, ParamValue fallback, const ParamInfo& info = {}) {
+  ParamSpec out;
+  static_cast<ParamInfo&>(out) = info;
+  out.name = name;
+  out.type = type;
+  out.fallback = std::move(fallback);
+  return out;
 }
 
 /// What is wrong with one more entry of an otherwise right section, without its position.
@@ -48,39 +71,38 @@ std::string entry_error(const std::string& entry) {
 
 TEST(Params, AreReadWithTheirTypes) {
   Errors errors;
-  const ParamSet params = read(
+  const Section params = read(
       "{type: diff_drive, track_m: +5.5e-1, wheels: 3, radii_m: [0.1, 1], solve: weighted,"
-      " channels: steer, enabled: false, log: /a/b/../c/}",
+      " channels: steer, enabled: false, log: /a/b/../c/, mount_m: [1, 2, 3]}",
       errors);
   EXPECT_EQ(errors.text(), "");
-  EXPECT_EQ(params.number("track_m"), 0.55);
-  EXPECT_EQ(params.number("sigma_drive_rad_per_s"), 0.001);
-  EXPECT_EQ(params.integer("wheels"), 3);
-  EXPECT_EQ(std::vector<double>(params.numbers("radii_m").begin(), params.numbers("radii_m").end()),
-            (std::vector<double>{0.1, 1.}));
-  EXPECT_EQ(params.text("solve"), "weighted");
-  ASSERT_EQ(params.texts("channels").size(), 1u);
-  EXPECT_EQ(params.texts("channels")[0], "steer");
-  EXPECT_FALSE(params.flag("enabled"));
-  EXPECT_EQ(params.text("log"), "/a/c");
+  EXPECT_EQ(params.track_m, 0.55);
+  EXPECT_EQ(params.sigma_drive_rad_per_s, 0.001);
+  EXPECT_EQ(params.wheels, 3);
+  EXPECT_EQ(params.radii_m, (std::vector<double>{0.1, 1.}));
+  EXPECT_EQ(params.solve, Solve::kWeighted);
+  EXPECT_EQ(params.channels, std::vector<std::string>{"steer"});
+  EXPECT_FALSE(params.enabled);
+  EXPECT_EQ(params.log, "/a/c");
+  EXPECT_EQ(params.mount_m, Eigen::Vector3d(1., 2., 3.));
 }
 
 TEST(Params, HaveDefaults) {
   Errors errors;
-  const ParamSet params = read("{track_m: 1}", errors);
-  EXPECT_EQ(params.integer("wheels"), 4);
-  EXPECT_EQ(params.numbers("radii_m").size(), 2u);
-  EXPECT_EQ(params.numbers("radii_m")[1], 0.2);
-  EXPECT_EQ(params.text("log"), "");
-  EXPECT_TRUE(params.texts("channels").empty());
-  EXPECT_TRUE(params.flag("enabled"));
+  const Section params = read("{track_m: 1}", errors);
+  EXPECT_EQ(params.wheels, 4);
+  EXPECT_EQ(params.radii_m, (std::vector<double>{0.1, 0.2}));
+  EXPECT_EQ(params.solve, Solve::kPlain);
+  EXPECT_EQ(params.log, "");
+  EXPECT_TRUE(params.channels.empty());
+  EXPECT_TRUE(params.enabled);
+  EXPECT_EQ(params.mount_m, Eigen::Vector3d(0., 0., 0.5));
 }
 
 TEST(Params, AcceptASingleValueForAList) {
   Errors errors;
-  const ParamSet params = read("{track_m: 1, radii_m: 0.3}", errors);
-  ASSERT_EQ(params.numbers("radii_m").size(), 1u);
-  EXPECT_EQ(params.numbers("radii_m")[0], 0.3);
+  EXPECT_EQ(read("{track_m: 1, radii_m: 0.3}", errors).radii_m, std::vector<double>{0.3});
+  EXPECT_TRUE(errors.empty());
 }
 
 TEST(Params, ReportAllErrorsWithPositions) {
@@ -93,7 +115,7 @@ TEST(Params, ReportAllErrorsWithPositions) {
       "configs/x.yaml");
   Errors errors;
   const Node& section = *root.find("kinematics");
-  read_params(section, section.mark(), "kinematics (diff_drive)", kSpecs, kOther, {}, errors);
+  read_section<Section>(section, section.mark(), "kinematics (diff_drive)", errors, kOther);
   EXPECT_EQ(errors.text(),
             "configs/x.yaml:3:3  kinematics (diff_drive): unknown key 'sigma_latral_m_per_s'"
             " - did you mean 'sigma_lateral_m_per_s'?\n"
@@ -124,7 +146,7 @@ TEST(Params, ReportUnknownKeys) {
   EXPECT_EQ(entry_error("gravity: x"),
             "kinematics (diff_drive): unknown key 'gravity' - known: track_m,"
             " sigma_drive_rad_per_s, sigma_lateral_m_per_s, wheels, radii_m, solve, log, channels,"
-            " enabled, type");
+            " enabled, mount_m, type");
 }
 
 TEST(Params, ReportAKeyInAnotherUnit) {
@@ -182,6 +204,24 @@ TEST(Params, ReportBoundsOfListElements) {
             "kinematics.radii_m[1]: 0 violates 0 < radii_m <= 1 (wheel radii, m)");
 }
 
+TEST(Params, ReportListsOfAnotherLength) {
+  EXPECT_EQ(entry_error("mount_m: [1, 2]"), "kinematics.mount_m: needs 3 numbers, not 2 (m)");
+  EXPECT_EQ(entry_error("mount_m: 1"), "kinematics.mount_m: needs 3 numbers, not 1 (m)");
+  EXPECT_EQ(entry_error("mount_m: {}"),
+            "kinematics.mount_m: expected 3 numbers, got a section (m)");
+}
+
+TEST(Params, ReportIntegersThatTheMemberDoesNotHold) {
+  struct Small {
+    std::int16_t n = 0;
+    void bind(ParamBinder& b) { b(VIWO_PARAM(n), {}); }
+  };
+  const Node root = parse("n: 70000", "x.yaml");
+  Errors errors;
+  read_section<Small>(root, root.mark(), "small", errors);
+  EXPECT_EQ(errors.text(), "x.yaml:1:4  small.n: 70000 is too large");
+}
+
 TEST(Params, ReportUnknownChoicesAndFlags) {
   EXPECT_EQ(entry_error("solve: wieghted"),
             "kinematics.solve: unknown value 'wieghted' - did you mean 'weighted'?");
@@ -191,24 +231,30 @@ TEST(Params, ReportUnknownChoicesAndFlags) {
 }
 
 TEST(Params, ResolvePathsAgainstTheFileTheyAreWrittenIn) {
-  constexpr std::array<ParamSpec, 2> specs = {
-      {{.name = "a", .type = ParamType::kPath}, {.name = "b", .type = ParamType::kPath}}};
+  struct Paths {
+    std::filesystem::path a, b;
+    void bind(ParamBinder& binder) {
+      binder(VIWO_PARAM(a), {});
+      binder(VIWO_PARAM(b), {});
+    }
+  };
   Node root = parse("{a: ../data/x.csv, b: x/}", "/robots/configs/base.yaml");
   Errors errors;
-  ParamSet params = read_params(root, root.mark(), "", specs, {}, {}, errors);
-  EXPECT_EQ(params.text("a"), "/robots/data/x.csv");
-  EXPECT_EQ(params.text("b"), "/robots/configs/x");
+  auto params = read_section<Paths>(root, root.mark(), "", errors);
+  EXPECT_EQ(params.a, "/robots/data/x.csv");
+  EXPECT_EQ(params.b, "/robots/configs/x");
 
   set_path(root, "a", parse_assignment("a=./y.csv").value);
   set_path(root, "b", *parse("b: z", "/variants/v.yaml").find("b"));
-  params = read_params(root, root.mark(), "", specs, {}, {}, errors);
-  EXPECT_EQ(params.text("a"), (std::filesystem::current_path() / "y.csv").string());
-  EXPECT_EQ(params.text("b"), "/variants/z");
+  params = read_section<Paths>(root, root.mark(), "", errors);
+  EXPECT_EQ(params.a, (std::filesystem::current_path() / "y.csv").string());
+  EXPECT_EQ(params.b, "/variants/z");
   EXPECT_TRUE(errors.empty());
 }
 
 TEST(Params, RefuseAnEmptyPathWithoutSuchADefault) {
-  constexpr std::array<ParamSpec, 1> specs = {{{.name = "a", .type = ParamType::kPath}}};
+  const std::vector<ParamSpec> specs{
+      spec("a", ParamType::kPath, std::string(), {.required = true})};
   const Node root = parse("a: ''", "x.yaml");
   Errors errors;
   read_params(root, root.mark(), "log", specs, {}, {}, errors);
@@ -228,8 +274,11 @@ class NoRows : public KinematicModel {
                          NoiseDerivatives&) const override {}
 };
 
-constexpr std::array<ParamSpec, 1> kNested = {
-    {{.name = "kinematics", .type = ParamType::kKinematics, .fallback = "{type: a}"}}};
+struct Nested {
+  NestedKinematics kinematics{"{type: a}"};
+  void bind(ParamBinder& b) { b(VIWO_PARAM(kinematics), {}); }
+};
+const std::vector<ParamSpec> kNested = param_specs<Nested>();
 
 TEST(Params, HandANestedModelToTheHost) {
   const NoRows model;
@@ -244,7 +293,7 @@ TEST(Params, HandANestedModelToTheHost) {
   const ParamSet given =
       read_params(root, root.mark(), "sensors.log (asl)", kNested, {}, context, errors);
   read_params(Node::null(), root.mark(), "sensors.log (asl)", kNested, {}, context, errors);
-  EXPECT_EQ(&given.kinematics("kinematics"), &model);
+  EXPECT_EQ(params_from<Nested>(given).kinematics.model, &model);
   EXPECT_EQ(seen, "sensors.log.kinematics=b sensors.log.kinematics=a ");
   const Node written = write_params(kNested, given, [&](const KinematicModel& m) {
     EXPECT_EQ(&m, &model);
@@ -262,20 +311,7 @@ TEST(Params, ReportANestedModelThatIsNoSection) {
             " value");
 }
 
-TEST(Params, FailForATableThatRefusesItsOwnDefault) {
-  constexpr std::array<ParamSpec, 1> specs = {
-      {{.name = "r_m", .type = ParamType::kNumber, .fallback = "-1", .min = 0.}}};
-  Errors errors;
-  try {
-    read_params(Node::null(), {}, "k", specs, {}, {}, errors);
-    FAIL();
-  } catch (const std::logic_error& error) {
-    EXPECT_STREQ(error.what(), "default of 'r_m'  k.r_m: -1 violates r_m >= 0");
-  }
-  EXPECT_THROW(check_specs(specs), std::logic_error);
-}
-
-std::string spec_error(std::vector<ParamSpec> specs) {
+std::string spec_error(const std::vector<ParamSpec>& specs) {
   try {
     check_specs(specs);
   } catch (const std::logic_error& error) {
@@ -285,37 +321,48 @@ std::string spec_error(std::vector<ParamSpec> specs) {
 }
 
 TEST(Params, TablesAreChecked) {
-  EXPECT_EQ(spec_error({kSpecs.begin(), kSpecs.end()}), "no error");
-  EXPECT_EQ(spec_error({{.name = nullptr, .type = ParamType::kInt}}), "a parameter without a name");
-  EXPECT_EQ(
-      spec_error({{.name = "a", .type = ParamType::kInt}, {.name = "a", .type = ParamType::kInt}}),
-      "parameter 'a' is in the table twice");
-  EXPECT_EQ(spec_error({{.name = "a", .type = ParamType::kInt, .help = nullptr}}),
-            "parameter 'a': unit, choices or help is a null pointer");
-  EXPECT_EQ(spec_error({{.name = "a", .type = ParamType::kInt, .fallback = "[1"}}).substr(0, 32),
-            "default of 'a'  not valid YAML: ");
-  EXPECT_EQ(spec_error({{.name = "a", .type = ParamType::kKinematics, .fallback = "b"}}),
-            "default of 'a'  is not a section");
-  EXPECT_EQ(spec_error({{.name = "a", .type = static_cast<ParamType>(77)}}),
-            "parameter 'a': unknown type");
+  const ParamSpec a = spec("a", ParamType::kInt, std::int64_t{1});
+  EXPECT_EQ(spec_error(param_specs<Section>()), "no error");
+  EXPECT_EQ(spec_error({spec("", ParamType::kInt, std::int64_t{1})}), "a parameter without a name");
+  EXPECT_EQ(spec_error({a, a}), "parameter 'a' is in the table twice");
+  EXPECT_EQ(spec_error({spec("r_m", ParamType::kNumber, -1., {.min = 0.})}),
+            "default of 'r_m': -1 violates r_m >= 0");
+  EXPECT_EQ(spec_error({spec("r_m", ParamType::kNumbers, std::vector{1., 3.}, {.max = 2.})}),
+            "default of 'r_m': 3 violates r_m <= 2");
+  EXPECT_EQ(spec_error({spec("a", ParamType::kString, std::string("z"), {.choices = "x|y"})}),
+            "default of 'a': 'z' is none of x|y");
+  ParamSpec nested = kNested.front();
+  nested.fallback_section = "b";
+  EXPECT_EQ(spec_error({nested}), "default of 'kinematics': not a section");
+  nested.fallback_section = "[1";
+  EXPECT_EQ(spec_error({nested}).substr(0, 41), "default of 'kinematics'  not valid YAML: ");
+}
+
+TEST(Params, OfATableThatIsNotTheStructuresAreABugOfTheProgram) {
+  EXPECT_THROW(params_from<Section>({}), std::logic_error);
+  struct Text {
+    std::string a;
+    void bind(ParamBinder& b) { b(VIWO_PARAM(a), {}); }
+  };
+  EXPECT_THROW(params_from<Text>({{"a", 1.}}), std::logic_error);
 }
 
 TEST(Params, AreWrittenBackToTheSameValues) {
   Errors errors;
-  const ParamSet params = read(
+  const Section params = read(
       "{track_m: 0.1234567890123456789, wheels: 8, radii_m: [1e-9, 0.3333333333333333],"
       " log: 'data/a: b.csv', channels: [steer, drive]}",
       errors);
-  const Node written = write_params(kSpecs, params);
+  const Node written = write_section(params);
   const Node reread = parse(to_yaml(written), "elsewhere/y.yaml");
-  const ParamSet again = read_params(reread, {}, "", kSpecs, {}, {}, errors);
+  EXPECT_EQ(write_section(read_section<Section>(reread, {}, "", errors)), written);
   EXPECT_EQ(errors.text(), "");
-  EXPECT_EQ(again.values(), params.values());
+  EXPECT_EQ(written.at_path("track_m")->scalar(), "0.12345678901234568");
   EXPECT_EQ(written.at_path("radii_m.0")->scalar(), "1e-09");
 }
 
 TEST(Params, AreDescribedAsATemplate) {
-  const std::string text = describe_params(std::span(kSpecs).first(7));
+  const std::string text = describe_params(param_specs<Section>());
   EXPECT_EQ(
       text,
       "track_m:                      # required number, m, > 0: distance between wheel contact"
@@ -325,7 +372,10 @@ TEST(Params, AreDescribedAsATemplate) {
       "wheels: 4                     # integer, >= 2, <= 8\n"
       "radii_m: [0.1, 0.2]           # list of numbers, m, > 0, <= 1: wheel radii\n"
       "solve: plain                  # text, plain | weighted\n"
-      "log: \"\"                       # path\n");
+      "log: \"\"                       # path\n"
+      "channels: []                  # list of texts, drive | steer\n"
+      "enabled: true                 # true or false\n"
+      "mount_m: [0, 0, 0.5]          # 3 numbers, m\n");
   EXPECT_EQ(parse(text, "t").find("solve")->scalar(), "plain");
 }
 

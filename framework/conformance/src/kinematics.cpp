@@ -210,12 +210,11 @@ void check_independent(const Subject& subject, Findings& findings) {
     any = any || two.nominal() != one.nominal() || !same(others, alone);
     if (!same(fingerprint(one), alone) || one.nominal() != Bench(loaded.object).nominal()) {
       return findings.fail("an instance changes when another one is made with a different '" +
-                           std::string(spec.name) +
+                           spec.name +
                            "' - no static variables: instances must not see each other");
     }
     if (!same(fingerprint(two), others)) {
-      return findings.fail("an instance changes when another one with a different '" +
-                           std::string(spec.name) +
+      return findings.fail("an instance changes when another one with a different '" + spec.name +
                            "' is used - no static variables: instances must not see each other");
     }
   }

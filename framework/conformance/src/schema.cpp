@@ -82,9 +82,9 @@ int count_of(const Node& section, const ParamSpec& spec) {
 std::vector<double> outside(const ParamSpec& spec) {
   std::vector<double> values;
   if (spec.type != ParamType::kInt) values.push_back(std::nan(""));
-  if (std::isfinite(spec.min)) {
-    values.push_back(spec.min - 1. - 1e-3 * std::abs(spec.min));
-    if (spec.min_exclusive) values.push_back(spec.min);
+  if (std::isfinite(spec.lowest())) {
+    values.push_back(spec.lowest() - 1. - 1e-3 * std::abs(spec.lowest()));
+    if (spec.excludes_lowest()) values.push_back(spec.lowest());
   }
   if (std::isfinite(spec.max)) values.push_back(spec.max + 1. + 1e-3 * std::abs(spec.max));
   return values;
@@ -93,7 +93,9 @@ std::vector<double> outside(const ParamSpec& spec) {
 /// Values at the edge of what it allows.
 std::vector<double> at_the_edge(const ParamSpec& spec) {
   std::vector<double> values;
-  if (std::isfinite(spec.min)) values.push_back(spec.min_exclusive ? spec.min + 1e-9 : spec.min);
+  if (std::isfinite(spec.lowest())) {
+    values.push_back(spec.lowest() + (spec.excludes_lowest() ? 1e-9 : 0.));
+  }
   if (std::isfinite(spec.max)) values.push_back(spec.max);
   if (spec.type == ParamType::kInt && !values.empty()) values.front() = std::ceil(values.front());
   return values;
@@ -133,11 +135,11 @@ void check_schema(const PluginInfo& info, Findings& findings) {
   for (const ParamSpec& spec : info.params) {
     const std::string name = spec.name;
     if (!is_snake_case(name)) findings.fail("parameter '" + name + "' is not in snake_case");
-    if (std::string(spec.help).empty()) {
+    if (spec.help.empty()) {
       findings.fail("parameter '" + name + "' has no help - say in one sentence what it does");
     }
-    if (!(spec.min <= spec.max)) {
-      findings.fail("parameter '" + name + "': min " + number(spec.min) + " is above max " +
+    if (!(spec.lowest() <= spec.max)) {
+      findings.fail("parameter '" + name + "': min " + number(spec.lowest()) + " is above max " +
                     number(spec.max));
     }
     check_unit(spec, findings);
@@ -162,7 +164,8 @@ void check_parameters(const Subject& subject, Findings& findings) {
       expect_answer(subject, with(section, spec, numbers(spec, value, count)),
                     "parameter '" + name + "' at its limit " + number(value), findings);
     }
-    const double allowed = spec.min_exclusive ? spec.min + 1. : std::max(spec.min, 0.);
+    const double allowed =
+        spec.excludes_lowest() ? spec.lowest() + 1. : std::max(spec.lowest(), 0.);
     for (const int n : {0, 1, 7, 100}) {
       if (!is_list) break;
       expect_answer(subject, with(section, spec, numbers(spec, std::min(allowed, spec.max), n)),

@@ -263,7 +263,7 @@ void check_files(const Subject& subject, Findings& findings) {
     const Node* value = subject.section().find(spec.name);
     if (value == nullptr || !value->is_scalar() || value->scalar().empty()) continue;
     ++paths;
-    const std::string name = "parameter '" + std::string(spec.name) + "'";
+    const std::string name = "parameter '" + spec.name + "'";
     for (const auto& [path, what, must_refuse] :
          {std::tuple(fs::path("/no/such/file.csv"), "a file that does not exist", true),
           std::tuple(garbage, "a file that is something else", true)}) {

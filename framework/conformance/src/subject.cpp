@@ -28,14 +28,15 @@ const Node* find_section(const Node& node, const std::string& name) {
 }
 
 double within(const ParamSpec& spec, double value) {
-  const double margin = spec.min_exclusive ? 1e-3 : 0.;
-  return std::clamp(value, spec.min + margin, std::max(spec.min + margin, spec.max));
+  const double lowest = spec.lowest() + (spec.excludes_lowest() ? 1e-3 : 0.);
+  return std::clamp(value, lowest, std::max(lowest, spec.max));
 }
 
 /// Entry `j` of `n` of a list: places go around a circle, all else is a little different each.
 double made_up(const ParamSpec& spec, int j, int n) {
   const char axis = spec.name[0];
-  const bool is_place = spec.name[1] == '_' && (axis == 'x' || axis == 'y') && !(spec.min >= 0.);
+  const bool is_place =
+      spec.name[1] == '_' && (axis == 'x' || axis == 'y') && !(spec.lowest() >= 0.);
   const double angle = 2. * M_PI * (j + 0.37) / n;
   const double value = !is_place     ? 0.1 + 0.003 * j
                        : axis == 'x' ? 0.3 * std::cos(angle)
@@ -44,9 +45,10 @@ double made_up(const ParamSpec& spec, int j, int n) {
 }
 
 Node made_up(const ParamSpec& spec, int n) {
-  const auto list = [n](const auto& item) {
+  const int count = spec.size > 0 ? spec.size : n;
+  const auto list = [count](const auto& item) {
     Node node = Node::list_of();
-    for (int j = 0; j < n; ++j) node.items().push_back(Node::scalar_of(item(j)));
+    for (int j = 0; j < count; ++j) node.items().push_back(Node::scalar_of(item(j)));
     return node;
   };
   const std::string choices = spec.choices;
@@ -59,7 +61,7 @@ Node made_up(const ParamSpec& spec, int n) {
     case ParamType::kNumber:
       return Node::scalar_of(number(within(spec, 0.3)));
     case ParamType::kNumbers:
-      return list([&](int j) { return number(made_up(spec, j, n)); });
+      return list([&](int j) { return number(made_up(spec, j, count)); });
     case ParamType::kString:
       return Node::scalar_of(choice);
     case ParamType::kStrings:
@@ -94,7 +96,7 @@ std::vector<Node> made_up_sections(const PluginInfo& info, std::string& missing)
     section.set("type", Node::scalar_of(info.name));
     bool has_list = false;
     for (const ParamSpec& spec : info.params) {
-      if (spec.fallback != nullptr) continue;
+      if (!spec.required) continue;
       const Node value = made_up(spec, n);
       if (value.is_null()) {
         missing = spec.name;

@@ -1,5 +1,4 @@
 // A differential drive with one mistake, which its name says; without it the model is right.
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <csignal>
@@ -18,36 +17,29 @@ bool is(std::string_view defect) {
   return std::string_view(kPluginName).substr(std::string_view("broken_").size()) == defect;
 }
 
-const std::array kParams{
-    ParamSpec{.name = is("name_without_unit") ? "radius" : "radius_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.05",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = is("no_help") ? "" : "radius of both wheels"},
-    ParamSpec{.name = "baseline_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.3",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "distance between the wheels"},
+struct Params {
+  double radius_m = 0.05;
+  double baseline_m = 0.3;
+
+  void bind(ParamBinder& b) {
+    b(is("name_without_unit") ? "radius" : "radius_m", radius_m,
+      {.unit = "m", .above = 0., .help = is("no_help") ? "" : "radius of both wheels"});
+    b(VIWO_PARAM(baseline_m), {.unit = "m", .above = 0., .help = "distance between the wheels"});
+  }
 };
 
 double shared_radius_m = 0.;
 
 class Broken final : public KinematicModel {
  public:
-  Broken(const ParamSet& params, const HostServices& /*services*/)
-      : radius_m_(params.number(kParams[0].name)), baseline_m_(params.number("baseline_m")) {
-    if (is("throws_at_the_edge") && baseline_m_ < 1e-6) throw std::logic_error("too narrow");
-    if (is("shared") || shared_radius_m == 0.) shared_radius_m = radius_m_;
-    if (is("first_instance")) baseline_m_ = 0.3;
+  Broken(const Params& params, const HostServices& /*services*/) : params_(params) {
+    if (is("throws_at_the_edge") && params_.baseline_m < 1e-6) throw std::logic_error("too narrow");
+    if (is("shared") || shared_radius_m == 0.) shared_radius_m = params_.radius_m;
+    if (is("first_instance")) params_.baseline_m = 0.3;
   }
 
   void describe(ModelDescription& out) const override {
-    const double r = is("shared") || is("first_instance") ? shared_radius_m : radius_m_;
+    const double r = is("shared") || is("first_instance") ? shared_radius_m : params_.radius_m;
     out.n_drive = 2;
     out.n_rows = 3;
     out.constant_A = true;
@@ -55,7 +47,7 @@ class Broken final : public KinematicModel {
     out.intrinsics = {
         {"r_left", "m", r, 0.001, is("gauge"), {0, 1}},
         {"r_right", is("no_unit") ? "" : "m", r, 0.001, false, {1, 1}},
-        {"baseline", "m", baseline_m_, is("prior") ? 0. : 0.01, false, baseline_rows}};
+        {"baseline", "m", params_.baseline_m, is("prior") ? 0. : 0.01, false, baseline_rows}};
     out.noises = {{NoiseKind::kDrive, 0, 0.001, {0, 1}},
                   {NoiseKind::kDrive, is("channel") ? 2 : 1, is("noise") ? -0.001 : 0.001, {1, 1}},
                   {NoiseKind::kSlip, 0, 0.001, {2, 1}}};
@@ -122,14 +114,14 @@ class Broken final : public KinematicModel {
   /// Where the left wheel is, in units of the baseline.
   static double left() { return is("rank") ? 0.5 : -0.5; }
 
-  double radius_m_, baseline_m_;
+  Params params_;
   mutable std::atomic<int> calls_ = 0;
   mutable int unsynchronised_calls_ = 0;
   mutable std::atomic<double> cached_ = 0.;
 };
 
 VIWO_REGISTER(KinematicModel, Broken, kPluginName, "1.0.0", "a base with one mistake", "Apache-2.0",
-              kParams);
+              Params);
 
 }  // namespace
 }  // namespace viwo

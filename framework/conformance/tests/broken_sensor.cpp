@@ -16,23 +16,23 @@ bool is(std::string_view defect) {
   return std::string_view(kPluginName).substr(std::string_view("broken_").size()) == defect;
 }
 
-constexpr std::array kParams{
-    ParamSpec{.name = "count",
-              .type = ParamType::kInt,
-              .fallback = "20",
-              .min = 0.,
-              .max = 1e6,
-              .help = "how many samples"},
-    ParamSpec{.name = "path", .type = ParamType::kPath, .fallback = "''", .help = "a file"},
+struct Params {
+  int count = 20;
+  std::filesystem::path path;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(count), {.min = 0., .max = 1e6, .help = "how many samples"});
+    b(VIWO_PARAM(path), {.help = "a file"});
+  }
 };
 
 int shared_count = 0;
 
 class Broken final : public Sensor {
  public:
-  Broken(const ParamSet& params, const HostServices& services)
-      : left_(params.integer("count")), seed_(services.seed) {
-    const std::string& path = params.text("path");
+  Broken(const Params& params, const HostServices& services)
+      : left_(params.count), seed_(services.seed) {
+    const std::string& path = params.path;
     if (path.empty() || is("ignores_files")) return;
     std::string word;
     std::ifstream file(path);
@@ -70,7 +70,7 @@ class Broken final : public Sensor {
 };
 
 VIWO_REGISTER(Sensor, Broken, kPluginName, "1.0.0", "a sensor with one mistake", "Apache-2.0",
-              kParams);
+              Params);
 
 }  // namespace
 }  // namespace viwo

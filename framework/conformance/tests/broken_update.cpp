@@ -38,14 +38,12 @@ bool is(std::string_view defect) {
   return std::string_view(kPluginName).substr(std::string_view("broken_").size()) == defect;
 }
 
-constexpr std::array kParams{
-    ParamSpec{.name = "sigma_height_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.1",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how flat the ground is"},
+struct Params {
+  double sigma_height_m = 0.1;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(sigma_height_m), {.unit = "m", .above = 0., .help = "how flat the ground is"});
+  }
 };
 
 constexpr int kMarks = 3;
@@ -54,8 +52,8 @@ int shared_calls = 0, shared_declarations = 0;
 
 class Broken final : public Update {
  public:
-  Broken(const ParamSet& params, const HostServices& /*services*/)
-      : sigma_m_(params.number("sigma_height_m")) {}
+  Broken(const Params& params, const HostServices& /*services*/)
+      : sigma_m_(params.sigma_height_m) {}
 
   void declare(Declarations& host) override {
     host_ = &host;
@@ -170,7 +168,7 @@ class Broken final : public Update {
 };
 
 VIWO_REGISTER(Update, Broken, kPluginName, "1.0.0", "an update with one mistake", "Apache-2.0",
-              kParams);
+              Params);
 
 }  // namespace
 }  // namespace viwo

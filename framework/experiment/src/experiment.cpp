@@ -30,24 +30,22 @@ namespace {
 
 using config::Node;
 
-constexpr std::array kExperimentParams{
-    ParamSpec{.name = "experiment", .type = ParamType::kString, .help = "name of the experiment"},
-    ParamSpec{.name = "base",
-              .type = ParamType::kString,
-              .help = "run configuration, relative to this file"},
-    ParamSpec{.name = "seeds",
-              .type = ParamType::kInt,
-              .fallback = "1",
-              .min = 1.,
-              .help = "runs of each variant and recording, with seeds 1, 2, ..."},
-    ParamSpec{.name = "report_by",
-              .type = ParamType::kStrings,
-              .fallback = "[]",
-              .help = "labels of the recordings to break the tables down by"},
-    ParamSpec{.name = "baseline",
-              .type = ParamType::kString,
-              .fallback = "''",
-              .help = "variant that the others are compared with; the first if not given"},
+struct ExperimentParams {
+  std::string experiment;
+  std::string base;
+  int seeds = 1;
+  std::vector<std::string> report_by;
+  std::string baseline;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(experiment), {.required = true, .help = "name of the experiment"});
+    b(VIWO_PARAM(base), {.required = true, .help = "run configuration, relative to this file"});
+    b(VIWO_PARAM(seeds),
+      {.min = 1., .help = "runs of each variant and recording, with seeds 1, 2, ..."});
+    b(VIWO_PARAM(report_by), {.help = "labels of the recordings to break the tables down by"});
+    b(VIWO_PARAM(baseline),
+      {.help = "variant that the others are compared with; the first if not given"});
+  }
 };
 
 void read_variants(const Node& file, ExperimentSetup& setup) {
@@ -313,21 +311,20 @@ ExperimentSetup read_experiment(const std::filesystem::path& path,
   const Node file = config::load_file(path);
   config::Errors errors;
   constexpr std::string_view kSections[] = {"variants", "recordings", "motions", "set"};
-  const ParamSet params = config::read_params(file, file.mark(), "experiment", kExperimentParams,
-                                              kSections, {}, errors);
+  const auto params =
+      config::read_section<ExperimentParams>(file, file.mark(), "experiment", errors, kSections);
   errors.throw_if_any();
   ExperimentSetup setup;
-  setup.name = params.text("experiment");
-  setup.seeds = options.seeds.value_or(static_cast<int>(params.integer("seeds")));
+  setup.name = params.experiment;
+  setup.seeds = options.seeds.value_or(params.seeds);
   if (setup.seeds < 1) throw InputError("--seeds must be at least 1");
-  const auto report_by = params.texts("report_by");
-  setup.report_by.assign(report_by.begin(), report_by.end());
-  setup.base_file = params.text("base");
+  setup.report_by = params.report_by;
+  setup.base_file = params.base;
   setup.recordings = read_recordings(file);
   setup.base = load_base(file, options.assignments);
   require_labels(setup.report_by, setup.recordings, file, "report_by");
   read_variants(file, setup);
-  find_baseline(file, params.text("baseline"), setup);
+  find_baseline(file, params.baseline, setup);
   return setup;
 }
 

@@ -112,7 +112,7 @@ void Filter::clone(const ImuSample& sample) {
   const auto free = std::find(slots_.begin(), slots_.end(), false);
   if (free == slots_.end()) throw std::logic_error("no room for another clone");
   *free = true;
-  CloneView clone;
+  CloneState clone;
   clone.t_ns = t_ns_;
   clone.slot = static_cast<int>(free - slots_.begin());
   clone.column = kImuSize + kPoseSize * clone.slot;
@@ -126,7 +126,7 @@ void Filter::clone(const ImuSample& sample) {
 
 void Filter::drop_oldest_clone() {
   if (clones_.empty()) return;
-  const CloneView& oldest = clones_.front();
+  const CloneState& oldest = clones_.front();
   slots_[static_cast<std::size_t>(oldest.slot)] = false;
   covariance_.clear_block(oldest.column, kPoseSize);
   clones_.erase(clones_.begin());
@@ -199,7 +199,7 @@ void Filter::correct() {
   imu_.v_IinG += dx_.segment<3>(kVelocityColumn);
   imu_.gyro_bias += dx_.segment<3>(kGyroBiasColumn);
   imu_.accel_bias += dx_.segment<3>(kAccelBiasColumn);
-  for (CloneView& clone : clones_) {
+  for (CloneState& clone : clones_) {
     turn(clone.R_GtoI, dx_.segment<3>(clone.column));
     clone.p_IinG += dx_.segment<3>(clone.column + 3);
     if (!options_.first_estimates) {

@@ -25,7 +25,7 @@ std::string failure_of(const Filter& filter, const HealthLimits& limits) {
   if (filter.covariance_failed()) {
     return "the covariance of the clones is not positive definite any more";
   }
-  const ImuView& imu = filter.imu();
+  const ImuState& imu = filter.imu();
   const Eigen::MatrixXd& P = filter.covariance();
   const bool finite = imu.R_GtoI.allFinite() && imu.p_IinG.allFinite() && imu.v_IinG.allFinite() &&
                       imu.gyro_bias.allFinite() && imu.accel_bias.allFinite() &&

@@ -70,7 +70,7 @@ struct Step {
 };
 
 /// Moves the mean over one step (F-1, F-2) and describes the step for the errors.
-Step integrate(const ImuSample& from, const ImuSample& to, double gravity, ImuView& imu) {
+Step integrate(const ImuSample& from, const ImuSample& to, double gravity, ImuState& imu) {
   const double dt = seconds_between(from.t_ns, to.t_ns);
   const Vector3d w0 = to_vector(from.gyro_rad_per_s) - imu.gyro_bias;
   const Vector3d w1 = to_vector(to.gyro_rad_per_s) - imu.gyro_bias;
@@ -111,7 +111,7 @@ ImuSample interpolate(const ImuSample& before, const ImuSample& after, std::int6
 }
 
 ImuTransition propagate(std::span<const ImuSample> samples, const ImuNoise& noise,
-                        double gravity_m_per_s2, ImuView& imu, std::span<const double> gaps_s) {
+                        double gravity_m_per_s2, ImuState& imu, std::span<const double> gaps_s) {
   ImuTransition transition{ImuMatrix::Identity(), ImuMatrix::Zero()};
   if (samples.size() < 2) return transition;
   for (std::size_t i = 1; i < samples.size(); ++i) {

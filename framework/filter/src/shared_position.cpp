@@ -14,19 +14,19 @@ constexpr double kLargestVariance_m2 = 100.;
 constexpr double kRounding = 1e-9;
 
 /// x, y or z of the position of a pose; -1: another column.
-int axis_of(int column, std::span<const CloneView> clones) {
+int axis_of(int column, std::span<const CloneState> clones) {
   const auto within = [column](int first) {
     return column >= first && column < first + 3 ? column - first : -1;
   };
   int axis = within(kPositionColumn);
-  for (const CloneView& clone : clones) axis = std::max(axis, within(clone.column + 3));
+  for (const CloneState& clone : clones) axis = std::max(axis, within(clone.column + 3));
   return axis;
 }
 
 /// Whether moving all poses together changes what a row of a Jacobian, by the columns of a factor,
 /// is of: more than rounding leaves of what was added up.
 template <class Row>
-bool is_seen_in(const Row& row, const FactorColumns& columns, std::span<const CloneView> clones) {
+bool is_seen_in(const Row& row, const FactorColumns& columns, std::span<const CloneState> clones) {
   Eigen::Array3d sum = Eigen::Array3d::Zero();
   double largest = 0.;
   int at = 0;
@@ -53,7 +53,7 @@ void SharedPosition::take_from(Eigen::Ref<Eigen::Matrix3d> P_position) {
 }
 
 bool SharedPosition::is_seen_by(const ResidualFactor& factor,
-                                std::span<const CloneView> clones) const {
+                                std::span<const CloneState> clones) const {
   for (Eigen::Index i = 0; i < factor.H.rows(); ++i) {
     if (is_seen_in(factor.H.row(i), factor.columns, clones)) return true;
   }
@@ -61,7 +61,7 @@ bool SharedPosition::is_seen_by(const ResidualFactor& factor,
 }
 
 bool SharedPosition::is_seen_by(const InformationFactor& factor,
-                                std::span<const CloneView> clones) const {
+                                std::span<const CloneState> clones) const {
   const int n = factor.columns.size();
   for (int i = 0; i < n; ++i) {
     // Only the lower triangle is filled.
@@ -71,12 +71,12 @@ bool SharedPosition::is_seen_by(const InformationFactor& factor,
   return false;
 }
 
-void SharedPosition::return_to(Covariance& covariance, std::span<const CloneView> clones) {
+void SharedPosition::return_to(Covariance& covariance, std::span<const CloneState> clones) {
   covariance.add(kPositionColumn, kPositionColumn, P_);
-  for (const CloneView& a : clones) {
+  for (const CloneState& a : clones) {
     covariance.add(a.column + 3, kPositionColumn, P_);
     covariance.add(kPositionColumn, a.column + 3, P_);
-    for (const CloneView& b : clones) covariance.add(a.column + 3, b.column + 3, P_);
+    for (const CloneState& b : clones) covariance.add(a.column + 3, b.column + 3, P_);
   }
   P_.setZero();
 }

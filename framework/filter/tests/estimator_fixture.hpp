@@ -126,7 +126,7 @@ class FakeUpdate final : public Update {
     write_down<TickSample>(data, ticks_, now.ticks);
     write_down<CellSample>(data, cells_, now.cells);
     write_down<FixSample>(data, fixes_, now.fixes);
-    for (const CloneView& clone : filter.clones) now.clones.push_back(clone.t_ns);
+    for (const CloneState& clone : filter.clones) now.clones.push_back(clone.t_ns);
     now.oldest_leaves = filter.oldest_leaves;
     if (emit_) emit_(filter, sink);
   }

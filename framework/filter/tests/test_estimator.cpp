@@ -66,7 +66,7 @@ TEST(Estimator, MovesTheStateAsOnePropagationOverTheWholeTimeWould) {
   bench.imu(-10, 300);
   for (const std::int64_t t : {57, 113, 200}) bench.tick(t);
   EXPECT_EQ(bench.steps(), 3);
-  ImuView expected = level_prior(kStart).state;
+  ImuState expected = level_prior(kStart).state;
   std::vector<ImuSample> samples;
   for (std::int64_t t = 0; t <= 200; t += 10) samples.push_back(imu_at(kStart + t * kMs));
   propagate(samples, {}, 9.81, expected);

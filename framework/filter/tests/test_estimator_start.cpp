@@ -116,7 +116,7 @@ TEST(EstimatorStart, OfAContinuationIsWhereTheImuWasWithTheBlocksOfThen) {
   EXPECT_EQ(clock[0].sigma, testing::base_clock(0.).entries[0].sigma) << "that of the prior";
   // Level stays level; what is left of the turn to the former orientation is none about the
   // vertical.
-  const ImuView& imu = filter.imu();
+  const ImuState& imu = filter.imu();
   EXPECT_NEAR(imu.R_GtoI(2, 2), 1., 1e-12);
   const Eigen::Vector3d left = log_so3(imu.R_GtoI.transpose() * place.R_GtoI);
   EXPECT_NEAR(left.z(), 0., 1e-12);

@@ -27,7 +27,7 @@ TEST(Filter, CloneIsACopyOfThePoseAndOfItsCovarianceWithEverything) {
   filter.propagate(samples);
   const MatrixXd before = filter.covariance();
   filter.clone(samples[1]);
-  const CloneView& clone = filter.clones().back();
+  const CloneState& clone = filter.clones().back();
   EXPECT_EQ(clone.t_ns, samples[1].t_ns);
   EXPECT_EQ(clone.R_GtoI, filter.imu().R_GtoI);
   EXPECT_EQ(clone.p_IinG, filter.imu().p_IinG);
@@ -51,7 +51,7 @@ TEST(Filter, DroppingTheOldestCloneFreesItsSlotAndLeavesAllOthersAlone) {
   EXPECT_THROW(filter.clone(imu_sample(filter.t_ns(), random)), std::logic_error);
   std::vector<int> slots;
   for (int k = 0; k < 9; ++k) {
-    const std::vector<CloneView> clones(filter.clones().begin(), filter.clones().end());
+    const std::vector<CloneState> clones(filter.clones().begin(), filter.clones().end());
     MatrixXd expected = filter.covariance();
     expected.middleRows(clones[0].column, kPoseSize).setZero();
     expected.middleCols(clones[0].column, kPoseSize).setZero();
@@ -86,8 +86,8 @@ TEST(Filter, DroppingACloneOfAnEmptyWindowDoesNothing) {
 TEST(Filter, FirstEstimatesStayWhenAnUpdateMovesTheEstimate) {
   Random random(4);
   Filter filter = running_filter(random, 3);
-  const std::vector<CloneView> before(filter.clones().begin(), filter.clones().end());
-  const ImuView imu = filter.imu();
+  const std::vector<CloneState> before(filter.clones().begin(), filter.clones().end());
+  const ImuState imu = filter.imu();
   ASSERT_EQ(filter.apply(random_factor(random)), FactorResult::kApplied);
   for (std::size_t i = 0; i < before.size(); ++i) {
     EXPECT_NE(filter.clones()[i].R_GtoI, before[i].R_GtoI);
@@ -107,7 +107,7 @@ TEST(Filter, WithoutFirstEstimatesTheyFollowTheEstimate) {
   options.first_estimates = false;
   Filter filter = running_filter(random, 3, options);
   ASSERT_EQ(filter.apply(random_factor(random)), FactorResult::kApplied);
-  for (const CloneView& clone : filter.clones()) {
+  for (const CloneState& clone : filter.clones()) {
     EXPECT_EQ(clone.R_GtoI_fej, clone.R_GtoI);
     EXPECT_EQ(clone.p_IinG_fej, clone.p_IinG);
   }
@@ -136,8 +136,8 @@ Matrix3d turned(const Matrix3d& R, const VectorXd& dx, int column) {
 TEST(Filter, CorrectsEveryBlockThroughItsBoxplus) {
   Random random(6);
   Filter filter = running_filter(random, 3);
-  const std::vector<CloneView> clones(filter.clones().begin(), filter.clones().end());
-  const ImuView imu = filter.imu();
+  const std::vector<CloneState> clones(filter.clones().begin(), filter.clones().end());
+  const ImuState imu = filter.imu();
   // The information factor correlates calibration and motion first. (Not of the present pose: the
   // newest clone is that.)
   InformationFactor information;

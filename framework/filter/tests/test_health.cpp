@@ -31,7 +31,7 @@ TEST(Health, IsGoodAtTheStart) { EXPECT_EQ(failure_at(level_prior(0)), ""); }
 TEST(Health, SeesAStateThatIsNotFinite) {
   for (int part = 0; part < 5; ++part) {
     ImuPrior prior = level_prior(0);
-    ImuView& imu = prior.state;
+    ImuState& imu = prior.state;
     (part == 0   ? imu.R_GtoI(1, 2)
      : part == 1 ? imu.p_IinG[0]
      : part == 2 ? imu.v_IinG[1]

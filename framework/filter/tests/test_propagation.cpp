@@ -35,8 +35,8 @@ std::vector<ImuSample> samples(double duration_s, double dt) {
   return all;
 }
 
-ImuView start() {
-  ImuView imu;
+ImuState start() {
+  ImuState imu;
   imu.R_GtoI = exp_so3({0.1, -0.2, 0.9});
   imu.p_IinG = {1., -2., 0.5};
   imu.v_IinG = {0.3, 0.2, -0.1};
@@ -49,14 +49,14 @@ ImuView start() {
 }
 
 /// The error state of `to` relative to `from`.
-VectorXd minus(const ImuView& to, const ImuView& from) {
+VectorXd minus(const ImuState& to, const ImuState& from) {
   VectorXd d(kImuSize);
   d << -log_so3(to.R_GtoI * from.R_GtoI.transpose()), to.p_IinG - from.p_IinG,
       to.v_IinG - from.v_IinG, to.gyro_bias - from.gyro_bias, to.accel_bias - from.accel_bias;
   return d;
 }
 
-ImuView plus(ImuView imu, const VectorXd& d) {
+ImuState plus(ImuState imu, const VectorXd& d) {
   imu.R_GtoI = exp_so3(-d.segment<3>(0)) * imu.R_GtoI;
   imu.p_IinG += d.segment<3>(3);
   imu.v_IinG += d.segment<3>(6);
@@ -67,7 +67,7 @@ ImuView plus(ImuView imu, const VectorXd& d) {
 
 TEST(Propagation, FollowsAFineIntegrationOfTheMotion) {
   // Midpoint rule with a step of 2 microseconds on the continuous signals.
-  ImuView fine = start();
+  ImuState fine = start();
   const int steps = 50000;
   const double h = 0.1 / steps;
   Matrix3d R = fine.R_GtoI.transpose();
@@ -80,7 +80,7 @@ TEST(Propagation, FollowsAFineIntegrationOfTheMotion) {
     R = R * exp_so3(h * (rate(t) - fine.gyro_bias));
   }
   fine.R_GtoI = R.transpose();
-  ImuView imu = start();
+  ImuState imu = start();
   propagate(samples(0.1, 0.005), {}, 9.81, imu);
   const VectorXd error = minus(imu, fine);
   // What is left is that the readings are taken as linear between samples.
@@ -91,10 +91,10 @@ TEST(Propagation, FollowsAFineIntegrationOfTheMotion) {
 
 TEST(Propagation, TransitionAgreesWithCentralDifferences) {
   const auto all = samples(0.1, 0.005);
-  ImuView imu = start();
+  ImuState imu = start();
   const ImuTransition transition = propagate(all, {}, 9.81, imu);
   const auto moved = [&](const VectorXd& d) -> VectorXd {
-    ImuView other = plus(start(), d);
+    ImuState other = plus(start(), d);
     propagate(all, {}, 9.81, other);
     return minus(other, imu);
   };
@@ -105,11 +105,11 @@ TEST(Propagation, TransitionAgreesWithCentralDifferences) {
 
 TEST(Propagation, FirstEstimatesKeepYawAndPositionUnobservable) {
   const auto all = samples(0.1, 0.005);
-  ImuView imu = start();
+  ImuState imu = start();
   // The estimate was corrected after it was first used.
   VectorXd correction = VectorXd::LinSpaced(kImuSize, -0.02, 0.03);
   imu = plus(imu, correction);
-  const auto null_space = [](const ImuView& at) {
+  const auto null_space = [](const ImuState& at) {
     Eigen::MatrixXd N = Eigen::MatrixXd::Zero(kImuSize, 4);
     const Vector3d up = Vector3d::UnitZ();
     N.block<3, 1>(0, 0) = at.R_GtoI_fej * up;
@@ -119,7 +119,7 @@ TEST(Propagation, FirstEstimatesKeepYawAndPositionUnobservable) {
     return N;
   };
   const Eigen::MatrixXd before = null_space(imu);
-  ImuView corrected = imu;
+  ImuState corrected = imu;
   const ImuTransition transition = propagate(all, {}, 9.81, imu);
   EXPECT_LT((transition.Phi * before - null_space(imu)).norm(), 1e-12);
   // Without first estimates the same product misses by the correction.
@@ -132,11 +132,11 @@ TEST(Propagation, FirstEstimatesKeepYawAndPositionUnobservable) {
 
 TEST(Propagation, NoiseAgreesWithALinearIntegrationOnFinerSteps) {
   const ImuNoise noise{2e-3, 3e-2, 1e-3, 2e-2};
-  ImuView imu = start();
+  ImuState imu = start();
   const ImuTransition transition = propagate(samples(0.1, 0.005), noise, 9.81, imu);
   // dP/dt = F P + P F^T + G Qc G^T by Euler steps of the readings sampled a hundred times finer.
   const auto fine = samples(0.1, 0.00005);
-  ImuView at = start();
+  ImuState at = start();
   ImuMatrix P = ImuMatrix::Zero();
   for (std::size_t i = 0; i + 1 < fine.size(); ++i) {
     const double h = seconds_between(fine[i].t_ns, fine[i + 1].t_ns);
@@ -182,7 +182,7 @@ TEST(Propagation, KnowsLittleOfAGapHoweverItIsCut) {
   for (const double step_s : {2., 0.1}) {
     const auto all = samples(T, step_s);
     std::vector<double> gaps_s(all.size(), T);
-    ImuView imu = start(), same = start();
+    ImuState imu = start(), same = start();
     const ImuTransition without = propagate(all, {}, 9.81, same);
     const ImuTransition with = propagate(all, {}, 9.81, imu, gaps_s);
     EXPECT_EQ(imu.p_IinG, same.p_IinG);

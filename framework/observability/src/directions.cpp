@@ -73,7 +73,7 @@ class Builder {
 
 /// (OB-5).
 MatrixXd global_position_and_yaw(const ObservabilityMatrix& state, Builder& build) {
-  const ImuView& imu = state.start();
+  const ImuState& imu = state.start();
   for (int i = 0; i < 3; ++i) {
     build.imu(kPositionColumn, Vector3d::Unit(i));
     build.feature(Vector3d::Unit(i));
@@ -91,7 +91,7 @@ MatrixXd global_position_and_yaw(const ObservabilityMatrix& state, Builder& buil
 /// (OB-9): without rotation a tilt of everything looks like an accelerometer bias.
 MatrixXd tilt_and_accelerometer_bias(const ObservabilityMatrix& state, double gravity_m_per_s2,
                                      Builder& build) {
-  const ImuView& imu = state.start();
+  const ImuState& imu = state.start();
   for (int i = 0; i < 2; ++i) {
     const Vector3d axis = Vector3d::Unit(i);
     build.imu(kThetaColumn, imu.R_GtoI * axis);

@@ -54,12 +54,12 @@ ObservabilityMatrix::ObservabilityMatrix(const Filter& filter, const FeatureOpti
 
 void ObservabilityMatrix::on_clone(const Filter& filter, const ImuMatrix& Phi) {
   Phi_ = (Phi * Phi_).eval();
-  const CloneView& clone = filter.clones().back();
+  const CloneState& clone = filter.clones().back();
   clone_Phi_[static_cast<std::size_t>(clone.slot)] = Phi_.topRows<kPoseSize>();
   if (feature_.enabled) add_bearing(clone);
 }
 
-void ObservabilityMatrix::add_bearing(const CloneView& clone) {
+void ObservabilityMatrix::add_bearing(const CloneState& clone) {
   const Eigen::Vector3d p_FinI = clone.R_GtoI_fej * (p_FinG_ - clone.p_IinG_fej);
   const double distance = p_FinI.norm();
   Eigen::Matrix3d along;  // a right-handed frame whose first axis is the bearing

@@ -175,7 +175,7 @@ Vector3d bearing(const VectorXd& dx) {
   filter.initialize(off);
   advance(filter);
   advance(filter);
-  const CloneView& clone = filter.clones().back();
+  const CloneState& clone = filter.clones().back();
   return (clone.R_GtoI * (p_FinG - clone.p_IinG)).normalized();
 }
 

@@ -121,18 +121,26 @@ void measurements() {
 
 void descriptor() {
   ENUM(ParamType);
+  RECORD(ParamInfo);
+  MEMBER(ParamInfo, unit);
+  MEMBER(ParamInfo, min);
+  MEMBER(ParamInfo, above);
+  MEMBER(ParamInfo, max);
+  MEMBER(ParamInfo, choices);
+  MEMBER(ParamInfo, required);
+  MEMBER(ParamInfo, help);
   RECORD(ParamSpec);
   MEMBER(ParamSpec, name);
   MEMBER(ParamSpec, type);
-  MEMBER(ParamSpec, unit);
+  MEMBER(ParamSpec, size);
   MEMBER(ParamSpec, fallback);
-  MEMBER(ParamSpec, min);
-  MEMBER(ParamSpec, max);
-  MEMBER(ParamSpec, min_exclusive);
-  MEMBER(ParamSpec, choices);
-  MEMBER(ParamSpec, help);
+  MEMBER(ParamSpec, fallback_section);
   RECORD(ParamSet);
-  std::cout << "  value is " << type_name(typeid(ParamSet::Value)) << "\n";
+  std::cout << "  value is " << type_name(typeid(ParamValue)) << "\n";
+  RECORD(NestedKinematics);
+  MEMBER(NestedKinematics, model);
+  RECORD(ParamBinder);
+  RECORD(NoParams);
   ENUM(LogLevel);
   RECORD(HostServices);
   MEMBER(HostServices, host);
@@ -154,7 +162,6 @@ void descriptor() {
   MEMBER(PluginDescriptor, summary);
   MEMBER(PluginDescriptor, license);
   MEMBER(PluginDescriptor, params);
-  MEMBER(PluginDescriptor, n_params);
   MEMBER(PluginDescriptor, create);
   MEMBER(PluginDescriptor, destroy);
   ENUM(Status);
@@ -296,25 +303,25 @@ void rig() {
 }
 
 void filter_view() {
-  RECORD(ImuView);
-  MEMBER(ImuView, R_GtoI);
-  MEMBER(ImuView, p_IinG);
-  MEMBER(ImuView, v_IinG);
-  MEMBER(ImuView, gyro_bias);
-  MEMBER(ImuView, accel_bias);
-  MEMBER(ImuView, R_GtoI_fej);
-  MEMBER(ImuView, p_IinG_fej);
-  MEMBER(ImuView, v_IinG_fej);
-  RECORD(CloneView);
-  MEMBER(CloneView, t_ns);
-  MEMBER(CloneView, slot);
-  MEMBER(CloneView, column);
-  MEMBER(CloneView, R_GtoI);
-  MEMBER(CloneView, p_IinG);
-  MEMBER(CloneView, R_GtoI_fej);
-  MEMBER(CloneView, p_IinG_fej);
-  MEMBER(CloneView, w_IinI);
-  MEMBER(CloneView, v_IinG);
+  RECORD(ImuState);
+  MEMBER(ImuState, R_GtoI);
+  MEMBER(ImuState, p_IinG);
+  MEMBER(ImuState, v_IinG);
+  MEMBER(ImuState, gyro_bias);
+  MEMBER(ImuState, accel_bias);
+  MEMBER(ImuState, R_GtoI_fej);
+  MEMBER(ImuState, p_IinG_fej);
+  MEMBER(ImuState, v_IinG_fej);
+  RECORD(CloneState);
+  MEMBER(CloneState, t_ns);
+  MEMBER(CloneState, slot);
+  MEMBER(CloneState, column);
+  MEMBER(CloneState, R_GtoI);
+  MEMBER(CloneState, p_IinG);
+  MEMBER(CloneState, R_GtoI_fej);
+  MEMBER(CloneState, p_IinG_fej);
+  MEMBER(CloneState, w_IinI);
+  MEMBER(CloneState, v_IinG);
   RECORD(ImuNoise);
   MEMBER(ImuNoise, gyro_rad_per_s_sqrt_hz);
   MEMBER(ImuNoise, accel_m_per_s2_sqrt_hz);

@@ -62,7 +62,7 @@ Library::Library(const std::filesystem::path& file) {
   find_descriptor(file);
   check_descriptor(file);
   const PluginDescriptor& d = *descriptor_;
-  info_ = {d.kind, d.name, d.version, d.summary, d.license, file, {d.params, d.n_params}};
+  info_ = {d.kind, d.name, d.version, d.summary, d.license, file, d.params()};
 }
 
 void Library::load(const std::filesystem::path& file) {
@@ -113,7 +113,7 @@ void Library::check_descriptor(const std::filesystem::path& file) const {
       throw PluginRefused(file, "has a descriptor with a null text - use VIWO_REGISTER(...)");
     }
   }
-  if (d.create == nullptr || d.destroy == nullptr || (d.params == nullptr && d.n_params > 0)) {
+  if (d.create == nullptr || d.destroy == nullptr || d.params == nullptr) {
     throw PluginRefused(file, "has a descriptor with a null pointer - use VIWO_REGISTER(...)");
   }
   const auto expected = parse_file_name(file);
@@ -122,12 +122,12 @@ void Library::check_descriptor(const std::filesystem::path& file) const {
                                   "' - its file must be named " + make_file_name(d.kind, d.name));
   }
   try {
-    config::check_specs({d.params, d.n_params});
-  } catch (const std::logic_error& error) {
+    config::check_specs(d.params());
+  } catch (const std::exception& error) {
     throw PluginRefused(file, std::string("has a wrong parameter table: ") + error.what());
   }
-  for (const ParamSpec& spec : std::span(d.params, d.n_params)) {
-    if (std::string_view(spec.name) == "type") {
+  for (const ParamSpec& spec : d.params()) {
+    if (spec.name == "type") {
       throw PluginRefused(file,
                           "has a wrong parameter table: 'type' is taken, it names the plugin");
     }

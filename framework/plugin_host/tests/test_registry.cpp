@@ -59,7 +59,7 @@ TEST_F(Registry, LoadsAPluginAndKnowsAboutIt) {
   EXPECT_EQ(info.license, "Apache-2.0");
   EXPECT_EQ(info.file, bad("moody"));
   ASSERT_EQ(info.params.size(), 2u);
-  EXPECT_STREQ(info.params[0].name, "radius_m");
+  EXPECT_EQ(info.params[0].name, "radius_m");
 }
 
 TEST_F(Registry, KeepsTextsOfAPluginValidAfterItIsGone) {
@@ -69,7 +69,7 @@ TEST_F(Registry, KeepsTextsOfAPluginValidAfterItIsGone) {
     info = registry.find("sensor", "ticks");
   }
   ASSERT_EQ(info.params.size(), 3u);
-  EXPECT_STREQ(info.params[1].fallback, "{type: moody}");
+  EXPECT_EQ(info.params[1].fallback_section, "{type: moody}");
 }
 
 TEST_F(Registry, SuggestsTheNearestName) {
@@ -116,7 +116,7 @@ TEST_F(Registry, SearchesCommandLineThenEnvironmentThenInstallation) {
   EXPECT_EQ(folders[1], "/env/a");
   EXPECT_EQ(folders[2], "/env/b");
   EXPECT_EQ(folders[3],
-            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v7");
+            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v8");
   EXPECT_EQ(error_of([] { PluginRegistry::default_search_path({"/no/such"}); }),
             "--plugin-path /no/such: no such folder");
 }
@@ -369,7 +369,7 @@ TEST_F(Registry, RefusesAnotherNameThanThatOfTheFile) {
 
 TEST_F(Registry, RefusesAWrongParameterTable) {
   EXPECT_EQ(reason(bad("bad_default")),
-            "has a wrong parameter table: default of 'r_m'  r_m: -1 violates r_m >= 0");
+            "has a wrong parameter table: default of 'r_m': -1 violates r_m >= 0");
   EXPECT_EQ(reason(bad("takes_type")),
             "has a wrong parameter table: 'type' is taken, it names the plugin");
 }

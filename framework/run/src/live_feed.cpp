@@ -310,7 +310,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   }
 
   static EstimateSample sample_of(const Filter& filter) {
-    const ImuView& imu = filter.imu();
+    const ImuState& imu = filter.imu();
     EstimateSample sample;
     sample.t_ns = filter.t_ns();
     const Eigen::Quaterniond q_ItoG(imu.R_GtoI.transpose());

@@ -45,7 +45,7 @@ Recorder::Recorder(const RunSetup& setup, const RunData& data, const Filter& fil
 
 void Recorder::record(const Estimator& estimator) {
   const Filter& filter = estimator.filter();
-  const ImuView& imu = filter.imu();
+  const ImuState& imu = filter.imu();
   const std::int64_t t_ns = filter.t_ns();
   if (is_live_) bound_series();
   if (result_.epochs == 0) begin_ns_ = last_ns_ = t_ns;
@@ -141,7 +141,7 @@ void Recorder::add_error(const Filter& filter, double t_s) {
   if (setup_.start.mode != StartMode::kReference) return;
   const auto truth = interpolate(truth_, filter.t_ns(), 0.2);
   if (!truth) return;
-  const ImuView& imu = filter.imu();
+  const ImuState& imu = filter.imu();
   Eigen::Matrix<double, 6, 1> error;
   error.head<3>() = -log_so3(truth->q_BtoW.toRotationMatrix().transpose() * imu.R_GtoI.transpose());
   error.tail<3>() = truth->p_BinW - imu.p_IinG;
@@ -167,13 +167,13 @@ void Recorder::add_error(const Filter& filter, double t_s) {
 
 /// From the oldest clone to now (F-40).
 void Recorder::add_relative_error(const Filter& filter, const StampedPose& truth) {
-  const CloneView& from = filter.clones().front();
+  const CloneState& from = filter.clones().front();
   const auto true_from = interpolate(truth_, from.t_ns, 0.2);
   if (!true_from || from.t_ns >= filter.t_ns()) return;
   const auto R_GtoI = [](const StampedPose& pose) -> Eigen::Matrix3d {
     return pose.q_BtoW.toRotationMatrix().transpose();
   };
-  const ImuView& to = filter.imu();
+  const ImuState& to = filter.imu();
   const auto& P = filter.covariance();
   Eigen::Matrix<double, 12, 12> both;
   both << P.topLeftCorner<6, 6>(), P.block<6, 6>(0, from.column), P.block<6, 6>(from.column, 0),

@@ -13,32 +13,32 @@ namespace {
 
 using config::Node;
 
-constexpr std::array kTopParams{
-    ParamSpec{.name = "model", .type = ParamType::kString, .help = "type of the kinematic model"},
-    ParamSpec{.name = "twist",
-              .type = ParamType::kString,
-              .choices = "plain|noise_weighted",
-              .help = "odometry.twist of the fit: the estimates belong to it"},
-    ParamSpec{.name = "extrinsics_x_m_y_m_yaw_rad",
-              .type = ParamType::kNumbers,
-              .fallback = "[0, 0, 0]",
-              .help = "pose of O in the reference body"},
+struct TopParams {
+  std::string model;
+  std::string twist;
+  Eigen::Vector3d extrinsics_x_m_y_m_yaw_rad{0., 0., 0.};
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(model), {.required = true, .help = "type of the kinematic model"});
+    b(VIWO_PARAM(twist), {.choices = "plain|noise_weighted",
+                          .required = true,
+                          .help = "odometry.twist of the fit: the estimates belong to it"});
+    b(VIWO_PARAM(extrinsics_x_m_y_m_yaw_rad), {.help = "pose of O in the reference body"});
+  }
 };
 
-constexpr std::array kIntrinsicParams{
-    ParamSpec{.name = "estimate", .type = ParamType::kNumber, .help = "value to run with"},
-    ParamSpec{.name = "sigma",
-              .type = ParamType::kNumber,
-              .min = 0.,
-              .help = "standard deviation; 0: held"},
-    ParamSpec{.name = "nominal",
-              .type = ParamType::kNumber,
-              .fallback = "0",
-              .help = "for the reader; not used"},
-    ParamSpec{.name = "unit",
-              .type = ParamType::kString,
-              .fallback = "''",
-              .help = "for the reader; not used"},
+struct IntrinsicParams {
+  double estimate = 0.;
+  double sigma = 0.;
+  double nominal = 0.;
+  std::string unit;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(estimate), {.required = true, .help = "value to run with"});
+    b(VIWO_PARAM(sigma), {.min = 0., .required = true, .help = "standard deviation; 0: held"});
+    b(VIWO_PARAM(nominal), {.help = "for the reader; not used"});
+    b(VIWO_PARAM(unit), {.help = "for the reader; not used"});
+  }
 };
 
 /// Shortest text that reads back to the same number.
@@ -55,27 +55,22 @@ CalibrationFile read_calibration(const std::filesystem::path& file, const WheelM
   const Node root = config::load_file(file);
   config::Errors errors;
   constexpr std::string_view kSections[] = {"intrinsics"};
-  const ParamSet top =
-      config::read_params(root, root.mark(), "calibration", kTopParams, kSections, {}, errors);
+  const auto top =
+      config::read_section<TopParams>(root, root.mark(), "calibration", errors, kSections);
   const Node* intrinsics = root.find("intrinsics");
   if (intrinsics == nullptr || !intrinsics->is_map()) {
     errors.add(root.mark(), "'intrinsics' must be a section with one entry per intrinsic");
   }
   errors.throw_if_any();
-  if (top.text("model") != model_name) {
-    config::fail(root.find("model")->mark(), "this calibration is for the model '" +
-                                                 top.text("model") + "', the run has '" +
-                                                 model_name + "'");
+  if (top.model != model_name) {
+    config::fail(root.find("model")->mark(), "this calibration is for the model '" + top.model +
+                                                 "', the run has '" + model_name + "'");
   }
   CalibrationFile calibration;
   calibration.x_WI = model.nominal();
   calibration.sigma = model.prior_sigma();
-  calibration.twist = top.text("twist");
-  const auto extrinsics = top.numbers("extrinsics_x_m_y_m_yaw_rad");
-  if (extrinsics.size() != 3) {
-    config::fail(root.find("extrinsics_x_m_y_m_yaw_rad")->mark(), "this must be [x, y, yaw]");
-  }
-  calibration.extrinsics = {extrinsics[0], extrinsics[1], extrinsics[2]};
+  calibration.twist = top.twist;
+  calibration.extrinsics = top.extrinsics_x_m_y_m_yaw_rad;
   std::vector<std::string> names;
   for (const auto& spec : model.description().intrinsics) names.push_back(spec.name);
   for (const auto& entry : intrinsics->entries()) {
@@ -86,11 +81,11 @@ CalibrationFile read_calibration(const std::filesystem::path& file, const WheelM
       continue;
     }
     const std::size_t before = errors.size();
-    const ParamSet values = config::read_params(
-        entry.value, entry.key_mark, "intrinsics." + entry.key, kIntrinsicParams, {}, {}, errors);
+    const auto values = config::read_section<IntrinsicParams>(entry.value, entry.key_mark,
+                                                              "intrinsics." + entry.key, errors);
     if (errors.size() > before) continue;
-    calibration.x_WI[index] = values.number("estimate");
-    calibration.sigma[index] = values.number("sigma");
+    calibration.x_WI[index] = values.estimate;
+    calibration.sigma[index] = values.sigma;
   }
   for (const std::string& name : names) {
     if (intrinsics->find(name) == nullptr) {

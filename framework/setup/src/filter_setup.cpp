@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
+#include <optional>
+#include <type_traits>
 #include <utility>
 
-#include "filter_params.hpp"
 #include "section.hpp"
+#include "section_params.hpp"
 #include "update_setup.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
@@ -22,64 +23,50 @@ using config::Errors;
 using config::Node;
 using Eigen::Vector3d;
 
-/// The values of a section, resolved; nothing if something in it is wrong.
-std::optional<ParamSet> read_section(const Node& section, const std::string& path,
-                                     std::span<const ParamSpec> specs, Node& resolved,
-                                     Errors& errors) {
+/// A section, and resolved; nothing if something in it is wrong.
+template <class T>
+std::optional<T> read_section(const Node& section, const std::string& path, Node& resolved,
+                              Errors& errors) {
   const std::size_t before = errors.size();
-  const ParamSet params = config::read_params(section, section.mark(), path, specs, {}, {}, errors);
+  const T params = config::read_section<T>(section, section.mark(), path, errors);
   if (errors.size() > before) return std::nullopt;
-  resolved = config::write_params(specs, params);
+  resolved = config::write_section(params);
   return params;
 }
 
-std::optional<Vector3d> three(const ParamSet& params, const char* key, const Node& section,
-                              Errors& errors) {
-  const auto values = params.numbers(key);
-  if (values.size() == 3) return Vector3d(values[0], values[1], values[2]);
-  const Node* node = section.find(key);
-  errors.add(node != nullptr ? node->mark() : section.mark(),
-             "wheels." + std::string(key) + " needs three numbers");
-  return std::nullopt;
-}
-
-void read_estimator(const ParamSet& p, FilterSetup& setup) {
-  setup.options.filter.clones = static_cast<int>(p.integer("clones"));
-  setup.options.filter.first_estimates = p.flag("first_estimates");
-  setup.options.filter.gravity_m_per_s2 = p.number("gravity_m_per_s2");
-  setup.options.growing_window = p.flag("growing_window");
-  setup.options.schedule.max_epoch_s = p.number("max_epoch_s");
-  setup.options.schedule.max_wait_s = p.number("max_wait_s");
-  setup.options.imu.max_gap_s = p.number("max_imu_gap_s");
-  setup.options.health.max_speed_m_per_s = p.number("max_speed_m_per_s");
-  setup.options.runner.max_update_failures = static_cast<int>(p.integer("max_update_failures"));
-  setup.options.monitor.enabled = p.flag("monitor");
-  setup.options.monitor.window_s = p.number("monitor_window_s");
-  setup.options.monitor.min_information = p.number("monitor_min_information");
-  setup.options.monitor.hold = p.flag("hold_unexcited");
-  setup.restart = p.text("restart") == "always"  ? Restart::kAlways
-                  : p.text("restart") == "never" ? Restart::kNever
-                                                 : Restart::kLive;
+void read_estimator(const EstimatorParams& p, FilterSetup& setup) {
+  setup.options.filter.clones = p.clones;
+  setup.options.filter.first_estimates = p.first_estimates;
+  setup.options.filter.gravity_m_per_s2 = p.gravity_m_per_s2;
+  setup.options.growing_window = p.growing_window;
+  setup.options.schedule.max_epoch_s = p.max_epoch_s;
+  setup.options.schedule.max_wait_s = p.max_wait_s;
+  setup.options.imu.max_gap_s = p.max_imu_gap_s;
+  setup.options.health.max_speed_m_per_s = p.max_speed_m_per_s;
+  setup.options.runner.max_update_failures = p.max_update_failures;
+  setup.options.monitor.enabled = p.monitor;
+  setup.options.monitor.window_s = p.monitor_window_s;
+  setup.options.monitor.min_information = p.monitor_min_information;
+  setup.options.monitor.hold = p.hold_unexcited;
+  setup.restart = p.restart;
   StartSetup& start = setup.start;
-  start.mode = p.text("start") == "standstill" ? StartMode::kStandstill
-               : p.text("start") == "moving"   ? StartMode::kMoving
-                                               : StartMode::kReference;
-  start.window_s = p.number("start_window_s");
-  start.sigma_orientation_rad = p.number("sigma_start_orientation_rad");
-  start.sigma_position_m = p.number("sigma_start_position_m");
-  start.sigma_velocity_m_per_s = p.number("sigma_start_velocity_m_per_s");
-  start.sigma_gyro_bias_rad_per_s = p.number("sigma_start_gyro_bias_rad_per_s");
-  start.sigma_accel_bias_m_per_s2 = p.number("sigma_start_accel_bias_m_per_s2");
-  start.state_error_scale = p.number("start_error_scale");
+  start.mode = p.start;
+  start.window_s = p.start_window_s;
+  start.sigma_orientation_rad = p.sigma_start_orientation_rad;
+  start.sigma_position_m = p.sigma_start_position_m;
+  start.sigma_velocity_m_per_s = p.sigma_start_velocity_m_per_s;
+  start.sigma_gyro_bias_rad_per_s = p.sigma_start_gyro_bias_rad_per_s;
+  start.sigma_accel_bias_m_per_s2 = p.sigma_start_accel_bias_m_per_s2;
+  start.state_error_scale = p.start_error_scale;
 }
 
 /// What `read` reads from the file that `section` names with the key `kalibr`; nothing if it
 /// cannot.
 template <class Read>
-auto from_kalibr(const ParamSet& p, const Node& section, const std::string& path, Read read,
-                 Errors& errors) -> std::optional<decltype(read(p.text("kalibr")))> {
+auto from_kalibr(const std::filesystem::path& file, const Node& section, const std::string& path,
+                 Read read, Errors& errors) -> std::optional<decltype(read(file))> {
   try {
-    return read(p.text("kalibr"));
+    return read(file);
   } catch (const InputError& error) {
     errors.add(section.find("kalibr")->mark(), path + ".kalibr: " + error.what());
     return std::nullopt;
@@ -88,47 +75,31 @@ auto from_kalibr(const ParamSet& p, const Node& section, const std::string& path
 
 /// The noises of the section `imu`, as numbers or in a Kalibr file, whose numbers then are written
 /// into the resolved section in its place.
-void read_imu(ParamSet p, const Node& section, FilterSetup& setup, Node& resolved, Errors& errors) {
-  ImuNoise noise;
-  const std::pair<const char*, double&> numbers[] = {
-      {"sigma_gyro_rad_per_s_sqrt_hz", noise.gyro_rad_per_s_sqrt_hz},
-      {"sigma_accel_m_per_s2_sqrt_hz", noise.accel_m_per_s2_sqrt_hz},
-      {"sigma_gyro_walk_rad_per_s2_sqrt_hz", noise.gyro_walk_rad_per_s2_sqrt_hz},
-      {"sigma_accel_walk_m_per_s3_sqrt_hz", noise.accel_walk_m_per_s3_sqrt_hz}};
-  if (!p.text("kalibr").empty()) {
-    for (const auto& [key, value] : numbers) {
-      const Node::Entry* const written = section.find_entry(key);
+void read_imu(ImuParams p, const Node& section, FilterSetup& setup, Node& resolved,
+              Errors& errors) {
+  if (!p.kalibr.empty()) {
+    for (const ParamSpec& spec : param_specs<sim::ImuNoiseParams>()) {
+      const Node::Entry* const written = section.find_entry(spec.name);
       if (written == nullptr) continue;
       errors.add(written->key_mark,
-                 "imu." + std::string(key) + ": imu.kalibr gives it, too - write either");
+                 "imu." + spec.name + ": imu.kalibr gives it, too - write either");
     }
-    const auto from_file = from_kalibr(p, section, "imu", log::read_kalibr_imu, errors);
+    const auto from_file = from_kalibr(p.kalibr, section, "imu", log::read_kalibr_imu, errors);
     if (!from_file) return;
-    noise = *from_file;
-    for (const auto& [key, value] : numbers) p.set(key, value);
-    p.set("kalibr", std::string());
-    resolved.set("imu", config::write_params(kImuParams, p));
+    p.set_densities(*from_file);
+    p.kalibr.clear();
+    resolved.set("imu", config::write_section(p));
   }
-  for (const auto& [key, value] : numbers) value = p.number(key);
-  setup.options.filter.imu_noise = noise;
-  setup.options.imu.max_gyro_rad_per_s = p.number("range_gyro_rad_per_s");
-  setup.options.imu.max_accel_m_per_s2 = p.number("range_accel_m_per_s2");
+  setup.options.filter.imu_noise = p.densities();
+  setup.options.imu.max_gyro_rad_per_s = p.range_gyro_rad_per_s;
+  setup.options.imu.max_accel_m_per_s2 = p.range_accel_m_per_s2;
 }
 
 /// How wrong calibration starts, in prior sigmas.
 struct CalibrationError {
-  enum class Draw { kGaussian, kSign, kPlus };
   double scale = 0.;
-  Draw draw = Draw::kGaussian;
+  EstimatorParams::Draw draw = EstimatorParams::Draw::kGaussian;
 };
-
-CalibrationError read_calibration_error(const ParamSet& p) {
-  using Draw = CalibrationError::Draw;
-  const std::string_view draw = p.text("calibration_error");
-  return {p.number("calibration_error_scale"), draw == "plus"   ? Draw::kPlus
-                                               : draw == "sign" ? Draw::kSign
-                                                                : Draw::kGaussian};
-}
 
 /// Draws how wrong calibration starts: the same whether it is then calibrated or not.
 class WrongStart {
@@ -138,9 +109,9 @@ class WrongStart {
   double draw(double sigma) {
     const double gaussian = random_.gaussian();
     switch (error_.draw) {
-      case CalibrationError::Draw::kSign:
+      case EstimatorParams::Draw::kSign:
         return std::copysign(error_.scale * sigma, gaussian);
-      case CalibrationError::Draw::kPlus:
+      case EstimatorParams::Draw::kPlus:
         return error_.scale * sigma;
       default:
         return error_.scale * sigma * gaussian;
@@ -182,60 +153,56 @@ void make_wrong(CameraPrior& prior, std::size_t index, WrongStart& wrong,
   for (int i = 0; i < 8; ++i) camera.intrinsics[i] += wrong.draw(prior.sigma_intrinsics[i]);
 }
 
-void read_cameras(const ParamSet& p, const Node& section, CalibrationError error,
+void read_cameras(const CamerasParams& p, const Node& section, CalibrationError error,
                   std::uint64_t seed, FilterSetup& setup, Errors& errors) {
-  auto cameras = from_kalibr(p, section, "cameras", log::read_kalibr_cameras, errors);
+  auto cameras = from_kalibr(p.kalibr, section, "cameras", log::read_kalibr_cameras, errors);
   if (!cameras) return;
-  const auto use = static_cast<std::size_t>(p.integer("use"));
+  const auto use = static_cast<std::size_t>(p.use);
   if (use > cameras->size()) {
     errors.add(section.find("use")->mark(), "cameras.use: there are only " +
                                                 std::to_string(cameras->size()) + " in " +
-                                                p.text("kalibr"));
+                                                p.kalibr.string());
     return;
   }
   if (use > 0) cameras->resize(use);
-  const bool calibrates = p.flag("calibrate");
+  const bool calibrates = p.calibrate;
   if (!calibrates) error.scale = 0.;
   WrongStart clock(error, seed, kFirstCameraDraw);
-  const double later_s = clock.draw(p.number("sigma_t_CtoI_s"));
+  const double later_s = clock.draw(p.sigma_t_CtoI_s);
   for (const CameraView& camera : *cameras) {
     const std::size_t index = setup.cameras.size();
     CameraPrior prior;
     prior.camera = camera;
-    prior.shares_clock = p.flag("synchronised");
-    prior.sigma_extrinsics.head<3>().setConstant(p.number("sigma_orientation_rad"));
-    prior.sigma_extrinsics.tail<3>().setConstant(p.number("sigma_position_m"));
-    prior.sigma_intrinsics.head<4>().setConstant(p.number("sigma_focal_px"));
-    prior.sigma_intrinsics.tail<4>().setConstant(p.number("sigma_distortion"));
-    prior.sigma_clock_s = p.number("sigma_t_CtoI_s");
+    prior.shares_clock = p.synchronised;
+    prior.sigma_extrinsics.head<3>().setConstant(p.sigma_orientation_rad);
+    prior.sigma_extrinsics.tail<3>().setConstant(p.sigma_position_m);
+    prior.sigma_intrinsics.head<4>().setConstant(p.sigma_focal_px);
+    prior.sigma_intrinsics.tail<4>().setConstant(p.sigma_distortion);
+    prior.sigma_clock_s = p.sigma_t_CtoI_s;
     WrongStart wrong(error, seed, kFirstCameraDraw + 1 + index);
     make_wrong(prior, index, wrong, setup.drawn_from);
     const double own_s = wrong.draw(prior.sigma_clock_s);
     if (wrong.is_wrong()) prior.camera.t_CtoI_s += prior.shares_clock ? later_s : own_s;
-    if (!calibrates || !p.flag("calibrate_extrinsics")) prior.sigma_extrinsics.setZero();
-    if (!calibrates || !p.flag("calibrate_intrinsics")) prior.sigma_intrinsics.setZero();
-    if (!calibrates || !p.flag("calibrate_time_offset")) prior.sigma_clock_s = 0.;
+    if (!calibrates || !p.calibrate_extrinsics) prior.sigma_extrinsics.setZero();
+    if (!calibrates || !p.calibrate_intrinsics) prior.sigma_intrinsics.setZero();
+    if (!calibrates || !p.calibrate_time_offset) prior.sigma_clock_s = 0.;
     setup.cameras.push_back(prior);
   }
 }
 
 /// A wheel set from its section `wheels`; the intrinsics and their sigmas are those of its model.
-void read_wheels(const ParamSet& p, const Node& section, WheelSet set, CalibrationError error,
-                 const ReadContext& context, FilterSetup& setup, Errors& errors) {
-  const auto p_IinO = three(p, "p_IinO_m", section, errors);
-  const auto rpy = three(p, "rpy_ItoO_rad", section, errors);
-  const auto sigma_p = three(p, "sigma_p_IinO_m", section, errors);
-  const auto sigma_R = three(p, "sigma_R_ItoO_rad", section, errors);
-  if (!p_IinO || !rpy || !sigma_p || !sigma_R) return;
+void read_wheels(const WheelsParams& p, WheelSet set, CalibrationError error,
+                 const ReadContext& context, FilterSetup& setup) {
+  const Vector3d& rpy = p.rpy_ItoO_rad;
   WheelsPrior& prior = set.prior;
-  prior.sensor = p.text("sensor");
+  prior.sensor = p.sensor;
   prior.wheels.model = &set.model->model();
-  prior.wheels.R_ItoO = sim::rotation_from_euler(rpy->z(), rpy->y(), rpy->x());
-  prior.wheels.p_IinO = *p_IinO;
-  prior.wheels.t_OtoI_s = p.number("t_OtoI_s");
-  prior.sigma_extrinsics << *sigma_R, *sigma_p;
-  prior.sigma_time_offset_s = p.number("sigma_t_OtoI_s");
-  if (!p.flag("hold_gauge")) {
+  prior.wheels.R_ItoO = sim::rotation_from_euler(rpy.z(), rpy.y(), rpy.x());
+  prior.wheels.p_IinO = p.p_IinO_m;
+  prior.wheels.t_OtoI_s = p.t_OtoI_s;
+  prior.sigma_extrinsics << p.sigma_R_ItoO_rad, p.sigma_p_IinO_m;
+  prior.sigma_time_offset_s = p.sigma_t_OtoI_s;
+  if (!p.hold_gauge) {
     for (Eigen::Index i = 0; i < prior.sigma_intrinsics.size(); ++i) {
       const IntrinsicSpec& spec = set.model->description().intrinsics[static_cast<std::size_t>(i)];
       if (spec.gauge_fixed) prior.sigma_intrinsics[i] = spec.prior_sigma;
@@ -254,18 +221,18 @@ void read_wheels(const ParamSet& p, const Node& section, WheelSet set, Calibrati
       prior.wheels.x_WI[i] += wrong.draw(prior.sigma_intrinsics[i]);
     }
   }
-  prior.intrinsics_walk = p.number("intrinsics_walk_per_sqrt_s");
-  if (const double wander = p.number("intrinsics_wander"); wander > 0. && !context.exact) {
+  prior.intrinsics_walk = p.intrinsics_walk_per_sqrt_s;
+  if (const double wander = p.intrinsics_wander; wander > 0. && !context.exact) {
     prior.sigma_wander.resize(prior.wheels.x_WI.size());
     for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
       const auto k = static_cast<std::size_t>(i);
       prior.sigma_wander[i] = wander * set.model->description().intrinsics[k].prior_sigma;
     }
-    prior.wander_time_s = p.number("intrinsics_wander_time_s");
+    prior.wander_time_s = p.intrinsics_wander_time_s;
   }
-  if (!p.flag("calibrate_extrinsics")) prior.sigma_extrinsics.setZero();
-  if (!p.flag("calibrate_time_offset")) prior.sigma_time_offset_s = 0.;
-  if (!p.flag("calibrate_intrinsics")) prior.sigma_intrinsics.setZero();
+  if (!p.calibrate_extrinsics) prior.sigma_extrinsics.setZero();
+  if (!p.calibrate_time_offset) prior.sigma_time_offset_s = 0.;
+  if (!p.calibrate_intrinsics) prior.sigma_intrinsics.setZero();
   setup.wheels.push_back(std::move(set));
 }
 
@@ -295,10 +262,9 @@ void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext&
     const std::string model_path = path + ".kinematics";
     const auto model = context.plugins.make_kinematics(
         *kinematics, model_path, instance_seed(context.seed, "kinematics", model_path), errors);
-    const Node section = section_or_empty(entry.value, "wheels");
     Node resolved_wheels;
-    const auto params =
-        read_section(section, path + ".wheels", kWheelsParams, resolved_wheels, errors);
+    const auto params = read_section<WheelsParams>(section_or_empty(entry.value, "wheels"),
+                                                   path + ".wheels", resolved_wheels, errors);
     if (!model.object || !params) continue;
     WheelSet set;
     set.prior.name = entry.key;
@@ -306,7 +272,7 @@ void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext&
                         [&] { return std::make_shared<const WheelModel>(model.object); });
     set.prior.wheels.x_WI = set.model->nominal();
     set.prior.sigma_intrinsics = set.model->prior_sigma();
-    read_wheels(*params, section, std::move(set), error, context, setup, errors);
+    read_wheels(*params, std::move(set), error, context, setup);
     Node resolved_set = Node::empty_map();
     resolved_set.set("kinematics", model.resolved);
     resolved_set.set("wheels", resolved_wheels);
@@ -355,38 +321,37 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
                         const Intrinsics& x_WI, const Intrinsics& sigma, const ReadContext& context,
                         Node& resolved, Errors& errors) {
   FilterSetup setup;
-  const auto read = [&](const char* key, std::span<const ParamSpec> specs) {
+  const auto read = [&]<class T>(const char* key, std::type_identity<T>) {
     Node section = Node::empty_map();
-    const auto params = read_section(section_or_empty(run, key), key, specs, section, errors);
+    const auto params = read_section<T>(section_or_empty(run, key), key, section, errors);
     if (params) resolved.set(key, section);
     return params;
   };
   CalibrationError error;
-  if (const auto params = read("estimator", kEstimatorParams)) {
+  if (const auto params = read("estimator", std::type_identity<EstimatorParams>())) {
     read_estimator(*params, setup);
     if (setup.options.monitor.hold && !setup.options.monitor.enabled) {
       errors.add(run.find("estimator")->mark(),
                  "estimator.hold_unexcited needs estimator.monitor: true");
     }
-    if (!context.exact) error = read_calibration_error(*params);
+    if (!context.exact) error = {params->calibration_error_scale, params->calibration_error};
     if (context.exact) setup.start.state_error_scale = 0.;
   }
-  if (const auto params = read("imu", kImuParams)) {
+  if (const auto params = read("imu", std::type_identity<ImuParams>())) {
     read_imu(*params, section_or_empty(run, "imu"), setup, resolved, errors);
   }
   if (run.find("cameras") != nullptr) {
-    if (const auto params = read("cameras", kCamerasParams)) {
+    if (const auto params = read("cameras", std::type_identity<CamerasParams>())) {
       read_cameras(*params, *run.find("cameras"), error, context.seed, setup, errors);
     }
   }
   if (model != nullptr) {
-    if (const auto params = read("wheels", kWheelsParams)) {
+    if (const auto params = read("wheels", std::type_identity<WheelsParams>())) {
       WheelSet set;
       set.model = model;
       set.prior.wheels.x_WI = x_WI;
       set.prior.sigma_intrinsics = sigma;
-      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error, context, setup,
-                  errors);
+      read_wheels(*params, std::move(set), error, context, setup);
     }
   }
   read_wheel_sets(run, error, context, setup, resolved, errors);

@@ -10,6 +10,7 @@
 
 #include "camera_check.hpp"
 #include "section.hpp"
+#include "section_params.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/setup/calibration_file.hpp"
 
@@ -17,77 +18,6 @@ namespace viwo {
 namespace {
 
 using config::Node;
-
-constexpr std::array kRunParams{
-    ParamSpec{.name = "name",
-              .type = ParamType::kString,
-              .fallback = "run",
-              .help = "what tables and pages call this run"},
-    ParamSpec{.name = "seed",
-              .type = ParamType::kInt,
-              .fallback = "1",
-              .min = 0.,
-              .help = "seed of everything random"},
-};
-
-constexpr std::array kOdometryParams{
-    ParamSpec{.name = "twist",
-              .type = ParamType::kString,
-              .fallback = "auto",
-              .choices = "auto|plain|noise_weighted",
-              .help = "rows of the model weighted equally or by their noise; auto: as the "
-                      "calibration file was fitted, plain without one"},
-    ParamSpec{.name = "rank_tolerance",
-              .type = ParamType::kNumber,
-              .fallback = "0.01",
-              .min = 0.,
-              .max = 1.,
-              .min_exclusive = true,
-              .help = "rows whose directions spread less [rad] do not tell the velocity across"},
-    ParamSpec{.name = "parity_gate_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0",
-              .min = 0.,
-              .max = 0.5,
-              .help = "samples whose parity residual is less likely than this are not believed; 0: "
-                      "no gate"},
-    ParamSpec{.name = "epoch_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0.1",
-              .min = 0.001,
-              .help = "time between two poses of the estimate"},
-    ParamSpec{.name = "reference_time_offset_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0",
-              .min = -10.,
-              .max = 10.,
-              .help = "t_reference = t_wheel + offset"},
-};
-
-constexpr std::array kEvaluationParams{
-    ParamSpec{.name = "alignment",
-              .type = ParamType::kString,
-              .fallback = "yaw_position",
-              .choices = "none|start|yaw_position|se3",
-              .help = "how the estimate is brought onto the reference for the absolute error"},
-    ParamSpec{.name = "segment_lengths_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .fallback = "[]",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "path lengths of the relative pose error; none: two that the path has "
-                      "several of"},
-    ParamSpec{.name = "reference_max_gap_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0.5",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "longest gap of the reference that is interpolated over"},
-};
 
 /// The key `input` of a sensor's section; "" if there is none, or if it is wrong.
 std::string read_input(const Node::Entry& entry, const Node& sensors, const Loaded<Sensor>& loaded,
@@ -207,29 +137,26 @@ void read_options(const Node& run, RunSetup& setup, config::Errors& errors) {
   const Node odometry = section_or_empty(run, "odometry");
   const Node evaluation = section_or_empty(run, "evaluation");
   const std::size_t before = errors.size();
-  const ParamSet o =
-      config::read_params(odometry, odometry.mark(), "odometry", kOdometryParams, {}, {}, errors);
-  const ParamSet e = config::read_params(evaluation, evaluation.mark(), "evaluation",
-                                         kEvaluationParams, {}, {}, errors);
+  const auto o =
+      config::read_section<OdometryParams>(odometry, odometry.mark(), "odometry", errors);
+  const auto e =
+      config::read_section<EvaluationParams>(evaluation, evaluation.mark(), "evaluation", errors);
   if (errors.size() > before) return;
-  if (o.text("twist") != "auto") {
-    setup.preintegration.twist.noise_weighted = o.text("twist") == "noise_weighted";
+  using Twist = OdometryParams::Twist;
+  if (o.twist != Twist::kAuto) {
+    setup.preintegration.twist.noise_weighted = o.twist == Twist::kNoiseWeighted;
   }
-  setup.preintegration.twist.rank_tolerance = o.number("rank_tolerance");
-  setup.preintegration.parity_gate_probability = o.number("parity_gate_probability");
+  setup.preintegration.twist.rank_tolerance = o.rank_tolerance;
+  setup.preintegration.parity_gate_probability = o.parity_gate_probability;
   setup.preintegration.parity = false;
-  setup.epoch_s = o.number("epoch_s");
-  setup.reference_time_offset_s = o.number("reference_time_offset_s");
-  for (const auto mode : {eval::Alignment::kNone, eval::Alignment::kStart,
-                          eval::Alignment::kYawPosition, eval::Alignment::kSe3}) {
-    if (e.text("alignment") == eval::name(mode)) setup.evaluation.alignment = mode;
-  }
-  const auto lengths = e.numbers("segment_lengths_m");
-  setup.evaluation.segment_lengths_m.assign(lengths.begin(), lengths.end());
-  setup.evaluation.max_reference_gap_s = e.number("reference_max_gap_s");
-  setup.reference_max_gap_s = e.number("reference_max_gap_s");
-  setup.resolved.set("odometry", config::write_params(kOdometryParams, o));
-  setup.resolved.set("evaluation", config::write_params(kEvaluationParams, e));
+  setup.epoch_s = o.epoch_s;
+  setup.reference_time_offset_s = o.reference_time_offset_s;
+  setup.evaluation.alignment = e.alignment;
+  setup.evaluation.segment_lengths_m = e.segment_lengths_m;
+  setup.evaluation.max_reference_gap_s = e.reference_max_gap_s;
+  setup.reference_max_gap_s = e.reference_max_gap_s;
+  setup.resolved.set("odometry", config::write_section(o));
+  setup.resolved.set("evaluation", config::write_section(e));
 }
 
 /// The sensor that the section `wheels` of a run names; "" for none.
@@ -274,12 +201,11 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
   constexpr std::string_view kSections[] = {"sensors", "kinematics", "odometry",    "evaluation",
                                             "imu",     "cameras",    "wheels",      "wheel_sets",
                                             "updates", "estimator",  "placeholders"};
-  const ParamSet top =
-      config::read_params(run, run.mark(), "run", kRunParams, kSections, {}, errors);
+  const auto top = config::read_section<RunParams>(run, run.mark(), "run", errors, kSections);
   if (errors.empty()) {
-    setup.name = top.text("name");
-    setup.seed = seed.value_or(static_cast<std::uint64_t>(top.integer("seed")));
-    setup.resolved = config::write_params(kRunParams, top);
+    setup.name = top.name;
+    setup.seed = seed.value_or(top.seed);
+    setup.resolved = config::write_section(top);
     setup.resolved.set("seed", Node::scalar_of(std::to_string(setup.seed)));
   } else {
     setup.resolved = Node::empty_map();

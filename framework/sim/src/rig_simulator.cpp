@@ -11,80 +11,69 @@
 namespace viwo::sim {
 namespace {
 
-Eigen::Vector3d vector_from(const ParamSet& params, const std::string& key) {
-  const auto numbers = params.numbers(key);
-  if (numbers.size() != 3) {
-    throw ParamError(key, "needs 3 numbers, not " + std::to_string(numbers.size()));
-  }
-  return {numbers[0], numbers[1], numbers[2]};
-}
-
-ImuSimulation imu_from(const ParamSet& params, double duration_s, std::int64_t start_ns,
+ImuSimulation imu_from(const RigParams& params, double duration_s, std::int64_t start_ns,
                        bool exact) {
   ImuSimulation imu;
   imu.duration_s = duration_s;
   imu.start_ns = start_ns;
-  imu.rate_hz = params.number("imu_rate_hz");
-  imu.gravity_m_per_s2 = params.number("gravity_m_per_s2");
-  imu.noise = params.flag("noise") && !exact;
-  imu.densities = {params.number("sigma_gyro_rad_per_s_sqrt_hz"),
-                   params.number("sigma_accel_m_per_s2_sqrt_hz"),
-                   params.number("sigma_gyro_walk_rad_per_s2_sqrt_hz"),
-                   params.number("sigma_accel_walk_m_per_s3_sqrt_hz")};
-  imu.gyro_bias = vector_from(params, "gyro_bias_rad_per_s");
-  imu.accel_bias = vector_from(params, "accel_bias_m_per_s2");
-  imu.sigma_gyro_bias_rad_per_s = params.number("sigma_gyro_bias_rad_per_s");
-  imu.sigma_accel_bias_m_per_s2 = params.number("sigma_accel_bias_m_per_s2");
+  imu.rate_hz = params.imu_rate_hz;
+  imu.gravity_m_per_s2 = params.gravity_m_per_s2;
+  imu.noise = params.noise && !exact;
+  imu.densities = params.densities();
+  imu.gyro_bias = params.gyro_bias_rad_per_s;
+  imu.accel_bias = params.accel_bias_m_per_s2;
+  imu.sigma_gyro_bias_rad_per_s = params.sigma_gyro_bias_rad_per_s;
+  imu.sigma_accel_bias_m_per_s2 = params.sigma_accel_bias_m_per_s2;
   return imu;
 }
 
-FeatureSimulation features_from(const ParamSet& params, double duration_s, std::int64_t start_ns,
+FeatureSimulation features_from(const RigParams& params, double duration_s, std::int64_t start_ns,
                                 bool exact) {
   FeatureSimulation features;
   features.duration_s = duration_s;
   features.start_ns = start_ns;
-  features.rate_hz = params.number("camera_rate_hz");
-  features.phase_s = params.number("camera_phase_s");
-  features.features = static_cast<int>(params.integer("features"));
-  features.landmark_min_m = params.number("landmark_min_m");
-  features.landmark_max_m = params.number("landmark_max_m");
-  features.max_view_angle_rad = params.number("max_view_angle_rad");
-  features.sigma_px = params.number("sigma_px");
-  features.noise = params.flag("noise") && !exact;
-  features.outlier_probability = exact ? 0. : params.number("feature_outlier_probability");
-  features.outlier_px = params.number("feature_outlier_px");
-  features.dropout_probability = exact ? 0. : params.number("feature_dropout_probability");
+  features.rate_hz = params.camera_rate_hz;
+  features.phase_s = params.camera_phase_s;
+  features.features = params.features;
+  features.landmark_min_m = params.landmark_min_m;
+  features.landmark_max_m = params.landmark_max_m;
+  features.max_view_angle_rad = params.max_view_angle_rad;
+  features.sigma_px = params.sigma_px;
+  features.noise = params.noise && !exact;
+  features.outlier_probability = exact ? 0. : params.feature_outlier_probability;
+  features.outlier_px = params.feature_outlier_px;
+  features.dropout_probability = exact ? 0. : params.feature_dropout_probability;
   if (features.landmark_max_m < features.landmark_min_m) {
     throw ParamError("landmark_max_m", "is less than landmark_min_m");
   }
   return features;
 }
 
-std::vector<CameraView> cameras_from(const ParamSet& params, const HostServices& services) {
-  if (params.text("cameras").empty()) {
+std::vector<CameraView> cameras_from(const RigParams& params, const HostServices& services) {
+  if (params.cameras.empty()) {
     throw ParamError("cameras", "a file is needed, or features: 0");
   }
-  return true_cameras(params, cameras_of_file(params), services);
+  return true_cameras(params, cameras_of_file(params.cameras, params.n_cameras), services);
 }
 
 }  // namespace
 
-RigSimulation rig_from(const ParamSet& params, double duration_s, std::int64_t start_ns,
+RigSimulation rig_from(const RigParams& params, double duration_s, std::int64_t start_ns,
                        const HostServices& services) {
   RigSimulation rig;
-  const Eigen::Vector3d rpy = vector_from(params, "rpy_ItoO_rad");
-  rig.mounting = {rotation_from_euler(rpy[2], rpy[1], rpy[0]), vector_from(params, "p_IinO_m")};
-  rig.with_imu = params.flag("imu");
+  const Eigen::Vector3d rpy = params.rpy_ItoO_rad;
+  rig.mounting = {rotation_from_euler(rpy[2], rpy[1], rpy[0]), params.p_IinO_m};
+  rig.with_imu = params.imu;
   rig.imu = imu_from(params, duration_s, start_ns, services.exact);
   rig.features = features_from(params, duration_s, start_ns, services.exact);
   if (rig.features.features > 0) rig.cameras = cameras_from(params, services);
   return rig;
 }
 
-SampleTypes rig_kinds(const ParamSet& params) {
+SampleTypes rig_kinds(const RigParams& params) {
   SampleTypes out = sample_types<StateSample>();
-  if (params.flag("imu")) out.push_back(&sample_type<ImuSample>());
-  if (params.integer("features") > 0) {
+  if (params.imu) out.push_back(&sample_type<ImuSample>());
+  if (params.features > 0) {
     out.push_back(&sample_type<FeatureSample>());
     out.push_back(&sample_type<CalibrationSample>());
   }

@@ -8,20 +8,21 @@
 
 namespace viwo::sim {
 
-std::vector<CameraView> cameras_of_file(const ParamSet& params) {
-  std::vector<CameraView> cameras = log::read_kalibr_cameras(params.text("cameras"));
-  const auto n = static_cast<std::size_t>(params.integer("n_cameras"));
+std::vector<CameraView> cameras_of_file(const std::filesystem::path& file, int n_cameras) {
+  std::vector<CameraView> cameras = log::read_kalibr_cameras(file);
+  const auto n = static_cast<std::size_t>(n_cameras);
   if (n > cameras.size()) {
-    throw ParamError("n_cameras", "there are only " + std::to_string(cameras.size()) + " in " +
-                                      params.text("cameras"));
+    throw ParamError("n_cameras",
+                     "there are only " + std::to_string(cameras.size()) + " in " + file.string());
   }
   cameras.resize(n);
   return cameras;
 }
 
-std::vector<CameraView> true_cameras(const ParamSet& params, std::vector<CameraView> of_file,
+std::vector<CameraView> true_cameras(const TrueCameraParams& params,
+                                     std::vector<CameraView> of_file,
                                      const HostServices& services) {
-  const auto clock_s = params.numbers("camera_clock_error_s");
+  const auto& clock_s = params.camera_clock_error_s;
   if (clock_s.size() != 1 && clock_s.size() != of_file.size()) {
     throw ParamError("camera_clock_error_s", "needs one number, or one for each of the " +
                                                  std::to_string(of_file.size()) + " cameras, not " +
@@ -37,12 +38,12 @@ std::vector<CameraView> true_cameras(const ParamSet& params, std::vector<CameraV
       for (double& value : out) value = sigma * random.gaussian();
       return out;
     };
-    const Eigen::Vector3d dtheta = three(params.number("sigma_true_camera_orientation_rad"));
+    const Eigen::Vector3d dtheta = three(params.sigma_true_camera_orientation_rad);
     // So that the file's numbers stay to the bit where nothing is drawn.
     if (!dtheta.isZero(0.)) camera.R_ItoC = exp_so3(-dtheta) * camera.R_ItoC;
-    camera.p_IinC += three(params.number("sigma_true_camera_position_m"));
-    const double focal_px = params.number("sigma_true_camera_focal_px");
-    const double distortion = params.number("sigma_true_camera_distortion");
+    camera.p_IinC += three(params.sigma_true_camera_position_m);
+    const double focal_px = params.sigma_true_camera_focal_px;
+    const double distortion = params.sigma_true_camera_distortion;
     for (int i = 0; i < 8; ++i) {
       camera.intrinsics[i] += (i < 4 ? focal_px : distortion) * random.gaussian();
     }

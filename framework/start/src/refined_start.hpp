@@ -11,7 +11,7 @@
 namespace viwo {
 
 struct RefinedStart {
-  ImuView state;                    ///< at the last key, in a gravity-aligned frame
+  ImuState state;                   ///< at the last key, in a gravity-aligned frame
   ImuMatrix P = ImuMatrix::Zero();  ///< where the yaw and the position of the last key are exact
   double sigma_scale = 0.;          ///< of the distances of points that are known best, relative
   double sigma_px = 0.;             ///< noise of the sights, as the residuals tell it

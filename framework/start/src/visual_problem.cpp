@@ -37,7 +37,7 @@ VisualEstimate VisualProblem::initial(const LinearStart& linear, const Vector3d&
   VisualEstimate x;
   x.calibration = VectorXd::Zero(size() - imu_columns());
   const Matrix3d R_GtoI = R_GtoI_from_up(-linear.gravity.normalized());
-  ImuView state;
+  ImuState state;
   state.R_GtoI = R_GtoI;
   state.v_IinG = R_GtoI.transpose() * linear.velocity;
   state.gyro_bias = gyro_bias;
@@ -50,7 +50,7 @@ VisualEstimate VisualProblem::initial(const LinearStart& linear, const Vector3d&
   for (std::size_t i = 0; i < window_.tracks.size(); ++i) {
     const StartSight& sight = window_.tracks[i].sights.front();
     const CameraView& camera = options_.cameras[sight.camera].camera;
-    const ImuView& key = x.keys[sight.key];
+    const ImuState& key = x.keys[sight.key];
     const Vector3d p_G = R_GtoI.transpose() * linear.points[i];
     in_anchor.emplace_back(camera.R_ItoC * (key.R_GtoI * (p_G - key.p_IinG)) + camera.p_IinC);
     if (in_anchor.back().z() > 0.05) depths.push_back(in_anchor.back().z());
@@ -86,7 +86,7 @@ VisualEstimate VisualProblem::moved(const VisualEstimate& x, const VectorXd& dx,
   VisualEstimate y = x;
   for (std::size_t k = 0; k < y.keys.size(); ++k) {
     const ImuVector d = dx.segment<kImuSize>(kImuSize * static_cast<Eigen::Index>(k));
-    ImuView& key = y.keys[k];
+    ImuState& key = y.keys[k];
     key.R_GtoI = normalized_rotation(exp_so3(-d.segment<3>(kThetaColumn)) * key.R_GtoI);
     key.p_IinG += d.segment<3>(kPositionColumn);
     key.v_IinG += d.segment<3>(kVelocityColumn);
@@ -101,7 +101,7 @@ VisualEstimate VisualProblem::moved(const VisualEstimate& x, const VectorXd& dx,
   return y;
 }
 
-VisualProblem::Prediction VisualProblem::predict(const ImuView& from, std::size_t to) const {
+VisualProblem::Prediction VisualProblem::predict(const ImuState& from, std::size_t to) const {
   Prediction p;
   p.state = from;
   p.state.R_GtoI_fej = from.R_GtoI;
@@ -132,7 +132,7 @@ void VisualProblem::add_priors(const VisualEstimate& x, VisualNormals& n) const 
 
 void VisualProblem::add_imu(const VisualEstimate& x, std::size_t k, VisualNormals& n) const {
   const Prediction p = predict(x.keys[k - 1], k);
-  const ImuView& key = x.keys[k];
+  const ImuState& key = x.keys[k];
   ImuVector r;
   r.segment<3>(kThetaColumn) = -log_so3(key.R_GtoI * p.state.R_GtoI.transpose());
   r.segment<3>(kPositionColumn) = key.p_IinG - p.state.p_IinG;
@@ -175,7 +175,7 @@ bool VisualProblem::sight_row(const VisualEstimate& x, std::size_t i, const Star
   const StartSight& first = window_.tracks[i].sights.front();
   const CameraView& anchor_camera = options_.cameras[first.camera].camera;
   const Matrix3d R_CtoI = anchor_camera.R_ItoC.transpose();
-  const ImuView& anchor = x.keys[first.key];
+  const ImuState& anchor = x.keys[first.key];
   const Vector3d& q = x.points[i];
   const Vector3d p_A(q.x() / q.z(), q.y() / q.z(), 1. / q.z());
   const Vector3d p_anchorI = R_CtoI * (p_A - anchor_camera.p_IinC);
@@ -183,7 +183,7 @@ bool VisualProblem::sight_row(const VisualEstimate& x, std::size_t i, const Star
 
   const CameraView camera = camera_at(x, sight.camera);
   const CameraPrior& prior = options_.cameras[sight.camera];
-  const ImuView& key = x.keys[sight.key];
+  const ImuState& key = x.keys[sight.key];
   // The image was taken a little later than the key's stamp if the clock is off.
   const double later_s =
       clock_sigma(sight.camera) * x.calibration[clock_column(sight.camera) - imu_columns()];

@@ -13,7 +13,7 @@
 namespace viwo {
 
 struct VisualEstimate {
-  std::vector<ImuView> keys;
+  std::vector<ImuState> keys;
   std::vector<Eigen::Vector3d> points;  ///< x/z, y/z, 1/z in the camera of the first sight
   Eigen::VectorXd calibration;          ///< of each camera, in prior sigmas
 };
@@ -57,7 +57,7 @@ class VisualProblem {
   static constexpr Eigen::Index kCalibration = 15;
 
   struct Prediction {
-    ImuView state;
+    ImuState state;
     ImuTransition transition;
   };
   /// The Jacobian of a sight by all columns that it has.
@@ -70,7 +70,7 @@ class VisualProblem {
     Eigen::Vector2d r;
   };
 
-  Prediction predict(const ImuView& from, std::size_t to) const;
+  Prediction predict(const ImuState& from, std::size_t to) const;
   /// Of the biases at the first key and of the calibration. Yaw and position of the last key are
   /// held: nothing measures them.
   void add_priors(const VisualEstimate& x, VisualNormals& n) const;

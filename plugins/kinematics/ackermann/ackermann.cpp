@@ -30,21 +30,14 @@ struct FrontWheel {
 
 class Ackermann final : public KinematicModel {
  public:
-  Ackermann(const ParamSet& params, const HostServices& /*services*/)
-      : n_steer_(params.text("steering") == "both" ? 2 : 1),
-        n_drive_(params.text("wheel_speeds") == "all" ? 4 : 2),
-        max_steer_rad_(params.number("max_steer_rad")),
-        prior_sigma_radius_m_(params.number("prior_sigma_radius_m")),
-        prior_sigma_length_m_(params.number("prior_sigma_length_m")),
-        prior_sigma_steer_offset_rad_(params.number("prior_sigma_steer_offset_rad")),
-        sigma_drive_rad_per_s_(params.number("sigma_drive_rad_per_s")),
-        sigma_steer_rad_(params.number("sigma_steer_rad")),
-        sigma_lateral_m_per_s_(params.number("sigma_lateral_m_per_s")),
-        sigma_front_lateral_m_per_s_(params.number("sigma_front_lateral_m_per_s")) {
-    append("radius_m", params.numbers("radius_m"), n_drive_, "measured wheels");
-    nominal_.push_back(params.number("wheel_base_m"));
-    nominal_.push_back(params.number("track_m"));
-    append("steer_offset_rad", params.numbers("steer_offset_rad"), n_steer_, "steering channels");
+  Ackermann(const ackermann::Params& params, const HostServices& /*services*/)
+      : params_(params),
+        n_steer_(params.steering == "both" ? 2 : 1),
+        n_drive_(params.wheel_speeds == "all" ? 4 : 2) {
+    append("radius_m", params.radius_m, n_drive_, "measured wheels");
+    nominal_.push_back(params.wheel_base_m);
+    nominal_.push_back(params.track_m);
+    append("steer_offset_rad", params.steer_offset_rad, n_steer_, "steering channels");
     // Rear left, rear right, axle, then what one steering channel enters together.
     int row = 3;
     for (int k = 0; k < n_steer_; ++k) {
@@ -70,30 +63,30 @@ class Ackermann final : public KinematicModel {
     const auto add = [&](const char* name, const char* unit, double sigma, RowRange rows) {
       out.intrinsics.push_back({name, unit, nominal_[out.intrinsics.size()], sigma, false, rows});
     };
-    for (int i = 0; i < n_drive_; ++i) add(wheels[i], "m", prior_sigma_radius_m_, all);
-    add("wheel_base", "m", prior_sigma_length_m_, front);
-    add("track", "m", prior_sigma_length_m_, all);
+    for (int i = 0; i < n_drive_; ++i) add(wheels[i], "m", params_.prior_sigma_radius_m, all);
+    add("wheel_base", "m", params_.prior_sigma_length_m, front);
+    add("track", "m", params_.prior_sigma_length_m, all);
     for (int k = 0; k < n_steer_; ++k) {
-      add(offsets[k], "rad", prior_sigma_steer_offset_rad_, rows_of_channel(k));
+      add(offsets[k], "rad", params_.prior_sigma_steer_offset_rad, rows_of_channel(k));
     }
     for (int i = 0; i < n_drive_; ++i) {
       out.noises.push_back({NoiseKind::kDrive,
                             i,
-                            sigma_drive_rad_per_s_,
+                            params_.sigma_drive_rad_per_s,
                             {row_of_drive(i), 1},
                             "sigma_drive_rad_per_s"});
     }
     for (int k = 0; k < n_steer_; ++k) {
       out.noises.push_back(
-          {NoiseKind::kSteer, k, sigma_steer_rad_, rows_of_channel(k), "sigma_steer_rad"});
+          {NoiseKind::kSteer, k, params_.sigma_steer_rad, rows_of_channel(k), "sigma_steer_rad"});
     }
     out.noises.push_back(
-        {NoiseKind::kSlip, 0, sigma_lateral_m_per_s_, {2, 1}, "sigma_lateral_m_per_s"});
+        {NoiseKind::kSlip, 0, params_.sigma_lateral_m_per_s, {2, 1}, "sigma_lateral_m_per_s"});
     for (const FrontRow& f : front_) {
       if (f.drive >= 0) continue;
       out.noises.push_back({NoiseKind::kSlip,
                             1 + f.steer,
-                            sigma_front_lateral_m_per_s_,
+                            params_.sigma_front_lateral_m_per_s,
                             {f.row, 1},
                             "sigma_front_lateral_m_per_s"});
     }
@@ -178,7 +171,8 @@ class Ackermann final : public KinematicModel {
     // Whatever sideways motion the slip of the rear axle does not account for, it cannot make.
     if (std::abs(xi.y() + slip[2]) > 1e-9 && std::abs(xi.y()) > 1e-9) return Status::kRejected;
     const double turn = x_WI[base()] * xi.z();
-    if (std::abs(turn) > 1e-9 && std::atan2(std::abs(turn), std::abs(xi.x())) > max_steer_rad_) {
+    if (std::abs(turn) > 1e-9 &&
+        std::atan2(std::abs(turn), std::abs(xi.x())) > params_.max_steer_rad) {
       return Status::kRejected;
     }
     EncoderSample out = sample;
@@ -267,19 +261,16 @@ class Ackermann final : public KinematicModel {
     for (int i = 0; i < n_drive_; ++i) out.J(row, i) = b[row] / (n_drive_ * x_WI[i]);
   }
 
+  ackermann::Params params_;
   int n_steer_, n_drive_;
   int n_rows_ = 0;
-  double max_steer_rad_;
-  double prior_sigma_radius_m_, prior_sigma_length_m_, prior_sigma_steer_offset_rad_;
-  double sigma_drive_rad_per_s_, sigma_steer_rad_;
-  double sigma_lateral_m_per_s_, sigma_front_lateral_m_per_s_;
   std::vector<double> nominal_;
   std::vector<FrontRow> front_;
 };
 
 VIWO_REGISTER(KinematicModel, Ackermann, "ackermann", "1.0.0",
               "car-like base: radii, wheel base, track and steering offset", "Apache-2.0",
-              ackermann::kParams);
+              ackermann::Params);
 
 }  // namespace
 }  // namespace viwo

@@ -11,80 +11,48 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
-    ParamSpec{.name = "radius_left_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "radius of the left wheels"},
-    ParamSpec{.name = "radius_right_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "radius of the right wheels"},
-    ParamSpec{.name = "baseline_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "distance between the left and right contact lines"},
-    ParamSpec{.name = "left_drives",
-              .type = ParamType::kNumbers,
-              .fallback = "[1]",
-              .min = 1.,
-              .max = kMaxDrives,
-              .help = "drive channels on the left, counted from 1"},
-    ParamSpec{.name = "right_drives",
-              .type = ParamType::kNumbers,
-              .fallback = "[2]",
-              .min = 1.,
-              .max = kMaxDrives,
-              .help = "drive channels on the right, counted from 1"},
-    ParamSpec{.name = "prior_sigma_radius_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.0003",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the radii are known"},
-    ParamSpec{.name = "prior_sigma_baseline_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.005",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the baseline is known"},
-    ParamSpec{.name = "sigma_drive_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "noise of a drive rate, per sample"},
-    ParamSpec{.name = "sigma_lateral_m_per_s",
-              .type = ParamType::kNumber,
-              .unit = "m/s",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "sideways velocity of the axle, per sample"},
+struct Params {
+  double radius_left_m = 0.;
+  double radius_right_m = 0.;
+  double baseline_m = 0.;
+  std::vector<double> left_drives{1.};
+  std::vector<double> right_drives{2.};
+  double prior_sigma_radius_m = 0.0003;
+  double prior_sigma_baseline_m = 0.005;
+  double sigma_drive_rad_per_s = 0.001;
+  double sigma_lateral_m_per_s = 0.001;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(radius_left_m),
+      {.unit = "m", .above = 0., .required = true, .help = "radius of the left wheels"});
+    b(VIWO_PARAM(radius_right_m),
+      {.unit = "m", .above = 0., .required = true, .help = "radius of the right wheels"});
+    b(VIWO_PARAM(baseline_m), {.unit = "m",
+                               .above = 0.,
+                               .required = true,
+                               .help = "distance between the left and right contact lines"});
+    b(VIWO_PARAM(left_drives),
+      {.min = 1., .max = kMaxDrives, .help = "drive channels on the left, counted from 1"});
+    b(VIWO_PARAM(right_drives),
+      {.min = 1., .max = kMaxDrives, .help = "drive channels on the right, counted from 1"});
+    b(VIWO_PARAM(prior_sigma_radius_m),
+      {.unit = "m", .above = 0., .help = "how well the radii are known"});
+    b(VIWO_PARAM(prior_sigma_baseline_m),
+      {.unit = "m", .above = 0., .help = "how well the baseline is known"});
+    b(VIWO_PARAM(sigma_drive_rad_per_s),
+      {.unit = "rad/s", .above = 0., .help = "noise of a drive rate, per sample"});
+    b(VIWO_PARAM(sigma_lateral_m_per_s),
+      {.unit = "m/s", .above = 0., .help = "sideways velocity of the axle, per sample"});
+  }
 };
 
 class Differential final : public KinematicModel {
  public:
-  Differential(const ParamSet& params, const HostServices& /*services*/)
-      : nominal_{params.number("radius_left_m"), params.number("radius_right_m"),
-                 params.number("baseline_m")},
-        prior_sigma_radius_m_(params.number("prior_sigma_radius_m")),
-        prior_sigma_baseline_m_(params.number("prior_sigma_baseline_m")),
-        sigma_drive_rad_per_s_(params.number("sigma_drive_rad_per_s")),
-        sigma_lateral_m_per_s_(params.number("sigma_lateral_m_per_s")) {
-    for (const char* key : {"left_drives", "right_drives"}) {
-      for (const double number : params.numbers(key)) add_channel(key, number);
-      if (key == std::string("left_drives")) n_left_ = static_cast<int>(channels_.size());
-    }
+  Differential(const Params& params, const HostServices& /*services*/)
+      : params_(params), nominal_{params.radius_left_m, params.radius_right_m, params.baseline_m} {
+    for (const double number : params.left_drives) add_channel("left_drives", number);
+    n_left_ = static_cast<int>(channels_.size());
+    for (const double number : params.right_drives) add_channel("right_drives", number);
     std::vector<std::size_t> sorted = channels_;
     std::sort(sorted.begin(), sorted.end());
     for (std::size_t i = 0; i < sorted.size(); ++i) {
@@ -106,16 +74,19 @@ class Differential final : public KinematicModel {
     out.n_rows = n + 1;
     out.constant_A = true;
     out.intrinsics = {
-        {"r_left", "m", nominal_[0], prior_sigma_radius_m_, false, {0, n_left_}},
-        {"r_right", "m", nominal_[1], prior_sigma_radius_m_, false, {n_left_, n - n_left_}},
-        {"baseline", "m", nominal_[2], prior_sigma_baseline_m_, false, {0, n}}};
+        {"r_left", "m", nominal_[0], params_.prior_sigma_radius_m, false, {0, n_left_}},
+        {"r_right", "m", nominal_[1], params_.prior_sigma_radius_m, false, {n_left_, n - n_left_}},
+        {"baseline", "m", nominal_[2], params_.prior_sigma_baseline_m, false, {0, n}}};
     for (int i = 0; i < n; ++i) {
       const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
-      out.noises.push_back(
-          {NoiseKind::kDrive, channel, sigma_drive_rad_per_s_, {i, 1}, "sigma_drive_rad_per_s"});
+      out.noises.push_back({NoiseKind::kDrive,
+                            channel,
+                            params_.sigma_drive_rad_per_s,
+                            {i, 1},
+                            "sigma_drive_rad_per_s"});
     }
     out.noises.push_back(
-        {NoiseKind::kSlip, 0, sigma_lateral_m_per_s_, {n, 1}, "sigma_lateral_m_per_s"});
+        {NoiseKind::kSlip, 0, params_.sigma_lateral_m_per_s, {n, 1}, "sigma_lateral_m_per_s"});
   }
 
   Status rows(const EncoderSample& sample, const Intrinsics& x_WI, bool A_is_current,
@@ -175,16 +146,15 @@ class Differential final : public KinematicModel {
   int side(int i) const { return i < n_left_ ? 0 : 1; }
   double sign(int i) const { return i < n_left_ ? -1. : 1.; }
 
+  Params params_;
   std::array<double, 3> nominal_;
-  double prior_sigma_radius_m_, prior_sigma_baseline_m_;
-  double sigma_drive_rad_per_s_, sigma_lateral_m_per_s_;
   std::vector<std::size_t> channels_;  ///< drive channel of each row, left ones first
   int n_left_ = 0;
 };
 
 VIWO_REGISTER(KinematicModel, Differential, "differential", "1.0.0",
               "differential drive with lateral no-slip row: two radii and the baseline",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

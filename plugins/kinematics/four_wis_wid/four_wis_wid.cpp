@@ -10,7 +10,7 @@ namespace {
 
 class FourWisWid final : public swerve::SwerveBase {
  public:
-  FourWisWid(const ParamSet& params, const HostServices& /*services*/) : SwerveBase(params) {}
+  FourWisWid(const swerve::Params& params, const HostServices& /*services*/) : SwerveBase(params) {}
 
   void describe(ModelDescription& out) const override {
     describe_wheels(swerve::RowsPerWheel::kDriveAndLateral, out);
@@ -86,7 +86,7 @@ class FourWisWid final : public swerve::SwerveBase {
 
 VIWO_REGISTER(KinematicModel, FourWisWid, "four_wis_wid", "1.0.0",
               "N >= 2 steered and driven wheels (swerve), rolling and lateral no-slip rows",
-              "Apache-2.0", swerve::kParams);
+              "Apache-2.0", swerve::Params);
 
 }  // namespace
 }  // namespace viwo

@@ -1,7 +1,5 @@
 // Reduced model of a base with N >= 2 steered and driven wheels: the rolling row of every wheel
 // only. Equations: model.md beside this file.
-#include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "swerve_base.hpp"
@@ -10,24 +8,25 @@
 namespace viwo {
 namespace {
 
-constexpr auto kParams = [] {
-  std::array<ParamSpec, swerve::kParams.size() + 1> params;
-  std::copy(swerve::kParams.begin(), swerve::kParams.end(), params.begin());
-  params.back() = {.name = "offset_derivative",
-                   .type = ParamType::kString,
-                   .fallback = "predicted",
-                   .choices = "predicted|measured",
-                   .help =
-                       "at the signal that the twist predicts, the derivative by a steering "
-                       "offset is taken where the wheel points as the twist predicts (zero: "
-                       "rolling rows do not tell offsets), or as it was read"};
-  return params;
-}();
+struct Params : swerve::Params {
+  enum class OffsetDerivative { kPredicted, kMeasured };
+  OffsetDerivative offset_derivative = OffsetDerivative::kPredicted;
+
+  void bind(ParamBinder& b) {
+    swerve::Params::bind(b);
+    b(VIWO_PARAM(offset_derivative),
+      {{"predicted", OffsetDerivative::kPredicted}, {"measured", OffsetDerivative::kMeasured}},
+      {.help = "at the signal that the twist predicts, the derivative by a steering offset is "
+               "taken where the wheel points as the twist predicts (zero: rolling rows do not "
+               "tell offsets), or as it was read"});
+  }
+};
 
 class FourWisWidDriveOnly final : public swerve::SwerveBase {
  public:
-  FourWisWidDriveOnly(const ParamSet& params, const HostServices& /*services*/)
-      : SwerveBase(params), points_as_predicted_(params.text("offset_derivative") == "predicted") {}
+  FourWisWidDriveOnly(const Params& params, const HostServices& /*services*/)
+      : SwerveBase(params),
+        points_as_predicted_(params.offset_derivative == Params::OffsetDerivative::kPredicted) {}
 
   void describe(ModelDescription& out) const override {
     describe_wheels(swerve::RowsPerWheel::kDriveOnly, out);
@@ -101,8 +100,7 @@ class FourWisWidDriveOnly final : public swerve::SwerveBase {
 };
 
 VIWO_REGISTER(KinematicModel, FourWisWidDriveOnly, "four_wis_wid_drive_only", "1.0.0",
-              "N >= 2 steered and driven wheels (swerve), rolling rows only", "Apache-2.0",
-              kParams);
+              "N >= 2 steered and driven wheels (swerve), rolling rows only", "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -11,63 +11,48 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
-    ParamSpec{.name = "x_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .help = "wheel contact points along x (forward) in O, one per wheel"},
-    ParamSpec{.name = "y_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .help = "wheel contact points along y (left) in O, one per wheel"},
-    ParamSpec{.name = "roller_angle_rad",
-              .type = ParamType::kNumbers,
-              .unit = "rad",
-              .min = -1.4,
-              .max = 1.4,
-              .help = "axis of the roller on the ground, from x, counter-clockwise, one per wheel; "
-                      "usual: -0.7854 front left and back right, 0.7854 the others"},
-    ParamSpec{.name = "radius_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "wheel radii, one for all or one per wheel"},
-    ParamSpec{.name = "prior_sigma_radius_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.0005",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the radii are known"},
-    ParamSpec{.name = "prior_sigma_roller_angle_rad",
-              .type = ParamType::kNumber,
-              .unit = "rad",
-              .fallback = "0.01",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the roller angles are known"},
-    ParamSpec{.name = "prior_sigma_lever_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.005",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the lever arms k = x tan(roller angle) - y are known"},
-    ParamSpec{.name = "sigma_drive_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "noise of a drive rate, per sample"},
-    ParamSpec{.name = "sigma_slip_m_per_s",
-              .type = ParamType::kNumber,
-              .unit = "m/s",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "what a wheel slips, as rolling velocity, per sample"},
+struct Params {
+  std::vector<double> x_m;
+  std::vector<double> y_m;
+  std::vector<double> roller_angle_rad;
+  std::vector<double> radius_m;
+  double prior_sigma_radius_m = 0.0005;
+  double prior_sigma_roller_angle_rad = 0.01;
+  double prior_sigma_lever_m = 0.005;
+  double sigma_drive_rad_per_s = 0.001;
+  double sigma_slip_m_per_s = 0.001;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(x_m), {.unit = "m",
+                        .required = true,
+                        .help = "wheel contact points along x (forward) in O, one per wheel"});
+    b(VIWO_PARAM(y_m), {.unit = "m",
+                        .required = true,
+                        .help = "wheel contact points along y (left) in O, one per wheel"});
+    b(VIWO_PARAM(roller_angle_rad),
+      {.unit = "rad",
+       .min = -1.4,
+       .max = 1.4,
+       .required = true,
+       .help = "axis of the roller on the ground, from x, counter-clockwise, one per wheel; "
+               "usual: -0.7854 front left and back right, 0.7854 the others"});
+    b(VIWO_PARAM(radius_m), {.unit = "m",
+                             .above = 0.,
+                             .required = true,
+                             .help = "wheel radii, one for all or one per wheel"});
+    b(VIWO_PARAM(prior_sigma_radius_m),
+      {.unit = "m", .above = 0., .help = "how well the radii are known"});
+    b(VIWO_PARAM(prior_sigma_roller_angle_rad),
+      {.unit = "rad", .above = 0., .help = "how well the roller angles are known"});
+    b(VIWO_PARAM(prior_sigma_lever_m),
+      {.unit = "m",
+       .above = 0.,
+       .help = "how well the lever arms k = x tan(roller angle) - y are known"});
+    b(VIWO_PARAM(sigma_drive_rad_per_s),
+      {.unit = "rad/s", .above = 0., .help = "noise of a drive rate, per sample"});
+    b(VIWO_PARAM(sigma_slip_m_per_s),
+      {.unit = "m/s", .above = 0., .help = "what a wheel slips, as rolling velocity, per sample"});
+  }
 };
 
 /// Appends `values`, repeated if there is one for all wheels.
@@ -85,22 +70,17 @@ void append(const char* key, std::span<const double> values, int n, bool one_for
 
 class Mecanum final : public KinematicModel {
  public:
-  Mecanum(const ParamSet& params, const HostServices& /*services*/)
-      : n_(static_cast<int>(params.numbers("x_m").size())),
-        prior_sigma_radius_m_(params.number("prior_sigma_radius_m")),
-        prior_sigma_roller_angle_rad_(params.number("prior_sigma_roller_angle_rad")),
-        prior_sigma_lever_m_(params.number("prior_sigma_lever_m")),
-        sigma_drive_rad_per_s_(params.number("sigma_drive_rad_per_s")),
-        sigma_slip_m_per_s_(params.number("sigma_slip_m_per_s")) {
+  Mecanum(const Params& params, const HostServices& /*services*/)
+      : params_(params), n_(static_cast<int>(params.x_m.size())) {
     if (n_ < 3 || n_ > kMaxDrives) {
       throw ParamError("x_m", "has " + std::to_string(n_) + " wheels, this model takes 3 to " +
                                   std::to_string(kMaxDrives));
     }
     std::vector<double> x, y;
-    append("x_m", params.numbers("x_m"), n_, false, x);
-    append("y_m", params.numbers("y_m"), n_, false, y);
-    append("radius_m", params.numbers("radius_m"), n_, true, nominal_);
-    append("roller_angle_rad", params.numbers("roller_angle_rad"), n_, false, nominal_);
+    append("x_m", params.x_m, n_, false, x);
+    append("y_m", params.y_m, n_, false, y);
+    append("radius_m", params.radius_m, n_, true, nominal_);
+    append("roller_angle_rad", params.roller_angle_rad, n_, false, nominal_);
     const auto angle = [&](int j) { return nominal_[static_cast<std::size_t>(gamma(j))]; };
     if (std::abs(std::tan(angle(0)) - std::tan(angle(1))) < 0.1) {
       throw ParamError("roller_angle_rad",
@@ -123,9 +103,9 @@ class Mecanum final : public KinematicModel {
       double prior_sigma;
       int held;  // the first so many entries hold the gauge (MC-8)
     };
-    const Group groups[] = {{"r_", "m", prior_sigma_radius_m_, 0},
-                            {"gamma_", "rad", prior_sigma_roller_angle_rad_, 1},
-                            {"k_", "m", prior_sigma_lever_m_, 2}};
+    const Group groups[] = {{"r_", "m", params_.prior_sigma_radius_m, 0},
+                            {"gamma_", "rad", params_.prior_sigma_roller_angle_rad, 1},
+                            {"k_", "m", params_.prior_sigma_lever_m, 2}};
     for (const Group& group : groups) {
       for (int j = 0; j < n_; ++j) {
         out.intrinsics.push_back({.name = group.name + std::to_string(j + 1),
@@ -138,11 +118,11 @@ class Mecanum final : public KinematicModel {
     }
     for (int j = 0; j < n_; ++j) {
       out.noises.push_back(
-          {NoiseKind::kDrive, j, sigma_drive_rad_per_s_, {j, 1}, "sigma_drive_rad_per_s"});
+          {NoiseKind::kDrive, j, params_.sigma_drive_rad_per_s, {j, 1}, "sigma_drive_rad_per_s"});
     }
     for (int j = 0; j < n_; ++j) {
       out.noises.push_back(
-          {NoiseKind::kSlip, j, sigma_slip_m_per_s_, {j, 1}, "sigma_slip_m_per_s"});
+          {NoiseKind::kSlip, j, params_.sigma_slip_m_per_s, {j, 1}, "sigma_slip_m_per_s"});
     }
   }
 
@@ -205,14 +185,13 @@ class Mecanum final : public KinematicModel {
   int gamma(int j) const { return n_ + j; }
   int k(int j) const { return 2 * n_ + j; }
 
+  Params params_;
   int n_;
   std::vector<double> nominal_;
-  double prior_sigma_radius_m_, prior_sigma_roller_angle_rad_, prior_sigma_lever_m_;
-  double sigma_drive_rad_per_s_, sigma_slip_m_per_s_;
 };
 
 VIWO_REGISTER(KinematicModel, Mecanum, "mecanum", "1.0.0",
-              "N >= 3 mecanum wheels: radii, roller angles and lever arms", "Apache-2.0", kParams);
+              "N >= 3 mecanum wheels: radii, roller angles and lever arms", "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -11,105 +11,75 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
-    ParamSpec{.name = "radius_left_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "effective radius of the left side: slip factor times radius"},
-    ParamSpec{.name = "radius_right_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "effective radius of the right side: slip factor times radius"},
-    ParamSpec{.name = "y_icr_left_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .help = "ICR of the left side along y, left of y_icr_right_m and, on a base that "
-                      "skids, outside of its contact line"},
-    ParamSpec{.name = "y_icr_right_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .help = "ICR of the right side along y"},
-    ParamSpec{.name = "x_icr_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0",
-              .help = "ICR of the base along x: the point that does not move sideways"},
-    ParamSpec{.name = "left_drives",
-              .type = ParamType::kNumbers,
-              .fallback = "[1]",
-              .min = 1.,
-              .max = kMaxDrives,
-              .help = "drive channels on the left, counted from 1"},
-    ParamSpec{.name = "right_drives",
-              .type = ParamType::kNumbers,
-              .fallback = "[2]",
-              .min = 1.,
-              .max = kMaxDrives,
-              .help = "drive channels on the right, counted from 1"},
-    ParamSpec{.name = "hold_frame",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "hold x_icr and y_icr_left, which places O on the base; false: the mounting "
-                      "of the IMU is known and places it (wheels.sigma_p_IinO_m 0 in x and y)"},
-    ParamSpec{.name = "prior_sigma_radius_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.003",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the effective radii are known"},
-    ParamSpec{.name = "prior_sigma_icr_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.05",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well each coordinate of an ICR is known"},
-    ParamSpec{.name = "sigma_drive_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "noise of a drive rate, per sample"},
-    ParamSpec{.name = "sigma_slip_m_per_s",
-              .type = ParamType::kNumber,
-              .unit = "m/s",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "what a side slips along besides its slip factor, per sample"},
-    ParamSpec{.name = "sigma_lateral_m_per_s",
-              .type = ParamType::kNumber,
-              .unit = "m/s",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "sideways velocity of the ICR of the base, per sample"},
+struct Params {
+  double radius_left_m = 0.;
+  double radius_right_m = 0.;
+  double y_icr_left_m = 0.;
+  double y_icr_right_m = 0.;
+  double x_icr_m = 0.;
+  std::vector<double> left_drives{1.};
+  std::vector<double> right_drives{2.};
+  bool hold_frame = true;
+  double prior_sigma_radius_m = 0.003;
+  double prior_sigma_icr_m = 0.05;
+  double sigma_drive_rad_per_s = 0.001;
+  double sigma_slip_m_per_s = 0.001;
+  double sigma_lateral_m_per_s = 0.001;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(radius_left_m),
+      {.unit = "m",
+       .above = 0.,
+       .required = true,
+       .help = "effective radius of the left side: slip factor times radius"});
+    b(VIWO_PARAM(radius_right_m),
+      {.unit = "m",
+       .above = 0.,
+       .required = true,
+       .help = "effective radius of the right side: slip factor times radius"});
+    b(VIWO_PARAM(y_icr_left_m),
+      {.unit = "m",
+       .required = true,
+       .help = "ICR of the left side along y, left of y_icr_right_m and, on a base that "
+               "skids, outside of its contact line"});
+    b(VIWO_PARAM(y_icr_right_m),
+      {.unit = "m", .required = true, .help = "ICR of the right side along y"});
+    b(VIWO_PARAM(x_icr_m),
+      {.unit = "m", .help = "ICR of the base along x: the point that does not move sideways"});
+    b(VIWO_PARAM(left_drives),
+      {.min = 1., .max = kMaxDrives, .help = "drive channels on the left, counted from 1"});
+    b(VIWO_PARAM(right_drives),
+      {.min = 1., .max = kMaxDrives, .help = "drive channels on the right, counted from 1"});
+    b(VIWO_PARAM(hold_frame),
+      {.help = "hold x_icr and y_icr_left, which places O on the base; false: the mounting "
+               "of the IMU is known and places it (wheels.sigma_p_IinO_m 0 in x and y)"});
+    b(VIWO_PARAM(prior_sigma_radius_m),
+      {.unit = "m", .above = 0., .help = "how well the effective radii are known"});
+    b(VIWO_PARAM(prior_sigma_icr_m),
+      {.unit = "m", .above = 0., .help = "how well each coordinate of an ICR is known"});
+    b(VIWO_PARAM(sigma_drive_rad_per_s),
+      {.unit = "rad/s", .above = 0., .help = "noise of a drive rate, per sample"});
+    b(VIWO_PARAM(sigma_slip_m_per_s),
+      {.unit = "m/s",
+       .above = 0.,
+       .help = "what a side slips along besides its slip factor, per sample"});
+    b(VIWO_PARAM(sigma_lateral_m_per_s),
+      {.unit = "m/s", .above = 0., .help = "sideways velocity of the ICR of the base, per sample"});
+  }
 };
 
 class SkidSteer final : public KinematicModel {
  public:
-  SkidSteer(const ParamSet& params, const HostServices& /*services*/)
-      : nominal_{params.number("radius_left_m"), params.number("radius_right_m"),
-                 params.number("y_icr_left_m"), params.number("y_icr_right_m"),
-                 params.number("x_icr_m")},
-        hold_frame_(params.flag("hold_frame")),
-        prior_sigma_radius_m_(params.number("prior_sigma_radius_m")),
-        prior_sigma_icr_m_(params.number("prior_sigma_icr_m")),
-        sigma_drive_rad_per_s_(params.number("sigma_drive_rad_per_s")),
-        sigma_slip_m_per_s_(params.number("sigma_slip_m_per_s")),
-        sigma_lateral_m_per_s_(params.number("sigma_lateral_m_per_s")) {
+  SkidSteer(const Params& params, const HostServices& /*services*/)
+      : params_(params),
+        nominal_{params.radius_left_m, params.radius_right_m, params.y_icr_left_m,
+                 params.y_icr_right_m, params.x_icr_m} {
     if (!(nominal_[kYLeft] > nominal_[kYRight])) {
       throw ParamError("y_icr_left_m", "must be greater than y_icr_right_m: y is to the left");
     }
-    for (const double number : params.numbers("left_drives")) add_channel("left_drives", number);
+    for (const double number : params.left_drives) add_channel("left_drives", number);
     n_left_ = static_cast<int>(channels_.size());
-    for (const double number : params.numbers("right_drives")) add_channel("right_drives", number);
+    for (const double number : params.right_drives) add_channel("right_drives", number);
     std::vector<std::size_t> sorted = channels_;
     std::sort(sorted.begin(), sorted.end());
     for (std::size_t i = 0; i < sorted.size(); ++i) {
@@ -130,23 +100,27 @@ class SkidSteer final : public KinematicModel {
     out.n_rows = n + 1;
     out.constant_A = true;
     out.intrinsics = {
-        {"r_left", "m", nominal_[kRLeft], prior_sigma_radius_m_, false, left},
-        {"r_right", "m", nominal_[kRRight], prior_sigma_radius_m_, false, right},
-        {"y_icr_left", "m", nominal_[kYLeft], prior_sigma_icr_m_, hold_frame_, left},  // (K-7)
-        {"y_icr_right", "m", nominal_[kYRight], prior_sigma_icr_m_, false, right},
-        {"x_icr", "m", nominal_[kX], prior_sigma_icr_m_, hold_frame_, {n, 1}}};
+        {"r_left", "m", nominal_[kRLeft], params_.prior_sigma_radius_m, false, left},
+        {"r_right", "m", nominal_[kRRight], params_.prior_sigma_radius_m, false, right},
+        {"y_icr_left", "m", nominal_[kYLeft], params_.prior_sigma_icr_m, params_.hold_frame,
+         left},  // (K-7)
+        {"y_icr_right", "m", nominal_[kYRight], params_.prior_sigma_icr_m, false, right},
+        {"x_icr", "m", nominal_[kX], params_.prior_sigma_icr_m, params_.hold_frame, {n, 1}}};
     for (int i = 0; i < n; ++i) {
       const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
-      out.noises.push_back(
-          {NoiseKind::kDrive, channel, sigma_drive_rad_per_s_, {i, 1}, "sigma_drive_rad_per_s"});
+      out.noises.push_back({NoiseKind::kDrive,
+                            channel,
+                            params_.sigma_drive_rad_per_s,
+                            {i, 1},
+                            "sigma_drive_rad_per_s"});
     }
     for (int i = 0; i < n; ++i) {
       const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
       out.noises.push_back(
-          {NoiseKind::kSlip, channel, sigma_slip_m_per_s_, {i, 1}, "sigma_slip_m_per_s"});
+          {NoiseKind::kSlip, channel, params_.sigma_slip_m_per_s, {i, 1}, "sigma_slip_m_per_s"});
     }
     out.noises.push_back(
-        {NoiseKind::kSlip, n, sigma_lateral_m_per_s_, {n, 1}, "sigma_lateral_m_per_s"});
+        {NoiseKind::kSlip, n, params_.sigma_lateral_m_per_s, {n, 1}, "sigma_lateral_m_per_s"});
   }
 
   Status rows(const EncoderSample& sample, const Intrinsics& x_WI, bool A_is_current,
@@ -205,7 +179,7 @@ class SkidSteer final : public KinematicModel {
   Status move_frame(const Eigen::Vector3d& g, Intrinsics& x_WI) const override {
     // The rolling rows have no sideways part: they hold the direction of x. With nothing held the
     // mounting places O, not this model.
-    if (!hold_frame_ || g[0] != 0.) return Status::kUnsupported;
+    if (!params_.hold_frame || g[0] != 0.) return Status::kUnsupported;
     x_WI[kX] -= g[1];  // (K-7)
     x_WI[kYLeft] -= g[2];
     x_WI[kYRight] -= g[2];
@@ -225,17 +199,15 @@ class SkidSteer final : public KinematicModel {
   int r(int i) const { return i < n_left_ ? kRLeft : kRRight; }
   int y(int i) const { return i < n_left_ ? kYLeft : kYRight; }
 
+  Params params_;
   std::array<double, 5> nominal_;
-  bool hold_frame_;
-  double prior_sigma_radius_m_, prior_sigma_icr_m_;
-  double sigma_drive_rad_per_s_, sigma_slip_m_per_s_, sigma_lateral_m_per_s_;
   std::vector<std::size_t> channels_;  ///< drive channel of each row, left ones first
   int n_left_ = 0;
 };
 
 VIWO_REGISTER(KinematicModel, SkidSteer, "skid_steer", "1.0.0",
               "skid-steered base: effective radii and centres of rotation of its sides",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

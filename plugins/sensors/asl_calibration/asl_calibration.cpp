@@ -8,22 +8,25 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
-    ParamSpec{.name = "path",
-              .type = ParamType::kPath,
-              .help = "the calibration table, or the folder of its data.csv"},
-    log::kMaxRejectedFractionParam};
+struct Params : log::MaxRejectedParams {
+  std::filesystem::path path;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path),
+      {.required = true, .help = "the calibration table, or the folder of its data.csv"});
+    log::MaxRejectedParams::bind(b);
+  }
+};
 
 class AslCalibration final : public log::RecordingSensor<CalibrationSample> {
  public:
-  AslCalibration(const ParamSet& params, const HostServices& /*services*/)
-      : RecordingSensor(log::read_asl_calibration(params.text("path"),
-                                                  params.number("max_rejected_fraction"))) {}
+  AslCalibration(const Params& params, const HostServices& /*services*/)
+      : RecordingSensor(log::read_asl_calibration(params.path, params.max_rejected_fraction)) {}
 };
 
 VIWO_REGISTER(Sensor, AslCalibration, "asl_calibration", "1.0.0",
               "true calibration parameters from a log folder (calibration_groundtruth0/data.csv)",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

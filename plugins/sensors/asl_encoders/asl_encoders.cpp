@@ -8,26 +8,35 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
-    ParamSpec{.name = "path",
-              .type = ParamType::kPath,
-              .help = "the encoder table, or the folder of its data.csv"},
-    ParamSpec{.name = "drive_input",
-              .type = ParamType::kString,
-              .fallback = "rate",
-              .choices = "rate|angle",
-              .help = "drive columns are rates [rad/s] or multi-turn angles [rad]"},
-    log::kStrideParam, log::kMaxGapParam, log::kMaxRejectedFractionParam};
+struct Params : log::StrideParams, log::LimitParams {
+  std::filesystem::path path;
+  enum class Drive { kRate, kAngle };
+  Drive drive_input = Drive::kRate;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path),
+      {.required = true, .help = "the encoder table, or the folder of its data.csv"});
+    b(VIWO_PARAM(drive_input), {{"rate", Drive::kRate}, {"angle", Drive::kAngle}},
+      {.help = "drive columns are rates [rad/s] or multi-turn angles [rad]"});
+    log::StrideParams::bind(b);
+    log::LimitParams::bind(b);
+  }
+
+  log::EncoderRecordingOptions options() const {
+    const bool is_angle = drive_input == Drive::kAngle;
+    check_stride(is_angle, "angle");
+    return {limits(), is_angle, stride};
+  }
+};
 
 class AslEncoders final : public log::RecordingSensor<EncoderSample> {
  public:
-  AslEncoders(const ParamSet& params, const HostServices& /*services*/)
-      : RecordingSensor(log::read_asl_encoders(params.text("path"),
-                                               log::encoder_options_from(params, "angle"))) {}
+  AslEncoders(const Params& params, const HostServices& /*services*/)
+      : RecordingSensor(log::read_asl_encoders(params.path, params.options())) {}
 };
 
 VIWO_REGISTER(Sensor, AslEncoders, "asl_encoders", "1.0.0",
-              "wheel encoders from a log folder (wheels0/data.csv)", "Apache-2.0", kParams);
+              "wheel encoders from a log folder (wheels0/data.csv)", "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

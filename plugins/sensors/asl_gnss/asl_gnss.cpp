@@ -8,21 +8,24 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{ParamSpec{.name = "path",
-                                       .type = ParamType::kPath,
-                                       .help = "the table, or the folder of its data.csv"},
-                             log::kMaxRejectedFractionParam};
+struct Params : log::MaxRejectedParams {
+  std::filesystem::path path;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path), {.required = true, .help = "the table, or the folder of its data.csv"});
+    log::MaxRejectedParams::bind(b);
+  }
+};
 
 class AslGnss final : public log::RecordingSensor<GnssSample> {
  public:
-  AslGnss(const ParamSet& params, const HostServices& /*services*/)
-      : RecordingSensor(
-            log::read_asl_gnss(params.text("path"), params.number("max_rejected_fraction"))) {}
+  AslGnss(const Params& params, const HostServices& /*services*/)
+      : RecordingSensor(log::read_asl_gnss(params.path, params.max_rejected_fraction)) {}
 };
 
 VIWO_REGISTER(Sensor, AslGnss, "asl_gnss", "1.0.0",
               "fixes of a satellite receiver from a log folder (gnss0/data.csv)", "Apache-2.0",
-              kParams);
+              Params);
 
 }  // namespace
 }  // namespace viwo

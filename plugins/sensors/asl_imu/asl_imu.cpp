@@ -8,19 +8,23 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{ParamSpec{.name = "path",
-                                       .type = ParamType::kPath,
-                                       .help = "the IMU table, or the folder of its data.csv"},
-                             log::kMaxGapParam, log::kMaxRejectedFractionParam};
+struct Params : log::LimitParams {
+  std::filesystem::path path;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path), {.required = true, .help = "the IMU table, or the folder of its data.csv"});
+    log::LimitParams::bind(b);
+  }
+};
 
 class AslImu final : public log::RecordingSensor<ImuSample> {
  public:
-  AslImu(const ParamSet& params, const HostServices& /*services*/)
-      : RecordingSensor(log::read_asl_imu(params.text("path"), log::limits_from(params))) {}
+  AslImu(const Params& params, const HostServices& /*services*/)
+      : RecordingSensor(log::read_asl_imu(params.path, params.limits())) {}
 };
 
 VIWO_REGISTER(Sensor, AslImu, "asl_imu", "1.0.0",
-              "inertial measurements from a log folder (imu0/data.csv)", "Apache-2.0", kParams);
+              "inertial measurements from a log folder (imu0/data.csv)", "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -8,21 +8,25 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
-    ParamSpec{.name = "path",
-              .type = ParamType::kPath,
-              .help = "the ground truth table, or the folder of its data.csv"},
-    log::kMaxGapParam, log::kMaxRejectedFractionParam};
+struct Params : log::LimitParams {
+  std::filesystem::path path;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path),
+      {.required = true, .help = "the ground truth table, or the folder of its data.csv"});
+    log::LimitParams::bind(b);
+  }
+};
 
 class AslPose final : public log::RecordingSensor<PoseSample> {
  public:
-  AslPose(const ParamSet& params, const HostServices& /*services*/)
-      : RecordingSensor(log::read_asl_poses(params.text("path"), log::limits_from(params))) {}
+  AslPose(const Params& params, const HostServices& /*services*/)
+      : RecordingSensor(log::read_asl_poses(params.path, params.limits())) {}
 };
 
 VIWO_REGISTER(Sensor, AslPose, "asl_pose", "1.0.0",
               "reference poses from a log folder (state_groundtruth_estimate0/data.csv)",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

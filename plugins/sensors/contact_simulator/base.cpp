@@ -1,24 +1,23 @@
 #include "base.hpp"
 
 #include <cmath>
-#include <span>
 
+#include "contact_params.hpp"
 #include "viwo/sim/random.hpp"
 
 namespace viwo::contact {
 namespace {
 
 /// The values of a list, repeated if there is one for all.
-std::vector<double> list(const ParamSet& params, const char* key, std::size_t n) {
-  const auto values = params.numbers(key);
-  if (values.size() == n) return {values.begin(), values.end()};
+std::vector<double> list(const char* key, const std::vector<double>& values, std::size_t n) {
+  if (values.size() == n) return values;
   if (values.size() == 1) return std::vector<double>(n, values[0]);
   throw ParamError(
       key, "has " + std::to_string(values.size()) + " values, not 1 or " + std::to_string(n));
 }
 
-void add_castors(const ParamSet& params, Base& base) {
-  const auto x = params.numbers("castor_x_m"), y = params.numbers("castor_y_m");
+void add_castors(const Params& params, Base& base) {
+  const auto &x = params.castor_x_m, &y = params.castor_y_m;
   if (x.size() != y.size() || x.size() > std::size_t{kMaxWheels - kMaxDrives}) {
     throw ParamError("castor_y_m", "needs a number for each of castor_x_m, at most " +
                                        std::to_string(kMaxWheels - kMaxDrives));
@@ -32,15 +31,15 @@ void add_castors(const ParamSet& params, Base& base) {
 }
 
 /// Rear wheels that are driven, front wheels that are steered and roll along.
-void make_car(const ParamSet& params, Base& base) {
+void make_car(const Params& params, Base& base) {
   if (base.wheels.size() != 4) {
     throw ParamError("x_m",
                      "base ackermann has four wheels: rear left, rear right, front left, "
                      "front right");
   }
-  const bool centre = params.text("steering") == "centre";
-  base.n_drive = params.text("wheel_speeds") == "rear" ? 2 : 4;
-  const auto offsets = list(params, "steer_offset_rad", centre ? 1 : 2);
+  const bool centre = params.steering == "centre";
+  base.n_drive = params.wheel_speeds == "rear" ? 2 : 4;
+  const auto offsets = list("steer_offset_rad", params.steer_offset_rad, centre ? 1 : 2);
   for (std::size_t j = 2; j < 4; ++j) {
     Wheel& wheel = base.wheels[j];
     wheel.kind = WheelKind::kFree;
@@ -55,30 +54,30 @@ void make_car(const ParamSet& params, Base& base) {
 
 }  // namespace
 
-Base base_from(const ParamSet& params) {
+Base base_from(const Params& params) {
   Base base;
-  base.name = params.text("base");
-  const std::size_t n = params.numbers("x_m").size();
+  base.name = params.base;
+  const std::size_t n = params.x_m.size();
   if (n < 2 || n > std::size_t{kMaxDrives}) throw ParamError("x_m", "needs 2 to 8 wheels");
-  if (params.numbers("y_m").size() != n) throw ParamError("y_m", "needs as many numbers as x_m");
-  const auto radius = list(params, "radius_m", n);
+  if (params.y_m.size() != n) throw ParamError("y_m", "needs as many numbers as x_m");
+  const auto radius = list("radius_m", params.radius_m, n);
   for (std::size_t j = 0; j < n; ++j) {
     Wheel wheel;
-    wheel.place_m = {params.numbers("x_m")[j], params.numbers("y_m")[j]};
+    wheel.place_m = {params.x_m[j], params.y_m[j]};
     wheel.radius_m = radius[j];
     base.wheels.push_back(wheel);
   }
   base.n_drive = static_cast<int>(n);
   base.moves_sideways = base.name == "swerve" || base.name == "mecanum";
   if (base.name == "swerve") {
-    const auto offsets = list(params, "steer_offset_rad", n);
+    const auto offsets = list("steer_offset_rad", params.steer_offset_rad, n);
     for (std::size_t j = 0; j < n; ++j) {
       base.wheels[j].steering = static_cast<int>(j);
-      base.wheels[j].scrub_m = params.number("scrub_m");
+      base.wheels[j].scrub_m = params.scrub_m;
       base.steerings.push_back({base.wheels[j].place_m, offsets[j]});
     }
   } else if (base.name == "mecanum") {
-    const auto angles = list(params, "roller_angle_rad", n);
+    const auto angles = list("roller_angle_rad", params.roller_angle_rad, n);
     for (std::size_t j = 0; j < n; ++j) {
       base.wheels[j].kind = WheelKind::kRoller;
       base.wheels[j].roller_rad = angles[j];

@@ -11,9 +11,10 @@
 
 #include "viwo/api/kinematic_model.hpp"
 #include "viwo/api/measurement.hpp"
-#include "viwo/api/params.hpp"
 
 namespace viwo::contact {
+
+struct Params;
 
 /// Most wheels of a base, castors included.
 inline constexpr int kMaxWheels = kMaxDrives + 4;
@@ -56,7 +57,7 @@ struct Base {
 };
 
 /// ParamError for lists of a wrong length, and for what the base cannot have.
-Base base_from(const ParamSet& params);
+Base base_from(const Params& params);
 
 /// How far the true base is from the one that was configured, standard deviations.
 struct TrueBaseErrors {

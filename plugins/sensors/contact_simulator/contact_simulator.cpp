@@ -21,9 +21,8 @@ namespace {
 using contact::Base;
 using contact::ContactSolver;
 using contact::ContactState;
+using contact::Params;
 
-constexpr auto kParams =
-    log::joined(contact::kParams, sim::kDriveParams, sim::kRigParams, sim::kTrueCameraParams);
 /// How often a trajectory is driven anew with the sideways velocity that was found on it.
 constexpr int kPasses = 3;
 constexpr double kStep = 0.01;  // s, of the sideways velocity
@@ -35,16 +34,17 @@ struct Vehicle {
   contact::EncoderErrors errors;
 };
 
-Vehicle vehicle_from(const ParamSet& params, const HostServices& services) {
-  const bool ideal = params.flag("ideal") || services.exact;
+Vehicle vehicle_from(const Params& params, const HostServices& services) {
+  const bool ideal = params.ideal || services.exact;
   const Base nominal = contact::base_from(params);
-  const contact::TrueBaseErrors sigma = contact::true_base_errors_from(params);
+  const contact::TrueBaseErrors sigma{params.sigma_true_radius_m, params.sigma_true_position_m,
+                                      params.sigma_true_steer_offset_rad};
   Vehicle out;
   out.truth = services.exact ? nominal : draw_base(nominal, sigma, services.seed);
-  const bool knows = services.exact || params.text("controller_knows") == "truth";
+  const bool knows = services.exact || params.controller_knows == "truth";
   out.controller = knows ? out.truth : nominal;
   out.physics = contact::physics_from(params, ideal);
-  out.errors = contact::encoder_errors_from(params, ideal, params.flag("noise") && !services.exact);
+  out.errors = contact::encoder_errors_from(params, ideal, params.noise && !services.exact);
   if (!out.physics.slips() && !knows) {
     throw ParamError("controller_knows", "a base whose controller is wrong must slip");
   }
@@ -76,8 +76,8 @@ void follow(const sim::BodyTrajectory& trajectory, const Vehicle& vehicle, Conta
 
 /// A base that cannot be told to move sideways does so by its tyres: the trajectory follows
 /// (CP-10).
-sim::BodyTrajectory drive(const ParamSet& params, const Vehicle& vehicle, double end_s) {
-  const double margin_s = std::abs(params.number("t_OtoI_s"));
+sim::BodyTrajectory drive(const Params& params, const Vehicle& vehicle, double end_s) {
+  const double margin_s = std::abs(params.t_OtoI_s);
   sim::BodyTrajectory trajectory = sim::drive_from(params, end_s, margin_s);
   if (vehicle.truth.moves_sideways) return trajectory;
   ContactSolver solver(vehicle.truth, vehicle.controller, vehicle.physics);
@@ -97,26 +97,25 @@ sim::BodyTrajectory drive(const ParamSet& params, const Vehicle& vehicle, double
   return trajectory;
 }
 
-std::vector<EncoderSample> encoders(const ParamSet& params, const sim::BodyTrajectory& trajectory,
+std::vector<EncoderSample> encoders(const Params& params, const sim::BodyTrajectory& trajectory,
                                     const Vehicle& vehicle, ContactSolver& solver,
                                     std::uint64_t seed) {
-  const double rate_hz = params.number("wheel_rate_hz"), begin_s = params.number("t_OtoI_s");
+  const double rate_hz = params.wheel_rate_hz, begin_s = params.t_OtoI_s;
   contact::Encoders reader(vehicle.errors, seed);
   std::vector<EncoderSample> out;
-  follow(trajectory, vehicle, solver, begin_s, begin_s + params.number("duration_s") + 1e-9,
-         1. / rate_hz, [&](std::int64_t k, const ContactState& state) {
+  follow(trajectory, vehicle, solver, begin_s, begin_s + params.duration_s + 1e-9, 1. / rate_hz,
+         [&](std::int64_t k, const ContactState& state) {
            out.push_back(reader.read(vehicle.truth, state, 1. / rate_hz));
-           out.back().t_ns = params.integer("start_ns") + sim::sample_time_ns(k, rate_hz);
+           out.back().t_ns = params.start_ns + sim::sample_time_ns(k, rate_hz);
          });
   log::make_cells(out, std::numeric_limits<double>::infinity());
   return out;
 }
 
-log::Recording<Measurement> simulate(const ParamSet& params, const HostServices& services) {
-  const std::int64_t start_ns = params.integer("start_ns");
+log::Recording<Measurement> simulate(const Params& params, const HostServices& services) {
+  const std::int64_t start_ns = params.start_ns;
   const Vehicle vehicle = vehicle_from(params, services);
-  const sim::RigSimulation rig =
-      sim::rig_from(params, params.number("duration_s"), start_ns, services);
+  const sim::RigSimulation rig = sim::rig_from(params, params.duration_s, start_ns, services);
   const sim::BodyTrajectory trajectory = drive(params, vehicle, sim::rig_end_s(rig));
   ContactSolver solver(vehicle.truth, vehicle.controller, vehicle.physics);
 
@@ -126,14 +125,14 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
   };
   add(contact::intrinsics_of(vehicle.truth, solver.static_radius_m(), start_ns));
   add(sim::mounting_truth(rig.mounting, start_ns));
-  out.samples.emplace_back(CalibrationSample{start_ns, "t_OtoI", params.number("t_OtoI_s")});
+  out.samples.emplace_back(CalibrationSample{start_ns, "t_OtoI", params.t_OtoI_s});
   add(sim::simulate_rig(trajectory, rig, services.seed));
   add(encoders(params, trajectory, vehicle, solver, services.seed));
   sim::sort_by_time(out.samples);
   return out;
 }
 
-SampleTypes kinds_of(const ParamSet& params) {
+SampleTypes kinds_of(const Params& params) {
   SampleTypes out = sim::rig_kinds(params);
   const SampleType* const truth = &sample_type<CalibrationSample>();
   if (std::find(out.begin(), out.end(), truth) == out.end()) out.push_back(truth);
@@ -143,13 +142,13 @@ SampleTypes kinds_of(const ParamSet& params) {
 
 class ContactSimulator final : public log::RecordingSensor<Measurement> {
  public:
-  ContactSimulator(const ParamSet& params, const HostServices& services)
+  ContactSimulator(const Params& params, const HostServices& services)
       : RecordingSensor(simulate(params, services), kinds_of(params)) {}
   bool can_be_exact() const override { return true; }
 };
 
 VIWO_REGISTER(Sensor, ContactSimulator, "contact_simulator", "1.0.0",
-              "a base on tyres that slip: encoders, IMU, cameras and truth", "Apache-2.0", kParams);
+              "a base on tyres that slip: encoders, IMU, cameras and truth", "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

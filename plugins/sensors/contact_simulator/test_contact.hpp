@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "contact_params.hpp"
 #include "contact_solver.hpp"
 #include "encoders.hpp"
 #include "viwo/sim/body_trajectory.hpp"
@@ -19,18 +20,15 @@ struct Geometry {
 };
 
 inline Base make_base(const Geometry& g) {
-  ParamSet params;
-  params.set("base", g.base);
-  params.set("x_m", g.x_m);
-  params.set("y_m", g.y_m);
-  params.set("radius_m", g.radius_m);
-  params.set("steer_offset_rad", g.steer_offset_rad);
-  params.set("roller_angle_rad", g.roller_angle_rad);
-  params.set("wheel_speeds", g.wheel_speeds);
-  params.set("steering", g.steering);
-  params.set("castor_x_m", std::vector<double>{});
-  params.set("castor_y_m", std::vector<double>{});
-  params.set("scrub_m", 0.);
+  Params params;
+  params.base = g.base;
+  params.x_m = g.x_m;
+  params.y_m = g.y_m;
+  params.radius_m = g.radius_m;
+  params.steer_offset_rad = g.steer_offset_rad;
+  params.roller_angle_rad = g.roller_angle_rad;
+  params.wheel_speeds = g.wheel_speeds;
+  params.steering = g.steering;
   return base_from(params);
 }
 

@@ -13,7 +13,6 @@
 #include <Eigen/Geometry>
 
 #include "viwo/api/plugin.hpp"
-#include "viwo/log/sensor_params.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/sim/image_renderer.hpp"
 #include "viwo/sim/rig_simulator.hpp"
@@ -26,72 +25,88 @@ namespace {
 /// What is left of the light in the dark.
 constexpr double kDarkGain = 0.01;
 
-// clang-format off
-constexpr std::array kImageParams{
-    ParamSpec{.name = "cameras", .type = ParamType::kPath,
-              .help = "cameras on the IMU, a camera chain file of Kalibr"},
-    ParamSpec{.name = "n_cameras", .type = ParamType::kInt, .fallback = "1", .min = 1., .max = 16.,
-              .help = "how many of them, from the first"},
-    ParamSpec{.name = "skip_first", .type = ParamType::kBool, .fallback = "true",
-              .help = "no images at the first true state, which sensor simulator gives for the start "
-                      "of the IMU; false with its camera_phase_s: 0"},
-    ParamSpec{.name = "world_seed", .type = ParamType::kInt, .fallback = "1", .min = 0.,
-              .max = 9e15, .help = "what textures and boxes are drawn with, for all seeds of a run"},
-    ParamSpec{.name = "room_size_m", .type = ParamType::kNumbers, .unit = "m", .fallback = "[]",
-              .min = 1., .max = 1000.,
-              .help = "edges of the room along x and y of G; []: as the motion needs it"},
-    ParamSpec{.name = "room_centre_m", .type = ParamType::kNumbers, .unit = "m", .fallback = "[]",
-              .help = "its centre; []: in the middle of the motion"},
-    ParamSpec{.name = "room_margin_m", .type = ParamType::kNumber, .unit = "m", .fallback = "3",
-              .min = 0.5, .max = 100.,
-              .help = "from the motion to the walls of a room without a size"},
-    ParamSpec{.name = "room_height_m", .type = ParamType::kNumber, .unit = "m", .fallback = "3",
-              .min = 0.5, .max = 100., .help = "from floor to ceiling"},
-    ParamSpec{.name = "floor_m", .type = ParamType::kNumber, .unit = "m", .fallback = "-0.12",
-              .min = -1000., .max = 1000., .help = "height of the floor in G, a plane"},
-    ParamSpec{.name = "boxes", .type = ParamType::kInt, .fallback = "40", .min = 0., .max = 1000.,
-              .help = "boxes and panels beside the path"},
-    ParamSpec{.name = "box_clearance_m", .type = ParamType::kNumber, .unit = "m",
-              .fallback = "0.5", .min = 0.1, .max = 100.,
-              .help = "between the path of the cameras and the boxes"},
-    ParamSpec{.name = "box_reach_m", .type = ParamType::kNumber, .unit = "m", .fallback = "3",
-              .min = 0.1, .max = 100., .help = "boxes are not further from the path"},
-    ParamSpec{.name = "texture_size_px", .type = ParamType::kInt, .unit = "px",
-              .fallback = "1024", .min = 8., .max = 8192.,
-              .help = "a texture repeats after so many texels (2.5 to 4.5 mm); a power of two"},
-    ParamSpec{.name = "sigma_grey", .type = ParamType::kNumber,
-              .fallback = "2", .min = 0., .max = 100., .help = "white noise of each pixel, grey levels"},
-    ParamSpec{.name = "vignette", .type = ParamType::kNumber, .fallback = "0", .min = 0.,
-              .max = 1., .help = "share of the light that the corners of an image lack"},
-    ParamSpec{.name = "exposure_swing", .type = ParamType::kNumber, .fallback = "0", .min = 0.,
-              .max = 1., .help = "share by which the brightness swings up and down"},
-    ParamSpec{.name = "exposure_period_s", .type = ParamType::kNumber, .unit = "s",
-              .fallback = "10", .min = 0.01, .max = 1e6, .help = "period of that"},
-    ParamSpec{.name = "dark_start_s", .type = ParamType::kNumbers, .unit = "s", .fallback = "[]",
-              .help = "when the light goes out, from the first true state on"},
-    ParamSpec{.name = "dark_duration_s", .type = ParamType::kNumber, .unit = "s",
-              .fallback = "5", .min = 0., .help = "for how long each time"},
-    ParamSpec{.name = "drop_start_s", .type = ParamType::kNumbers, .unit = "s", .fallback = "[]",
-              .help = "when images begin to be missing, from the first true state on"},
-    ParamSpec{.name = "drop_duration_s", .type = ParamType::kNumber, .unit = "s",
-              .fallback = "2", .min = 0., .help = "for how long each time"},
-};
-// clang-format on
+struct Params : sim::TrueCameraParams {
+  std::filesystem::path cameras;
+  int n_cameras = 1;
+  bool skip_first = true;
+  std::int64_t world_seed = 1;
+  std::vector<double> room_size_m;
+  std::vector<double> room_centre_m;
+  double room_margin_m = 3.;
+  double room_height_m = 3.;
+  double floor_m = -0.12;
+  int boxes = 40;
+  double box_clearance_m = 0.5;
+  double box_reach_m = 3.;
+  int texture_size_px = 1024;
+  double sigma_grey = 2.;
+  double vignette = 0.;
+  double exposure_swing = 0.;
+  double exposure_period_s = 10.;
+  std::vector<double> dark_start_s;
+  double dark_duration_s = 5.;
+  std::vector<double> drop_start_s;
+  double drop_duration_s = 2.;
 
-constexpr auto kParams = log::joined(kImageParams, sim::kTrueCameraParams);
-
-std::vector<double> list(const ParamSet& params, const char* key) {
-  const auto numbers = params.numbers(key);
-  return {numbers.begin(), numbers.end()};
-}
-
-/// Two numbers or none.
-std::vector<double> pair_or_none(const ParamSet& params, const char* key) {
-  std::vector<double> out = list(params, key);
-  if (out.size() != 2 && !out.empty()) {
-    throw ParamError(key, "needs two numbers, along x and y, not " + std::to_string(out.size()));
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(cameras),
+      {.required = true, .help = "cameras on the IMU, a camera chain file of Kalibr"});
+    b(VIWO_PARAM(n_cameras), {.min = 1., .max = 16., .help = "how many of them, from the first"});
+    b(VIWO_PARAM(skip_first),
+      {.help = "no images at the first true state, which sensor simulator gives for the start "
+               "of the IMU; false with its camera_phase_s: 0"});
+    b(VIWO_PARAM(world_seed),
+      {.min = 0.,
+       .max = 9e15,
+       .help = "what textures and boxes are drawn with, for all seeds of a run"});
+    b(VIWO_PARAM(room_size_m),
+      {.unit = "m",
+       .min = 1.,
+       .max = 1000.,
+       .help = "edges of the room along x and y of G; []: as the motion needs it"});
+    b(VIWO_PARAM(room_centre_m),
+      {.unit = "m", .help = "its centre; []: in the middle of the motion"});
+    b(VIWO_PARAM(room_margin_m), {.unit = "m",
+                                  .min = 0.5,
+                                  .max = 100.,
+                                  .help = "from the motion to the walls of a room without a size"});
+    b(VIWO_PARAM(room_height_m),
+      {.unit = "m", .min = 0.5, .max = 100., .help = "from floor to ceiling"});
+    b(VIWO_PARAM(floor_m),
+      {.unit = "m", .min = -1000., .max = 1000., .help = "height of the floor in G, a plane"});
+    b(VIWO_PARAM(boxes), {.min = 0., .max = 1000., .help = "boxes and panels beside the path"});
+    b(VIWO_PARAM(box_clearance_m), {.unit = "m",
+                                    .min = 0.1,
+                                    .max = 100.,
+                                    .help = "between the path of the cameras and the boxes"});
+    b(VIWO_PARAM(box_reach_m),
+      {.unit = "m", .min = 0.1, .max = 100., .help = "boxes are not further from the path"});
+    b(VIWO_PARAM(texture_size_px),
+      {.unit = "px",
+       .min = 8.,
+       .max = 8192.,
+       .help = "a texture repeats after so many texels (2.5 to 4.5 mm); a power of two"});
+    b(VIWO_PARAM(sigma_grey),
+      {.min = 0., .max = 100., .help = "white noise of each pixel, grey levels"});
+    b(VIWO_PARAM(vignette),
+      {.min = 0., .max = 1., .help = "share of the light that the corners of an image lack"});
+    b(VIWO_PARAM(exposure_swing),
+      {.min = 0., .max = 1., .help = "share by which the brightness swings up and down"});
+    b(VIWO_PARAM(exposure_period_s),
+      {.unit = "s", .min = 0.01, .max = 1e6, .help = "period of that"});
+    b(VIWO_PARAM(dark_start_s),
+      {.unit = "s", .help = "when the light goes out, from the first true state on"});
+    b(VIWO_PARAM(dark_duration_s), {.unit = "s", .min = 0., .help = "for how long each time"});
+    b(VIWO_PARAM(drop_start_s),
+      {.unit = "s", .help = "when images begin to be missing, from the first true state on"});
+    b(VIWO_PARAM(drop_duration_s), {.unit = "s", .min = 0., .help = "for how long each time"});
+    sim::TrueCameraParams::bind(b);
   }
-  return out;
+};
+
+const std::vector<double>& pair_or_none(const char* key, const std::vector<double>& numbers) {
+  if (numbers.size() == 2 || numbers.empty()) return numbers;
+  throw ParamError(key, "needs two numbers, along x and y, not " + std::to_string(numbers.size()));
 }
 
 /// Times of equal length.
@@ -107,7 +122,7 @@ struct Intervals {
 
 /// What a configuration says.
 struct Options {
-  Options(const ParamSet& params, const HostServices& services);
+  Options(const Params& params, const HostServices& services);
 
   std::vector<CameraView> cameras;       ///< as they truly are
   std::vector<CameraView> file_cameras;  ///< as the file says
@@ -119,29 +134,29 @@ struct Options {
   Intervals dark, dropped;
 };
 
-Options::Options(const ParamSet& params, const HostServices& services)
-    : file_cameras(sim::cameras_of_file(params)),
-      skip_first(params.flag("skip_first")),
-      size_m(pair_or_none(params, "room_size_m")),
-      centre_m(pair_or_none(params, "room_centre_m")),
-      margin_m(params.number("room_margin_m")),
-      sigma_grey(services.exact ? 0. : params.number("sigma_grey")),
-      vignette(params.number("vignette")),
-      exposure_swing(params.number("exposure_swing")),
-      exposure_period_s(params.number("exposure_period_s")),
-      dark{list(params, "dark_start_s"), params.number("dark_duration_s")},
-      dropped{list(params, "drop_start_s"), params.number("drop_duration_s")} {
+Options::Options(const Params& params, const HostServices& services)
+    : file_cameras(sim::cameras_of_file(params.cameras, params.n_cameras)),
+      skip_first(params.skip_first),
+      size_m(pair_or_none("room_size_m", params.room_size_m)),
+      centre_m(pair_or_none("room_centre_m", params.room_centre_m)),
+      margin_m(params.room_margin_m),
+      sigma_grey(services.exact ? 0. : params.sigma_grey),
+      vignette(params.vignette),
+      exposure_swing(params.exposure_swing),
+      exposure_period_s(params.exposure_period_s),
+      dark{params.dark_start_s, params.dark_duration_s},
+      dropped{params.drop_start_s, params.drop_duration_s} {
   cameras = sim::true_cameras(params, file_cameras, services);
-  room.seed = static_cast<std::uint64_t>(params.integer("world_seed"));
-  room.floor_m = params.number("floor_m");
-  room.height_m = params.number("room_height_m");
-  room.blocks = static_cast<int>(params.integer("boxes"));
-  room.clearance_m = params.number("box_clearance_m");
-  room.reach_m = params.number("box_reach_m");
+  room.seed = static_cast<std::uint64_t>(params.world_seed);
+  room.floor_m = params.floor_m;
+  room.height_m = params.room_height_m;
+  room.blocks = params.boxes;
+  room.clearance_m = params.box_clearance_m;
+  room.reach_m = params.box_reach_m;
   if (room.reach_m < room.clearance_m) {
     throw ParamError("box_reach_m", "is less than box_clearance_m");
   }
-  room.texture_size = static_cast<int>(params.integer("texture_size_px"));
+  room.texture_size = params.texture_size_px;
   if (!std::has_single_bit(static_cast<unsigned>(room.texture_size))) {
     throw ParamError("texture_size_px", std::to_string(room.texture_size) +
                                             " is not a power of two: 512, 1024, 2048, ...");
@@ -173,7 +188,7 @@ class RenderedImage final : public ImageSource {
 
 class ImageSimulator final : public Sensor {
  public:
-  ImageSimulator(const ParamSet& params, const HostServices& services)
+  ImageSimulator(const Params& params, const HostServices& services)
       : options_(params, services), seed_(services.seed) {}
 
   SampleTypes yields() const override { return sample_types<ImageSample, CalibrationSample>(); }
@@ -279,7 +294,7 @@ class ImageSimulator final : public Sensor {
 
 VIWO_REGISTER(Sensor, ImageSimulator, "image_simulator", "1.0.0",
               "images of a textured room, along the true states of another sensor", "Apache-2.0",
-              kParams);
+              Params);
 
 }  // namespace
 }  // namespace viwo

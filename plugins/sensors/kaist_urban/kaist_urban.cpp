@@ -22,30 +22,42 @@
 namespace viwo {
 namespace {
 
-// clang-format off
-constexpr std::array kParams{
-    ParamSpec{.name = "path", .type = ParamType::kPath,
-              .help = "folder of a sequence (urban28-pankyo): sensor_data, calibration, image, "
-                      "global_pose.csv"},
-    ParamSpec{.name = "imu", .type = ParamType::kBool, .fallback = "true",
-              .help = "read sensor_data/xsens_imu.csv"},
-    ParamSpec{.name = "wheels", .type = ParamType::kBool, .fallback = "true",
-              .help = "read sensor_data/encoder.csv: drives 1 (left) and 2 (right)"},
-    ParamSpec{.name = "images", .type = ParamType::kBool, .fallback = "true",
-              .help = "read image/stereo_left and stereo_right: cameras 0 and 1"},
-    ParamSpec{.name = "reference", .type = ParamType::kBool, .fallback = "true",
-              .help = "read global_pose.csv"},
-    ParamSpec{.name = "encoder_resolution", .type = ParamType::kInt, .fallback = "0", .min = 0.,
-              .max = 1e9,
-              .help = "counts of a turn of a wheel; 0: from calibration/EncoderParameter.txt"},
-    ParamSpec{.name = "start_s", .type = ParamType::kNumber, .unit = "s", .fallback = "0",
-              .min = 0., .max = 1e6,
-              .help = "leave out what is earlier, counted from the first stamp of what is read"},
-    ParamSpec{.name = "duration_s", .type = ParamType::kNumber, .unit = "s", .fallback = "0",
-              .min = 0., .max = 1e6, .help = "leave out what is later than this behind start_s; "
-                                             "0: nothing"},
-    log::kMaxGapParam, log::kMaxRejectedFractionParam};
-// clang-format on
+struct Params : log::LimitParams {
+  std::filesystem::path path;
+  bool imu = true;
+  bool wheels = true;
+  bool images = true;
+  bool reference = true;
+  int encoder_resolution = 0;
+  double start_s = 0.;
+  double duration_s = 0.;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path),
+      {.required = true,
+       .help = "folder of a sequence (urban28-pankyo): sensor_data, calibration, image, "
+               "global_pose.csv"});
+    b(VIWO_PARAM(imu), {.help = "read sensor_data/xsens_imu.csv"});
+    b(VIWO_PARAM(wheels), {.help = "read sensor_data/encoder.csv: drives 1 (left) and 2 (right)"});
+    b(VIWO_PARAM(images), {.help = "read image/stereo_left and stereo_right: cameras 0 and 1"});
+    b(VIWO_PARAM(reference), {.help = "read global_pose.csv"});
+    b(VIWO_PARAM(encoder_resolution),
+      {.min = 0.,
+       .max = 1e9,
+       .help = "counts of a turn of a wheel; 0: from calibration/EncoderParameter.txt"});
+    b(VIWO_PARAM(start_s),
+      {.unit = "s",
+       .min = 0.,
+       .max = 1e6,
+       .help = "leave out what is earlier, counted from the first stamp of what is read"});
+    b(VIWO_PARAM(duration_s), {.unit = "s",
+                               .min = 0.,
+                               .max = 1e6,
+                               .help = "leave out what is later than this behind start_s; "
+                                       "0: nothing"});
+    log::LimitParams::bind(b);
+  }
+};
 
 std::int64_t nanoseconds(double seconds) {
   return static_cast<std::int64_t>(std::llround(1e9 * seconds));
@@ -71,24 +83,24 @@ struct Track {
 
 class KaistUrban final : public Sensor {
  public:
-  KaistUrban(const ParamSet& params, const HostServices& /*services*/) {
-    const std::filesystem::path folder = params.text("path");
+  KaistUrban(const Params& params, const HostServices& /*services*/) {
+    const std::filesystem::path folder = params.path;
     std::error_code ignored;
     if (!std::filesystem::is_directory(folder, ignored)) {
       throw ParamError("path", folder.string() + " is no folder");
     }
-    const kaist::Sequence sequence(folder, log::limits_from(params));
-    if (params.flag("reference")) keep(sequence.reference());
-    if (params.flag("imu")) keep(sequence.imu());
-    if (params.flag("wheels")) keep(sequence.wheels(params.integer("encoder_resolution")));
-    if (params.flag("images")) {
+    const kaist::Sequence sequence(folder, params.limits());
+    if (params.reference) keep(sequence.reference());
+    if (params.imu) keep(sequence.imu());
+    if (params.wheels) keep(sequence.wheels(params.encoder_resolution));
+    if (params.images) {
       keep<0>(sequence.images(0));
       keep<1>(sequence.images(1));
     }
     if (!earliest()) {
       throw ParamError("path", "nothing to read: imu, wheels, images and reference are all false");
     }
-    cut(params.number("start_s"), params.number("duration_s"));
+    cut(params.start_s, params.duration_s);
   }
 
   SampleTypes yields() const override { return yields_; }
@@ -171,7 +183,7 @@ class KaistUrban final : public Sensor {
 
 VIWO_REGISTER(Sensor, KaistUrban, "kaist_urban", "1.0.0",
               "stereo images, IMU, wheel encoders and reference of a KAIST Complex Urban sequence",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

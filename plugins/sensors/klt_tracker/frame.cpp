@@ -37,7 +37,7 @@ int contrast(const Image& image) {
 }
 
 FrameMaker::FrameMaker(const TrackerOptions& options) : options_(options) {
-  if (options.histogram == Histogram::kClahe) {
+  if (options.histogram_method == Histogram::kClahe) {
     clahe_ = cv::createCLAHE(kClaheLimit, cv::Size(kClaheTiles, kClaheTiles));
   }
 }
@@ -49,7 +49,7 @@ void FrameMaker::make(const Image& image, bool with_derivatives, Frame& out) {
   // OpenCV has no matrix of constant data; nothing writes to it.
   cv::Mat pixels(image.height_px, image.width_px, CV_8UC1,
                  const_cast<std::uint8_t*>(image.pixels.data()));
-  switch (options_.histogram) {
+  switch (options_.histogram_method) {
     case Histogram::kNone:
       break;
     case Histogram::kEqualize:

@@ -31,10 +31,10 @@ std::string size_text(int width_px, int height_px) {
   return std::to_string(width_px) + " x " + std::to_string(height_px) + " pixels";
 }
 
-std::vector<CameraView> read_cameras(const ParamSet& params) {
-  const std::string& file = params.text("cameras");
+std::vector<CameraView> read_cameras(const Params& params) {
+  const std::string& file = params.cameras;
   std::vector<CameraView> cameras = log::read_kalibr_cameras(file);
-  const auto asked = static_cast<std::size_t>(params.integer("n_cameras"));
+  const auto asked = static_cast<std::size_t>(params.n_cameras);
   if (asked > cameras.size()) {
     throw ParamError("n_cameras",
                      "there are only " + std::to_string(cameras.size()) + " cameras in " + file);
@@ -42,28 +42,28 @@ std::vector<CameraView> read_cameras(const ParamSet& params) {
   cameras.resize(asked > 0 ? asked : std::min<std::size_t>(cameras.size(), kMaxCameras));
   if (cameras.size() < 2) return cameras;
   const double shift_s = std::abs(cameras[1].t_CtoI_s - cameras[0].t_CtoI_s);
-  if (shift_s > params.number("max_camera_dt_s")) {
+  if (shift_s > params.max_camera_dt_s) {
     throw ParamError("max_camera_dt_s", "timeshift_cam_imu of cam0 and cam1 differ by " +
                                             std::to_string(shift_s) + " s in " + file +
                                             ": images of a pair must be taken at the same time");
   }
   const Eigen::Vector3d p_C0inC1 =
       cameras[1].p_IinC - cameras[1].R_ItoC * cameras[0].R_ItoC.transpose() * cameras[0].p_IinC;
-  if (params.flag("stereo") && p_C0inC1.norm() < kMinBaseline) {
+  if (params.stereo && p_C0inC1.norm() < kMinBaseline) {
     throw ParamError("stereo", "cam0 and cam1 are at the same place in " + file);
   }
   return cameras;
 }
 
 /// Not 0 where no point may be; empty without a mask.
-cv::Mat read_mask(const ParamSet& params, std::size_t camera, const CameraView& view) {
+cv::Mat read_mask(const Params& params, std::size_t camera, const CameraView& view) {
   const std::string name = "mask" + std::to_string(camera);
-  const std::string& file = params.text(name);
+  const std::filesystem::path& file = camera == 0 ? params.mask0 : params.mask1;
   if (file.empty()) return {};
   Image image;
   read_image(file, image);
   if (image.width_px != view.width_px || image.height_px != view.height_px) {
-    throw ParamError(name, file + " has " + size_text(image.width_px, image.height_px) +
+    throw ParamError(name, file.string() + " has " + size_text(image.width_px, image.height_px) +
                                ", camera " + std::to_string(camera) + " has " +
                                size_text(view.width_px, view.height_px));
   }
@@ -73,14 +73,14 @@ cv::Mat read_mask(const ParamSet& params, std::size_t camera, const CameraView& 
 
 }  // namespace
 
-KltTracker::KltTracker(const ParamSet& params, const HostServices& services)
+KltTracker::KltTracker(const Params& params, const HostServices& services)
     : services_(services),
-      options_(read_options(params)),
-      chain_file_(params.text("cameras")),
-      max_gap_s_(params.number("max_gap_s")),
-      max_camera_dt_s_(params.number("max_camera_dt_s")),
+      options_(params),
+      chain_file_(params.cameras),
+      max_gap_s_(params.max_gap_s),
+      max_camera_dt_s_(params.max_camera_dt_s),
       cameras_(read_cameras(params)) {
-  const bool stereo = cameras_.size() > 1 && params.flag("stereo");
+  const bool stereo = cameras_.size() > 1 && params.stereo;
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     eyes_.emplace_back(options_);
     const cv::Mat mask = read_mask(params, i, cameras_[i]);

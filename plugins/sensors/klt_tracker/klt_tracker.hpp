@@ -12,17 +12,17 @@
 #include "camera_tracker.hpp"
 #include "frame.hpp"
 #include "image_groups.hpp"
+#include "params.hpp"
 #include "stereo_matcher.hpp"
 #include "tracker_options.hpp"
 #include "viwo/api/host_services.hpp"
-#include "viwo/api/params.hpp"
 #include "viwo/api/sensor.hpp"
 
 namespace viwo::klt {
 
 class KltTracker final : public Sensor {
  public:
-  KltTracker(const ParamSet& params, const HostServices& services);
+  KltTracker(const Params& params, const HostServices& services);
 
   SampleTypes yields() const override { return sample_types<FeatureSample>(); }
   bool takes_input() const override { return true; }

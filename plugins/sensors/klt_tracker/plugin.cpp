@@ -9,7 +9,7 @@ namespace {
 
 VIWO_REGISTER(Sensor, klt::KltTracker, "klt_tracker", "1.0.0",
               "feature tracks from images (Lucas-Kanade), mono and stereo", "Apache-2.0",
-              klt::kParams);
+              klt::Params);
 
 }  // namespace
 }  // namespace viwo

@@ -221,9 +221,9 @@ TEST(Frame, EqualisationFindsPointsInADimImage) {
   }));
   TrackerOptions options;
   EXPECT_EQ(detect(pinhole(320, 240), options, dim).size(), 0U);
-  options.histogram = Histogram::kEqualize;
+  options.histogram_method = Histogram::kEqualize;
   EXPECT_GT(detect(pinhole(320, 240), options, dim).size(), 40U);
-  options.histogram = Histogram::kClahe;
+  options.histogram_method = Histogram::kClahe;
   EXPECT_GT(detect(pinhole(320, 240), options, dim).size(), 40U);
 }
 

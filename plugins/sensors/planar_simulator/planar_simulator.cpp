@@ -15,92 +15,60 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kBaseParams{
-    ParamSpec{.name = "robot",
-              .type = ParamType::kKinematics,
-              .help = "the base: its nominal intrinsics and its noise"},
-    ParamSpec{.name = "motion",
-              .type = ParamType::kString,
-              .fallback = "icr_sweep",
-              .choices = sim::kMotionChoices,
-              .help = "how the base moves"},
-    ParamSpec{.name = "duration_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "60",
-              .min = 0.,
-              .max = 86400.,
-              .min_exclusive = true,
-              .help = "how long"},
-    ParamSpec{.name = "speed_m_per_s",
-              .type = ParamType::kNumber,
-              .unit = "m/s",
-              .fallback = "0.5",
-              .help = "speed of the motion"},
-    ParamSpec{.name = "yaw_rate_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "0.6",
-              .help = "constant or peak yaw rate of the motions that turn"},
-    ParamSpec{.name = "pivot_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .fallback = "[0, 0]",
-              .help = "point of the base that motion pivot turns about"},
-    ParamSpec{.name = "ramp_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "1",
-              .min = 0.,
-              .help = "smooth start from rest; 0: at speed from the beginning"},
-    ParamSpec{.name = "rate_hz",
-              .type = ParamType::kNumber,
-              .unit = "Hz",
-              .fallback = "100",
-              .min = 0.,
-              .max = 10000.,
-              .min_exclusive = true,
-              .help = "rate of the encoder samples"},
-    ParamSpec{.name = "reference_rate_hz",
-              .type = ParamType::kNumber,
-              .unit = "Hz",
-              .fallback = "100",
-              .min = 0.,
-              .max = 10000.,
-              .min_exclusive = true,
-              .help = "rate of the true poses"},
-    ParamSpec{.name = "start_ns",
-              .type = ParamType::kInt,
-              .unit = "ns",
-              .fallback = "0",
-              .min = 0.,
-              .max = 4e18,
-              .help = "stamp at which the motion starts"},
-    ParamSpec{.name = "time_offset_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0",
-              .min = -10.,
-              .max = 10.,
-              .help = "what to add to a stamp of the encoders to get the time of the reference"},
-    ParamSpec{.name = "noise",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "noise of encoders and wheel slip as the robot's description says"},
+struct Params : sim::EncoderParams {
+  NestedKinematics robot;
+  std::string motion = "icr_sweep";
+  double duration_s = 60.;
+  double speed_m_per_s = 0.5;
+  double yaw_rate_rad_per_s = 0.6;
+  Eigen::Vector2d pivot_m{0., 0.};
+  double ramp_s = 1.;
+  double rate_hz = 100.;
+  double reference_rate_hz = 100.;
+  std::int64_t start_ns = 0;
+  double time_offset_s = 0.;
+  bool noise = true;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(robot),
+      {.required = true, .help = "the base: its nominal intrinsics and its noise"});
+    b(VIWO_PARAM(motion), {.choices = sim::kMotionChoices, .help = "how the base moves"});
+    b(VIWO_PARAM(duration_s), {.unit = "s", .above = 0., .max = 86400., .help = "how long"});
+    b(VIWO_PARAM(speed_m_per_s), {.unit = "m/s", .help = "speed of the motion"});
+    b(VIWO_PARAM(yaw_rate_rad_per_s),
+      {.unit = "rad/s", .help = "constant or peak yaw rate of the motions that turn"});
+    b(VIWO_PARAM(pivot_m),
+      {.unit = "m", .help = "point of the base that motion pivot turns about"});
+    b(VIWO_PARAM(ramp_s),
+      {.unit = "s", .min = 0., .help = "smooth start from rest; 0: at speed from the beginning"});
+    b(VIWO_PARAM(rate_hz),
+      {.unit = "Hz", .above = 0., .max = 10000., .help = "rate of the encoder samples"});
+    b(VIWO_PARAM(reference_rate_hz),
+      {.unit = "Hz", .above = 0., .max = 10000., .help = "rate of the true poses"});
+    b(VIWO_PARAM(start_ns),
+      {.unit = "ns", .min = 0., .max = 4e18, .help = "stamp at which the motion starts"});
+    b(VIWO_PARAM(time_offset_s),
+      {.unit = "s",
+       .min = -10.,
+       .max = 10.,
+       .help = "what to add to a stamp of the encoders to get the time of the reference"});
+    b(VIWO_PARAM(noise),
+      {.help = "noise of encoders and wheel slip as the robot's description says"});
+    sim::EncoderParams::bind(b);
+  }
 };
 
-constexpr auto kParams = log::joined(kBaseParams, sim::kEncoderParams);
-
-std::vector<EncoderSample> encoders(const ParamSet& params, const sim::PlanarMotion& motion,
+std::vector<EncoderSample> encoders(const Params& params, const sim::PlanarMotion& motion,
                                     const HostServices& services) {
-  const KinematicModel& robot = params.kinematics("robot");
+  const KinematicModel& robot = *params.robot.model;
   ModelDescription description;
   robot.describe(description);
-  sim::EncoderSimulation options = sim::encoder_simulation_from(params, description);
-  options.rate_hz = params.number("rate_hz");
-  options.time_offset_s = params.number("time_offset_s");
+  sim::EncoderSimulation options = sim::encoder_simulation_from(
+      params, description, params.duration_s, params.start_ns, params.noise);
+  options.rate_hz = params.rate_hz;
+  options.time_offset_s = params.time_offset_s;
   if (services.exact) options.make_exact();
-  const double scale = services.exact ? 0. : params.number("true_intrinsics_scale");
+  const double scale = services.exact ? 0. : params.true_intrinsics_scale;
   const Intrinsics truth = sim::perturbed_intrinsics(description, scale, services.seed);
   try {
     return sim::simulate_encoders(robot, truth, motion, options, services.seed);
@@ -109,27 +77,23 @@ std::vector<EncoderSample> encoders(const ParamSet& params, const sim::PlanarMot
   }
 }
 
-std::vector<PoseSample> poses(const ParamSet& params, const sim::PlanarMotion& motion) {
+std::vector<PoseSample> poses(const Params& params, const sim::PlanarMotion& motion) {
   sim::PoseIntegrator integrator(motion);
   std::vector<PoseSample> out;
-  const double rate_hz = params.number("reference_rate_hz");
-  const std::int64_t end_ns = std::llround(params.number("duration_s") * 1e9);
+  const double rate_hz = params.reference_rate_hz;
+  const std::int64_t end_ns = std::llround(params.duration_s * 1e9);
   for (std::int64_t k = 0, t_ns = 0; t_ns <= end_ns; t_ns = sim::sample_time_ns(++k, rate_hz)) {
     const Eigen::Vector3d& g = integrator.advance_to(static_cast<double>(t_ns) * 1e-9);
-    out.push_back({params.integer("start_ns") + t_ns,
+    out.push_back({params.start_ns + t_ns,
                    {g[1], g[2], 0.},
                    {0., 0., std::sin(0.5 * g[0]), std::cos(0.5 * g[0])}});
   }
   return out;
 }
 
-log::Recording<Measurement> simulate(const ParamSet& params, const HostServices& services) {
-  const auto pivot = params.numbers("pivot_m");
-  if (pivot.size() != 2) throw ParamError("pivot_m", "needs two numbers");
-  const sim::PlanarMotion motion(params.text("motion"), {params.number("speed_m_per_s"),
-                                                         params.number("yaw_rate_rad_per_s"),
-                                                         params.number("ramp_s"),
-                                                         {pivot[0], pivot[1]}});
+log::Recording<Measurement> simulate(const Params& params, const HostServices& services) {
+  const sim::PlanarMotion motion(params.motion, {params.speed_m_per_s, params.yaw_rate_rad_per_s,
+                                                 params.ramp_s, params.pivot_m});
   log::Recording<Measurement> out;
   const auto from_wheels = encoders(params, motion, services);
   const auto from_reference = poses(params, motion);
@@ -143,13 +107,13 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
 
 class PlanarSimulator final : public log::RecordingSensor<Measurement> {
  public:
-  PlanarSimulator(const ParamSet& params, const HostServices& services)
+  PlanarSimulator(const Params& params, const HostServices& services)
       : RecordingSensor(simulate(params, services), sample_types<EncoderSample, PoseSample>()) {}
   bool can_be_exact() const override { return true; }
 };
 
 VIWO_REGISTER(Sensor, PlanarSimulator, "planar_simulator", "1.0.0",
-              "encoders and true poses of any base that moves on a plane", "Apache-2.0", kParams);
+              "encoders and true poses of any base that moves on a plane", "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -17,23 +17,29 @@
 namespace viwo {
 namespace {
 
-// clang-format off
-constexpr std::array kMotionParams{
-    ParamSpec{.name = "path", .type = ParamType::kPath,
-              .help = "recorded poses of O: ROS PoseStamped messages printed as text, or gzipped"},
-    ParamSpec{.name = "planar", .type = ParamType::kBool, .fallback = "true",
-              .help = "use x, y and yaw only; z, pitch and roll are zero"},
-    ParamSpec{.name = "knot_spacing_s", .type = ParamType::kNumber, .unit = "s",
-              .fallback = "0.3", .min = 0.02, .max = 10.,
-              .help = "of the spline through the poses: shorter is closer to them and rougher"},
-    ParamSpec{.name = "time_offset_s", .type = ParamType::kNumber, .unit = "s", .fallback = "0",
-              .min = -10., .max = 10., .help = "t_imu = stamp of a pose + time_offset_s"},
-    log::kClockParam, log::kReceptionUtcOffsetParam, log::kMaxGapParam,
-    log::kMaxRejectedFractionParam,
-};
-// clang-format on
+struct Params : log::TextClockParams, log::LimitParams, sim::RigParams {
+  std::filesystem::path path;
+  bool planar = true;
+  double knot_spacing_s = 0.3;
+  double time_offset_s = 0.;
 
-constexpr auto kParams = log::joined(kMotionParams, sim::kRigParams, sim::kTrueCameraParams);
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path),
+      {.required = true,
+       .help = "recorded poses of O: ROS PoseStamped messages printed as text, or gzipped"});
+    b(VIWO_PARAM(planar), {.help = "use x, y and yaw only; z, pitch and roll are zero"});
+    b(VIWO_PARAM(knot_spacing_s),
+      {.unit = "s",
+       .min = 0.02,
+       .max = 10.,
+       .help = "of the spline through the poses: shorter is closer to them and rougher"});
+    b(VIWO_PARAM(time_offset_s),
+      {.unit = "s", .min = -10., .max = 10., .help = "t_imu = stamp of a pose + time_offset_s"});
+    log::TextClockParams::bind(b);
+    log::LimitParams::bind(b);
+    sim::RigParams::bind(b);
+  }
+};
 
 /// IMU samples must not lie behind the last pose.
 double duration_within(double recorded_s, double imu_rate_hz) {
@@ -48,19 +54,17 @@ void report(const HostServices& services, const sim::FitResidual& residual) {
   services.log(LogLevel::kInfo, text.data());
 }
 
-log::Recording<Measurement> simulate(const ParamSet& params, const HostServices& services) {
-  auto recorded =
-      log::read_ros_poses(params.text("path"), log::clock_from(params), log::limits_from(params));
-  const std::int64_t offset_ns = std::llround(params.number("time_offset_s") * 1e9);
+log::Recording<Measurement> simulate(const Params& params, const HostServices& services) {
+  auto recorded = log::read_ros_poses(params.path, params.ros_clock(), params.limits());
+  const std::int64_t offset_ns = std::llround(params.time_offset_s * 1e9);
   for (PoseSample& pose : recorded.samples) pose.t_ns += offset_ns;
   // The spline is poor at its ends, where it has samples on one side only.
-  const double margin_s = params.number("knot_spacing_s");
+  const double margin_s = params.knot_spacing_s;
   const std::int64_t start_ns = recorded.samples.front().t_ns + std::llround(margin_s * 1e9);
   const sim::BodyTrajectory trajectory = sim::BodyTrajectory::through(
-      recorded.samples, start_ns, params.flag("planar"), params.number("knot_spacing_s"));
+      recorded.samples, start_ns, params.planar, params.knot_spacing_s);
   report(services, sim::fit_residual(trajectory, recorded.samples, start_ns));
-  const double duration_s =
-      duration_within(trajectory.end_s() - margin_s, params.number("imu_rate_hz"));
+  const double duration_s = duration_within(trajectory.end_s() - margin_s, params.imu_rate_hz);
   if (!(duration_s > 0.)) throw ParamError("path", "the recording is too short");
 
   log::Recording<Measurement> out;
@@ -73,14 +77,14 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
 
 class RecordedMotionSimulator final : public log::RecordingSensor<Measurement> {
  public:
-  RecordedMotionSimulator(const ParamSet& params, const HostServices& services)
+  RecordedMotionSimulator(const Params& params, const HostServices& services)
       : RecordingSensor(simulate(params, services), sim::rig_kinds(params)) {}
   bool can_be_exact() const override { return true; }
 };
 
 VIWO_REGISTER(Sensor, RecordedMotionSimulator, "recorded_motion_simulator", "1.0.0",
               "IMU, cameras and true states on a trajectory through recorded poses", "Apache-2.0",
-              kParams);
+              Params);
 
 }  // namespace
 }  // namespace viwo

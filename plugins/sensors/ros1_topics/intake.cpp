@@ -55,7 +55,7 @@ Intake::Intake(const bag::TopicOptions& options, const HostServices& services, L
     : options_(options),
       services_(services),
       queue_(queue),
-      cells_(options.drive_is_angle, options.max_gap_s),
+      cells_(options.drive_is_angle(), options.max_gap_s),
       image_order_(options.image_topics.size()) {
   const auto want = [this](const std::string& name, std::vector<Kind> kinds, int camera = -1) {
     if (!name.empty()) topics_.push_back({name, std::move(kinds), camera});
@@ -209,7 +209,7 @@ void Intake::begin_again(std::size_t topic) {
   state.last_ns.reset();
   state.jump = jump_of(topics_[topic]);
   const Kind kind = topics_[topic].kinds.front();
-  if (kind == Kind::kJoints) cells_ = LiveCells(options_.drive_is_angle, options_.max_gap_s);
+  if (kind == Kind::kJoints) cells_ = LiveCells(options_.drive_is_angle(), options_.max_gap_s);
   if (kind == Kind::kImage) image_order_ = ImageOrder(options_.image_topics.size());
 }
 

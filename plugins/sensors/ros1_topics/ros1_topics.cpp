@@ -27,76 +27,54 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::array kOwnParams{
-    ParamSpec{.name = "master_uri",
-              .type = ParamType::kString,
-              .fallback = "",
-              .help = "http://HOST:PORT of the ROS master; empty: the environment's "
-                      "ROS_MASTER_URI, or else this machine's"},
-    ParamSpec{.name = "connect_timeout_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "2",
-              .min = 0.,
-              .max = 3600.,
-              .help = "how long to wait for a ROS master"},
-    ParamSpec{.name = "idle_timeout_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0",
-              .min = 0.,
-              .max = 1e6,
-              .help = "the run ends when nothing has come for this long; 0: it goes on"},
-    ParamSpec{.name = "max_waiting_images",
-              .type = ParamType::kInt,
-              .fallback = "32",
-              .min = 2.,
-              .max = 10000.,
-              .help = "images that are held until they are taken; then the oldest are dropped"},
-    ParamSpec{.name = "publish",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "whether the estimate is published: odometry, tf and diagnostics"},
-    ParamSpec{.name = "odometry_topic_out",
-              .type = ParamType::kString,
-              .fallback = "viwo/odometry",
-              .help = "nav_msgs/Odometry"},
-    ParamSpec{.name = "publish_tf",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "whether the pose is on /tf, too"},
-    ParamSpec{.name = "world_frame",
-              .type = ParamType::kString,
-              .fallback = "odom",
-              .help = "frame of the poses"},
-    ParamSpec{.name = "body_frame",
-              .type = ParamType::kString,
-              .fallback = "imu",
-              .help = "frame whose pose is published"},
-    ParamSpec{.name = "p_IinB_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .fallback = "[0, 0, 0]",
-              .help = "origin of the IMU in body_frame"},
-    ParamSpec{.name = "rpy_ItoB_rad",
-              .type = ParamType::kNumbers,
-              .unit = "rad",
-              .fallback = "[0, 0, 0]",
-              .help = "roll, pitch, yaw of the IMU in body_frame, R_ItoB = Rz Ry Rx"},
-    ParamSpec{.name = "sigma_rate_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "0.01",
-              .min = 0.,
-              .help = "of the angular rate in the published twist"},
-    ParamSpec{.name = "warn_latency_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0.25",
-              .min = 0.,
-              .help = "a longer time from image to pose is a warning in the diagnostics"}};
+struct Params : bag::TopicOptions {
+  std::string master_uri;
+  double connect_timeout_s = 2.;
+  double idle_timeout_s = 0.;
+  int max_waiting_images = 32;
+  bool publish = true;
+  std::string odometry_topic_out = "viwo/odometry";
+  bool publish_tf = true;
+  std::string world_frame = "odom";
+  std::string body_frame = "imu";
+  Eigen::Vector3d p_IinB_m{0., 0., 0.};
+  Eigen::Vector3d rpy_ItoB_rad{0., 0., 0.};
+  double sigma_rate_rad_per_s = 0.01;
+  double warn_latency_s = 0.25;
 
-constexpr auto kParams = log::joined(bag::kTopicParams, kOwnParams);
+  void bind(ParamBinder& b) {
+    bag::TopicOptions::bind(b);
+    b(VIWO_PARAM(master_uri),
+      {.help = "http://HOST:PORT of the ROS master; empty: the environment's "
+               "ROS_MASTER_URI, or else this machine's"});
+    b(VIWO_PARAM(connect_timeout_s),
+      {.unit = "s", .min = 0., .max = 3600., .help = "how long to wait for a ROS master"});
+    b(VIWO_PARAM(idle_timeout_s),
+      {.unit = "s",
+       .min = 0.,
+       .max = 1e6,
+       .help = "the run ends when nothing has come for this long; 0: it goes on"});
+    b(VIWO_PARAM(max_waiting_images),
+      {.min = 2.,
+       .max = 10000.,
+       .help = "images that are held until they are taken; then the oldest are dropped"});
+    b(VIWO_PARAM(publish),
+      {.help = "whether the estimate is published: odometry, tf and diagnostics"});
+    b(VIWO_PARAM(odometry_topic_out), {.help = "nav_msgs/Odometry"});
+    b(VIWO_PARAM(publish_tf), {.help = "whether the pose is on /tf, too"});
+    b(VIWO_PARAM(world_frame), {.help = "frame of the poses"});
+    b(VIWO_PARAM(body_frame), {.help = "frame whose pose is published"});
+    b(VIWO_PARAM(p_IinB_m), {.unit = "m", .help = "origin of the IMU in body_frame"});
+    b(VIWO_PARAM(rpy_ItoB_rad),
+      {.unit = "rad", .help = "roll, pitch, yaw of the IMU in body_frame, R_ItoB = Rz Ry Rx"});
+    b(VIWO_PARAM(sigma_rate_rad_per_s),
+      {.unit = "rad/s", .min = 0., .help = "of the angular rate in the published twist"});
+    b(VIWO_PARAM(warn_latency_s),
+      {.unit = "s",
+       .min = 0.,
+       .help = "a longer time from image to pose is a warning in the diagnostics"});
+  }
+};
 
 constexpr auto kPoll = 100ms;           ///< how late an end that nobody signals is seen
 constexpr auto kSilence = 2s;           ///< without any message the master is asked for
@@ -104,29 +82,21 @@ constexpr auto kTopicSilence = 1000ms;  ///< of one topic: worth a warning
 constexpr auto kPublisherWait = 3s;     ///< before topics without publisher are named
 constexpr auto kProbe = 1000ms;
 
-Eigen::Vector3d three(const ParamSet& params, const std::string& name) {
-  const auto values = params.numbers(name);
-  if (values.size() != 3) {
-    throw ParamError(name, "expected 3 numbers, got " + std::to_string(values.size()));
-  }
-  return {values[0], values[1], values[2]};
-}
-
-OutputFrames frames_from(const ParamSet& params) {
+OutputFrames frames_from(const Params& params) {
   OutputFrames frames;
-  frames.world = params.text("world_frame");
-  frames.body = params.text("body_frame");
+  frames.world = params.world_frame;
+  frames.body = params.body_frame;
   if (frames.world.empty()) throw ParamError("world_frame", "a frame needs a name");
   if (frames.body.empty()) throw ParamError("body_frame", "a frame needs a name");
   if (frames.world == frames.body) {
     throw ParamError("body_frame", "'" + frames.body + "' is the world_frame, too");
   }
-  const Eigen::Vector3d rpy = three(params, "rpy_ItoB_rad");
+  const Eigen::Vector3d rpy = params.rpy_ItoB_rad;
   frames.R_ItoB = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
                    Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
                    Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
                       .toRotationMatrix();
-  frames.p_IinB = three(params, "p_IinB_m");
+  frames.p_IinB = params.p_IinB_m;
   return frames;
 }
 
@@ -136,23 +106,23 @@ std::chrono::milliseconds milliseconds(double seconds) {
 
 class Ros1Topics final : public Sensor {
  public:
-  Ros1Topics(const ParamSet& params, const HostServices& services)
+  Ros1Topics(const Params& params, const HostServices& services)
       : services_(services),
-        options_(options_from(params)),
+        options_(checked(params)),
         frames_(frames_from(params)),
-        sigma_rate_(params.number("sigma_rate_rad_per_s")),
-        warn_latency_s_(params.number("warn_latency_s")),
-        idle_timeout_(milliseconds(params.number("idle_timeout_s"))),
-        master_(master_address(params.text("master_uri"))),
-        queue_(static_cast<std::size_t>(params.integer("max_waiting_images"))),
+        sigma_rate_(params.sigma_rate_rad_per_s),
+        warn_latency_s_(params.warn_latency_s),
+        idle_timeout_(milliseconds(params.idle_timeout_s)),
+        master_(master_address(params.master_uri)),
+        queue_(static_cast<std::size_t>(params.max_waiting_images)),
         intake_(options_, services_, queue_) {
-    const std::string& out = params.text("odometry_topic_out");
+    const std::string& out = params.odometry_topic_out;
     check_name("odometry_topic_out", out);
-    join(master_, milliseconds(params.number("connect_timeout_s")));
+    join(master_, milliseconds(params.connect_timeout_s));
     node_ = std::make_unique<ros::NodeHandle>();
     node_->setCallbackQueue(&callbacks_);
     subscribe();
-    if (params.flag("publish")) advertise(out, params.flag("publish_tf"));
+    if (params.publish) advertise(out, params.publish_tf);
     watch_ = node_->createWallTimer(ros::WallDuration(1.),
                                     [this](const ros::WallTimerEvent&) { watch(); });
     // Two threads: watch() may wait for the master, messages must not.
@@ -307,7 +277,7 @@ class Ros1Topics final : public Sensor {
 
 VIWO_REGISTER(Sensor, Ros1Topics, "ros1_topics", "1.0.0",
               "IMU, images, wheels and poses of a running ROS 1 system; publishes the estimate",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo::ros1

@@ -232,7 +232,7 @@ TEST_F(IntakeTest, MakesCausalCellsOfRates) {
 
 TEST_F(IntakeTest, MakesCellsOfAnglesWhoseRatesAreExactInTheMean) {
   TopicOptions options = wheels();
-  options.drive_is_angle = true;
+  options.drive_input = TopicOptions::Drive::kPosition;
   Intake intake = make(options);
   take(intake, 0, joint_message(kTime, 1., 2., 0.1));
   take(intake, 0, joint_message(kTime + 100'000'000, 3., 2.5, 0.3));

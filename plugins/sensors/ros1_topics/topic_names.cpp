@@ -24,16 +24,16 @@ void check_name(const std::string& key, const std::string& topic) {
   }
 }
 
-bag::TopicOptions options_from(const ParamSet& params) {
-  bag::TopicOptions options = bag::topic_options_from(params, "imu_topic", "listen to");
+const bag::TopicOptions& checked(const bag::TopicOptions& topics) {
+  topics.check("imu_topic", "listen to");
   std::set<std::string> seen;
-  check_topic("imu_topic", options.imu_topic, seen);
-  for (const std::string& topic : options.image_topics) check_topic("image_topics", topic, seen);
-  check_topic("joint_topic", options.joint_topic, seen);
-  check_topic("pose_topic", options.pose_topic, seen);
-  check_topic("odometry_topic", options.odometry_topic, seen);
-  check_topic("gnss_topic", options.gnss_topic, seen);
-  return options;
+  check_topic("imu_topic", topics.imu_topic, seen);
+  for (const std::string& topic : topics.image_topics) check_topic("image_topics", topic, seen);
+  check_topic("joint_topic", topics.joint_topic, seen);
+  check_topic("pose_topic", topics.pose_topic, seen);
+  check_topic("odometry_topic", topics.odometry_topic, seen);
+  check_topic("gnss_topic", topics.gnss_topic, seen);
+  return topics;
 }
 
 }  // namespace viwo::ros1

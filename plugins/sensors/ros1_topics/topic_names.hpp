@@ -4,15 +4,14 @@
 #include <string>
 
 #include "topic_options.hpp"
-#include "viwo/api/params.hpp"
 
 namespace viwo::ros1 {
 
 /// ParamError for what cannot be the name of a topic.
 void check_name(const std::string& key, const std::string& topic);
 
-/// ParamError for names that are none in ROS, for topics that are wanted twice and for parameters
-/// that contradict each other.
-bag::TopicOptions options_from(const ParamSet& params);
+/// `topics`; ParamError for names that are none in ROS, for topics that are wanted twice and for
+/// parameters that contradict each other.
+const bag::TopicOptions& checked(const bag::TopicOptions& topics);
 
 }  // namespace viwo::ros1

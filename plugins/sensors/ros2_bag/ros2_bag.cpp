@@ -1,5 +1,4 @@
 // Sensor ros2_bag: IMU, images, wheels and poses of a ROS 2 bag (model.md).
-#include <array>
 
 #include "bag_sensor.hpp"
 #include "ros2_file.hpp"
@@ -8,20 +7,24 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kFileParams{
-    ParamSpec{.name = "path",
-              .type = ParamType::kPath,
-              .help = "the folder of a bag, with metadata.yaml, or its .db3"}};
-constexpr auto kParams = log::joined(kFileParams, bag::kBagParams);
+struct Params : bag::BagOptions {
+  std::filesystem::path path;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path),
+      {.required = true, .help = "the folder of a bag, with metadata.yaml, or its .db3"});
+    bag::BagOptions::bind(b);
+  }
+};
 
 class Ros2Bag final : public bag::BagSensor {
  public:
-  Ros2Bag(const ParamSet& params, const HostServices& /*services*/)
-      : BagSensor(bag::open_ros2(params.text("path")), bag::options_from(params)) {}
+  Ros2Bag(const Params& params, const HostServices& /*services*/)
+      : BagSensor(bag::open_ros2(params.path), params.checked()) {}
 };
 
 VIWO_REGISTER(Sensor, Ros2Bag, "ros2_bag", "1.0.0",
-              "IMU, images, wheels and poses of a ROS 2 bag (SQLite)", "Apache-2.0", kParams);
+              "IMU, images, wheels and poses of a ROS 2 bag (SQLite)", "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -8,43 +8,40 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
-    ParamSpec{.name = "path", .type = ParamType::kPath, .help = "the recording, plain or gzipped"},
-    ParamSpec{.name = "drive",
-              .type = ParamType::kStrings,
-              .help = "joints that drive, in the order of the wheels"},
-    ParamSpec{.name = "steer",
-              .type = ParamType::kStrings,
-              .fallback = "[]",
-              .help = "joints that steer, in the order of the wheels"},
-    ParamSpec{.name = "drive_input",
-              .type = ParamType::kString,
-              .fallback = "position",
-              .choices = "position|velocity",
-              .help = "drive rates from differences of positions, or from velocities"},
-    log::kClockParam,
-    log::kReceptionUtcOffsetParam,
-    log::kStrideParam,
-    log::kMaxGapParam,
-    log::kMaxRejectedFractionParam};
+struct Params : log::TextClockParams, log::StrideParams, log::LimitParams {
+  std::filesystem::path path;
+  std::vector<std::string> drive;
+  std::vector<std::string> steer;
+  enum class Drive { kPosition, kVelocity };
+  Drive drive_input = Drive::kPosition;
 
-log::RosEncoderOptions options_from(const ParamSet& params) {
-  const auto drive = params.texts("drive");
-  const auto steer = params.texts("steer");
-  return {log::encoder_options_from(params, "position"),
-          log::clock_from(params),
-          {drive.begin(), drive.end()},
-          {steer.begin(), steer.end()}};
-}
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path), {.required = true, .help = "the recording, plain or gzipped"});
+    b(VIWO_PARAM(drive),
+      {.required = true, .help = "joints that drive, in the order of the wheels"});
+    b(VIWO_PARAM(steer), {.help = "joints that steer, in the order of the wheels"});
+    b(VIWO_PARAM(drive_input), {{"position", Drive::kPosition}, {"velocity", Drive::kVelocity}},
+      {.help = "drive rates from differences of positions, or from velocities"});
+    log::TextClockParams::bind(b);
+    log::StrideParams::bind(b);
+    log::LimitParams::bind(b);
+  }
+
+  log::RosEncoderOptions options() const {
+    const bool is_angle = drive_input == Drive::kPosition;
+    check_stride(is_angle, "position");
+    return {{limits(), is_angle, stride}, ros_clock(), drive, steer};
+  }
+};
 
 class RosTextEncoders final : public log::RecordingSensor<EncoderSample> {
  public:
-  RosTextEncoders(const ParamSet& params, const HostServices& /*services*/)
-      : RecordingSensor(log::read_ros_encoders(params.text("path"), options_from(params))) {}
+  RosTextEncoders(const Params& params, const HostServices& /*services*/)
+      : RecordingSensor(log::read_ros_encoders(params.path, params.options())) {}
 };
 
 VIWO_REGISTER(Sensor, RosTextEncoders, "ros_text_encoders", "1.0.0",
-              "wheel encoders from ROS JointState messages printed as text", "Apache-2.0", kParams);
+              "wheel encoders from ROS JointState messages printed as text", "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -8,21 +8,25 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
-    ParamSpec{.name = "path", .type = ParamType::kPath, .help = "the recording, plain or gzipped"},
-    log::kClockParam, log::kReceptionUtcOffsetParam, log::kMaxGapParam,
-    log::kMaxRejectedFractionParam};
+struct Params : log::TextClockParams, log::LimitParams {
+  std::filesystem::path path;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(path), {.required = true, .help = "the recording, plain or gzipped"});
+    log::TextClockParams::bind(b);
+    log::LimitParams::bind(b);
+  }
+};
 
 class RosTextPose final : public log::RecordingSensor<PoseSample> {
  public:
-  RosTextPose(const ParamSet& params, const HostServices& /*services*/)
-      : RecordingSensor(log::read_ros_poses(params.text("path"), log::clock_from(params),
-                                            log::limits_from(params))) {}
+  RosTextPose(const Params& params, const HostServices& /*services*/)
+      : RecordingSensor(log::read_ros_poses(params.path, params.ros_clock(), params.limits())) {}
 };
 
 VIWO_REGISTER(Sensor, RosTextPose, "ros_text_pose", "1.0.0",
               "reference poses from ROS PoseStamped messages printed as text", "Apache-2.0",
-              kParams);
+              Params);
 
 }  // namespace
 }  // namespace viwo

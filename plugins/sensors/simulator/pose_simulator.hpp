@@ -2,7 +2,6 @@
 // measurement for updates that name the simulator as their sensor.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -16,25 +15,36 @@
 
 namespace viwo {
 
-// clang-format off
-inline constexpr std::array kPoseParams{
-    ParamSpec{.name = "pose_rate_hz", .type = ParamType::kNumber, .unit = "Hz", .fallback = "0",
-              .min = 0., .max = 10000., .help = "rate of noisy poses of a body B on the IMU, for updates that measure with poses; 0: none"},
-    ParamSpec{.name = "sigma_pose_position_m", .type = ParamType::kNumber, .unit = "m",
-              .fallback = "0.02", .min = 0., .help = "noise of their position, per axis"},
-    ParamSpec{.name = "sigma_pose_orientation_rad", .type = ParamType::kNumber, .unit = "rad",
-              .fallback = "0.01", .min = 0., .help = "noise of their orientation, per axis of B"},
-    ParamSpec{.name = "pose_p_BinI_m", .type = ParamType::kNumbers, .unit = "m",
-              .fallback = "[0, 0, 0]", .help = "where B is seen from the IMU"},
-    ParamSpec{.name = "pose_rpy_ItoB_rad", .type = ParamType::kNumbers, .unit = "rad",
-              .fallback = "[0, 0, 0]", .min = -3.2, .max = 3.2,
-              .help = "how the IMU is turned in B: R_ItoB = Rz(third) Ry(second) Rx(first)"},
-    ParamSpec{.name = "pose_outlier_probability", .type = ParamType::kNumber, .fallback = "0",
-              .min = 0., .max = 1., .help = "probability that a position is off"},
-    ParamSpec{.name = "pose_outlier_m", .type = ParamType::kNumber, .unit = "m", .fallback = "2",
-              .min = 0., .help = "by up to how much, each axis"},
+struct PoseParams {
+  double pose_rate_hz = 0.;
+  double sigma_pose_position_m = 0.02;
+  double sigma_pose_orientation_rad = 0.01;
+  Eigen::Vector3d pose_p_BinI_m{0., 0., 0.};
+  Eigen::Vector3d pose_rpy_ItoB_rad{0., 0., 0.};
+  double pose_outlier_probability = 0.;
+  double pose_outlier_m = 2.;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(pose_rate_hz), {.unit = "Hz",
+                                 .min = 0.,
+                                 .max = 10000.,
+                                 .help = "rate of noisy poses of a body B on the IMU, for updates "
+                                         "that measure with poses; 0: none"});
+    b(VIWO_PARAM(sigma_pose_position_m),
+      {.unit = "m", .min = 0., .help = "noise of their position, per axis"});
+    b(VIWO_PARAM(sigma_pose_orientation_rad),
+      {.unit = "rad", .min = 0., .help = "noise of their orientation, per axis of B"});
+    b(VIWO_PARAM(pose_p_BinI_m), {.unit = "m", .help = "where B is seen from the IMU"});
+    b(VIWO_PARAM(pose_rpy_ItoB_rad),
+      {.unit = "rad",
+       .min = -3.2,
+       .max = 3.2,
+       .help = "how the IMU is turned in B: R_ItoB = Rz(third) Ry(second) Rx(first)"});
+    b(VIWO_PARAM(pose_outlier_probability),
+      {.min = 0., .max = 1., .help = "probability that a position is off"});
+    b(VIWO_PARAM(pose_outlier_m), {.unit = "m", .min = 0., .help = "by up to how much, each axis"});
+  }
 };
-// clang-format on
 
 struct PoseSimulation {
   double duration_s = 0.;
@@ -48,24 +58,20 @@ struct PoseSimulation {
   Eigen::Vector3d p_BinI = Eigen::Vector3d::Zero();
 };
 
-inline PoseSimulation pose_simulation_from(const ParamSet& params, bool exact) {
-  const auto three = [&params](const char* key) {
-    const auto values = params.numbers(key);
-    if (values.size() != 3) throw ParamError(key, "needs three numbers");
-    return Eigen::Vector3d(values[0], values[1], values[2]);
-  };
+inline PoseSimulation pose_simulation_from(const PoseParams& params, double duration_s,
+                                           std::int64_t start_ns, bool noisy, bool exact) {
   PoseSimulation out;
-  out.duration_s = params.number("duration_s");
-  out.start_ns = params.integer("start_ns");
-  out.rate_hz = params.number("pose_rate_hz");
-  const double noise = params.flag("noise") && !exact ? 1. : 0.;
-  out.sigma_position_m = noise * params.number("sigma_pose_position_m");
-  out.sigma_orientation_rad = noise * params.number("sigma_pose_orientation_rad");
-  out.outlier_probability = exact ? 0. : params.number("pose_outlier_probability");
-  out.outlier_m = params.number("pose_outlier_m");
-  const Eigen::Vector3d rpy = three("pose_rpy_ItoB_rad");
+  out.duration_s = duration_s;
+  out.start_ns = start_ns;
+  out.rate_hz = params.pose_rate_hz;
+  const double noise = noisy && !exact ? 1. : 0.;
+  out.sigma_position_m = noise * params.sigma_pose_position_m;
+  out.sigma_orientation_rad = noise * params.sigma_pose_orientation_rad;
+  out.outlier_probability = exact ? 0. : params.pose_outlier_probability;
+  out.outlier_m = params.pose_outlier_m;
+  const Eigen::Vector3d& rpy = params.pose_rpy_ItoB_rad;
   out.R_ItoB = sim::rotation_from_euler(rpy.z(), rpy.y(), rpy.x());
-  out.p_BinI = three("pose_p_BinI_m");
+  out.p_BinI = params.pose_p_BinI_m;
   return out;
 }
 

@@ -10,7 +10,6 @@
 #include "pose_simulator.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
-#include "viwo/log/sensor_params.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/drive_params.hpp"
@@ -25,45 +24,51 @@ namespace {
 /// A base that cannot move sideways slides by what the spline deviates from its motion, m/s.
 constexpr double kSliding = 1e-4;
 
-// clang-format off
-constexpr std::array kBaseParams{
-    ParamSpec{.name = "robot", .type = ParamType::kKinematics,
-              .help = "the base: its nominal intrinsics and its noise"},
-    ParamSpec{.name = "true_sigma_p_IinO_m", .type = ParamType::kNumbers, .unit = "m",
-              .fallback = "[0, 0, 0]", .help = "the true mount is p_IinO_m + a draw of these sigmas"},
-    ParamSpec{.name = "true_sigma_R_ItoO_rad", .type = ParamType::kNumbers, .unit = "rad",
-              .fallback = "[0, 0, 0]", .help = "and turned by a draw of these"},
-    ParamSpec{.name = "true_sigma_t_OtoI_s", .type = ParamType::kNumber, .unit = "s",
-              .fallback = "0", .min = 0., .help = "the true clock is t_OtoI_s + a draw of this sigma"},
-    ParamSpec{.name = "wheel_set", .type = ParamType::kString, .fallback = "''",
-              .help = "for a second simulator, the wheel set (wheel_sets.NAME) that it stands for: "
-                      "its truth is told as NAME.r_1 and so on, true states are left to the first"},
-    ParamSpec{.name = "wheels", .type = ParamType::kBool, .fallback = "true",
-              .help = "whether there are encoder samples"},
-    ParamSpec{.name = "wheel_rate_hz", .type = ParamType::kNumber, .unit = "Hz", .fallback = "100",
-              .min = 1., .max = 10000., .help = "rate of the encoder samples"},
-    ParamSpec{.name = "t_OtoI_s", .type = ParamType::kNumber, .unit = "s", .fallback = "0",
-              .min = -10., .max = 10., .help = "t_imu = t_odom + t_OtoI"},
-};
-// clang-format on
+struct Params : sim::EncoderParams, sim::DriveParams, PoseParams, sim::RigParams {
+  NestedKinematics robot;
+  Eigen::Vector3d true_sigma_p_IinO_m{0., 0., 0.};
+  Eigen::Vector3d true_sigma_R_ItoO_rad{0., 0., 0.};
+  double true_sigma_t_OtoI_s = 0.;
+  std::string wheel_set;
+  bool wheels = true;
+  double wheel_rate_hz = 100.;
+  double t_OtoI_s = 0.;
 
-constexpr auto kParams = log::joined(kBaseParams, sim::kEncoderParams, sim::kDriveParams,
-                                     kPoseParams, sim::kRigParams, sim::kTrueCameraParams);
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(robot),
+      {.required = true, .help = "the base: its nominal intrinsics and its noise"});
+    b(VIWO_PARAM(true_sigma_p_IinO_m),
+      {.unit = "m", .help = "the true mount is p_IinO_m + a draw of these sigmas"});
+    b(VIWO_PARAM(true_sigma_R_ItoO_rad), {.unit = "rad", .help = "and turned by a draw of these"});
+    b(VIWO_PARAM(true_sigma_t_OtoI_s),
+      {.unit = "s", .min = 0., .help = "the true clock is t_OtoI_s + a draw of this sigma"});
+    b(VIWO_PARAM(wheel_set),
+      {.help = "for a second simulator, the wheel set (wheel_sets.NAME) that it stands for: "
+               "its truth is told as NAME.r_1 and so on, true states are left to the first"});
+    b(VIWO_PARAM(wheels), {.help = "whether there are encoder samples"});
+    b(VIWO_PARAM(wheel_rate_hz),
+      {.unit = "Hz", .min = 1., .max = 10000., .help = "rate of the encoder samples"});
+    b(VIWO_PARAM(t_OtoI_s),
+      {.unit = "s", .min = -10., .max = 10., .help = "t_imu = t_odom + t_OtoI"});
+    sim::EncoderParams::bind(b);
+    sim::DriveParams::bind(b);
+    PoseParams::bind(b);
+    sim::RigParams::bind(b);
+  }
+};
 
 /// What is written, moved by a draw: the truth that nobody knows.
-void draw_mount(const ParamSet& params, std::uint64_t seed, sim::Mounting& mounting,
+void draw_mount(const Params& params, std::uint64_t seed, sim::Mounting& mounting,
                 double& t_OtoI_s) {
   sim::RandomStream random(seed, sim::Stream::kTrueMount);
-  const auto draw = [&](const char* key) {
-    const auto sigma = params.numbers(key);
-    if (sigma.size() != 3) throw ParamError(key, "needs three numbers");
+  const auto draw = [&](const Eigen::Vector3d& sigma) {
     Eigen::Vector3d out;
-    for (int i = 0; i < 3; ++i) out[i] = sigma[static_cast<std::size_t>(i)] * random.gaussian();
+    for (int i = 0; i < 3; ++i) out[i] = sigma[i] * random.gaussian();
     return out;
   };
-  mounting.p_IinO += draw("true_sigma_p_IinO_m");
-  mounting.R_ItoO = exp_so3(draw("true_sigma_R_ItoO_rad")) * mounting.R_ItoO;
-  t_OtoI_s += params.number("true_sigma_t_OtoI_s") * random.gaussian();
+  mounting.p_IinO += draw(params.true_sigma_p_IinO_m);
+  mounting.R_ItoO = exp_so3(draw(params.true_sigma_R_ItoO_rad)) * mounting.R_ItoO;
+  t_OtoI_s += params.true_sigma_t_OtoI_s * random.gaussian();
 }
 
 std::vector<CalibrationSample> calibration_truth(const ModelDescription& robot,
@@ -82,15 +87,16 @@ std::vector<CalibrationSample> calibration_truth(const ModelDescription& robot,
   return out;
 }
 
-log::Recording<Measurement> simulate(const ParamSet& params, const HostServices& services) {
-  const KinematicModel& robot = params.kinematics("robot");
+log::Recording<Measurement> simulate(const Params& params, const HostServices& services) {
+  const KinematicModel& robot = *params.robot.model;
   ModelDescription description;
   robot.describe(description);
-  const std::int64_t start_ns = params.integer("start_ns");
-  sim::RigSimulation rig = sim::rig_from(params, params.number("duration_s"), start_ns, services);
-  sim::EncoderSimulation wheels = sim::encoder_simulation_from(params, description);
-  wheels.rate_hz = params.number("wheel_rate_hz");
-  wheels.time_offset_s = params.number("t_OtoI_s");
+  const std::int64_t start_ns = params.start_ns;
+  sim::RigSimulation rig = sim::rig_from(params, params.duration_s, start_ns, services);
+  sim::EncoderSimulation wheels =
+      sim::encoder_simulation_from(params, description, params.duration_s, start_ns, params.noise);
+  wheels.rate_hz = params.wheel_rate_hz;
+  wheels.time_offset_s = params.t_OtoI_s;
   wheels.sliding_m_per_s = kSliding;
   if (services.exact) {
     wheels.make_exact();
@@ -99,11 +105,11 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
   }
   const sim::BodyTrajectory trajectory =
       sim::drive_from(params, sim::rig_end_s(rig), std::abs(wheels.time_offset_s));
-  const double scale = services.exact ? 0. : params.number("true_intrinsics_scale");
+  const double scale = services.exact ? 0. : params.true_intrinsics_scale;
   const Intrinsics x_WI = sim::perturbed_intrinsics(description, scale, services.seed);
 
   log::Recording<Measurement> out;
-  const std::string& wheel_set = params.text("wheel_set");
+  const std::string& wheel_set = params.wheel_set;
   for (CalibrationSample truth :
        calibration_truth(description, x_WI, rig.mounting, wheels.time_offset_s, start_ns)) {
     if (!wheel_set.empty()) truth.name = wheel_set + "." + truth.name;
@@ -115,14 +121,16 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
                   [](const Measurement& m) { return m.get_if<StateSample>() != nullptr; });
   }
   std::move(from_rig.begin(), from_rig.end(), std::back_inserter(out.samples));
-  const auto poses = simulate_poses(trajectory, rig.mounting,
-                                    pose_simulation_from(params, services.exact), services.seed);
+  const auto poses = simulate_poses(
+      trajectory, rig.mounting,
+      pose_simulation_from(params, params.duration_s, start_ns, params.noise, services.exact),
+      services.seed);
   out.samples.insert(out.samples.end(), poses.begin(), poses.end());
-  if (params.flag("wheels")) {
+  if (params.wheels) {
     try {
       const auto from_wheels = sim::simulate_encoders(
-          robot, x_WI, [&trajectory](double t_s) { return trajectory.twist(t_s); },
-          params.text("motion"), wheels, services.seed);
+          robot, x_WI, [&trajectory](double t_s) { return trajectory.twist(t_s); }, params.motion,
+          wheels, services.seed);
       out.samples.insert(out.samples.end(), from_wheels.begin(), from_wheels.end());
     } catch (const InputError& error) {
       throw ParamError("motion", error.what());
@@ -132,26 +140,26 @@ log::Recording<Measurement> simulate(const ParamSet& params, const HostServices&
   return out;
 }
 
-SampleTypes kinds_of(const ParamSet& params) {
+SampleTypes kinds_of(const Params& params) {
   SampleTypes out = sim::rig_kinds(params);
-  if (!params.text("wheel_set").empty()) std::erase(out, &sample_type<StateSample>());
+  if (!params.wheel_set.empty()) std::erase(out, &sample_type<StateSample>());
   const SampleType* const truth = &sample_type<CalibrationSample>();
   if (std::find(out.begin(), out.end(), truth) == out.end()) out.push_back(truth);
-  if (params.number("pose_rate_hz") > 0.) out.push_back(&sample_type<PoseSample>());
-  if (params.flag("wheels")) out.push_back(&sample_type<EncoderSample>());
+  if (params.pose_rate_hz > 0.) out.push_back(&sample_type<PoseSample>());
+  if (params.wheels) out.push_back(&sample_type<EncoderSample>());
   return out;
 }
 
 class Simulator final : public log::RecordingSensor<Measurement> {
  public:
-  Simulator(const ParamSet& params, const HostServices& services)
+  Simulator(const Params& params, const HostServices& services)
       : RecordingSensor(simulate(params, services), kinds_of(params)) {}
   bool can_be_exact() const override { return true; }
 };
 
 VIWO_REGISTER(Sensor, Simulator, "simulator", "1.0.0",
               "IMU, cameras, encoders and truth of any base that drives on a ground", "Apache-2.0",
-              kParams);
+              Params);
 
 }  // namespace
 }  // namespace viwo

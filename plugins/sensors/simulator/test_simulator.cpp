@@ -193,7 +193,8 @@ TEST(Simulator, SaysWhatItRefusesAndWhere) {
     const std::string text = error_of(section_of(rest, robot));
     return text.substr(std::min(text.find("sensor."), text.size()));
   };
-  EXPECT_EQ(refusal("p_IinO_m: [1, 2]"), "sensor.p_IinO_m: needs 3 numbers, not 2");
+  EXPECT_EQ(refusal("p_IinO_m: [1, 2]"),
+            "sensor.p_IinO_m: needs 3 numbers, not 2 (where the IMU sits on the base, m)");
   EXPECT_EQ(refusal("landmark_min_m: 8"), "sensor.landmark_max_m: is less than landmark_min_m");
   EXPECT_EQ(refusal("n_cameras: 2, camera_clock_error_s: [0, 0, 0]"),
             "sensor.camera_clock_error_s: needs one number, or one for each of the 2 cameras, not "

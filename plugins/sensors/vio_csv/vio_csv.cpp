@@ -19,21 +19,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kParams{
-    ParamSpec{.name = "folder",
-              .type = ParamType::kPath,
-              .help = "where imu.csv, features.csv and groundtruth.csv are, plain or gzipped"},
-    ParamSpec{.name = "imu", .type = ParamType::kBool, .fallback = "true", .help = "read imu.csv"},
-    ParamSpec{.name = "features",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "read features.csv"},
-    ParamSpec{.name = "truth",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "read groundtruth.csv, or init_state.csv where there is no groundtruth.csv"},
-    log::kMaxGapParam,
-    log::kMaxRejectedFractionParam};
+struct Params : log::LimitParams {
+  std::filesystem::path folder;
+  bool imu = true;
+  bool features = true;
+  bool truth = true;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(folder),
+      {.required = true,
+       .help = "where imu.csv, features.csv and groundtruth.csv are, plain or gzipped"});
+    b(VIWO_PARAM(imu), {.help = "read imu.csv"});
+    b(VIWO_PARAM(features), {.help = "read features.csv"});
+    b(VIWO_PARAM(truth),
+      {.help = "read groundtruth.csv, or init_state.csv where there is no groundtruth.csv"});
+    log::LimitParams::bind(b);
+  }
+};
 
 bool is_there(const fs::path& file) {
   std::error_code ignored;
@@ -128,15 +130,15 @@ struct Track {
 
 class VioCsv final : public Sensor {
  public:
-  VioCsv(const ParamSet& params, const HostServices& /*services*/) {
-    const fs::path folder = params.text("folder");
-    const log::LogLimits limits = log::limits_from(params);
-    if (!params.flag("imu") && !params.flag("features") && !params.flag("truth")) {
+  VioCsv(const Params& params, const HostServices& /*services*/) {
+    const fs::path folder = params.folder;
+    const log::LogLimits limits = params.limits();
+    if (!params.imu && !params.features && !params.truth) {
       throw ParamError("folder", "nothing to read: imu, features and truth are all false");
     }
-    if (params.flag("truth")) keep(states_, read_states(folder, limits));
-    if (params.flag("imu")) keep(imu_, read_imu(folder, limits));
-    if (params.flag("features")) keep(features_, read_features(folder, limits));
+    if (params.truth) keep(states_, read_states(folder, limits));
+    if (params.imu) keep(imu_, read_imu(folder, limits));
+    if (params.features) keep(features_, read_features(folder, limits));
   }
 
   SampleTypes yields() const override { return yields_; }
@@ -185,7 +187,7 @@ class VioCsv final : public Sensor {
 
 VIWO_REGISTER(Sensor, VioCsv, "vio_csv", "1.0.0",
               "inertial measurements, feature tracks and reference states from CSV exports",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -42,7 +42,7 @@ std::optional<MissingJoint> joint_reading(const Joints& joints, const TopicOptio
   out.t_ns = joints.t_ns;
   out.n_drive = static_cast<int>(options.drive_joints.size());
   out.n_steer = static_cast<int>(options.steer_joints.size());
-  const What drive = options.drive_is_angle ? What::kPosition : What::kVelocity;
+  const What drive = options.drive_is_angle() ? What::kPosition : What::kVelocity;
   auto missing = pick(joints, options.drive_joints, drive, out.drive);
   if (!missing) missing = pick(joints, options.steer_joints, What::kPosition, out.steer_rad);
   return missing;

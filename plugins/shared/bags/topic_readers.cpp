@@ -151,7 +151,7 @@ class JointReader final : public TopicReader {
   }
 
   void move_samples(BagSamples& out) override {
-    if (options_.drive_is_angle) {
+    if (options_.drive_is_angle()) {
       out.wheels = log::cells_from_angles(readings_, options_.max_gap_s, options_.stride);
       if (!out.wheels.empty()) return;
       throw InputError("topic '" + filter_.topic() +

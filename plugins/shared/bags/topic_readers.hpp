@@ -28,7 +28,7 @@ class TopicReader {
 
  protected:
   TopicReader(const BagOptions& options, const std::string& topic, const log::LogLimits& limits)
-      : filter_(limits, topic), by_reception_(options.by_reception) {}
+      : filter_(limits, topic), by_reception_(options.by_reception()) {}
   virtual void move_samples(BagSamples& out) = 0;
   /// Before the number of messages is judged.
   virtual void check(const std::string& /*bag*/) const {}

@@ -20,16 +20,9 @@ void append(const char* key, std::span<const double> values, int n, std::vector<
 
 }  // namespace
 
-SwerveBase::SwerveBase(const ParamSet& params)
-    : prior_sigma_radius_m_(params.number("prior_sigma_radius_m")),
-      prior_sigma_position_m_(params.number("prior_sigma_position_m")),
-      prior_sigma_steer_offset_rad_(params.number("prior_sigma_steer_offset_rad")),
-      prior_sigma_steer_gain_(params.number("prior_sigma_steer_gain")),
-      sigma_drive_rad_per_s_(params.number("sigma_drive_rad_per_s")),
-      sigma_steer_rad_(params.number("sigma_steer_rad")),
-      sigma_lateral_m_per_s_(params.number("sigma_lateral_m_per_s")) {
-  const auto x_m = params.numbers("x_m");
-  const auto y_m = params.numbers("y_m");
+SwerveBase::SwerveBase(const Params& params) : params_(params) {
+  const auto& x_m = params.x_m;
+  const auto& y_m = params.y_m;
   n_ = static_cast<int>(x_m.size());
   if (n_ < 2 || n_ > kMaxDrives) {
     throw ParamError("x_m", "has " + std::to_string(n_) + " wheels, this model takes 2 to " +
@@ -42,10 +35,10 @@ SwerveBase::SwerveBase(const ParamSet& params)
   bool apart = false;
   for (std::size_t j = 1; j < x_m.size(); ++j) apart |= x_m[j] != x_m[0] || y_m[j] != y_m[0];
   if (!apart) throw ParamError("x_m", "all wheels are at the same place: no yaw rate can be told");
-  append("radius_m", params.numbers("radius_m"), n_, nominal_);
+  append("radius_m", params.radius_m, n_, nominal_);
   nominal_.insert(nominal_.end(), x_m.begin(), x_m.end());
   nominal_.insert(nominal_.end(), y_m.begin(), y_m.end());
-  append("steer_offset_rad", params.numbers("steer_offset_rad"), n_, nominal_);
+  append("steer_offset_rad", params.steer_offset_rad, n_, nominal_);
   if (!has_gains()) return;
   nominal_.resize(nominal_.size() + x_m.size(), 0.);
   if (nominal_.size() > static_cast<std::size_t>(kMaxIntrinsics)) {
@@ -68,11 +61,11 @@ void SwerveBase::describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& 
     double prior_sigma;
     bool holds_gauge;
   };
-  const Group groups[] = {{"r_", "m", prior_sigma_radius_m_, false},
-                          {"x_", "m", prior_sigma_position_m_, true},
-                          {"y_", "m", prior_sigma_position_m_, true},
-                          {"delta_o", "rad", prior_sigma_steer_offset_rad_, true},
-                          {"kappa_", "1", prior_sigma_steer_gain_, false}};
+  const Group groups[] = {{"r_", "m", params_.prior_sigma_radius_m, false},
+                          {"x_", "m", params_.prior_sigma_position_m, true},
+                          {"y_", "m", params_.prior_sigma_position_m, true},
+                          {"delta_o", "rad", params_.prior_sigma_steer_offset_rad, true},
+                          {"kappa_", "1", params_.prior_sigma_steer_gain, false}};
   for (const Group& group : groups) {
     if (!(group.prior_sigma > 0.)) continue;
     for (int j = 0; j < n_; ++j) {
@@ -86,15 +79,16 @@ void SwerveBase::describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& 
   }
   for (int j = 0; j < n_; ++j) {
     out.noises.push_back(
-        {NoiseKind::kDrive, j, sigma_drive_rad_per_s_, {k * j, k}, "sigma_drive_rad_per_s"});
+        {NoiseKind::kDrive, j, params_.sigma_drive_rad_per_s, {k * j, k}, "sigma_drive_rad_per_s"});
   }
   for (int j = 0; j < n_; ++j) {
-    out.noises.push_back({NoiseKind::kSteer, j, sigma_steer_rad_, {k * j, k}, "sigma_steer_rad"});
+    out.noises.push_back(
+        {NoiseKind::kSteer, j, params_.sigma_steer_rad, {k * j, k}, "sigma_steer_rad"});
   }
   if (rows_per_wheel == RowsPerWheel::kDriveOnly) return;
   for (int j = 0; j < n_; ++j) {
     out.noises.push_back(
-        {NoiseKind::kSlip, j, sigma_lateral_m_per_s_, {k * j, k}, "sigma_lateral_m_per_s"});
+        {NoiseKind::kSlip, j, params_.sigma_lateral_m_per_s, {k * j, k}, "sigma_lateral_m_per_s"});
   }
 }
 

@@ -14,78 +14,54 @@
 
 namespace viwo::swerve {
 
-inline constexpr std::array kParams{
-    ParamSpec{.name = "x_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .help = "wheel contact points along x (forward) in O, one per wheel"},
-    ParamSpec{.name = "y_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .help = "wheel contact points along y (left) in O, one per wheel"},
-    ParamSpec{.name = "radius_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "wheel radii, one for all or one per wheel"},
-    ParamSpec{.name = "steer_offset_rad",
-              .type = ParamType::kNumbers,
-              .unit = "rad",
-              .fallback = "[0]",
-              .help =
-                  "reading of the steering encoder when the wheel points along x, one for all or "
-                  "one per wheel"},
-    ParamSpec{.name = "prior_sigma_radius_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.0003",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the radii are known"},
-    ParamSpec{.name = "prior_sigma_position_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.002",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well each coordinate of a contact point is known"},
-    ParamSpec{.name = "prior_sigma_steer_offset_rad",
-              .type = ParamType::kNumber,
-              .unit = "rad",
-              .fallback = "0.01",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how well the steering offsets are known"},
-    ParamSpec{.name = "prior_sigma_steer_gain",
-              .type = ParamType::kNumber,
-              .unit = "1",
-              .fallback = "0",
-              .min = 0.,
-              .help = "how well it is known that the steering angles turn by what is read; 0: they "
-                      "do, and no gains are estimated"},
-    ParamSpec{.name = "sigma_drive_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "noise of a drive rate, per sample"},
-    ParamSpec{.name = "sigma_steer_rad",
-              .type = ParamType::kNumber,
-              .unit = "rad",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "noise of a steering angle, per sample"},
-    ParamSpec{
-        .name = "sigma_lateral_m_per_s",
-        .type = ParamType::kNumber,
-        .unit = "m/s",
-        .fallback = "0.001",
-        .min = 0.,
-        .min_exclusive = true,
-        .help = "sideways velocity of a contact point, per sample (unused by drive-only models)"},
+struct Params {
+  std::vector<double> x_m;
+  std::vector<double> y_m;
+  std::vector<double> radius_m;
+  std::vector<double> steer_offset_rad{0.};
+  double prior_sigma_radius_m = 0.0003;
+  double prior_sigma_position_m = 0.002;
+  double prior_sigma_steer_offset_rad = 0.01;
+  double prior_sigma_steer_gain = 0.;
+  double sigma_drive_rad_per_s = 0.001;
+  double sigma_steer_rad = 0.001;
+  double sigma_lateral_m_per_s = 0.001;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(x_m), {.unit = "m",
+                        .required = true,
+                        .help = "wheel contact points along x (forward) in O, one per wheel"});
+    b(VIWO_PARAM(y_m), {.unit = "m",
+                        .required = true,
+                        .help = "wheel contact points along y (left) in O, one per wheel"});
+    b(VIWO_PARAM(radius_m), {.unit = "m",
+                             .above = 0.,
+                             .required = true,
+                             .help = "wheel radii, one for all or one per wheel"});
+    b(VIWO_PARAM(steer_offset_rad),
+      {.unit = "rad",
+       .help = "reading of the steering encoder when the wheel points along x, one for all or "
+               "one per wheel"});
+    b(VIWO_PARAM(prior_sigma_radius_m),
+      {.unit = "m", .above = 0., .help = "how well the radii are known"});
+    b(VIWO_PARAM(prior_sigma_position_m),
+      {.unit = "m", .above = 0., .help = "how well each coordinate of a contact point is known"});
+    b(VIWO_PARAM(prior_sigma_steer_offset_rad),
+      {.unit = "rad", .above = 0., .help = "how well the steering offsets are known"});
+    b(VIWO_PARAM(prior_sigma_steer_gain),
+      {.unit = "1",
+       .min = 0.,
+       .help = "how well it is known that the steering angles turn by what is read; 0: they "
+               "do, and no gains are estimated"});
+    b(VIWO_PARAM(sigma_drive_rad_per_s),
+      {.unit = "rad/s", .above = 0., .help = "noise of a drive rate, per sample"});
+    b(VIWO_PARAM(sigma_steer_rad),
+      {.unit = "rad", .above = 0., .help = "noise of a steering angle, per sample"});
+    b(VIWO_PARAM(sigma_lateral_m_per_s),
+      {.unit = "m/s",
+       .above = 0.,
+       .help = "sideways velocity of a contact point, per sample (unused by drive-only models)"});
+  }
 };
 
 /// Rows that one wheel contributes, for filling in the description.
@@ -100,7 +76,7 @@ class SwerveBase : public KinematicModel {
 
  protected:
   /// Throws ParamError when the lists do not agree in length or there are fewer than two wheels.
-  explicit SwerveBase(const ParamSet& params);
+  explicit SwerveBase(const Params& params);
 
   /// Intrinsics, encoder noises, counts; rows per wheel decide the row ranges. Wheel 1's position
   /// and steering offset hold the gauge (four_wis_wid/model.md, S-11).
@@ -114,7 +90,7 @@ class SwerveBase : public KinematicModel {
   int x(int j) const { return n_ + j; }
   int y(int j) const { return 2 * n_ + j; }
   int delta_o(int j) const { return 3 * n_ + j; }
-  bool has_gains() const { return prior_sigma_steer_gain_ > 0.; }
+  bool has_gains() const { return params_.prior_sigma_steer_gain > 0.; }
   int kappa(int j) const { return 4 * n_ + j; }  ///< only with gains
 
   /// Of wheel j: by how much it turns for each radian that is read, and where it points (S-1), rad.
@@ -126,11 +102,9 @@ class SwerveBase : public KinematicModel {
   }
 
  private:
+  Params params_;
   int n_ = 0;
   std::vector<double> nominal_;
-  double prior_sigma_radius_m_, prior_sigma_position_m_, prior_sigma_steer_offset_rad_;
-  double prior_sigma_steer_gain_;
-  double sigma_drive_rad_per_s_, sigma_steer_rad_, sigma_lateral_m_per_s_;
 };
 
 }  // namespace viwo::swerve

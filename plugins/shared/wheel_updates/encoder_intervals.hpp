@@ -36,7 +36,7 @@ class EncoderIntervals {
   std::optional<EncoderInterval> next(const FilterView& filter, double t_OtoI_s,
                                       std::span<const EncoderSample> encoders,
                                       double at_least_s = 0.) {
-    const CloneView& now = filter.clones.back();
+    const CloneState& now = filter.clones.back();
     const std::int64_t cut_ns = now.t_ns - std::llround(1e9 * t_OtoI_s);  // (WO-1)
     if (!started_) {
       start_at(now, cut_ns);
@@ -70,7 +70,7 @@ class EncoderIntervals {
   }
 
  private:
-  void start_at(const CloneView& clone, std::int64_t cut_ns) {
+  void start_at(const CloneState& clone, std::int64_t cut_ns) {
     started_ = true;
     start_t_ns_ = clone.t_ns;
     start_slot_ = clone.slot;
@@ -79,7 +79,7 @@ class EncoderIntervals {
 
   std::optional<std::size_t> find_start(const FilterView& filter) const {
     for (std::size_t i = filter.clones.size(); i-- > 0;) {
-      const CloneView& clone = filter.clones[i];
+      const CloneState& clone = filter.clones[i];
       if (clone.t_ns == start_t_ns_ && clone.slot == start_slot_) return i;
     }
     return std::nullopt;

@@ -35,7 +35,7 @@ struct Geometry {
 
 }  // namespace
 
-MovingPose moving_pose(const CloneView& clone, double after_s, bool first_estimate) {
+MovingPose moving_pose(const CloneState& clone, double after_s, bool first_estimate) {
   return {first_estimate ? clone.R_GtoI_fej : clone.R_GtoI,
           first_estimate ? clone.p_IinG_fej : clone.p_IinG, clone.w_IinI,
           clone.R_GtoI_fej * clone.v_IinG, after_s};

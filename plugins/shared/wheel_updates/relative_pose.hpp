@@ -18,7 +18,7 @@ struct MovingPose {
 };
 
 /// Of a clone, at its estimate or at its first estimate; its velocity is turned by the latter.
-MovingPose moving_pose(const CloneView& clone, double after_s, bool first_estimate);
+MovingPose moving_pose(const CloneState& clone, double after_s, bool first_estimate);
 
 /// Where the IMU sits in O.
 struct Extrinsics {

@@ -42,12 +42,12 @@ constexpr double kContradiction = 1e-3;
 /// A fix that is so many times better than the one that the search began with takes its place.
 constexpr double kBetterSigma = 2.;
 
-ClonePose at_estimate(const CloneView& clone) {
+ClonePose at_estimate(const CloneState& clone) {
   // The velocity is held in I, as it was when the clone was made.
   return {clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.R_GtoI_fej * clone.v_IinG};
 }
 
-ClonePose at_first_estimate(const CloneView& clone) {
+ClonePose at_first_estimate(const CloneState& clone) {
   ClonePose pose = at_estimate(clone);
   pose.R_GtoI = clone.R_GtoI_fej;
   pose.p_IinG = clone.p_IinG_fej;
@@ -82,7 +82,7 @@ Matrix3d covariance(const FilterView& filter, const Place& a, const Place& b) {
 
 class Gnss final : public Update {
  public:
-  Gnss(const ParamSet& params, const HostServices& services)
+  Gnss(const GnssParams& params, const HostServices& services)
       : options_(gnss_options(params)),
         services_(services),
         contradiction_(chi2_quantile(1. - kContradiction, 3.)),
@@ -181,7 +181,7 @@ class Gnss final : public Update {
                          seconds_between(clones[last - 1].t_ns, t_ns) / period_s);
   }
 
-  Place place_between(const FilterView& filter, const CloneView& a, const CloneView& b,
+  Place place_between(const FilterView& filter, const CloneState& a, const CloneState& b,
                       double period_s, double u) const {
     const BlockView& arm = filter.block(lever_);
     const Lever lever{Matrix3d::Identity(), arm.numbers()};
@@ -358,7 +358,7 @@ class Gnss final : public Update {
 
 VIWO_REGISTER(Update, Gnss, "gnss", "1.0.0",
               "fixes of a satellite receiver; finds how the Earth lies in the filter's world",
-              "Apache-2.0", kGnssParams);
+              "Apache-2.0", GnssParams);
 
 }  // namespace
 }  // namespace viwo

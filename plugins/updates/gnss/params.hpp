@@ -18,58 +18,77 @@ namespace viwo::gnss {
 
 inline constexpr double kUnknownPositionM = 1e3;  ///< the default of sigma_p_EinG_m
 
-// clang-format off
-inline constexpr std::array kGnssParams{
-    ParamSpec{.name = "name", .type = ParamType::kString, .fallback = "gnss",
-              .help = "in front of what is estimated; another one for a further receiver"},
-    ParamSpec{.name = "p_AinI_m", .type = ParamType::kNumbers, .unit = "m",
-              .fallback = "[0, 0, 0]", .help = "lever arm: where the antenna is seen from the IMU"},
-    ParamSpec{.name = "sigma_p_AinI_m", .type = ParamType::kNumbers, .unit = "m",
-              .fallback = "[0.05, 0.05, 0.05]", .min = 0.,
-              .help = "how well that is known; 0 holds it"},
-    ParamSpec{.name = "t_AtoI_s", .type = ParamType::kNumber, .unit = "s", .fallback = "0",
-              .min = -10., .max = 10.,
-              .help = "clock of the receiver: t_imu = stamp + t_AtoI; below 0 for stamps that are "
-                      "late"},
-    ParamSpec{.name = "sigma_m", .type = ParamType::kNumber, .unit = "m", .fallback = "1",
-              .min = 0., .min_exclusive = true,
-              .help = "noise of fixes that come without a covariance, per axis"},
-    ParamSpec{.name = "sigma_scale", .type = ParamType::kNumber, .fallback = "1", .min = 0.,
-              .min_exclusive = true, .help = "the sigmas of all fixes are taken so many times"},
-    ParamSpec{.name = "sigma_drift_m", .type = ParamType::kNumber, .unit = "m", .fallback = "0",
-              .min = 0.,
-              .help = "error that consecutive fixes share, per horizontal axis; 0: none"},
-    ParamSpec{.name = "sigma_height_drift_m", .type = ParamType::kNumber, .unit = "m",
-              .fallback = "0", .min = 0., .help = "the same, up"},
-    ParamSpec{.name = "drift_time_constant_s", .type = ParamType::kNumber, .unit = "s",
-              .fallback = "100", .min = 0., .min_exclusive = true,
-              .help = "in which that error becomes another one"},
-    ParamSpec{.name = "yaw_EtoG_rad", .type = ParamType::kNumber, .unit = "rad", .fallback = "0",
-              .min = -6.3, .max = 6.3,
-              .help = "how E (x east) is turned in G, about the vertical, counter-clockwise"},
-    ParamSpec{.name = "sigma_yaw_rad", .type = ParamType::kNumber, .unit = "rad",
-              .fallback = "3.2", .min = 0.,
-              .help = "how well that is known; 3.2: not at all; 0 holds it"},
-    ParamSpec{.name = "origin_deg", .type = ParamType::kNumbers, .unit = "deg", .fallback = "[]",
-              .help = "with a known yaw: latitude and longitude of the origin of E; empty: that of "
-                      "the first fix that is used"},
-    ParamSpec{.name = "origin_altitude_m", .type = ParamType::kNumber, .unit = "m",
-              .fallback = "0", .help = "of that origin, above the ellipsoid"},
-    ParamSpec{.name = "p_EinG_m", .type = ParamType::kNumbers, .unit = "m",
-              .fallback = "[0, 0, 0]", .help = "where that origin is in G"},
-    ParamSpec{.name = "sigma_p_EinG_m", .type = ParamType::kNumber, .unit = "m",
-              .fallback = "1000", .min = 0.,
-              .help = "how well that is known; 1000: not at all; 0 holds it"},
-    ParamSpec{.name = "alignment_sigma_rad", .type = ParamType::kNumber, .unit = "rad",
-              .fallback = "0.2", .min = 0.001, .max = 0.3,
-              .help = "fixes are used from when two of them tell the yaw so well"},
-    ParamSpec{.name = "max_span_s", .type = ParamType::kNumber, .unit = "s", .fallback = "0.5",
-              .min = 0., .min_exclusive = true,
-              .help = "fixes between clones further apart are left out"},
-    ParamSpec{.name = "gate_probability", .type = ParamType::kNumber, .fallback = "0.001",
-              .min = 0., .max = 0.5, .help = "fixes less likely than this are left out; 0: none"},
+struct GnssParams {
+  std::string name = "gnss";
+  Eigen::Vector3d p_AinI_m{0., 0., 0.};
+  Eigen::Vector3d sigma_p_AinI_m{0.05, 0.05, 0.05};
+  double t_AtoI_s = 0.;
+  double sigma_m = 1.;
+  double sigma_scale = 1.;
+  double sigma_drift_m = 0.;
+  double sigma_height_drift_m = 0.;
+  double drift_time_constant_s = 100.;
+  double yaw_EtoG_rad = 0.;
+  double sigma_yaw_rad = 3.2;
+  std::vector<double> origin_deg;
+  double origin_altitude_m = 0.;
+  Eigen::Vector3d p_EinG_m{0., 0., 0.};
+  double sigma_p_EinG_m = 1000.;
+  double alignment_sigma_rad = 0.2;
+  double max_span_s = 0.5;
+  double gate_probability = 0.001;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(name),
+      {.help = "in front of what is estimated; another one for a further receiver"});
+    b(VIWO_PARAM(p_AinI_m),
+      {.unit = "m", .help = "lever arm: where the antenna is seen from the IMU"});
+    b(VIWO_PARAM(sigma_p_AinI_m),
+      {.unit = "m", .min = 0., .help = "how well that is known; 0 holds it"});
+    b(VIWO_PARAM(t_AtoI_s),
+      {.unit = "s",
+       .min = -10.,
+       .max = 10.,
+       .help = "clock of the receiver: t_imu = stamp + t_AtoI; below 0 for stamps that are "
+               "late"});
+    b(VIWO_PARAM(sigma_m), {.unit = "m",
+                            .above = 0.,
+                            .help = "noise of fixes that come without a covariance, per axis"});
+    b(VIWO_PARAM(sigma_scale),
+      {.above = 0., .help = "the sigmas of all fixes are taken so many times"});
+    b(VIWO_PARAM(sigma_drift_m),
+      {.unit = "m",
+       .min = 0.,
+       .help = "error that consecutive fixes share, per horizontal axis; 0: none"});
+    b(VIWO_PARAM(sigma_height_drift_m), {.unit = "m", .min = 0., .help = "the same, up"});
+    b(VIWO_PARAM(drift_time_constant_s),
+      {.unit = "s", .above = 0., .help = "in which that error becomes another one"});
+    b(VIWO_PARAM(yaw_EtoG_rad),
+      {.unit = "rad",
+       .min = -6.3,
+       .max = 6.3,
+       .help = "how E (x east) is turned in G, about the vertical, counter-clockwise"});
+    b(VIWO_PARAM(sigma_yaw_rad),
+      {.unit = "rad", .min = 0., .help = "how well that is known; 3.2: not at all; 0 holds it"});
+    b(VIWO_PARAM(origin_deg),
+      {.unit = "deg",
+       .help = "with a known yaw: latitude and longitude of the origin of E; empty: that of "
+               "the first fix that is used"});
+    b(VIWO_PARAM(origin_altitude_m), {.unit = "m", .help = "of that origin, above the ellipsoid"});
+    b(VIWO_PARAM(p_EinG_m), {.unit = "m", .help = "where that origin is in G"});
+    b(VIWO_PARAM(sigma_p_EinG_m),
+      {.unit = "m", .min = 0., .help = "how well that is known; 1000: not at all; 0 holds it"});
+    b(VIWO_PARAM(alignment_sigma_rad),
+      {.unit = "rad",
+       .min = 0.001,
+       .max = 0.3,
+       .help = "fixes are used from when two of them tell the yaw so well"});
+    b(VIWO_PARAM(max_span_s),
+      {.unit = "s", .above = 0., .help = "fixes between clones further apart are left out"});
+    b(VIWO_PARAM(gate_probability),
+      {.min = 0., .max = 0.5, .help = "fixes less likely than this are left out; 0: none"});
+  }
 };
-// clang-format on
 
 struct GnssOptions {
   std::string name;
@@ -115,33 +134,27 @@ struct GnssOptions {
   }
 };
 
-inline Eigen::Vector3d three(const ParamSet& params, const char* key) {
-  const auto values = params.numbers(key);
-  if (values.size() != 3) throw ParamError(key, "needs three numbers");
-  return {values[0], values[1], values[2]};
-}
-
 /// ParamError for lists of a wrong length and contradictions.
-inline GnssOptions gnss_options(const ParamSet& params) {
-  const double drift = params.number("sigma_drift_m");
+inline GnssOptions gnss_options(const GnssParams& params) {
+  const double drift = params.sigma_drift_m;
   GnssOptions options{
-      .name = params.text("name"),
-      .p_AinI = three(params, "p_AinI_m"),
-      .sigma_p_AinI = three(params, "sigma_p_AinI_m"),
-      .t_AtoI_s = params.number("t_AtoI_s"),
-      .noise = {params.number("sigma_m"), params.number("sigma_scale")},
-      .sigma_drift = {drift, drift, params.number("sigma_height_drift_m")},
-      .drift_time_constant_s = params.number("drift_time_constant_s"),
+      .name = params.name,
+      .p_AinI = params.p_AinI_m,
+      .sigma_p_AinI = params.sigma_p_AinI_m,
+      .t_AtoI_s = params.t_AtoI_s,
+      .noise = {params.sigma_m, params.sigma_scale},
+      .sigma_drift = {drift, drift, params.sigma_height_drift_m},
+      .drift_time_constant_s = params.drift_time_constant_s,
       .frame = {},
-      .alignment = {params.number("yaw_EtoG_rad"), three(params, "p_EinG_m")},
-      .sigma_yaw_rad = params.number("sigma_yaw_rad"),
-      .sigma_p_EinG_m = params.number("sigma_p_EinG_m"),
-      .alignment_sigma_rad = params.number("alignment_sigma_rad"),
-      .max_span_s = params.number("max_span_s"),
-      .gate_probability = params.number("gate_probability"),
+      .alignment = {params.yaw_EtoG_rad, params.p_EinG_m},
+      .sigma_yaw_rad = params.sigma_yaw_rad,
+      .sigma_p_EinG_m = params.sigma_p_EinG_m,
+      .alignment_sigma_rad = params.alignment_sigma_rad,
+      .max_span_s = params.max_span_s,
+      .gate_probability = params.gate_probability,
   };
   if (options.name.empty()) throw ParamError("name", "must not be empty");
-  const auto origin = params.numbers("origin_deg");
+  const auto origin = params.origin_deg;
   const bool position_is_given =
       options.sigma_p_EinG_m != kUnknownPositionM || !options.alignment.p_EinG.isZero(0.);
   if (origin.empty()) {
@@ -157,7 +170,7 @@ inline GnssOptions gnss_options(const ParamSet& params) {
                      "needs a yaw that is known: sigma_yaw_rad must be at most "
                      "alignment_sigma_rad");
   }
-  options.frame.emplace(origin[0], origin[1], params.number("origin_altitude_m"));
+  options.frame.emplace(origin[0], origin[1], params.origin_altitude_m);
   return options;
 }
 

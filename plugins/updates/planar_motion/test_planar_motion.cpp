@@ -21,7 +21,7 @@ using namespace planar_motion;
 constexpr std::int64_t kMs = 1'000'000;
 const std::vector<std::string> kHalfAMinute{"sensors.simulator0.duration_s=30"};
 
-ImuPose pose_of(const CloneView& clone) { return {clone.R_GtoI, clone.p_IinG}; }
+ImuPose pose_of(const CloneState& clone) { return {clone.R_GtoI, clone.p_IinG}; }
 
 /// A drive over a tilted plane (upright: over the horizontal one), two clones 0.1 s apart.
 testing::SmallFilter driving(bool upright = false, double sigma = 1e-3) {

@@ -22,90 +22,62 @@ using namespace pose_reference;
 /// The host has room for so many factors of one update in an epoch.
 constexpr double kMostFixes = 16.;
 
-constexpr std::array kParams{
-    ParamSpec{.name = "use",
-              .type = ParamType::kString,
-              .fallback = "position",
-              .choices = "position|pose",
-              .help = "what of a fix is believed: position (GNSS), or position and orientation "
-                      "(motion capture)"},
-    ParamSpec{.name = "sigma_position_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.02",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "noise of the position, per axis"},
-    ParamSpec{.name = "sigma_height_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0",
-              .min = 0.,
-              .help = "noise of the vertical axis, if it is another; 0: sigma_position_m"},
-    ParamSpec{.name = "sigma_orientation_rad",
-              .type = ParamType::kNumber,
-              .unit = "rad",
-              .fallback = "0.01",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "use pose: noise of the orientation, per axis of B"},
-    ParamSpec{.name = "p_BinI_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .fallback = "[0, 0, 0]",
-              .help = "lever arm: where B (antenna, marker frame) is seen from the IMU"},
-    ParamSpec{.name = "rpy_ItoB_rad",
-              .type = ParamType::kNumbers,
-              .unit = "rad",
-              .fallback = "[0, 0, 0]",
-              .min = -3.2,
-              .max = 3.2,
-              .help = "how the IMU is turned in B: R_ItoB = Rz(third) Ry(second) Rx(first)"},
-    ParamSpec{.name = "yaw_WtoG_rad",
-              .type = ParamType::kNumber,
-              .unit = "rad",
-              .fallback = "0",
-              .min = -3.2,
-              .max = 3.2,
-              .help = "how the world W of the fixes is turned in G, about the vertical"},
-    ParamSpec{.name = "p_WinG_m",
-              .type = ParamType::kNumbers,
-              .unit = "m",
-              .fallback = "[0, 0, 0]",
-              .help = "where the origin of W is in G"},
-    ParamSpec{.name = "max_per_epoch",
-              .type = ParamType::kInt,
-              .fallback = "5",
-              .min = 1.,
-              .max = kMostFixes,
-              .help = "of more fixes in an epoch so many are used, evenly spread"},
-    ParamSpec{.name = "max_span_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0.5",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "fixes between clones further apart are left out"},
-    ParamSpec{.name = "gate_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0.001",
-              .min = 0.,
-              .max = 0.5,
-              .help = "fixes less likely than this are left out; 0: none"},
+struct Params {
+  std::string use = "position";
+  double sigma_position_m = 0.02;
+  double sigma_height_m = 0.;
+  double sigma_orientation_rad = 0.01;
+  Eigen::Vector3d p_BinI_m{0., 0., 0.};
+  Eigen::Vector3d rpy_ItoB_rad{0., 0., 0.};
+  double yaw_WtoG_rad = 0.;
+  Eigen::Vector3d p_WinG_m{0., 0., 0.};
+  int max_per_epoch = 5;
+  double max_span_s = 0.5;
+  double gate_probability = 0.001;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(use),
+      {.choices = "position|pose",
+       .help = "what of a fix is believed: position (GNSS), or position and orientation "
+               "(motion capture)"});
+    b(VIWO_PARAM(sigma_position_m),
+      {.unit = "m", .above = 0., .help = "noise of the position, per axis"});
+    b(VIWO_PARAM(sigma_height_m),
+      {.unit = "m",
+       .min = 0.,
+       .help = "noise of the vertical axis, if it is another; 0: sigma_position_m"});
+    b(VIWO_PARAM(sigma_orientation_rad),
+      {.unit = "rad", .above = 0., .help = "use pose: noise of the orientation, per axis of B"});
+    b(VIWO_PARAM(p_BinI_m),
+      {.unit = "m", .help = "lever arm: where B (antenna, marker frame) is seen from the IMU"});
+    b(VIWO_PARAM(rpy_ItoB_rad),
+      {.unit = "rad",
+       .min = -3.2,
+       .max = 3.2,
+       .help = "how the IMU is turned in B: R_ItoB = Rz(third) Ry(second) Rx(first)"});
+    b(VIWO_PARAM(yaw_WtoG_rad),
+      {.unit = "rad",
+       .min = -3.2,
+       .max = 3.2,
+       .help = "how the world W of the fixes is turned in G, about the vertical"});
+    b(VIWO_PARAM(p_WinG_m), {.unit = "m", .help = "where the origin of W is in G"});
+    b(VIWO_PARAM(max_per_epoch),
+      {.min = 1.,
+       .max = kMostFixes,
+       .help = "of more fixes in an epoch so many are used, evenly spread"});
+    b(VIWO_PARAM(max_span_s),
+      {.unit = "s", .above = 0., .help = "fixes between clones further apart are left out"});
+    b(VIWO_PARAM(gate_probability),
+      {.min = 0., .max = 0.5, .help = "fixes less likely than this are left out; 0: none"});
+  }
 };
 
-Vector3d three(const ParamSet& params, const char* key) {
-  const auto values = params.numbers(key);
-  if (values.size() != 3) throw ParamError(key, "needs three numbers");
-  return {values[0], values[1], values[2]};
-}
-
-ClonePose at_estimate(const CloneView& clone) {
+ClonePose at_estimate(const CloneState& clone) {
   // The velocity is held in I, as it was when the clone was made.
   return {clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.R_GtoI_fej * clone.v_IinG};
 }
 
-ClonePose at_first_estimate(const CloneView& clone) {
+ClonePose at_first_estimate(const CloneState& clone) {
   ClonePose pose = at_estimate(clone);
   pose.R_GtoI = clone.R_GtoI_fej;
   pose.p_IinG = clone.p_IinG_fej;
@@ -114,21 +86,20 @@ ClonePose at_first_estimate(const CloneView& clone) {
 
 class PoseReference final : public Update {
  public:
-  PoseReference(const ParamSet& params, const HostServices& /*services*/)
-      : with_orientation_(params.text("use") == "pose"),
-        max_per_epoch_(static_cast<std::size_t>(params.integer("max_per_epoch"))),
-        max_span_s_(params.number("max_span_s")),
-        gate_probability_(params.number("gate_probability")),
-        p_WinG_(three(params, "p_WinG_m")) {
-    const double height = params.number("sigma_height_m");
-    const double position = params.number("sigma_position_m");
-    sigma_.head<3>().setConstant(params.number("sigma_orientation_rad"));
+  PoseReference(const Params& params, const HostServices& /*services*/)
+      : params_(params),
+        with_orientation_(params.use == "pose"),
+        max_per_epoch_(static_cast<std::size_t>(params.max_per_epoch)),
+        p_WinG_(params.p_WinG_m) {
+    const double height = params.sigma_height_m;
+    const double position = params.sigma_position_m;
+    sigma_.head<3>().setConstant(params.sigma_orientation_rad);
     sigma_.tail<3>() << position, position, height > 0. ? height : position;
-    R_WtoG_ = exp_so3({0., 0., params.number("yaw_WtoG_rad")});
-    const Vector3d rpy = three(params, "rpy_ItoB_rad");
+    R_WtoG_ = exp_so3({0., 0., params.yaw_WtoG_rad});
+    const Vector3d rpy = params.rpy_ItoB_rad;
     lever_.R_ItoB =
         exp_so3({0., 0., rpy.z()}) * exp_so3({0., rpy.y(), 0.}) * exp_so3({rpy.x(), 0., 0.});
-    lever_.p_BinI = three(params, "p_BinI_m");
+    lever_.p_BinI = params.p_BinI_m;
   }
 
   void declare(Declarations& host) override {
@@ -165,14 +136,14 @@ class PoseReference final : public Update {
     }
     std::size_t last = clones.size() - 1;
     while (last > 1 && clones[last - 1].t_ns >= t_ns) --last;
-    if (seconds_between(clones[last - 1].t_ns, clones[last].t_ns) > max_span_s_) {
+    if (seconds_between(clones[last - 1].t_ns, clones[last].t_ns) > params_.max_span_s) {
       too_far_.add(1, t_ns);
       return std::nullopt;
     }
     return last;
   }
 
-  void emit(const CloneView& first, const CloneView& last, const PoseSample& fix,
+  void emit(const CloneState& first, const CloneState& last, const PoseSample& fix,
             FactorSink& sink) {
     const Eigen::Quaterniond q = to_quaternion(fix.q_BtoW_xyzw);
     if (with_orientation_ && !(std::abs(q.norm() - 1.) < 1e-3)) {
@@ -190,7 +161,7 @@ class PoseReference final : public Update {
     factor.columns.add(first.column, kPoseSize);
     factor.columns.add(last.column, kPoseSize);
     factor.set_rows(rows);
-    factor.gate_probability = gate_probability_;
+    factor.gate_probability = params_.gate_probability;
     factor.heavy_tailed = true;
     factor.H = J.bottomRows(rows);
     factor.R.diagonal() = sigma_.tail(rows).cwiseAbs2();
@@ -202,10 +173,10 @@ class PoseReference final : public Update {
     factor.residual.head<3>() = -log_so3(R_BtoG.transpose() * body.R_GtoB.transpose());
   }
 
+  Params params_;
   StreamId fixes_;
   bool with_orientation_;
   std::size_t max_per_epoch_;
-  double max_span_s_, gate_probability_;
   Eigen::Matrix<double, 6, 1> sigma_;  // orientation, position
   Vector3d p_WinG_;
   Matrix3d R_WtoG_;
@@ -219,7 +190,7 @@ class PoseReference final : public Update {
 
 VIWO_REGISTER(Update, PoseReference, "pose_reference", "1.0.0",
               "positions or poses of a body on the IMU, as GNSS or motion capture gives them",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -68,14 +68,14 @@ class Drive : public ::testing::Test {
     truth_.P *= 1e-4;
   }
 
-  CloneView at(double t_s, int slot) const {
+  CloneState at(double t_s, int slot) const {
     sim::PoseIntegrator pose(motion_);
     return drive_.clone(std::llround(t_s * 1e9), slot, pose.advance_to(t_s), motion_.twist(t_s));
   }
 
   /// B as W sees it: yaw of W in G 0.4, origin of W at [5, -3, 1] in G.
   PoseSample fix(double t_s) const {
-    const CloneView imu = at(t_s, 0);
+    const CloneState imu = at(t_s, 0);
     const Matrix3d R_GtoW = exp_so3({0., 0., -0.4});
     const Matrix3d R_ItoB =
         exp_so3({0., 0., -1.2}) * exp_so3({0., 0.5, 0.}) * exp_so3({0.3, 0., 0.});
@@ -346,7 +346,8 @@ TEST_F(PoseConfiguration, TellsWhatIsWrongWithTheNameOfASensor) {
                                    "that is named here"));
   EXPECT_THAT(error({"updates.mocap={type: pose_reference}"}),
               ::testing::HasSubstr("mocap needs the sensor that gives its poses (sensor: NAME)"));
-  EXPECT_THAT(error({"updates.gnss.p_WinG_m=[1, 2]"}), ::testing::HasSubstr("needs three numbers"));
+  EXPECT_THAT(error({"updates.gnss.p_WinG_m=[1, 2]"}),
+              ::testing::HasSubstr("needs 3 numbers, not 2"));
 }
 
 TEST_F(PoseConfiguration, OfALogGivesTheSameBitsAsTheSimulator) {

@@ -59,7 +59,7 @@ bool Landmarks::add(int track, const Feature& feature, const Window& window, Tra
   if (size() == options_.most) return false;
   // The anchor that stays longest: the newest clone, in the first camera that sees it there and has
   // seen it all the time.
-  const CloneView& newest = window.filter().clones.back();
+  const CloneState& newest = window.filter().clones.back();
   for (int camera = 0; camera < window.n_cameras(); ++camera) {
     if (std::popcount(tracks.mask(track, camera)) != max_clones_) continue;
     const int clone = window.clone_in_slot(newest.slot);
@@ -184,8 +184,8 @@ void Landmarks::settle(const FilterView& filter, TrackStore& tracks, BlockEdits&
 }
 
 bool Landmarks::move_anchor(Landmark& landmark, const FilterView& filter, BlockEdits& edits) {
-  const CloneView& from = filter.clones.front();
-  const CloneView& to = filter.clones.back();
+  const CloneState& from = filter.clones.front();
+  const CloneState& to = filter.clones.back();
   const BlockView& extrinsics =
       filter.block(cameras_[static_cast<std::size_t>(landmark.camera)].extrinsics);
   const BlockView& block = filter.block(landmark.block);

@@ -2,13 +2,12 @@
 #include "viwo/api/plugin.hpp"
 
 #include "visual_features.hpp"
-#include "visual_features_params.hpp"
 
 namespace viwo {
 namespace {
 
 VIWO_REGISTER(Update, visual::VisualFeatures, "visual_features", "1.0.0",
-              "feature tracks of any number of cameras (MSCKF)", "Apache-2.0", visual::kParams);
+              "feature tracks of any number of cameras (MSCKF)", "Apache-2.0", visual::Params);
 
 }  // namespace
 }  // namespace viwo

@@ -15,8 +15,9 @@ void check(const testing::SceneOptions& window, double gate_probability) {
   options.n_clones = 3 * window.n_clones;
   testing::Scene path = testing::make_scene(options, 300, random);
   testing::Scene scene = path.with_clones(static_cast<std::size_t>(window.n_clones));
-  VisualFeatures update(testing::params_with({{"gate_probability", gate_probability}}),
-                        HostServices{});
+  Params params = testing::default_params();
+  params.gate_probability = gate_probability;
+  VisualFeatures update(params, HostServices{});
   scene.start(update);
   FactorSink sink(1, static_cast<int>(scene.P.cols()));
   const auto n = static_cast<std::size_t>(window.n_clones);

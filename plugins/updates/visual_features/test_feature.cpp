@@ -87,7 +87,7 @@ void check_jacobians(const SceneOptions& options, std::uint64_t seed) {
   ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
   ASSERT_EQ(track.feature.linearize(track.window), FeatureStatus::kOk);
   Scene first = scene;  // Jacobians are those of the first estimates
-  for (CloneView& clone : first.clones) {
+  for (CloneState& clone : first.clones) {
     clone.R_GtoI = clone.R_GtoI_fej;
     clone.p_IinG = clone.p_IinG_fej;
   }
@@ -218,7 +218,7 @@ TEST(Feature, TriangulationIsTheMinimumOfThePixelResiduals) {
 TEST(Feature, RefusesPointsWithoutParallaxTooFarTooNearAndBehind) {
   Random random(6);
   Scene still = testing::make_scene({.n_clones = 6}, 0, random);
-  for (CloneView& clone : still.clones) clone.p_IinG.setZero();
+  for (CloneState& clone : still.clones) clone.p_IinG.setZero();
   Track no_parallax(still, still, {0.1, 0.1, 4.}, 1., 0.3, random);
   ASSERT_EQ(no_parallax.feature.sights().size(), 6u);
   EXPECT_EQ(no_parallax.feature.triangulate(no_parallax.window), FeatureStatus::kParallax);
@@ -230,7 +230,7 @@ TEST(Feature, RefusesPointsWithoutParallaxTooFarTooNearAndBehind) {
   EXPECT_EQ(near.feature.triangulate(near.window), FeatureStatus::kDistance);
 
   Scene backwards = scene;  // the same bearings from a mirrored path meet behind the cameras
-  for (CloneView& clone : backwards.clones) clone.p_IinG *= -1.;
+  for (CloneState& clone : backwards.clones) clone.p_IinG *= -1.;
   Track behind(scene, backwards, {0.4, 0.1, 5.}, 1., 0.1, random);
   EXPECT_EQ(behind.feature.triangulate(behind.window), FeatureStatus::kNotVisible);
 

@@ -177,7 +177,7 @@ struct Seen {
 
   Anchor anchor_of(Scene& at) const {
     const CameraView camera = at.camera(static_cast<std::size_t>(landmark.camera));
-    const CloneView& clone = at.clones[anchor_clone];
+    const CloneState& clone = at.clones[anchor_clone];
     return {clone.R_GtoI, camera.R_ItoC, clone.p_IinG, camera.p_IinC};
   }
 
@@ -241,7 +241,7 @@ TEST(LandmarkRows, JacobiansAreCentralDifferencesAtTheFirstEstimates) {
     EXPECT_LT((rows.residual() - residual).norm(), 1e-9);
 
     Scene first = seen.scene;
-    for (CloneView& clone : first.clones) {
+    for (CloneState& clone : first.clones) {
       clone.R_GtoI = clone.R_GtoI_fej;
       clone.p_IinG = clone.p_IinG_fej;
     }
@@ -312,8 +312,10 @@ struct Begun {
     estimate = truth;
     estimate.plus(-error);
     estimate.first_estimates();
-    VisualFeatures update(testing::params_with({{"max_landmarks", 5.}, {"gate_probability", 0.}}),
-                          HostServices{});
+    Params params = testing::default_params();
+    params.max_landmarks = 5;
+    params.gate_probability = 0.;
+    VisualFeatures update(params, HostServices{});
     estimate.start(update);
     sink = estimate.sink();
     for (std::size_t k = 0; k < truth.clones.size(); ++k) {
@@ -340,7 +342,7 @@ TEST(Landmarks, BeginWithAllTheirSightsAndEstimateThemselvesConsistently) {
     if (n_new == 0) continue;
     Eigen::VectorXd error(n + n_new);
     error.head(n) = begun.error;
-    const CloneView& newest = begun.truth.clones.back();
+    const CloneState& newest = begun.truth.clones.back();
     Scene truth = begun.truth;
     const CameraView camera = truth.camera(0);
     const Anchor anchor{newest.R_GtoI, camera.R_ItoC, newest.p_IinG, camera.p_IinC};
@@ -385,18 +387,20 @@ TEST(Landmarks, BeginWithTheRowsThatTheEliminatedTracksWouldHave) {
   std::vector<Eigen::MatrixXd> Lambdas;
   std::vector<Eigen::VectorXd> etas;
   const auto n = scene.P.cols();
-  for (const double most : {0., 3.}) {
+  for (const int most : {0, 3}) {
     Random noise(67);
     Scene estimate = scene;
-    VisualFeatures update(testing::params_with({{"max_landmarks", most}, {"gate_probability", 0.}}),
-                          HostServices{});
+    Params params = testing::default_params();
+    params.max_landmarks = most;
+    params.gate_probability = 0.;
+    VisualFeatures update(params, HostServices{});
     estimate.start(update);
     FactorSink sink = estimate.sink();
     for (std::size_t k = 0; k < 6; ++k) {
       testing::epoch(update, estimate, k + 1, testing::images(scene, k, 1., noise), sink, k == 5);
     }
     ASSERT_EQ(sink.applied(), 3);
-    ASSERT_EQ(sink.added().size(), most == 0. ? 0u : 3u);
+    ASSERT_EQ(sink.added().size(), most == 0 ? 0u : 3u);
     const auto size = estimate.P.cols(), n_new = size - n;
     Eigen::MatrixXd Lambda = Eigen::MatrixXd::Zero(size, size);
     Eigen::VectorXd eta = Eigen::VectorXd::Zero(size);

@@ -61,7 +61,7 @@ struct Batch {
     for (int i = 0; i < n / 2; ++i) {
       const LinearSight& row = rows[static_cast<std::size_t>(i)];
       const Sight& sight = feature.sights()[static_cast<std::size_t>(i)];
-      for (const CloneView& clone : estimate.clones) {
+      for (const CloneState& clone : estimate.clones) {
         if (clone.slot != window.clone(sight.clone).slot) continue;
         H_x.block<2, 6>(2 * i, clone.column) = row.H_x;
       }
@@ -136,7 +136,7 @@ TEST(NormalEquations, KeepTheirPrecisionWhenTheParallaxIsWeak) {
   Random random(12);
   const SceneOptions options{.n_clones = 8};
   Batch batch(options, 40, random);
-  for (CloneView& clone : batch.estimate.clones) {
+  for (CloneState& clone : batch.estimate.clones) {
     clone.p_IinG = clone.p_IinG_fej = 0.0005 * testing::normal3(random);
   }
   batch.estimate.numbers(batch.estimate.camera_blocks[0].extrinsics).setZero();
@@ -218,7 +218,7 @@ TEST(NormalEquations, ReadOnlyTheLowerTriangleOfTheCovariance) {
   EXPECT_EQ(batch.window.covariance(), whole);
   // By name: the extrinsics of the first camera stand before the clones in the state, after them
   // in the factor.
-  const CloneView& clone = batch.estimate.clones[3];
+  const CloneState& clone = batch.estimate.clones[3];
   const int row = batch.window.camera(0).column[0];
   EXPECT_GE(row, batch.window.clone_columns());
   const int column = batch.window.clone(batch.window.clone_in_slot(clone.slot)).column;
@@ -229,7 +229,7 @@ TEST(NormalEquations, ReadOnlyTheLowerTriangleOfTheCovariance) {
 TEST(NormalEquations, RefuseAPointThatTheRowsDoNotDetermine) {
   Random random(15);
   Batch batch({.n_clones = 5}, 30, random);
-  for (CloneView& clone : batch.estimate.clones) {
+  for (CloneState& clone : batch.estimate.clones) {
     clone.p_IinG = clone.p_IinG_fej = Eigen::Vector3d(1e-9 * clone.slot, 0., 0.);
   }
   batch.estimate.numbers(batch.estimate.camera_blocks[0].extrinsics).setZero();

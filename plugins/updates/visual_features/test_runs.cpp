@@ -82,9 +82,9 @@ class FilterRun {
     std::vector<CameraPrior> priors = draw_priors();
     imu_ = sim::simulate_imu(trajectory, {}, imu_options(), seed);
     features_ = sim::simulate_features(trajectory, {}, cameras_, feature_options(), seed);
-    visual_ = std::make_shared<VisualFeatures>(
-        testing::params_with({{"max_landmarks", static_cast<double>(options.max_landmarks)}}),
-        HostServices{});
+    Params params = testing::default_params();
+    params.max_landmarks = options.max_landmarks;
+    visual_ = std::make_shared<VisualFeatures>(params, HostServices{});
     std::shared_ptr<Update> update = visual_;
     if (options.breaks_anchors) update = std::make_shared<BreaksAnchors>(visual_);
     EstimatorOptions estimator;

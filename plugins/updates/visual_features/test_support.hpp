@@ -36,26 +36,10 @@ inline Eigen::VectorXd normals(Random& random, int n) {
 }
 inline Eigen::Vector3d normal3(Random& random) { return normals(random, 3); }
 
-inline ParamSet params_with(const std::vector<std::pair<std::string, double>>& changes = {}) {
-  ParamSet params;
-  const auto put = [&](const ParamSpec& spec, double value) {
-    if (spec.type == ParamType::kInt) {
-      params.set(spec.name, static_cast<std::int64_t>(value));
-    } else {
-      params.set(spec.name, value);
-    }
-  };
-  for (const ParamSpec& spec : kParams) {
-    if (spec.type == ParamType::kBool) {
-      params.set(spec.name,
-                 false);  // find_noise: what is asked for is the noise that is configured
-      continue;
-    }
-    put(spec, std::stod(spec.fallback));
-    for (const auto& [name, value] : changes) {
-      if (name == spec.name) put(spec, value);
-    }
-  }
+/// The defaults, with the noise that is configured.
+inline Params default_params() {
+  Params params;
+  params.find_noise = false;
   return params;
 }
 
@@ -143,7 +127,7 @@ struct Scene : viwo::testing::UpdateHost {
   bool predict(std::size_t clone, std::size_t j, std::int64_t stamp_ns,
                const Eigen::Vector3d& p_FinG, Eigen::Vector2d& uv) {
     const CameraView c = camera(j);
-    const CloneView& at = clones[clone];
+    const CloneState& at = clones[clone];
     const double dt = seconds_between(at.t_ns, stamp_ns) + c.t_CtoI_s;
     const Eigen::Vector3d v_IinI = at.R_GtoI_fej * at.v_IinG;  // kept in I
     const Eigen::Vector3d p_IinG = at.p_IinG + dt * (at.R_GtoI.transpose() * v_IinI);
@@ -159,7 +143,7 @@ struct Scene : viwo::testing::UpdateHost {
 inline Eigen::MatrixXd make_covariance(const Scene& scene, const SceneOptions& options, int size,
                                        Random& random) {
   Eigen::VectorXd sigma = Eigen::VectorXd::Constant(size, 0.01);
-  for (const CloneView& clone : scene.clones) {
+  for (const CloneState& clone : scene.clones) {
     sigma.segment<3>(clone.column).setConstant(options.sigma_theta);
     sigma.segment<3>(clone.column + 3).setConstant(options.sigma_p);
   }
@@ -206,7 +190,7 @@ inline Scene make_scene(const SceneOptions& options, int n_landmarks, Random& ra
   };
   place(scene.camera_blocks[0].extrinsics);
   for (int i = 0; i < options.n_clones; ++i) {
-    CloneView& clone = scene.clones.emplace_back();
+    CloneState& clone = scene.clones.emplace_back();
     clone.t_ns = 1'000'000'000 + std::int64_t{100'000'000} * i;
     clone.slot = (i + 5) % options.n_clones;
     clone.column = size + kPoseSize * clone.slot;
@@ -225,7 +209,7 @@ inline Scene make_scene(const SceneOptions& options, int n_landmarks, Random& ra
   if (options.calibrates) {
     Eigen::VectorXd off = options.first_estimate_off * normals(random, size);
     off.head(kImuSize).setZero();
-    for (const CloneView& clone : scene.clones) off.segment<kPoseSize>(clone.column).setZero();
+    for (const CloneState& clone : scene.clones) off.segment<kPoseSize>(clone.column).setZero();
     for (std::size_t j = 0; j < scene.n_cameras(); ++j) off[scene.clock_column(j)] *= 0.03;
     scene.plus(off);
   }

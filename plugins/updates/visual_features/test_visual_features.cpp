@@ -15,8 +15,12 @@ using testing::Random;
 using testing::Scene;
 using testing::SceneOptions;
 
-VisualFeatures update_with(const std::vector<std::pair<std::string, double>>& changes) {
-  return VisualFeatures(testing::params_with(changes), HostServices{});
+/// The defaults, changed by `change`.
+template <class Change>
+VisualFeatures update_with(const Change& change) {
+  Params params = testing::default_params();
+  change(params);
+  return VisualFeatures(params, HostServices{});
 }
 
 FactorSink sink_for(const Scene& scene) { return {1, static_cast<int>(scene.P.cols())}; }
@@ -51,7 +55,10 @@ double mean_nees(const SceneOptions& options, double sigma_used_px, double flip,
     Scene estimate = truth;  // truth = estimate [+] error
     estimate.plus(-error);
     estimate.first_estimates();
-    VisualFeatures update = update_with({{"sigma_px", sigma_used_px}, {"gate_probability", 0.}});
+    VisualFeatures update = update_with([&](Params& p) {
+      p.sigma_px = sigma_used_px;
+      p.gate_probability = 0.;
+    });
     FactorSink sink = sink_for(truth);
     testing::show_all(update, truth, estimate, 1., random, sink);
     EXPECT_GT(sink.applied(), 10);
@@ -59,7 +66,7 @@ double mean_nees(const SceneOptions& options, double sigma_used_px, double flip,
     Eigen::VectorXd eta = Eigen::VectorXd::Zero(n);
     testing::scatter(*sink.information(), Lambda, eta);
     Eigen::VectorXd sign = Eigen::VectorXd::Ones(n);
-    for (const CloneView& clone : truth.clones) sign.segment<3>(clone.column).setConstant(flip);
+    for (const CloneState& clone : truth.clones) sign.segment<3>(clone.column).setConstant(flip);
     Lambda = sign.asDiagonal() * Lambda * sign.asDiagonal();
     eta = sign.asDiagonal() * eta;
     Lambda = sigma.asDiagonal() * Lambda * sigma.asDiagonal();
@@ -106,12 +113,12 @@ TEST(VisualFeatures, DropsTracksByTheGateAtTheRateThatItPromises) {
   for (int run = 0; run < 40; ++run) {
     Scene truth =
         testing::make_scene({.n_clones = 8, .sigma_theta = 1e-5, .sigma_p = 1e-5}, 50, random);
-    VisualFeatures update = update_with({{"gate_probability", 0.05}});
+    VisualFeatures update = update_with([](Params& p) { p.gate_probability = 0.05; });
     FactorSink sink = sink_for(truth);
     testing::show_all(update, truth, truth, 1., random, sink);
     applied += sink.applied();
     rejected += sink.rejected();
-    VisualFeatures wild = update_with({{"gate_probability", 0.05}});
+    VisualFeatures wild = update_with([](Params& p) { p.gate_probability = 0.05; });
     testing::show_all(wild, truth, truth, 4., random, sink);
     wild_applied += sink.applied();
   }
@@ -128,7 +135,7 @@ std::vector<RejectionCount> tracks_of_moving_points(const Eigen::Vector3d& v, st
   Random random(24);
   Scene scene = testing::make_scene(
       {.n_clones = 8, .n_cameras = 2, .sigma_theta = 1e-5, .sigma_p = 1e-5}, 100, random);
-  VisualFeatures update = update_with({{"min_observations", 16.}});
+  VisualFeatures update = update_with([](Params& p) { p.min_observations = 16; });
   FactorSink sink = sink_for(scene);
   scene.start(update);
   for (std::size_t k = 0; k < 8; ++k) {
@@ -165,7 +172,7 @@ TEST(VisualFeatures, UsesLostTracksAndThoseOfALeavingCloneOnce) {
   Scene scene = testing::make_scene({.n_clones = 5}, 0, random);
   Scene truth = scene;
   truth.landmarks = {{0.3, 0.1, 4.}, {0.5, -0.1, 4.}, {0.4, 0.2, 3.5}};
-  VisualFeatures update = update_with({{"gate_probability", 0.}});
+  VisualFeatures update = update_with([](Params& p) { p.gate_probability = 0.; });
   scene.start(update);
   FactorSink sink = sink_for(scene);
   for (std::size_t k = 0; k < 5; ++k) {
@@ -189,7 +196,10 @@ TEST(VisualFeatures, TriesTheLongestTracksFirstAndDropsLostOnesBeyondTheLimit) {
   Random random(24);
   Scene scene = testing::make_scene({.n_clones = 6}, 0, random);
   for (int i = 0; i < 6; ++i) scene.landmarks.emplace_back(0.2 + 0.1 * i, 0.1, 4.);
-  VisualFeatures update = update_with({{"max_features", 2.}, {"gate_probability", 0.}});
+  VisualFeatures update = update_with([](Params& p) {
+    p.max_features = 2;
+    p.gate_probability = 0.;
+  });
   scene.start(update);
   FactorSink sink = sink_for(scene);
   for (std::size_t k = 0; k < 6; ++k) {
@@ -216,7 +226,7 @@ TEST(VisualFeatures, WaitsForACameraThatMissesAnImage) {
   Random random(25);
   Scene scene = testing::make_scene({.n_clones = 6, .n_cameras = 2}, 0, random);
   scene.landmarks = {{0.4, 0.1, 4.}};
-  VisualFeatures update = update_with({{"gate_probability", 0.}});
+  VisualFeatures update = update_with([](Params& p) { p.gate_probability = 0.; });
   scene.start(update);
   FactorSink sink = sink_for(scene);
   for (std::size_t k = 0; k < 4; ++k) {
@@ -233,14 +243,14 @@ TEST(VisualFeatures, ForgetsObservationsOfClonesThatAreGone) {
   Random random(26);
   Scene scene = testing::make_scene({.n_clones = 5}, 0, random);
   scene.landmarks = {{0.3, 0.1, 4.}};
-  VisualFeatures update = update_with({});
+  VisualFeatures update = update_with([](Params&) {});
   scene.start(update);
   FactorSink sink = sink_for(scene);
   for (std::size_t k = 0; k < 3; ++k) {
     testing::epoch(update, scene, k + 1, testing::images(scene, k, 0.5, random), sink);
   }
   // The same slots at other times: a restart of the filter.
-  for (CloneView& clone : scene.clones) clone.t_ns += 1'000'000'000;
+  for (CloneState& clone : scene.clones) clone.t_ns += 1'000'000'000;
   testing::epoch(update, scene, 3, testing::empty_images(scene, 2), sink);
   EXPECT_EQ(sink.applied(), 0);
   EXPECT_TRUE(counts(update).empty());
@@ -250,7 +260,10 @@ TEST(VisualFeatures, CountsBadDataAndGoesOn) {
   Random random(27);
   Scene scene = testing::make_scene({.n_clones = 5}, 0, random);
   scene.landmarks = {{0.3, 0.1, 4.}, {0.5, 0.2, 4.}};
-  VisualFeatures update = update_with({{"max_tracks", 3.}, {"gate_probability", 0.}});
+  VisualFeatures update = update_with([](Params& p) {
+    p.max_tracks = 3;
+    p.gate_probability = 0.;
+  });
   scene.start(update);
   FactorSink sink = sink_for(scene);
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -284,7 +297,7 @@ TEST(VisualFeatures, CountsBadDataAndGoesOn) {
 TEST(VisualFeatures, SurvivesNothingAtAllAndBrokenEstimates) {
   Random random(28);
   Scene scene = testing::make_scene({.n_clones = 5}, 30, random);
-  VisualFeatures update = update_with({{"min_observations", std::int64_t{4}}});
+  VisualFeatures update = update_with([](Params& p) { p.min_observations = 4; });
   scene.start(update);
   FactorSink sink = sink_for(scene);
   FilterView empty = scene.view();
@@ -309,10 +322,10 @@ TEST(VisualFeatures, SurvivesNothingAtAllAndBrokenEstimates) {
 }
 
 TEST(VisualFeatures, RefusesImpossibleConfigurations) {
-  EXPECT_THROW(update_with({{"min_distance_m", 2000.}}), ParamError);
+  EXPECT_THROW(update_with([](Params& p) { p.min_distance_m = 2000.; }), ParamError);
   Random random(29);
   Scene scene = testing::make_scene({.n_clones = 5}, 0, random);
-  VisualFeatures update = update_with({});
+  VisualFeatures update = update_with([](Params&) {});
   Scene blind;
   try {
     update.declare(blind);
@@ -330,7 +343,7 @@ TEST(VisualFeatures, GivesTheSameBitsWhateverTheOrderOfThePoints) {
   for (const bool reversed : {false, true}) {
     Random random(30);
     Scene scene = testing::make_scene(options, 80, random);
-    VisualFeatures update = update_with({});
+    VisualFeatures update = update_with([](Params&) {});
     scene.start(update);
     FactorSink sink = sink_for(scene);
     for (std::size_t k = 0; k < 6; ++k) {

@@ -22,9 +22,9 @@ void TrackStore::start(int max_tracks, int max_clones, int n_cameras) {
   slots_ = 0;
 }
 
-void TrackStore::keep_clones(std::span<const CloneView> clones) {
+void TrackStore::keep_clones(std::span<const CloneState> clones) {
   std::uint64_t same = 0, now = 0;
-  for (const CloneView& clone : clones) {
+  for (const CloneState& clone : clones) {
     if (clone.slot < 0 || clone.slot >= max_clones_) continue;
     const std::uint64_t bit = std::uint64_t{1} << clone.slot;
     std::int64_t& time_ns = slot_time_ns_[index(clone.slot)];

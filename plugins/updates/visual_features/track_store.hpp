@@ -29,7 +29,7 @@ class TrackStore {
 
   /// Forgets the observations of clones that are gone (a clone is its slot and its time), then
   /// tracks without any but those to keep().
-  void keep_clones(std::span<const CloneView> clones);
+  void keep_clones(std::span<const CloneState> clones);
 
   /// Track of a landmark: -1 when it has none.
   int find(std::int64_t id) const;

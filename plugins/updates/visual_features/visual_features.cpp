@@ -45,17 +45,12 @@ const char* reason_of(FeatureStatus status) {
 
 }  // namespace
 
-VisualFeatures::VisualFeatures(const ParamSet& params, const HostServices& services)
-    : sigma_px_(params.number("sigma_px")),
-      gate_probability_(params.number("gate_probability")),
-      max_features_(static_cast<int>(params.integer("max_features"))),
-      min_observations_(static_cast<int>(params.integer("min_observations"))),
-      max_tracks_(static_cast<int>(params.integer("max_tracks"))),
-      max_landmarks_(static_cast<int>(params.integer("max_landmarks"))),
-      limits_{.min_distance_m = params.number("min_distance_m"),
-              .max_distance_m = params.number("max_distance_m"),
-              .max_condition = params.number("max_condition")} {
-  noise_.set_enabled(!services.exact && params.flag("find_noise"));
+VisualFeatures::VisualFeatures(const Params& params, const HostServices& services)
+    : params_(params),
+      limits_{.min_distance_m = params.min_distance_m,
+              .max_distance_m = params.max_distance_m,
+              .max_condition = params.max_condition} {
+  noise_.set_enabled(!services.exact && params.find_noise);
   dropped_.reserve(kReasons);
   if (limits_.min_distance_m >= limits_.max_distance_m) {
     throw ParamError("min_distance_m", "min_distance_m must be less than max_distance_m");
@@ -76,8 +71,8 @@ void VisualFeatures::declare(Declarations& host) {
     images.clocks.push_back({blocks.clock_constant_s, blocks.clock});
   }
   images_ = host.stream(images);
-  if (max_landmarks_ > 0) {
-    room_ = host.room({.name = "landmarks", .blocks = max_landmarks_, .entries = 3});
+  if (params_.max_landmarks > 0) {
+    room_ = host.room({.name = "landmarks", .blocks = params_.max_landmarks, .entries = 3});
   }
 }
 
@@ -88,13 +83,13 @@ void VisualFeatures::start(const UpdateSetup& setup) {
   }
   const int n_cameras = static_cast<int>(cameras_.size());
   const int max_sights = setup.max_clones * n_cameras;
-  tracks_.start(max_tracks_, setup.max_clones, n_cameras);
+  tracks_.start(params_.max_tracks, setup.max_clones, n_cameras);
   window_.start(setup.max_clones, cameras_, blocks_);
-  feature_.start(max_sights, sigma_px_, limits_);
+  feature_.start(max_sights, params_.sigma_px, limits_);
   equations_.start(setup.max_clones, n_cameras);
   gate_.start(setup.max_clones, n_cameras);
-  candidates_.reserve(static_cast<std::size_t>(max_tracks_));
-  seen_epoch_.assign(static_cast<std::size_t>(max_tracks_), -1);
+  candidates_.reserve(static_cast<std::size_t>(params_.max_tracks));
+  seen_epoch_.assign(static_cast<std::size_t>(params_.max_tracks), -1);
   const auto thresholds = [&](double probability) {
     std::vector<double> of_dof;
     for (int dof = 0; dof <= 2 * max_sights && probability > 0.; ++dof) {
@@ -102,12 +97,13 @@ void VisualFeatures::start(const UpdateSetup& setup) {
     }
     return of_dof;
   };
-  thresholds_ = thresholds(gate_probability_ / 2.);
-  landmarks_.start({.most = max_landmarks_,
-                    .sigma_px = sigma_px_,
+  thresholds_ = thresholds(params_.gate_probability / 2.);
+  landmarks_.start({.most = params_.max_landmarks,
+                    .sigma_px = params_.sigma_px,
                     .min_distance_m = limits_.min_distance_m,
                     .max_distance_m = limits_.max_distance_m},
-                   room_, max_tracks_, setup.max_clones, blocks_, thresholds(gate_probability_));
+                   room_, params_.max_tracks, setup.max_clones, blocks_,
+                   thresholds(params_.gate_probability));
 }
 
 void VisualFeatures::reject(const char* reason, std::int64_t id, std::int64_t count) {
@@ -128,7 +124,7 @@ void VisualFeatures::rejections(std::vector<RejectionCount>& out) const {
 }
 
 void VisualFeatures::noises(std::vector<NoiseFound>& out) const {
-  noise_.append_to("sigma_px", "px", sigma_px_, out);
+  noise_.append_to("sigma_px", "px", params_.sigma_px, out);
 }
 
 void VisualFeatures::update(const FilterView& filter, const EpochData& data, FactorSink& sink) {
@@ -140,14 +136,15 @@ void VisualFeatures::update(const FilterView& filter, const EpochData& data, Fac
   window_.set(filter);
   gate_.begin();
   weighed_ = 0;
-  feature_.set_sigma(noise_.scale() * sigma_px_);
-  landmarks_.set_sigma(noise_.scale() * sigma_px_);
+  feature_.set_sigma(noise_.scale() * params_.sigma_px);
+  landmarks_.set_sigma(noise_.scale() * params_.sigma_px);
   landmarks_.begin(window_, tracks_);
   images_now_ = 0;
   for (const FeatureSample& sample : data.samples<FeatureSample>(images_)) take_image(sample);
   window_.set_poses();
   select(filter);
-  const std::size_t n_used = std::min(candidates_.size(), static_cast<std::size_t>(max_features_));
+  const std::size_t n_used =
+      std::min(candidates_.size(), static_cast<std::size_t>(params_.max_features));
   for (std::size_t i = 0; i < n_used; ++i) use(candidates_[i], sink);
   // A track that loses only its oldest observation waits: that goes with the clone.
   for (std::size_t i = n_used; i < candidates_.size(); ++i) {
@@ -206,7 +203,7 @@ void VisualFeatures::take_image(const FeatureSample& sample) {
 
 void VisualFeatures::select(const FilterView& filter) {
   candidates_.clear();
-  const CloneView& oldest = filter.clones.front();
+  const CloneState& oldest = filter.clones.front();
   const bool leaves = filter.oldest_leaves && oldest.slot >= 0 && oldest.slot < kMaxWindowClones;
   const std::span<const int> active = tracks_.active();
   for (std::size_t i = active.size(); i-- > 0;) {  // backwards: remove() fills from behind
@@ -223,7 +220,7 @@ void VisualFeatures::select(const FilterView& filter) {
     if (!lost && !at_oldest) continue;
     const int length = tracks_.length(track);
     const std::int64_t id = tracks_.id(track);
-    if (length >= min_observations_) {
+    if (length >= params_.min_observations) {
       candidates_.push_back({track, length, id, lost});
     } else if (lost) {
       reject(kShort, id);
@@ -276,7 +273,7 @@ void VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
     reject(reason, candidate.id);
     if (candidate.lost) tracks_.remove(candidate.track);
   };
-  if (feature_.collect(tracks_, candidate.track, window_) < min_observations_) {
+  if (feature_.collect(tracks_, candidate.track, window_) < params_.min_observations) {
     return refuse(kShort);
   }
   bool passes = false;
@@ -284,7 +281,7 @@ void VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
   if (!passes) {
     // A few strays, false matches, must not cost the track.
     const int strays = feature_.leave_out_strays();
-    if (strays > 0 && static_cast<int>(feature_.sights().size()) >= min_observations_) {
+    if (strays > 0 && static_cast<int>(feature_.sights().size()) >= params_.min_observations) {
       status = try_feature(passes);
       if (passes) reject(kStray, candidate.id, strays);
     }

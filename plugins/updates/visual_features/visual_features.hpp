@@ -12,8 +12,8 @@
 #include "landmarks.hpp"
 #include "normal_equations.hpp"
 #include "track_store.hpp"
+#include "visual_features_params.hpp"
 #include "viwo/api/host_services.hpp"
-#include "viwo/api/params.hpp"
 #include "viwo/api/rejections.hpp"
 #include "viwo/api/update.hpp"
 #include "window.hpp"
@@ -23,7 +23,7 @@ namespace viwo::visual {
 class VisualFeatures final : public Update {
  public:
   /// Parameters: visual_features_params.hpp. ParamError when two of them contradict each other.
-  VisualFeatures(const ParamSet& params, const HostServices& services);
+  VisualFeatures(const Params& params, const HostServices& services);
 
   /// InputError when there is no camera.
   void declare(Declarations& host) override;
@@ -65,12 +65,7 @@ class VisualFeatures final : public Update {
   /// The factor of this epoch, with the columns of the window.
   InformationFactor& factor(FactorSink& sink);
 
-  double sigma_px_;
-  double gate_probability_;
-  int max_features_;
-  int min_observations_;
-  int max_tracks_;
-  int max_landmarks_;
+  Params params_;
   TriangulationLimits limits_;
 
   std::vector<CameraPrior> cameras_;

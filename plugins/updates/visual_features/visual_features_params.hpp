@@ -7,68 +7,60 @@
 
 namespace viwo::visual {
 
-inline constexpr std::array kParams{
-    ParamSpec{.name = "sigma_px",
-              .type = ParamType::kNumber,
-              .unit = "px",
-              .fallback = "1",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "noise of a feature, per coordinate of the image as it is (distorted)"},
-    ParamSpec{.name = "find_noise",
-              .type = ParamType::kBool,
-              .fallback = "true",
-              .help = "sigma_px is scaled to what the residuals tell, and reported; false: as "
-                      "configured"},
-    ParamSpec{.name = "max_features",
-              .type = ParamType::kInt,
-              .fallback = "100",
-              .min = 1.,
-              .max = 100000.,
-              .help = "most tracks that are tried in one epoch; the longest come first"},
-    ParamSpec{.name = "gate_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0.001",
-              .min = 0.,
-              .max = 0.999,
-              .help = "a track whose chi-square is less likely than this is dropped; 0: no gate"},
-    ParamSpec{.name = "min_observations",
-              .type = ParamType::kInt,
-              .fallback = "2",
-              .min = 2.,
-              .help = "fewest observations, of all cameras together, that a track is used with"},
-    ParamSpec{.name = "max_tracks",
-              .type = ParamType::kInt,
-              .fallback = "2000",
-              .min = 1.,
-              .max = 1000000.,
-              .help = "room for tracks at a time; new points beyond it are dropped"},
-    ParamSpec{.name = "max_landmarks",
-              .type = ParamType::kInt,
-              .fallback = "0",
-              .min = 0.,
-              .max = 1000.,
-              .help = "most landmarks that are kept in the state, from tracks that outlive the "
-                      "window; 0: none"},
-    ParamSpec{.name = "min_distance_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0.1",
-              .min = 0.,
-              .help = "a track whose point is nearer to one of its cameras is not used"},
-    ParamSpec{.name = "max_distance_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "1000",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "a track whose point is farther from all of its cameras is not used"},
-    ParamSpec{.name = "max_condition",
-              .type = ParamType::kNumber,
-              .fallback = "1e6",
-              .min = 1.,
-              .max = 1e8,
-              .help = "largest condition number of the intersection of a track's rays; 1e4 is a "
-                      "parallax of about one degree, 1e6 of a tenth"}};
+struct Params {
+  double sigma_px = 1.;
+  bool find_noise = true;
+  int max_features = 100;
+  double gate_probability = 0.001;
+  int min_observations = 2;
+  int max_tracks = 2000;
+  int max_landmarks = 0;
+  double min_distance_m = 0.1;
+  double max_distance_m = 1000.;
+  double max_condition = 1e6;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(sigma_px),
+      {.unit = "px",
+       .above = 0.,
+       .help = "noise of a feature, per coordinate of the image as it is (distorted)"});
+    b(VIWO_PARAM(find_noise),
+      {.help = "sigma_px is scaled to what the residuals tell, and reported; false: as "
+               "configured"});
+    b(VIWO_PARAM(max_features),
+      {.min = 1.,
+       .max = 100000.,
+       .help = "most tracks that are tried in one epoch; the longest come first"});
+    b(VIWO_PARAM(gate_probability),
+      {.min = 0.,
+       .max = 0.999,
+       .help = "a track whose chi-square is less likely than this is dropped; 0: no gate"});
+    b(VIWO_PARAM(min_observations),
+      {.min = 2.,
+       .help = "fewest observations, of all cameras together, that a track is used with"});
+    b(VIWO_PARAM(max_tracks),
+      {.min = 1.,
+       .max = 1000000.,
+       .help = "room for tracks at a time; new points beyond it are dropped"});
+    b(VIWO_PARAM(max_landmarks),
+      {.min = 0.,
+       .max = 1000.,
+       .help = "most landmarks that are kept in the state, from tracks that outlive the "
+               "window; 0: none"});
+    b(VIWO_PARAM(min_distance_m),
+      {.unit = "m",
+       .min = 0.,
+       .help = "a track whose point is nearer to one of its cameras is not used"});
+    b(VIWO_PARAM(max_distance_m),
+      {.unit = "m",
+       .above = 0.,
+       .help = "a track whose point is farther from all of its cameras is not used"});
+    b(VIWO_PARAM(max_condition),
+      {.min = 1.,
+       .max = 1e8,
+       .help = "largest condition number of the intersection of a track's rays; 1e4 is a "
+               "parallax of about one degree, 1e6 of a tenth"});
+  }
+};
 
 }  // namespace viwo::visual

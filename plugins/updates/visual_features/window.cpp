@@ -43,7 +43,7 @@ void Window::set_clones() {
   std::fill(index_of_slot_.begin(), index_of_slot_.end(), -1);
   order_.clear();
   for (int i = 0; i < static_cast<int>(filter_.clones.size()); ++i) {
-    const CloneView& clone = filter_.clones[static_cast<std::size_t>(i)];
+    const CloneState& clone = filter_.clones[static_cast<std::size_t>(i)];
     if (clone.column < 0 || clone.slot < 0 || clone.slot >= n_slots) continue;
     int& index = index_of_slot_[static_cast<std::size_t>(clone.slot)];
     if (index >= 0) continue;
@@ -56,7 +56,7 @@ void Window::set_clones() {
   });
   clones_.clear();
   for (const int i : order_) {
-    const CloneView& from = filter_.clones[static_cast<std::size_t>(i)];
+    const CloneState& from = filter_.clones[static_cast<std::size_t>(i)];
     index_of_slot_[static_cast<std::size_t>(from.slot)] = n_clones();
     WindowClone& clone = clones_.emplace_back();
     clone.t_ns = from.t_ns;

@@ -123,7 +123,7 @@ TEST_F(OneInterval, DoesNotIterateAwayWhereFirstEstimatesSayOtherwise) {
   // first estimates makes it seem that the interval tells of the yaw.
   testing::SmallFilter lost = truth_;
   VectorXd together = VectorXd::Zero(lost.P.rows());
-  for (const CloneView& clone : lost.clones) {
+  for (const CloneState& clone : lost.clones) {
     together.segment<3>(clone.column) = clone.R_GtoI.col(2);
     together.segment<3>(clone.column + 3) = Eigen::Vector3d::UnitZ().cross(clone.p_IinG);
   }
@@ -251,7 +251,7 @@ TEST(EncoderIntervals, WaitsForLateSamplesAndCountsLostIntervals) {
   EncoderIntervals intervals;
   testing::SmallFilter filter;
   const auto clone_at = [&](int k) {
-    CloneView clone;
+    CloneState clone;
     clone.t_ns = 100 * k * kMs;
     clone.slot = k % 4;
     return clone;

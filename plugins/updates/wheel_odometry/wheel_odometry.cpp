@@ -26,7 +26,7 @@ namespace viwo {
 namespace {
 
 using namespace wheel_motion;
-using wheel_odometry::kParams;
+using wheel_odometry::Params;
 
 constexpr int kMaxColumns = kGeometrySize + 2 * kMaxIntrinsics;
 static_assert(kMaxColumns <= kMaxFactorColumns);
@@ -57,23 +57,17 @@ struct Point {
 
 class WheelOdometry final : public Update {
  public:
-  WheelOdometry(const ParamSet& params, const HostServices& services)
-      : gate_probability_(params.number("gate_probability")),
-        noise_scale_(params.number("noise_scale")),
-        sigma_floor_yaw_rad_(params.number("sigma_floor_yaw_rad")),
-        sigma_floor_position_m_(params.number("sigma_floor_position_m")),
-        sigma_yaw_rad_per_sqrt_m_(params.number("sigma_yaw_rad_per_sqrt_m")),
-        sigma_position_m_per_sqrt_m_(params.number("sigma_position_m_per_sqrt_m")),
-        max_iterations_(services.exact ? 1 : static_cast<int>(params.integer("max_iterations"))),
-        second_order_noise_(!services.exact && params.flag("second_order_noise")),
-        max_bridged_s_(params.number("max_bridged_s")),
-        wheel_check_probability_(services.exact ? 0. : params.number("wheel_check_probability")) {
-    noise_.set_enabled(!services.exact && params.flag("find_noise"));
-    options_.twist.noise_weighted = params.text("twist") == "noise_weighted";
-    options_.parity_gate_probability = params.number("sample_gate_probability");
+  WheelOdometry(const Params& params, const HostServices& services)
+      : params_(params),
+        max_iterations_(services.exact ? 1 : params.max_iterations),
+        second_order_noise_(!services.exact && params.second_order_noise),
+        wheel_check_probability_(services.exact ? 0. : params.wheel_check_probability) {
+    noise_.set_enabled(!services.exact && params.find_noise);
+    options_.twist.noise_weighted = params.twist == Params::TwistWeights::kNoise;
+    options_.parity_gate_probability = params.sample_gate_probability;
     options_.parity = false;
     options_.twist.fitted_jacobian = true;
-    options_.twist.motion_sigmas = services.exact ? 0. : params.number("motion_sigmas");
+    options_.twist.motion_sigmas = services.exact ? 0. : params.motion_sigmas;
   }
 
   void declare(Declarations& host) override {
@@ -103,13 +97,14 @@ class WheelOdometry final : public Update {
       return;
     }
     const auto encoders = checked_.next(samples, wheels, filter.P());
-    const CloneView& first = filter.clones[interval->first_clone];
-    const CloneView& last = filter.clones[interval->last_clone];
+    const CloneState& first = filter.clones[interval->first_clone];
+    const CloneState& last = filter.clones[interval->last_clone];
     set_start(wheels, first, last, *interval);
     if (!measure(encoders, *interval, at_)) return;
     measure_rate(encoders, *interval);
     tallies_.add(pose_, last.t_ns);
-    if (!(pose_.bridged_s <= max_bridged_s_) || !pose_.g.allFinite() || !pose_.P_g.allFinite()) {
+    if (!(pose_.bridged_s <= params_.max_bridged_s) || !pose_.g.allFinite() ||
+        !pose_.P_g.allFinite()) {
       bridged_.add(1, last.t_ns);
       return;
     }
@@ -134,14 +129,14 @@ class WheelOdometry final : public Update {
   }
 
   void noises(std::vector<NoiseFound>& out) const override {
-    noise_.append_to("noise_scale", "", noise_scale_, out);
+    noise_.append_to("noise_scale", "", params_.noise_scale, out);
   }
 
  private:
   /// Prior estimate of the factor's states, and the first estimates for its Jacobian.
-  void set_start(const WheelsView& wheels, const CloneView& first, const CloneView& last,
+  void set_start(const WheelsView& wheels, const CloneState& first, const CloneState& last,
                  const EncoderInterval& interval) {
-    const auto moving = [&](const CloneView& clone, std::int64_t cut_ns, bool fej) {
+    const auto moving = [&](const CloneState& clone, std::int64_t cut_ns, bool fej) {
       const double after_s = seconds_between(clone.t_ns, cut_ns) + wheels.t_OtoI_s;  // (WO-2)
       return moving_pose(clone, after_s, fej);
     };
@@ -177,7 +172,7 @@ class WheelOdometry final : public Update {
 
   /// Columns of what the filter estimates, and where they stand in the geometry and in x_WI.
   void set_columns(const WheelsView& wheels, const FilterView::Covariance& P,
-                   const CloneView& first, const CloneView& last, FactorColumns& columns) {
+                   const CloneState& first, const CloneState& last, FactorColumns& columns) {
     n_geometry_ = 0;
     const auto add = [&](int column, int count, int geometry) {
       if (column < 0) return;
@@ -262,10 +257,12 @@ class WheelOdometry final : public Update {
   void set_noise() {
     const double path = pose_.path_length_m;
     const auto square = [](double x) { return x * x; };
-    R_ = square(noise_scale_) * pose_.P_g + curvature_noise_;
-    R_(0, 0) += square(sigma_floor_yaw_rad_) + path * square(sigma_yaw_rad_per_sqrt_m_);
+    R_ = square(params_.noise_scale) * pose_.P_g + curvature_noise_;
+    R_(0, 0) +=
+        square(params_.sigma_floor_yaw_rad) + path * square(params_.sigma_yaw_rad_per_sqrt_m);
     for (int i = 1; i < 3; ++i) {
-      R_(i, i) += square(sigma_floor_position_m_) + path * square(sigma_position_m_per_sqrt_m_);
+      R_(i, i) += square(params_.sigma_floor_position_m) +
+                  path * square(params_.sigma_position_m_per_sqrt_m);
     }
   }
 
@@ -366,7 +363,7 @@ class WheelOdometry final : public Update {
     factor.H.rightCols(wandering) = H_.rightCols(wandering);
     factor.residual.head<3>() = moved_back;
     factor.R = R_;
-    factor.gate_probability = gate_probability_;
+    factor.gate_probability = params_.gate_probability;
     factor.heavy_tailed = true;
     factor.noise = noise_.enabled() ? &noise_ : nullptr;
   }
@@ -413,13 +410,10 @@ class WheelOdometry final : public Update {
     }
   }
 
+  Params params_;
   PreintegrationOptions options_;
-  double gate_probability_, noise_scale_;
-  double sigma_floor_yaw_rad_, sigma_floor_position_m_;
-  double sigma_yaw_rad_per_sqrt_m_, sigma_position_m_per_sqrt_m_;
   int max_iterations_;
   bool second_order_noise_;
-  double max_bridged_s_;
   double wheel_check_probability_;
 
   WheelsBlocks blocks_;
@@ -458,7 +452,7 @@ class WheelOdometry final : public Update {
 
 VIWO_REGISTER(Update, WheelOdometry, "wheel_odometry", "1.0.0",
               "relative planar pose between clones, preintegrated from the wheel encoders",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

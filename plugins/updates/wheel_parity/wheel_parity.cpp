@@ -23,33 +23,25 @@
 namespace viwo {
 namespace {
 
-constexpr std::array kParams{
-    kIntervalGateParam,
-    kSampleGateParam,
-    ParamSpec{.name = "noise_scale",
-              .type = ParamType::kNumber,
-              .fallback = "1",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "factor on the standard deviation of the parity noise, for encoders whose "
-                      "noise is not white"},
-    ParamSpec{.name = "period_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0.5",
-              .min = 0.,
-              .help = "how much is taken together, at most what the clones reach over; 0: every "
-                      "epoch by itself"},
-    ParamSpec{.name = "max_iterations",
-              .type = ParamType::kInt,
-              .fallback = "20",
-              .min = 1,
-              .max = 100,
-              .help = "linearisations per interval at most; 1: a plain EKF update"},
-    kSecondOrderNoiseParam,
-    kMotionParam,
-    kWheelCheckParam,
-    kFindNoiseParam,
+struct Params : WheelUpdateParams {
+  double noise_scale = 1.;
+  double period_s = 0.5;
+  int max_iterations = 20;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(noise_scale),
+      {.above = 0.,
+       .help = "factor on the standard deviation of the parity noise, for encoders whose "
+               "noise is not white"});
+    b(VIWO_PARAM(period_s),
+      {.unit = "s",
+       .min = 0.,
+       .help = "how much is taken together, at most what the clones reach over; 0: every "
+               "epoch by itself"});
+    b(VIWO_PARAM(max_iterations),
+      {.min = 1, .max = 100, .help = "linearisations per interval at most; 1: a plain EKF update"});
+    WheelUpdateParams::bind(b);
+  }
 };
 
 using Square = IntrinsicMatrix;
@@ -73,17 +65,15 @@ constexpr double kMostBeyond = 4.;
 
 class WheelParity final : public Update {
  public:
-  WheelParity(const ParamSet& params, const HostServices& services)
-      : gate_probability_(params.number("gate_probability")),
-        noise_scale_(params.number("noise_scale")),
-        period_s_(params.number("period_s")),
-        max_iterations_(services.exact ? 1 : static_cast<int>(params.integer("max_iterations"))),
-        second_order_noise_(!services.exact && params.flag("second_order_noise")),
-        wheel_check_probability_(services.exact ? 0. : params.number("wheel_check_probability")) {
-    noise_.set_enabled(!services.exact && params.flag("find_noise"));
+  WheelParity(const Params& params, const HostServices& services)
+      : params_(params),
+        max_iterations_(services.exact ? 1 : params.max_iterations),
+        second_order_noise_(!services.exact && params.second_order_noise),
+        wheel_check_probability_(services.exact ? 0. : params.wheel_check_probability) {
+    noise_.set_enabled(!services.exact && params.find_noise);
     options_.twist.noise_weighted = true;
-    options_.twist.motion_sigmas = services.exact ? 0. : params.number("motion_sigmas");
-    options_.parity_gate_probability = params.number("sample_gate_probability");
+    options_.twist.motion_sigmas = services.exact ? 0. : params.motion_sigmas;
+    options_.parity_gate_probability = params.sample_gate_probability;
     options_.parity = true;
   }
 
@@ -104,7 +94,7 @@ class WheelParity final : public Update {
     const WheelsView wheels = blocks_.view(filter);
     const auto samples = data.samples<EncoderSample>(encoders_);
     const std::optional<EncoderInterval> interval =
-        intervals_.next(filter, wheels.t_OtoI_s, samples, period_s_ - kPeriodSlackS);
+        intervals_.next(filter, wheels.t_OtoI_s, samples, params_.period_s - kPeriodSlackS);
     if (!interval.has_value()) return;
     if (wheels.intrinsics_column < 0 && wheels.wander_column < 0) return;
     if (!has_channels(preintegrator_->model().description(), samples.back())) {
@@ -159,7 +149,7 @@ class WheelParity final : public Update {
   }
 
   void noises(std::vector<NoiseFound>& out) const override {
-    noise_.append_to("noise_scale", "", noise_scale_, out);
+    noise_.append_to("noise_scale", "", params_.noise_scale, out);
     if (wheel_noise_.has_value()) wheel_noise_->append_to(out);
   }
 
@@ -214,7 +204,9 @@ class WheelParity final : public Update {
   }
 
   /// Of the parity information, which is that of the encoders' own noise.
-  double parity_weight() const { return 1. / (noise_scale_ * noise_scale_ * noise_.variance()); }
+  double parity_weight() const {
+    return 1. / (params_.noise_scale * params_.noise_scale * noise_.variance());
+  }
 
   /// (WP-1), (WP-2), (WP-3): the parity information at x as a cost of errors about x0, in units
   /// of sigma.
@@ -297,10 +289,10 @@ class WheelParity final : public Update {
   }
 
   double gate(int dof) {
-    if (gate_probability_ <= 0.) return std::numeric_limits<double>::infinity();
+    if (params_.gate_probability <= 0.) return std::numeric_limits<double>::infinity();
     if (dof != gate_dof_) {
       gate_dof_ = dof;
-      gate_ = chi2_quantile(1. - gate_probability_, dof);
+      gate_ = chi2_quantile(1. - params_.gate_probability, dof);
     }
     return gate_;
   }
@@ -328,9 +320,8 @@ class WheelParity final : public Update {
     }
   }
 
+  Params params_;
   PreintegrationOptions options_;
-  double gate_probability_, noise_scale_;
-  double period_s_;
   int max_iterations_;
   bool second_order_noise_;
   double wheel_check_probability_;
@@ -364,7 +355,7 @@ class WheelParity final : public Update {
 
 VIWO_REGISTER(Update, WheelParity, "wheel_parity", "1.0.0",
               "information about the wheel intrinsics from how the wheels contradict each other",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -19,79 +19,70 @@ namespace {
 using namespace wheel_motion;
 using namespace wheel_relative_pose;
 
-constexpr std::array kParams{
-    ParamSpec{.name = "gate_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0.05",
-              .min = 0.,
-              .max = 0.5,
-              .help = "intervals less likely than this are left out (the paper's alpha, which it "
-                      "does not give); 0: none"},
-    ParamSpec{.name = "residual_gate_m_per_s",
-              .type = ParamType::kNumber,
-              .unit = "m/s",
-              .fallback = "0",
-              .min = 0.,
-              .help = "readings with a larger |e_perp| are replaced by the one before (the paper "
-                      "gives no threshold); 0: none"},
-    ParamSpec{.name = "sigma_floor_yaw_rad",
-              .type = ParamType::kNumber,
-              .unit = "rad",
-              .fallback = "0",
-              .min = 0.,
-              .help = "yaw noise of each interval on top of the encoders' (the paper has one of "
-                      "a size that it does not give)"},
-    ParamSpec{.name = "sigma_floor_position_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "0",
-              .min = 0.,
-              .help = "position noise of each interval on top of the encoders', per axis (as "
-                      "sigma_floor_yaw_rad)"},
-    ParamSpec{.name = "reading",
-              .type = ParamType::kString,
-              .fallback = "from_stamp",
-              .choices = "from_stamp|cell",
-              .help = "how long a reading holds: from its stamp to the next, as published; or over "
-                      "the time around the stamp that it stands for"},
-    ParamSpec{.name = "jacobian_at",
-              .type = ParamType::kString,
-              .fallback = "measured",
-              .choices = "measured|fitted",
-              .help = "the readings at which the twist is differentiated: the measured ones, as "
-                      "published; or those that the twist predicts"},
-    ParamSpec{.name = "rank_tolerance",
-              .type = ParamType::kNumber,
-              .fallback = "0",
-              .min = 0.,
-              .max = 0.5,
-              .help = "twists that the rows do not tell are taken as zero with 0.1 m/s, see "
-                      "docs/math/wheel_odometry.md, W-3; 0: the plain inverse, as published"},
-    ParamSpec{.name = "max_hold_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "0.05",
-              .min = 0.,
-              .help = "intervals in which one reading would have to do for longer are left out"},
+struct Params {
+  double gate_probability = 0.05;
+  double residual_gate_m_per_s = 0.;
+  double sigma_floor_yaw_rad = 0.;
+  double sigma_floor_position_m = 0.;
+  std::string reading = "from_stamp";
+  std::string jacobian_at = "measured";
+  double rank_tolerance = 0.;
+  double max_hold_s = 0.05;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(gate_probability),
+      {.min = 0.,
+       .max = 0.5,
+       .help = "intervals less likely than this are left out (the paper's alpha, which it "
+               "does not give); 0: none"});
+    b(VIWO_PARAM(residual_gate_m_per_s),
+      {.unit = "m/s",
+       .min = 0.,
+       .help = "readings with a larger |e_perp| are replaced by the one before (the paper "
+               "gives no threshold); 0: none"});
+    b(VIWO_PARAM(sigma_floor_yaw_rad),
+      {.unit = "rad",
+       .min = 0.,
+       .help = "yaw noise of each interval on top of the encoders' (the paper has one of "
+               "a size that it does not give)"});
+    b(VIWO_PARAM(sigma_floor_position_m),
+      {.unit = "m",
+       .min = 0.,
+       .help = "position noise of each interval on top of the encoders', per axis (as "
+               "sigma_floor_yaw_rad)"});
+    b(VIWO_PARAM(reading),
+      {.choices = "from_stamp|cell",
+       .help = "how long a reading holds: from its stamp to the next, as published; or over "
+               "the time around the stamp that it stands for"});
+    b(VIWO_PARAM(jacobian_at),
+      {.choices = "measured|fitted",
+       .help = "the readings at which the twist is differentiated: the measured ones, as "
+               "published; or those that the twist predicts"});
+    b(VIWO_PARAM(rank_tolerance),
+      {.min = 0.,
+       .max = 0.5,
+       .help = "twists that the rows do not tell are taken as zero with 0.1 m/s, see "
+               "docs/math/wheel_odometry.md, W-3; 0: the plain inverse, as published"});
+    b(VIWO_PARAM(max_hold_s),
+      {.unit = "s",
+       .min = 0.,
+       .help = "intervals in which one reading would have to do for longer are left out"});
+  }
 };
 
-IncrementOptions read_options(const ParamSet& params, bool exact) {
+IncrementOptions read_options(const Params& params, bool exact) {
   IncrementOptions options;
-  options.twist.fitted_jacobian = params.text("jacobian_at") == "fitted";
-  options.twist.rank_tolerance = params.number("rank_tolerance");
-  options.holds_from_stamp = params.text("reading") == "from_stamp";
-  options.residual_gate_m_per_s = exact ? 0. : params.number("residual_gate_m_per_s");
+  options.twist.fitted_jacobian = params.jacobian_at == "fitted";
+  options.twist.rank_tolerance = params.rank_tolerance;
+  options.holds_from_stamp = params.reading == "from_stamp";
+  options.residual_gate_m_per_s = exact ? 0. : params.residual_gate_m_per_s;
   return options;
 }
 
 class WheelRelativePose final : public Update {
  public:
-  WheelRelativePose(const ParamSet& params, const HostServices& services)
-      : options_(read_options(params, services.exact)),
-        gate_probability_(params.number("gate_probability")),
-        sigma_floor_yaw_rad_(params.number("sigma_floor_yaw_rad")),
-        sigma_floor_position_m_(params.number("sigma_floor_position_m")),
-        max_hold_s_(params.number("max_hold_s")) {}
+  WheelRelativePose(const Params& params, const HostServices& services)
+      : params_(params), options_(read_options(params, services.exact)) {}
 
   void declare(Declarations& host) override {
     blocks_ = declare_wheels(host);
@@ -107,8 +98,8 @@ class WheelRelativePose final : public Update {
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
     if (filter.clones.size() < 2) return;
-    const CloneView& first = filter.clones[filter.clones.size() - 2];
-    const CloneView& last = filter.clones.back();
+    const CloneState& first = filter.clones[filter.clones.size() - 2];
+    const CloneState& last = filter.clones.back();
     const WheelsView wheels = blocks_.view(filter);
     const auto encoders = data.samples<EncoderSample>(encoders_);
     if (!encoders.empty() && !has_channels(integrator_->model().description(), encoders.back())) {
@@ -127,7 +118,7 @@ class WheelRelativePose final : public Update {
 
  private:
   /// g between two clones, at the present estimate of calibration and clock (RP-1).
-  bool measure(const WheelsView& wheels, const CloneView& first, const CloneView& last,
+  bool measure(const WheelsView& wheels, const CloneState& first, const CloneState& last,
                std::span<const EncoderSample> encoders) {
     const std::int64_t offset_ns = std::llround(1e9 * wheels.t_OtoI_s);
     integrator_->set_intrinsics(wheels.x_WI);
@@ -138,7 +129,7 @@ class WheelRelativePose final : public Update {
     }
     refused_.add(increment_.refused, last.t_ns);
     gated_.add(increment_.gated, last.t_ns);
-    if (!(increment_.longest_hold_s <= max_hold_s_) || !increment_.g.allFinite() ||
+    if (!(increment_.longest_hold_s <= params_.max_hold_s) || !increment_.g.allFinite() ||
         !increment_.P_g.allFinite()) {
       held_.add(1, last.t_ns);
       return false;
@@ -147,7 +138,7 @@ class WheelRelativePose final : public Update {
   }
 
   /// (RP-9)
-  void add_factor(const WheelsView& wheels, const CloneView& first, const CloneView& last,
+  void add_factor(const WheelsView& wheels, const CloneState& first, const CloneState& last,
                   ResidualFactor& factor) {
     const Extrinsics mount{wheels.R_ItoO, wheels.p_IinO};
     const PoseJacobian by_state = relative_pose_jacobian(
@@ -173,15 +164,15 @@ class WheelRelativePose final : public Update {
     factor.residual = increment_.g - relative_pose(moving_pose(first, 0., false),
                                                    moving_pose(last, 0., false), mount);  // (RP-7)
     factor.residual[0] = std::remainder(factor.residual[0], 2. * M_PI);
-    const Eigen::Vector3d floor(sigma_floor_yaw_rad_, sigma_floor_position_m_,
-                                sigma_floor_position_m_);
+    const Eigen::Vector3d floor(params_.sigma_floor_yaw_rad, params_.sigma_floor_position_m,
+                                params_.sigma_floor_position_m);
     factor.R = increment_.P_g;
     factor.R += floor.cwiseAbs2().asDiagonal();
-    factor.gate_probability = gate_probability_;  // (RP-10)
+    factor.gate_probability = params_.gate_probability;  // (RP-10)
   }
 
+  Params params_;
   IncrementOptions options_;
-  double gate_probability_, sigma_floor_yaw_rad_, sigma_floor_position_m_, max_hold_s_;
 
   WheelsBlocks blocks_;
   StreamId encoders_;
@@ -197,7 +188,7 @@ class WheelRelativePose final : public Update {
 
 VIWO_REGISTER(Update, WheelRelativePose, "wheel_relative_pose", "1.0.0",
               "the wheel measurement of the paper as published: relative pose between clones",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace
 }  // namespace viwo

@@ -21,88 +21,65 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr std::array kParams{
-    ParamSpec{.name = "detector",
-              .type = ParamType::kString,
-              .fallback = "imu",
-              .choices = "imu|wheels",
-              .help = "what tells a standstill from slow, even motion: images or else the filter's "
-                      "own certainty (imu), or drive rates of a wheel set (wheels)"},
-    ParamSpec{.name = "max_noise_ratio",
-              .type = ParamType::kNumber,
-              .fallback = "3",
-              .min = 1.,
-              .help = "IMU samples of an epoch may scatter by this factor more than their noise"},
-    ParamSpec{.name = "max_drive_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "0.02",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "detector wheels: drive rate of a wheel that stands"},
-    ParamSpec{.name = "max_disparity_px",
-              .type = ParamType::kNumber,
-              .unit = "px",
-              .fallback = "2.5",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "detector imu: median distance of the points of two images that are "
-                      "window_s apart; above 1.7 times the noise of a point"},
-    ParamSpec{.name = "min_points",
-              .type = ParamType::kInt,
-              .fallback = "10",
-              .min = 3,
-              .max = 1000,
-              .help = "detector imu: points that two images must share to be compared"},
-    ParamSpec{.name = "window_s",
-              .type = ParamType::kNumber,
-              .unit = "s",
-              .fallback = "1",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "detector imu: how long the images must not have moved"},
-    ParamSpec{.name = "slowest_m_per_s",
-              .type = ParamType::kNumber,
-              .unit = "m/s",
-              .fallback = "0.05",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "detector imu without images: the slowest motion; a standstill is only "
-                      "believed when the filter knows its velocity to a quarter of it"},
-    ParamSpec{.name = "slowest_rad_per_s",
-              .type = ParamType::kNumber,
-              .unit = "rad/s",
-              .fallback = "0.02",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "the same for the slowest rotation and the gyroscope bias"},
-    ParamSpec{.name = "sigma_velocity_m_per_s",
-              .type = ParamType::kNumber,
-              .unit = "m/s",
-              .fallback = "0.001",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how still a standing base is: velocity, per axis"},
-    ParamSpec{.name = "sigma_rotation_rad",
-              .type = ParamType::kNumber,
-              .unit = "rad",
-              .fallback = "1e-5",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how still a standing base is: rotation from epoch to epoch, per axis"},
-    ParamSpec{.name = "sigma_position_m",
-              .type = ParamType::kNumber,
-              .unit = "m",
-              .fallback = "1e-5",
-              .min = 0.,
-              .min_exclusive = true,
-              .help = "how still a standing base is: displacement from epoch to epoch, per axis"},
-    ParamSpec{.name = "gate_probability",
-              .type = ParamType::kNumber,
-              .fallback = "0.01",
-              .min = 0.,
-              .max = 0.5,
-              .help = "standstills less likely than this to the filter are not believed; 0: none"},
+struct Params {
+  std::string detector = "imu";
+  double max_noise_ratio = 3.;
+  double max_drive_rad_per_s = 0.02;
+  double max_disparity_px = 2.5;
+  int min_points = 10;
+  double window_s = 1.;
+  double slowest_m_per_s = 0.05;
+  double slowest_rad_per_s = 0.02;
+  double sigma_velocity_m_per_s = 0.001;
+  double sigma_rotation_rad = 1e-5;
+  double sigma_position_m = 1e-5;
+  double gate_probability = 0.01;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(detector),
+      {.choices = "imu|wheels",
+       .help = "what tells a standstill from slow, even motion: images or else the filter's "
+               "own certainty (imu), or drive rates of a wheel set (wheels)"});
+    b(VIWO_PARAM(max_noise_ratio),
+      {.min = 1.,
+       .help = "IMU samples of an epoch may scatter by this factor more than their noise"});
+    b(VIWO_PARAM(max_drive_rad_per_s),
+      {.unit = "rad/s", .above = 0., .help = "detector wheels: drive rate of a wheel that stands"});
+    b(VIWO_PARAM(max_disparity_px),
+      {.unit = "px",
+       .above = 0.,
+       .help = "detector imu: median distance of the points of two images that are "
+               "window_s apart; above 1.7 times the noise of a point"});
+    b(VIWO_PARAM(min_points),
+      {.min = 3,
+       .max = 1000,
+       .help = "detector imu: points that two images must share to be compared"});
+    b(VIWO_PARAM(window_s),
+      {.unit = "s", .above = 0., .help = "detector imu: how long the images must not have moved"});
+    b(VIWO_PARAM(slowest_m_per_s),
+      {.unit = "m/s",
+       .above = 0.,
+       .help = "detector imu without images: the slowest motion; a standstill is only "
+               "believed when the filter knows its velocity to a quarter of it"});
+    b(VIWO_PARAM(slowest_rad_per_s),
+      {.unit = "rad/s",
+       .above = 0.,
+       .help = "the same for the slowest rotation and the gyroscope bias"});
+    b(VIWO_PARAM(sigma_velocity_m_per_s),
+      {.unit = "m/s", .above = 0., .help = "how still a standing base is: velocity, per axis"});
+    b(VIWO_PARAM(sigma_rotation_rad),
+      {.unit = "rad",
+       .above = 0.,
+       .help = "how still a standing base is: rotation from epoch to epoch, per axis"});
+    b(VIWO_PARAM(sigma_position_m),
+      {.unit = "m",
+       .above = 0.,
+       .help = "how still a standing base is: displacement from epoch to epoch, per axis"});
+    b(VIWO_PARAM(gate_probability),
+      {.min = 0.,
+       .max = 0.5,
+       .help = "standstills less likely than this to the filter are not believed; 0: none"});
+  }
 };
 
 /// The IMU must have so many samples in an epoch to be judged quiet.
@@ -110,18 +87,10 @@ constexpr std::size_t kFewestSamples = 5;
 
 class ZeroVelocity final : public Update {
  public:
-  ZeroVelocity(const ParamSet& params, const HostServices& /*services*/)
-      : use_wheels_(params.text("detector") == "wheels"),
-        max_noise_ratio_(params.number("max_noise_ratio")),
-        max_drive_rad_per_s_(params.number("max_drive_rad_per_s")),
-        slowest_m_per_s_(params.number("slowest_m_per_s")),
-        slowest_rad_per_s_(params.number("slowest_rad_per_s")),
-        sigma_velocity_m_per_s_(params.number("sigma_velocity_m_per_s")),
-        sigma_rotation_rad_(params.number("sigma_rotation_rad")),
-        sigma_position_m_(params.number("sigma_position_m")),
-        gate_probability_(params.number("gate_probability")),
-        images_(params.number("max_disparity_px"), static_cast<int>(params.integer("min_points")),
-                params.number("window_s")) {}
+  ZeroVelocity(const Params& params, const HostServices& /*services*/)
+      : params_(params),
+        use_wheels_(params.detector == "wheels"),
+        images_(params.max_disparity_px, params.min_points, params.window_s) {}
 
   void declare(Declarations& host) override {
     if (use_wheels_) {
@@ -177,7 +146,8 @@ class ZeroVelocity final : public Update {
       for (const ImuSample& sample : imu) {
         squares += (Vector3d((sample.*channel).data()) - mean).squaredNorm();
       }
-      const double limit = max_noise_ratio_ * max_noise_ratio_ * density * density * rate_hz;
+      const double limit =
+          params_.max_noise_ratio * params_.max_noise_ratio * density * density * rate_hz;
       return !(squares <= 3. * (n - 1.) * limit);
     };
     return !scatters(&ImuSample::gyro_rad_per_s, noise.gyro_rad_per_s_sqrt_hz) &&
@@ -195,7 +165,7 @@ class ZeroVelocity final : public Update {
       if (sample.end_ns <= from_ns || sample.begin_ns >= to_ns) continue;
       for (int i = 0; i < sample.n_drive; ++i) {
         const double rate = sample.drive_rad_per_s[static_cast<std::size_t>(i)];
-        if (!(std::abs(rate) <= max_drive_rad_per_s_)) return false;
+        if (!(std::abs(rate) <= params_.max_drive_rad_per_s)) return false;
       }
       reached_ns = sample.end_ns;
     }
@@ -209,12 +179,12 @@ class ZeroVelocity final : public Update {
     const auto largest_sigma = [&](int column) {
       return std::sqrt(P.diagonal().segment<3>(column).maxCoeff());
     };
-    return 4. * largest_sigma(kVelocityColumn) < slowest_m_per_s_ &&
-           4. * largest_sigma(kGyroBiasColumn) < slowest_rad_per_s_;
+    return 4. * largest_sigma(kVelocityColumn) < params_.slowest_m_per_s &&
+           4. * largest_sigma(kGyroBiasColumn) < params_.slowest_rad_per_s;
   }
 
   void emit(const FilterView& filter, ResidualFactor& factor) const {
-    const CloneView& now = filter.clones.back();
+    const CloneState& now = filter.clones.back();
     const bool two = filter.clones.size() > 1;
     const int theta = factor.columns.add(kThetaColumn, 3);
     const int velocity = factor.columns.add(kVelocityColumn, 3);
@@ -224,37 +194,34 @@ class ZeroVelocity final : public Update {
       last = factor.columns.add(now.column, kPoseSize);
     }
     factor.set_rows(two ? 9 : 3);
-    factor.gate_probability = gate_probability_;
+    factor.gate_probability = params_.gate_probability;
     const auto square = [](double x) { return x * x; };
 
     // (ZV-3)
-    const ImuView& imu = filter.imu;
+    const ImuState& imu = filter.imu;
     factor.residual.head<3>() = -imu.R_GtoI * imu.v_IinG;
     factor.H.block<3, 3>(0, theta) = skew(imu.R_GtoI_fej * imu.v_IinG_fej);
     factor.H.block<3, 3>(0, velocity) = imu.R_GtoI_fej;
-    factor.R.diagonal().head<3>().setConstant(square(sigma_velocity_m_per_s_));
+    factor.R.diagonal().head<3>().setConstant(square(params_.sigma_velocity_m_per_s));
     if (!two) return;
 
     // (ZV-4)
-    const CloneView& before = filter.clones[filter.clones.size() - 2];
+    const CloneState& before = filter.clones[filter.clones.size() - 2];
     factor.residual.segment<3>(3) = -log_so3(now.R_GtoI * before.R_GtoI.transpose());
     const Vector3d phi = log_so3(now.R_GtoI_fej * before.R_GtoI_fej.transpose());
     factor.H.block<3, 3>(3, first) = right_jacobian_inverse_so3(phi);
     factor.H.block<3, 3>(3, last) = -right_jacobian_inverse_so3(-phi);
-    factor.R.diagonal().segment<3>(3).setConstant(square(sigma_rotation_rad_));
+    factor.R.diagonal().segment<3>(3).setConstant(square(params_.sigma_rotation_rad));
     // (ZV-5)
     factor.residual.tail<3>() = -before.R_GtoI * (now.p_IinG - before.p_IinG);
     factor.H.block<3, 3>(6, first) = skew(before.R_GtoI_fej * (now.p_IinG_fej - before.p_IinG_fej));
     factor.H.block<3, 3>(6, first + 3) = -before.R_GtoI_fej;
     factor.H.block<3, 3>(6, last + 3) = before.R_GtoI_fej;
-    factor.R.diagonal().tail<3>().setConstant(square(sigma_position_m_));
+    factor.R.diagonal().tail<3>().setConstant(square(params_.sigma_position_m));
   }
 
+  Params params_;
   bool use_wheels_;
-  double max_noise_ratio_, max_drive_rad_per_s_;
-  double slowest_m_per_s_, slowest_rad_per_s_;
-  double sigma_velocity_m_per_s_, sigma_rotation_rad_, sigma_position_m_;
-  double gate_probability_;
   WheelsBlocks wheels_;
   StreamId encoders_, features_;
   StillImages images_;
@@ -263,7 +230,7 @@ class ZeroVelocity final : public Update {
 
 VIWO_REGISTER(Update, ZeroVelocity, "zero_velocity", "1.0.0",
               "a base that stands has no velocity and does not move between clones", "Apache-2.0",
-              kParams);
+              Params);
 
 }  // namespace
 }  // namespace viwo

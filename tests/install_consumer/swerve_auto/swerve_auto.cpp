@@ -1,6 +1,5 @@
 // The recorded swerve robot as somebody else would model it: four wheels at the corners of a
 // square, each steered and driven, with one radius and one track to calibrate.
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -11,44 +10,46 @@
 namespace {
 
 using viwo::NoiseKind;
-using viwo::ParamSpec;
-using viwo::ParamType;
 
-constexpr ParamSpec positive(const char* name, const char* unit, const char* fallback,
-                             const char* help) {
-  return {.name = name,
-          .type = ParamType::kNumber,
-          .unit = unit,
-          .fallback = fallback,
-          .min = 0.,
-          .min_exclusive = true,
-          .help = help};
-}
+struct Params {
+  double radius_m = 0.;
+  double track_m = 0.;
+  double prior_sigma_m = 0.001;
+  double sigma_drive_rad_per_s = 0.02;
+  double sigma_steer_rad = 0.00044;
+  double sigma_lateral_m_per_s = 0.001;
 
-constexpr std::array kParams{
-    positive("radius_m", "m", nullptr, "radius of all wheels"),
-    positive("track_m", "m", nullptr, "side of the square"),
-    positive("prior_sigma_m", "m", "0.001", "how well both are known"),
-    positive("sigma_drive_rad_per_s", "rad/s", "0.02", "noise of a drive rate, per sample"),
-    positive("sigma_steer_rad", "rad", "0.00044", "noise of a steering angle, per sample"),
-    positive("sigma_lateral_m_per_s", "m/s", "0.001", "sideways velocity of a wheel, per sample")};
+  void bind(viwo::ParamBinder& b) {
+    b(VIWO_PARAM(radius_m),
+      {.unit = "m", .above = 0., .required = true, .help = "radius of all wheels"});
+    b(VIWO_PARAM(track_m),
+      {.unit = "m", .above = 0., .required = true, .help = "side of the square"});
+    b(VIWO_PARAM(prior_sigma_m), {.unit = "m", .above = 0., .help = "how well both are known"});
+    b(VIWO_PARAM(sigma_drive_rad_per_s),
+      {.unit = "rad/s", .above = 0., .help = "noise of a drive rate, per sample"});
+    b(VIWO_PARAM(sigma_steer_rad),
+      {.unit = "rad", .above = 0., .help = "noise of a steering angle, per sample"});
+    b(VIWO_PARAM(sigma_lateral_m_per_s),
+      {.unit = "m/s", .above = 0., .help = "sideways velocity of a wheel, per sample"});
+  }
+};
 
 class SwerveAuto final : public viwo::AutoKinematics<SwerveAuto> {
  public:
-  SwerveAuto(const viwo::ParamSet& params, const viwo::HostServices& /*services*/) : p_(params) {}
+  SwerveAuto(const Params& params, const viwo::HostServices& /*services*/) : p_(params) {}
 
   void describe(viwo::ModelDescription& out) const override {
     out.n_drive = out.n_steer = 4;
     out.n_rows = 8;
     out.noise_block = 2;
-    out.intrinsics = {{"r", "m", p_.number("radius_m"), p_.number("prior_sigma_m")},
-                      {"track", "m", p_.number("track_m"), p_.number("prior_sigma_m")}};
+    out.intrinsics = {{"r", "m", p_.radius_m, p_.prior_sigma_m},
+                      {"track", "m", p_.track_m, p_.prior_sigma_m}};
     const auto add = [&out](NoiseKind kind, double sigma, int first, int rows) {
       for (int i = 0; i < 4; ++i) out.noises.push_back({kind, i, sigma, {2 * i + first, rows}});
     };
-    add(NoiseKind::kDrive, p_.number("sigma_drive_rad_per_s"), 0, 1);
-    add(NoiseKind::kSteer, p_.number("sigma_steer_rad"), 0, 2);
-    add(NoiseKind::kSlip, p_.number("sigma_lateral_m_per_s"), 1, 1);
+    add(NoiseKind::kDrive, p_.sigma_drive_rad_per_s, 0, 1);
+    add(NoiseKind::kSteer, p_.sigma_steer_rad, 0, 2);
+    add(NoiseKind::kSlip, p_.sigma_lateral_m_per_s, 1, 1);
   }
 
   template <class T>
@@ -71,10 +72,10 @@ class SwerveAuto final : public viwo::AutoKinematics<SwerveAuto> {
   }
 
  private:
-  viwo::ParamSet p_;
+  Params p_;
 };
 
 VIWO_REGISTER(viwo::KinematicModel, SwerveAuto, "swerve_auto", "1.0.0", "square swerve base",
-              "Apache-2.0", kParams);
+              "Apache-2.0", Params);
 
 }  // namespace

@@ -91,19 +91,19 @@ inline CalibrationResult run_calibration(const CalibrationRuns& options) {
     }
     FactorSink sink(4, static_cast<int>(filter.P.rows()));
     sim::PoseIntegrator pose(motion);
-    CloneView before;
+    CloneState before;
     const auto epochs = static_cast<std::int64_t>(options.duration_s * 10.);
     for (std::int64_t k = 1; k <= epochs; ++k) {
       const std::int64_t t_ns = k * kEpochNs;
       const double t = 1e-9 * static_cast<double>(t_ns);
-      const CloneView now =
+      const CloneState now =
           drive.clone(t_ns, static_cast<int>(k % 2), pose.advance_to(t), motion.twist(t));
       filter.clones[0] = k == 1 ? now : before;
       filter.clones[1] = now;
       before = now;
       filter.layout();
       // Poses as an independent source tells them, new at each epoch.
-      for (CloneView& clone : filter.clones) {
+      for (CloneState& clone : filter.clones) {
         const int c = clone.column;
         filter.P.middleRows(c, 6).setZero();
         filter.P.middleCols(c, 6).setZero();

@@ -37,10 +37,10 @@ struct TiltedDrive {
   Eigen::Vector3d p_IinO{0.08, -0.05, 0.12};
 
   /// The clone for the planar pose g = [yaw, x, y] of O in W and the twist of O.
-  CloneView clone(std::int64_t t_ns, int slot, const Eigen::Vector3d& g, const Twist& xi) const {
+  CloneState clone(std::int64_t t_ns, int slot, const Eigen::Vector3d& g, const Twist& xi) const {
     const Eigen::Matrix3d R_WtoO = exp_so3({0., 0., -g[0]});
     const Eigen::Matrix3d R_GtoO = R_WtoO * R_GtoW;
-    CloneView clone;
+    CloneState clone;
     clone.t_ns = t_ns;
     clone.slot = slot;
     clone.R_GtoI = R_ItoO.transpose() * R_GtoO;

@@ -43,13 +43,13 @@ class Fixes : public ::testing::Test {
     for (int k = 0; k < 4; ++k) truth_.clones.push_back(at(1. + kPeriod * k, k));
   }
 
-  CloneView at(double t_s, int slot) const {
+  CloneState at(double t_s, int slot) const {
     sim::PoseIntegrator pose(motion_);
     return drive_.clone(std::llround(t_s * 1e9), slot, pose.advance_to(t_s), motion_.twist(t_s));
   }
 
   GnssSample fix(double t_s) const {
-    const CloneView imu = at(t_s, 0);
+    const CloneState imu = at(t_s, 0);
     const Vector3d p =
         gnss::R_GtoE(kYaw) * (imu.p_IinG + imu.R_GtoI.transpose() * kLever - kOrigin);
     const GeographicLib::LocalCartesian frame(48.14, 11.58, 520.);
@@ -152,7 +152,7 @@ TEST_F(Fixes, TellNothingOfATurnAndAShiftOfEverythingAlsoWhereFirstEstimatesAreO
   const Rows before = rows_of(*update, truth_, {fix(1.27)})[0];
   EXPECT_GT((factor.H - before.H).cwiseAbs().maxCoeff(), 1e-3) << "the estimate counts for nothing";
   VectorXd turn = VectorXd::Zero(H.cols()), shift = turn;
-  for (const CloneView& clone : truth_.clones) {
+  for (const CloneState& clone : truth_.clones) {
     turn.segment<3>(clone.column) = clone.R_GtoI_fej * Vector3d::UnitZ();
     turn.segment<3>(clone.column + 3) = Vector3d::UnitZ().cross(clone.p_IinG_fej);
     shift.segment<3>(clone.column + 3) << 1., 2., 3.;
@@ -173,7 +173,7 @@ TEST_F(Fixes, AreLinearisedAtTheFirstOfThemWhereThePositionOfTheEarthIsNotKnown)
   truth_.set_priors();
   const auto made = rows_of(*update, truth_, {fix(1.1), fix(1.3)});
   ASSERT_EQ(made.size(), 2u);
-  const CloneView imu = at(1.1, 0);
+  const CloneState imu = at(1.1, 0);
   const Vector3d first = imu.p_IinG + imu.R_GtoI.transpose() * kLever;
   // The origin of E is the first fix, the declared position of it zero.
   const Vector3d expected = gnss::R_GtoE(kYaw) * -first;
@@ -294,7 +294,7 @@ std::string error_of(const std::string& parameters) {
 
 TEST(GnssParameters, SayWhatContradictsWhat) {
   using ::testing::HasSubstr;
-  EXPECT_THAT(error_of("p_AinI_m: [1, 2]"), HasSubstr("p_AinI_m: needs three numbers"));
+  EXPECT_THAT(error_of("p_AinI_m: [1, 2]"), HasSubstr("p_AinI_m: needs 3 numbers, not 2"));
   EXPECT_THAT(error_of("sigma_p_EinG_m: 0"),
               HasSubstr("origin_deg: is not given, but where it is in G"));
   EXPECT_THAT(error_of("origin_deg: [48, 11]"),

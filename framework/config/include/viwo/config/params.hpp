@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "viwo/api/params.hpp"
+#include "viwo/api/status.hpp"
 #include "viwo/config/errors.hpp"
 #include "viwo/config/node.hpp"
 
@@ -34,14 +35,44 @@ ParamSet read_params(const Node& map, const Mark& where, std::string_view what,
                      std::span<const ParamSpec> specs, std::span<const std::string_view> other_keys,
                      const ReadContext& context, Errors& errors);
 
-/// Throws std::logic_error when a table is wrong: a name missing or twice, a null text, a fallback
-/// that its own row refuses (kKinematics: that is not a section).
+/// Throws std::logic_error when a table is wrong: a name missing or twice, a default that its own
+/// row refuses (kKinematics: that is not a section).
 void check_specs(std::span<const ParamSpec> specs);
+
+/// A value that is no nested model.
+Node value_node(const ParamValue& value);
 
 /// Writes checked values back: a section that read_params accepts and that gives the same values.
 /// `write_kinematics` gives the section of a nested model.
 Node write_params(std::span<const ParamSpec> specs, const ParamSet& params,
                   const std::function<Node(const KinematicModel&)>& write_kinematics = {});
+
+/// The section as a structure with bind() (viwo/api/params.hpp); its defaults when something in it
+/// is wrong, which then is in `errors`.
+template <class T>
+T read_section(const Node& map, const Mark& where, std::string_view what, Errors& errors,
+               std::span<const std::string_view> other_keys = {}) {
+  const std::size_t before = errors.size();
+  const ParamSet values = read_params(map, where, what, param_specs<T>(), other_keys, {}, errors);
+  if (errors.size() > before) return {};
+  try {
+    return params_from<T>(values);
+  } catch (const ParamError& error) {
+    const Node* const value = map.find(error.key());
+    errors.add(
+        value != nullptr ? value->mark() : where,
+        std::string(what.substr(0, what.find(" ("))) + "." + error.key() + ": " + error.what());
+    return {};
+  }
+}
+
+/// A section that read_section reads back.
+template <class T>
+Node write_section(const T& section) {
+  Node out = Node::empty_map();
+  for (const ParamSpec& spec : param_specs(section)) out.set(spec.name, value_node(spec.fallback));
+  return out;
+}
 
 /// A YAML template of a section: "key: default  # unit, bounds, choices: help", one line per
 /// parameter; required ones have no value.

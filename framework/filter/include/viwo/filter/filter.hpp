@@ -29,7 +29,7 @@ struct FilterOptions {
 /// An inertial state to start from.
 struct ImuPrior {
   std::int64_t t_ns = 0;
-  ImuView state;  ///< first estimates are ignored
+  ImuState state;  ///< first estimates are ignored
   ImuMatrix P = ImuMatrix::Zero();
 };
 
@@ -78,8 +78,8 @@ class Filter {
 
   std::int64_t t_ns() const { return t_ns_; }
   const FilterOptions& options() const { return options_; }
-  const ImuView& imu() const { return imu_; }
-  std::span<const CloneView> clones() const { return clones_; }
+  const ImuState& imu() const { return imu_; }
+  std::span<const CloneState> clones() const { return clones_; }
   const StateBlocks& blocks() const { return blocks_; }
   /// Without what all poses have in common where that is large (F-41): imu_covariance() has it.
   const Eigen::MatrixXd& covariance() const { return covariance_.matrix(); }
@@ -101,9 +101,9 @@ class Filter {
 
   FilterOptions options_;
   std::int64_t t_ns_ = kNever;
-  ImuView imu_;
-  std::vector<CloneView> clones_;  // oldest first
-  std::vector<bool> slots_;        // taken
+  ImuState imu_;
+  std::vector<CloneState> clones_;  // oldest first
+  std::vector<bool> slots_;         // taken
   std::size_t window_limit_ = std::numeric_limits<std::size_t>::max();
   StateBlocks blocks_;
   Covariance covariance_;

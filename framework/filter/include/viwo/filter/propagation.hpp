@@ -29,6 +29,7 @@ struct ImuTransition {
 /// each sample the length of the gap that it ends or lies in, where the line between samples is a
 /// guess (F-27); empty: there is none.
 ImuTransition propagate(std::span<const ImuSample> samples, const ImuNoise& noise,
-                        double gravity_m_per_s2, ImuView& imu, std::span<const double> gaps_s = {});
+                        double gravity_m_per_s2, ImuState& imu,
+                        std::span<const double> gaps_s = {});
 
 }  // namespace viwo

@@ -21,10 +21,10 @@ class SharedPosition {
   bool is_zero() const { return P_.isZero(0.); }
 
   /// Whether a factor would change if all poses were moved together.
-  bool is_seen_by(const ResidualFactor& factor, std::span<const CloneView> clones) const;
-  bool is_seen_by(const InformationFactor& factor, std::span<const CloneView> clones) const;
+  bool is_seen_by(const ResidualFactor& factor, std::span<const CloneState> clones) const;
+  bool is_seen_by(const InformationFactor& factor, std::span<const CloneState> clones) const;
   /// Puts it back, into the position of every pose.
-  void return_to(Covariance& covariance, std::span<const CloneView> clones);
+  void return_to(Covariance& covariance, std::span<const CloneState> clones);
 
  private:
   Eigen::Matrix3d P_ = Eigen::Matrix3d::Zero();

@@ -52,7 +52,7 @@ class ObservabilityMatrix final : public EstimatorObserver {
   const Eigen::VectorXd& prior_sigma() const { return prior_sigma_; }
 
   /// Inertial state of the start.
-  const ImuView& start() const { return start_; }
+  const ImuState& start() const { return start_; }
 
   /// Triangular R with R^T R = M^T M, M in units of the noise: size() x size().
   Eigen::MatrixXd triangle();
@@ -62,11 +62,11 @@ class ObservabilityMatrix final : public EstimatorObserver {
   /// Rows of a factor's own columns, in units of its noise.
   void add_factor(const FactorColumns& columns, const Eigen::MatrixXd& rows);
   void add_rows(const Eigen::MatrixXd& rows);
-  void add_bearing(const CloneView& clone);
+  void add_bearing(const CloneState& clone);
   void compress();
 
   FeatureOptions feature_;
-  ImuView start_;
+  ImuState start_;
   std::vector<int> calibration_;
   std::vector<int> column_of_;    // of the state, per column of the filter; -1: none
   std::vector<bool> is_in_room_;  // per column of the filter: of a block that comes and goes

@@ -27,7 +27,7 @@ inline constexpr int kImuSize = 15;
 
 /// Pose and velocity of the IMU. `_fej`: as it was before the first update that saw it; Jacobians
 /// are taken there (equal to the estimate when first estimates are turned off).
-struct ImuView {
+struct ImuState {
   Eigen::Matrix3d R_GtoI = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_IinG = Eigen::Vector3d::Zero();
   Eigen::Vector3d v_IinG = Eigen::Vector3d::Zero();
@@ -39,7 +39,7 @@ struct ImuView {
 };
 
 /// Pose of the IMU at a past epoch.
-struct CloneView {
+struct CloneState {
   std::int64_t t_ns = 0;  ///< IMU clock
   int slot = 0;           ///< stays the same as long as the clone lives, 0 .. max_clones - 1
   int column = -1;        ///< of dtheta; dp follows
@@ -54,16 +54,16 @@ struct CloneView {
 
 /// White noise and bias random walk of the IMU, continuous time.
 struct ImuNoise {
-  double gyro_rad_per_s_sqrt_hz = 1.7e-4;
+  double gyro_rad_per_s_sqrt_hz = 1.6968e-4;
   double accel_m_per_s2_sqrt_hz = 2e-3;
-  double gyro_walk_rad_per_s2_sqrt_hz = 2e-5;
+  double gyro_walk_rad_per_s2_sqrt_hz = 1.9393e-5;
   double accel_walk_m_per_s3_sqrt_hz = 3e-3;
 };
 
 struct FilterView {
-  ImuView imu;
-  std::span<const CloneView> clones;  ///< oldest first; the last one is now
-  std::span<const BlockView> blocks;  ///< by BlockId::index
+  ImuState imu;
+  std::span<const CloneState> clones;  ///< oldest first; the last one is now
+  std::span<const BlockView> blocks;   ///< by BlockId::index
   ImuNoise imu_noise;
   double gravity_m_per_s2 = 9.81;
   bool oldest_leaves = false;  ///< the oldest clone is dropped after this epoch

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <cstring>
 #include <exception>
-#include <iterator>
 #include <string_view>
+#include <vector>
 
 #include "viwo/api/build_record.hpp"
 #include "viwo/api/export.hpp"
@@ -39,8 +39,8 @@ struct PluginDescriptor {
   const char* version;
   const char* summary;
   const char* license;
-  const ParamSpec* params;
-  std::uint32_t n_params;
+  /// Its parameters, which stay until the process exits. May throw what bind() throws.
+  const std::vector<ParamSpec>& (*params)();
   /// Returns the interface pointer (KinematicModel*, Sensor*, Update*) as void*, or nullptr with
   /// `error`.
   void* (*create)(const ParamSet* params, const HostServices* services, ErrorText* error) noexcept;
@@ -71,11 +71,18 @@ void copy_text(std::string_view from, std::array<char, N>& to) {
   to[size] = '\0';
 }
 
-template <class Interface, class Implementation>
+template <class Params>
+const std::vector<ParamSpec>& plugin_params() {
+  // Never destroyed: the host may look at it while the process exits.
+  static const auto& specs = *new std::vector<ParamSpec>(param_specs<Params>());
+  return specs;
+}
+
+template <class Interface, class Implementation, class Params>
 void* create_plugin(const ParamSet* params, const HostServices* services,
                     ErrorText* error) noexcept {
   try {
-    return static_cast<Interface*>(new Implementation(*params, *services));
+    return static_cast<Interface*>(new Implementation(params_from<Params>(*params), *services));
   } catch (const ParamError& failure) {
     error->cause = ErrorText::kParam;
     copy_text(failure.key(), error->key);
@@ -102,11 +109,11 @@ void destroy_plugin(void* object) noexcept {
 }  // namespace viwo
 
 /// Registers the one plugin of a library. Interface: KinematicModel, Sensor or Update;
-/// Implementation: a class derived from it with a constructor (const ParamSet&, const
-/// HostServices&); params: a constexpr array of ParamSpec. The symbol is strong: a second
-/// registration does not link.
+/// Params: a structure with bind() (viwo/api/params.hpp); Implementation: a class derived from the
+/// interface with a constructor (const Params&, const HostServices&). The symbol is strong: a
+/// second registration does not link.
 #define VIWO_REGISTER(Interface, Implementation, plugin_name, plugin_version, plugin_summary, \
-                      plugin_license, plugin_params)                                          \
+                      plugin_license, Params)                                                 \
   extern "C" VIWO_API const ::viwo::PluginDescriptor viwo_plugin;                             \
   extern "C" const ::viwo::PluginDescriptor viwo_plugin = {                                   \
       sizeof(::viwo::PluginDescriptor),                                                       \
@@ -117,7 +124,6 @@ void destroy_plugin(void* object) noexcept {
       plugin_version,                                                                         \
       plugin_summary,                                                                         \
       plugin_license,                                                                         \
-      std::data(plugin_params),                                                               \
-      static_cast<std::uint32_t>(std::size(plugin_params)),                                   \
-      &::viwo::detail::create_plugin<Interface, Implementation>,                              \
+      &::viwo::detail::plugin_params<Params>,                                                 \
+      &::viwo::detail::create_plugin<Interface, Implementation, Params>,                      \
       &::viwo::detail::destroy_plugin<Interface>}

@@ -1,49 +1,62 @@
 // How a simulated base drives on which ground: parameters that simulating sensors have in common.
 #pragma once
 
-#include <array>
+#include <cstdint>
+#include <string>
 
 #include "viwo/api/params.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 
 namespace viwo::sim {
 
-/// The trajectory of kDriveParams from before time 0 to behind `end_s`, with `margin_s` more at
-/// both ends, and half a second in which the ends of its spline do not matter; `sideways` as for
-/// BodyTrajectory::drive(). ParamError for what cannot be driven.
-BodyTrajectory drive_from(const ParamSet& params, double end_s, double margin_s,
-                          const SidewaysVelocity& sideways = {});
-
 /// Names of PlanarMotion.
 inline constexpr const char* kMotionChoices =
     "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
     "spin|constant_steering|pivot|sweep_then_straight|mixed";
 
-// clang-format off
-inline constexpr std::array kDriveParams{
-    ParamSpec{.name = "motion", .type = ParamType::kString, .fallback = "icr_sweep",
-              .choices = kMotionChoices,
-              .help = "how the base moves"},
-    ParamSpec{.name = "duration_s", .type = ParamType::kNumber, .unit = "s", .fallback = "60",
-              .min = 0., .max = 7200., .min_exclusive = true, .help = "how long"},
-    ParamSpec{.name = "speed_m_per_s", .type = ParamType::kNumber, .unit = "m/s",
-              .fallback = "0.5", .min = -20., .max = 20., .help = "speed of the motion"},
-    ParamSpec{.name = "yaw_rate_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
-              .fallback = "0.6", .min = -6., .max = 6.,
-              .help = "constant or peak yaw rate of the motions that turn"},
-    ParamSpec{.name = "pivot_m", .type = ParamType::kNumbers, .unit = "m", .fallback = "[0, 0]",
-              .help = "point of the base that motion pivot turns about"},
-    ParamSpec{.name = "ramp_s", .type = ParamType::kNumber, .unit = "s", .fallback = "1", .min = 0.,
-              .max = 3600., .help = "smooth start from rest; 0: at speed from the beginning"},
-    ParamSpec{.name = "ground", .type = ParamType::kString, .fallback = "flat",
-              .choices = "flat|uneven", .help = "what the base drives on"},
-    ParamSpec{.name = "ground_amplitude_m", .type = ParamType::kNumber, .unit = "m",
-              .fallback = "0.05", .min = 0., .max = 10., .help = "of the waves of uneven ground"},
-    ParamSpec{.name = "ground_wavelength_m", .type = ParamType::kNumber, .unit = "m",
-              .fallback = "3", .min = 0.1, .max = 1000., .help = "of the waves of uneven ground"},
-    ParamSpec{.name = "start_ns", .type = ParamType::kInt, .unit = "ns", .fallback = "0",
-              .min = 0., .max = 4e18, .help = "stamp at which the motion starts"},
+/// How PlanarMotion and Ground go.
+struct DriveParams {
+  std::string motion = "icr_sweep";
+  double duration_s = 60.;
+  double speed_m_per_s = 0.5;
+  double yaw_rate_rad_per_s = 0.6;
+  Eigen::Vector2d pivot_m{0., 0.};
+  double ramp_s = 1.;
+  std::string ground = "flat";
+  double ground_amplitude_m = 0.05;
+  double ground_wavelength_m = 3.;
+  std::int64_t start_ns = 0;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(motion), {.choices = kMotionChoices, .help = "how the base moves"});
+    b(VIWO_PARAM(duration_s), {.unit = "s", .above = 0., .max = 7200., .help = "how long"});
+    b(VIWO_PARAM(speed_m_per_s),
+      {.unit = "m/s", .min = -20., .max = 20., .help = "speed of the motion"});
+    b(VIWO_PARAM(yaw_rate_rad_per_s),
+      {.unit = "rad/s",
+       .min = -6.,
+       .max = 6.,
+       .help = "constant or peak yaw rate of the motions that turn"});
+    b(VIWO_PARAM(pivot_m),
+      {.unit = "m", .help = "point of the base that motion pivot turns about"});
+    b(VIWO_PARAM(ramp_s), {.unit = "s",
+                           .min = 0.,
+                           .max = 3600.,
+                           .help = "smooth start from rest; 0: at speed from the beginning"});
+    b(VIWO_PARAM(ground), {.choices = "flat|uneven", .help = "what the base drives on"});
+    b(VIWO_PARAM(ground_amplitude_m),
+      {.unit = "m", .min = 0., .max = 10., .help = "of the waves of uneven ground"});
+    b(VIWO_PARAM(ground_wavelength_m),
+      {.unit = "m", .min = 0.1, .max = 1000., .help = "of the waves of uneven ground"});
+    b(VIWO_PARAM(start_ns),
+      {.unit = "ns", .min = 0., .max = 4e18, .help = "stamp at which the motion starts"});
+  }
 };
-// clang-format on
+
+/// The trajectory of DriveParams from before time 0 to behind `end_s`, with `margin_s` more at
+/// both ends, and half a second in which the ends of its spline do not matter; `sideways` as for
+/// BodyTrajectory::drive(). ParamError for what cannot be driven.
+BodyTrajectory drive_from(const DriveParams& params, double end_s, double margin_s,
+                          const SidewaysVelocity& sideways = {});
 
 }  // namespace viwo::sim

@@ -2,9 +2,8 @@
 // simulating sensors have in common.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <string>
+#include <filesystem>
 #include <vector>
 
 #include "viwo/api/host_services.hpp"
@@ -12,9 +11,88 @@
 #include "viwo/api/params.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/feature_simulator.hpp"
+#include "viwo/sim/imu_params.hpp"
 #include "viwo/sim/imu_simulator.hpp"
+#include "viwo/sim/true_cameras.hpp"
 
 namespace viwo::sim {
+
+/// What rides on a base, and how noisy it is.
+struct RigParams : ImuNoiseParams, TrueCameraParams {
+  Eigen::Vector3d p_IinO_m{0.05, 0.02, 0.15};
+  Eigen::Vector3d rpy_ItoO_rad{0., 0., 0.};
+  bool imu = true;
+  double imu_rate_hz = 200.;
+  double gravity_m_per_s2 = 9.81;
+  Eigen::Vector3d gyro_bias_rad_per_s{0., 0., 0.};
+  Eigen::Vector3d accel_bias_m_per_s2{0., 0., 0.};
+  double sigma_gyro_bias_rad_per_s = 0.;
+  double sigma_accel_bias_m_per_s2 = 0.;
+  std::filesystem::path cameras;
+  int n_cameras = 1;
+  double camera_rate_hz = 10.;
+  double camera_phase_s = 0.0137;
+  int features = 200;
+  double landmark_min_m = 5.;
+  double landmark_max_m = 7.;
+  double max_view_angle_rad = 1.4;
+  double sigma_px = 1.;
+  double feature_outlier_probability = 0.;
+  double feature_outlier_px = 30.;
+  double feature_dropout_probability = 0.;
+  bool noise = true;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(p_IinO_m), {.unit = "m", .help = "where the IMU sits on the base"});
+    b(VIWO_PARAM(rpy_ItoO_rad),
+      {.unit = "rad",
+       .min = -3.2,
+       .max = 3.2,
+       .help = "how it is turned: R_ItoO = Rz(third) Ry(second) Rx(first)"});
+    b(VIWO_PARAM(imu), {.help = "whether there are IMU samples"});
+    b(VIWO_PARAM(imu_rate_hz), {.unit = "Hz", .min = 1., .max = 10000., .help = "rate of the IMU"});
+    b(VIWO_PARAM(gravity_m_per_s2),
+      {.unit = "m/s^2", .min = 0., .max = 100., .help = "gravity, along -z of G"});
+    ImuNoiseParams::bind(b);
+    b(VIWO_PARAM(gyro_bias_rad_per_s),
+      {.unit = "rad/s", .help = "bias of the gyroscope in the first sample"});
+    b(VIWO_PARAM(accel_bias_m_per_s2),
+      {.unit = "m/s^2", .help = "bias of the accelerometer in the first sample"});
+    b(VIWO_PARAM(sigma_gyro_bias_rad_per_s),
+      {.unit = "rad/s", .min = 0., .help = "of what is drawn and added to that bias"});
+    b(VIWO_PARAM(sigma_accel_bias_m_per_s2),
+      {.unit = "m/s^2", .min = 0., .help = "of what is drawn and added to that bias"});
+    b(VIWO_PARAM(cameras), {.help = "cameras on the IMU, a camera chain file of Kalibr"});
+    b(VIWO_PARAM(n_cameras), {.min = 1., .max = 16., .help = "how many of them, from the first"});
+    b(VIWO_PARAM(camera_rate_hz), {.unit = "Hz",
+                                   .min = 0.1,
+                                   .max = 1000.,
+                                   .help = "rate of the images, and of the true states"});
+    b(VIWO_PARAM(camera_phase_s),
+      {.unit = "s",
+       .min = 0.,
+       .max = 10.,
+       .help = "time of the first images; by default they fall between IMU samples"});
+    b(VIWO_PARAM(features), {.min = 0., .max = 5000., .help = "points of an image; 0: no images"});
+    b(VIWO_PARAM(landmark_min_m),
+      {.unit = "m", .above = 0., .help = "smallest distance of new landmarks"});
+    b(VIWO_PARAM(landmark_max_m),
+      {.unit = "m", .above = 0., .help = "largest distance of new landmarks"});
+    b(VIWO_PARAM(max_view_angle_rad), {.unit = "rad",
+                                       .min = 0.1,
+                                       .max = 3.,
+                                       .help = "nothing is seen further off the optical axis"});
+    b(VIWO_PARAM(sigma_px), {.unit = "px", .min = 0., .help = "noise of each pixel coordinate"});
+    b(VIWO_PARAM(feature_outlier_probability),
+      {.min = 0., .max = 1., .help = "probability that a point is off"});
+    b(VIWO_PARAM(feature_outlier_px), {.unit = "px", .min = 0., .help = "by up to how much"});
+    b(VIWO_PARAM(feature_dropout_probability),
+      {.min = 0., .max = 1., .help = "probability that an image lacks a point"});
+    b(VIWO_PARAM(noise),
+      {.help = "all white noise and random walks; not outliers, slip and dropouts"});
+    TrueCameraParams::bind(b);
+  }
+};
 
 struct RigSimulation {
   Mounting mounting;
@@ -24,14 +102,14 @@ struct RigSimulation {
   std::vector<CameraView> cameras;  ///< as they truly are; none without images
 };
 
-/// Parameters of kRigParams and kTrueCameraParams as they were configured; `duration_s` and
-/// `start_ns` are the caller's. With `services.exact` nothing is noisy, missing or off.
-/// ParamError for lists of a wrong length, contradictions and a missing camera file.
-RigSimulation rig_from(const ParamSet& params, double duration_s, std::int64_t start_ns,
+/// As it was configured; `duration_s` and `start_ns` are the caller's. With `services.exact`
+/// nothing is noisy, missing or off. ParamError for lists of a wrong length, contradictions and a
+/// missing camera file.
+RigSimulation rig_from(const RigParams& params, double duration_s, std::int64_t start_ns,
                        const HostServices& services);
 
 /// The kinds of samples that simulate_rig() gives for these parameters.
-SampleTypes rig_kinds(const ParamSet& params);
+SampleTypes rig_kinds(const RigParams& params);
 
 /// What the trajectory must cover for the rig, s.
 double rig_end_s(const RigSimulation& rig);
@@ -46,69 +124,5 @@ std::vector<CalibrationSample> mounting_truth(const Mounting& mounting, std::int
 
 /// Sorts by stamp; what has the same stamp keeps its order.
 void sort_by_time(std::vector<Measurement>& measurements);
-
-// clang-format off
-inline constexpr std::array kRigParams{
-    ParamSpec{.name = "p_IinO_m", .type = ParamType::kNumbers, .unit = "m",
-              .fallback = "[0.05, 0.02, 0.15]", .help = "where the IMU sits on the base"},
-    ParamSpec{.name = "rpy_ItoO_rad", .type = ParamType::kNumbers, .unit = "rad",
-              .fallback = "[0, 0, 0]", .min = -3.2, .max = 3.2,
-              .help = "how it is turned: R_ItoO = Rz(third) Ry(second) Rx(first)"},
-    ParamSpec{.name = "imu", .type = ParamType::kBool, .fallback = "true",
-              .help = "whether there are IMU samples"},
-    ParamSpec{.name = "imu_rate_hz", .type = ParamType::kNumber, .unit = "Hz", .fallback = "200",
-              .min = 1., .max = 10000., .help = "rate of the IMU"},
-    ParamSpec{.name = "gravity_m_per_s2", .type = ParamType::kNumber, .unit = "m/s^2",
-              .fallback = "9.81", .min = 0., .max = 100., .help = "gravity, along -z of G"},
-    ParamSpec{.name = "sigma_gyro_rad_per_s_sqrt_hz", .type = ParamType::kNumber,
-              .unit = "rad/s/sqrt(Hz)", .fallback = "1.7e-4", .min = 0.,
-              .help = "white noise of the gyroscope"},
-    ParamSpec{.name = "sigma_accel_m_per_s2_sqrt_hz", .type = ParamType::kNumber,
-              .unit = "m/s^2/sqrt(Hz)", .fallback = "2e-3", .min = 0.,
-              .help = "white noise of the accelerometer"},
-    ParamSpec{.name = "sigma_gyro_walk_rad_per_s2_sqrt_hz", .type = ParamType::kNumber,
-              .unit = "rad/s^2/sqrt(Hz)", .fallback = "2e-5", .min = 0.,
-              .help = "random walk of the gyroscope's bias"},
-    ParamSpec{.name = "sigma_accel_walk_m_per_s3_sqrt_hz", .type = ParamType::kNumber,
-              .unit = "m/s^3/sqrt(Hz)", .fallback = "3e-3", .min = 0.,
-              .help = "random walk of the accelerometer's bias"},
-    ParamSpec{.name = "gyro_bias_rad_per_s", .type = ParamType::kNumbers, .unit = "rad/s",
-              .fallback = "[0, 0, 0]", .help = "bias of the gyroscope in the first sample"},
-    ParamSpec{.name = "accel_bias_m_per_s2", .type = ParamType::kNumbers, .unit = "m/s^2",
-              .fallback = "[0, 0, 0]", .help = "bias of the accelerometer in the first sample"},
-    ParamSpec{.name = "sigma_gyro_bias_rad_per_s", .type = ParamType::kNumber, .unit = "rad/s",
-              .fallback = "0", .min = 0., .help = "of what is drawn and added to that bias"},
-    ParamSpec{.name = "sigma_accel_bias_m_per_s2", .type = ParamType::kNumber, .unit = "m/s^2",
-              .fallback = "0", .min = 0., .help = "of what is drawn and added to that bias"},
-    ParamSpec{.name = "cameras", .type = ParamType::kPath, .fallback = "",
-              .help = "cameras on the IMU, a camera chain file of Kalibr"},
-    ParamSpec{.name = "n_cameras", .type = ParamType::kInt, .fallback = "1", .min = 1., .max = 16.,
-              .help = "how many of them, from the first"},
-    ParamSpec{.name = "camera_rate_hz", .type = ParamType::kNumber, .unit = "Hz", .fallback = "10",
-              .min = 0.1, .max = 1000., .help = "rate of the images, and of the true states"},
-    ParamSpec{.name = "camera_phase_s", .type = ParamType::kNumber, .unit = "s",
-              .fallback = "0.0137", .min = 0., .max = 10.,
-              .help = "time of the first images; by default they fall between IMU samples"},
-    ParamSpec{.name = "features", .type = ParamType::kInt, .fallback = "200", .min = 0.,
-              .max = 5000., .help = "points of an image; 0: no images"},
-    ParamSpec{.name = "landmark_min_m", .type = ParamType::kNumber, .unit = "m", .fallback = "5",
-              .min = 0., .min_exclusive = true, .help = "smallest distance of new landmarks"},
-    ParamSpec{.name = "landmark_max_m", .type = ParamType::kNumber, .unit = "m", .fallback = "7",
-              .min = 0., .min_exclusive = true, .help = "largest distance of new landmarks"},
-    ParamSpec{.name = "max_view_angle_rad", .type = ParamType::kNumber, .unit = "rad",
-              .fallback = "1.4", .min = 0.1, .max = 3.,
-              .help = "nothing is seen further off the optical axis"},
-    ParamSpec{.name = "sigma_px", .type = ParamType::kNumber, .unit = "px", .fallback = "1",
-              .min = 0., .help = "noise of each pixel coordinate"},
-    ParamSpec{.name = "feature_outlier_probability", .type = ParamType::kNumber, .fallback = "0",
-              .min = 0., .max = 1., .help = "probability that a point is off"},
-    ParamSpec{.name = "feature_outlier_px", .type = ParamType::kNumber, .unit = "px",
-              .fallback = "30", .min = 0., .help = "by up to how much"},
-    ParamSpec{.name = "feature_dropout_probability", .type = ParamType::kNumber, .fallback = "0",
-              .min = 0., .max = 1., .help = "probability that an image lacks a point"},
-    ParamSpec{.name = "noise", .type = ParamType::kBool, .fallback = "true",
-              .help = "all white noise and random walks; not outliers, slip and dropouts"},
-};
-// clang-format on
 
 }  // namespace viwo::sim

@@ -35,8 +35,8 @@ struct UpdateHost : Declarations {
 
   explicit UpdateHost(Rig of_all = {}) : rig_(std::move(of_all)) {}
 
-  ImuView imu;
-  std::vector<CloneView> clones;
+  ImuState imu;
+  std::vector<CloneState> clones;
   std::vector<Block> blocks;  ///< by BlockId::index
   Eigen::MatrixXd P;
   ImuNoise imu_noise;
@@ -86,7 +86,7 @@ struct UpdateHost : Declarations {
   /// its size changes.
   void layout() {
     int column = kImuSize;
-    for (CloneView& clone : clones) {
+    for (CloneState& clone : clones) {
       clone.column = column;
       column += kPoseSize;
     }
@@ -163,7 +163,7 @@ struct UpdateHost : Declarations {
     imu.v_IinG += d.segment<3>(kVelocityColumn);
     imu.gyro_bias += d.segment<3>(kGyroBiasColumn);
     imu.accel_bias += d.segment<3>(kAccelBiasColumn);
-    for (CloneView& clone : clones) {
+    for (CloneState& clone : clones) {
       rotate(clone.R_GtoI, clone.column);
       clone.p_IinG += d.segment<3>(clone.column + 3);
     }
@@ -181,7 +181,7 @@ struct UpdateHost : Declarations {
     imu.R_GtoI_fej = imu.R_GtoI;
     imu.p_IinG_fej = imu.p_IinG;
     imu.v_IinG_fej = imu.v_IinG;
-    for (CloneView& clone : clones) {
+    for (CloneState& clone : clones) {
       clone.R_GtoI_fej = clone.R_GtoI;
       clone.p_IinG_fej = clone.p_IinG;
     }
