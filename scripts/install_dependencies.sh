@@ -64,7 +64,9 @@ if [ "${1:-}" = --tests ] || [ "${1:-}" = --engines ]; then
   if ! grep -qsx 'ID=ubuntu' /etc/os-release; then
     need_command chromium chromium chromium-browser google-chrome
   fi
-  for package in python3-rosmaster python3-rosbag librosbag-dev xvfb; do need_package "$package"; done
+  for package in python3-rosmaster python3-rosbag librosbag-dev python3-jsonschema python3-yaml xvfb; do
+    need_package "$package"
+  done
 fi
 optional=("${missing[@]}")
 missing=("${required[@]}")

@@ -17,7 +17,7 @@ TEST_F(CommandLineTest, WithoutArgumentsPrintsTheHelpAndFails) {
   for (const char* command :
        {"run CONFIG", "experiment EXPERIMENT", "calibrate CONFIG", "simulate CONFIG --out DIR",
         "evaluate --reference A.tum --estimate B.tum",
-        "plugins list | describe NAME | check FILE | new KIND NAME [--out DIR]"}) {
+        "plugins list | describe NAME | schema | check FILE | new KIND NAME [--out DIR]"}) {
     EXPECT_NE(help.out.find("\n  viwo " + std::string(command)), std::string::npos) << command;
   }
 }
@@ -92,9 +92,10 @@ TEST_F(CommandLineTest, RefusesMissingAndSuperfluousArguments) {
   expect_refused({"evaluate", "--reference", "a.tum"},
                  "viwo evaluate: the option '--estimate' is required but missing (see viwo "
                  "evaluate --help)");
-  expect_refused({"plugins"},
-                 "viwo plugins: what to do is missing - usage: viwo plugins list | describe NAME | "
-                 "check FILE | new KIND NAME [--out DIR] (see viwo plugins --help)");
+  expect_refused(
+      {"plugins"},
+      "viwo plugins: what to do is missing - usage: viwo plugins list | describe NAME | schema | "
+      "check FILE | new KIND NAME [--out DIR] (see viwo plugins --help)");
 }
 
 TEST_F(CommandLineTest, RefusesOptionValuesThatMakeNoSense) {
@@ -134,11 +135,12 @@ TEST_F(CommandLineTest, ListsAndDescribesPlugins) {
   EXPECT_NE(describe.out.find("\ntype: differential\n"), std::string::npos) << describe.out;
   EXPECT_NE(describe.out.find("\nbaseline_m: "), std::string::npos) << describe.out;
   expect_refused({"plugins", "describe", "diferential"},
-                 "no plugin 'diferential' - did you mean 'differential'?");
+                 "no plugin or section 'diferential' - did you mean 'differential'?");
   expect_refused({"plugins", "lst"}, "viwo plugins: unknown 'lst' - did you mean 'list'?");
-  expect_refused({"plugins", "describe"},
-                 "viwo plugins: usage: viwo plugins list | describe NAME | check FILE | new KIND "
-                 "NAME [--out DIR]");
+  expect_refused(
+      {"plugins", "describe"},
+      "viwo plugins: usage: viwo plugins list | describe NAME | schema | check FILE | new KIND "
+      "NAME [--out DIR]");
 }
 
 TEST_F(CommandLineTest, ChecksAPluginFile) {

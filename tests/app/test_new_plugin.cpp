@@ -94,9 +94,10 @@ TEST_F(NewPlugin, IsTheOnlyOneThatTakesAFolder) {
         {"plugins", "describe", "differential", "--out", "x"}}) {
     expect_refused(words, "viwo plugins: --out is for viwo plugins new KIND NAME");
   }
-  expect_refused({"plugins", "new", "kinematics"},
-                 "viwo plugins: usage: viwo plugins list | describe NAME | check FILE | new KIND "
-                 "NAME [--out DIR]");
+  expect_refused(
+      {"plugins", "new", "kinematics"},
+      "viwo plugins: usage: viwo plugins list | describe NAME | schema | check FILE | new KIND "
+      "NAME [--out DIR]");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// viwo plugins list | describe NAME | check FILE | new KIND NAME
+// viwo plugins list | describe NAME | schema | check FILE | new KIND NAME
 #include <algorithm>
 #include <iostream>
 
@@ -6,6 +6,7 @@
 #include "new_plugin.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/setup/schema.hpp"
 
 namespace viwo::app {
 namespace {
@@ -32,6 +33,13 @@ int list(PluginRegistry& plugins) {
 int describe(PluginRegistry& plugins, const std::string& name) {
   std::vector<std::string> names;
   bool found = false;
+  for (const HostSection& section : host_sections()) {
+    names.push_back(section.name);
+    if (section.name != name) continue;
+    found = true;
+    std::cout << "# section of a run configuration: " << section.summary << "\n"
+              << config::describe_params(section.params);
+  }
   for (const PluginListing& listing : plugins.list()) {
     if (!listing.info) continue;
     names.push_back(listing.info->name);
@@ -43,7 +51,17 @@ int describe(PluginRegistry& plugins, const std::string& name) {
               << "\ntype: " << info.name << "\n"
               << config::describe_params(info.params);
   }
-  if (!found) throw InputError("no plugin '" + name + "'" + config::did_you_mean(name, names));
+  if (!found)
+    throw InputError("no plugin or section '" + name + "'" + config::did_you_mean(name, names));
+  return 0;
+}
+
+int schema(PluginRegistry& plugins) {
+  std::vector<PluginInfo> infos;
+  for (const PluginListing& listing : plugins.list()) {
+    if (listing.info) infos.push_back(*listing.info);
+  }
+  std::cout << run_schema(infos).dump(2) << "\n";
   return 0;
 }
 
@@ -64,16 +82,18 @@ int plugins_command(const Arguments& arguments) {
   if (arguments.out) throw InputError("viwo plugins: --out is for viwo plugins new KIND NAME");
   if (what == "list" && n == 1) return list(plugins);
   if (what == "describe" && n == 2) return describe(plugins, arguments.positional[1]);
+  if (what == "schema" && n == 1) return schema(plugins);
   if (what == "check" && n == 2) {
     print_line(plugins.check(arguments.positional[1]));
     return 0;
   }
-  const std::vector<std::string> verbs{"list", "describe", "check", "new"};
+  const std::vector<std::string> verbs{"list", "describe", "schema", "check", "new"};
   if (std::find(verbs.begin(), verbs.end(), what) == verbs.end()) {
     throw InputError("viwo plugins: unknown '" + what + "'" + config::did_you_mean(what, verbs));
   }
   throw InputError(
-      "viwo plugins: usage: viwo plugins list | describe NAME | check FILE | new KIND NAME "
+      "viwo plugins: usage: viwo plugins list | describe NAME | schema | check FILE | new KIND "
+      "NAME "
       "[--out DIR]");
 }
 
