@@ -1,5 +1,4 @@
 // The sensor ros1_topics in a running ROS 1 system.
-#include <array>
 #include <chrono>
 #include <fstream>
 #include <iterator>

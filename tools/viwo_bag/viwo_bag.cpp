@@ -82,7 +82,7 @@ Log read_log(const fs::path& folder) {
   if (!fs::is_directory(folder, ignored)) throw InputError(folder.string() + "  is no folder");
   const auto has = [&](const fs::path& part) { return fs::exists(folder / part, ignored); };
   // Gaps are nothing that a bag could not hold.
-  const log::LogLimits limits{std::numeric_limits<double>::infinity(), 0.1};
+  const LogLimits limits{std::numeric_limits<double>::infinity(), 0.1};
   Log log;
   if (has("imu0")) {
     log.imu = samples_of(log::read_asl_imu(folder / "imu0", limits), folder / "imu0");

@@ -1,7 +1,6 @@
 #include "viwo/calibration/calibrate.hpp"
 
 #include <algorithm>
-#include <array>
 #include <set>
 
 #include <tbb/parallel_for.h>

@@ -1,7 +1,6 @@
 #include "subject.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <system_error>
 

@@ -1,5 +1,4 @@
 // A sensor with one mistake, which its name says; without it it is right.
-#include <array>
 #include <cmath>
 #include <fstream>
 #include <stdexcept>

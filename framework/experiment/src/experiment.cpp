@@ -1,7 +1,6 @@
 #include "viwo/experiment/experiment.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "viwo/math/stamp_jump.hpp"
+#include "viwo/api/stamp_order.hpp"
 #include "viwo/plausibility/finding.hpp"
 
 namespace viwo {

@@ -3,6 +3,7 @@
 #include "api_record.hpp"
 
 #include "viwo/api/plugin.hpp"
+#include "viwo/api/stamp_order.hpp"
 
 namespace {
 
@@ -364,6 +365,11 @@ void sensors() {
   MEMBER(RejectionCount, first);
   MEMBER(RejectionCount, of);
   RECORD(Rejections);
+  RECORD(LogLimits);
+  MEMBER(LogLimits, max_gap_s);
+  MEMBER(LogLimits, max_rejected_fraction);
+  RECORD(StampJump);
+  RECORD(StampOrder);
   RECORD(EstimateSample);
   MEMBER(EstimateSample, t_ns);
   MEMBER(EstimateSample, q_ItoG_xyzw);

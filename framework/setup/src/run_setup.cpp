@@ -2,7 +2,6 @@
 #include "viwo/setup/run_setup.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 #include <utility>

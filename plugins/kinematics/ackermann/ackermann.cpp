@@ -1,7 +1,6 @@
 // Car-like base: rear wheels that do not steer, front wheels that do. Rolling rows of the measured
 // wheels, no-slip row of the rear axle, steering rows at the front. Equations: model.md beside this
 // file.
-#include <array>
 #include <cmath>
 #include <span>
 #include <string>

@@ -1,7 +1,8 @@
 // Parameters of the car-like base.
 #pragma once
 
-#include <array>
+#include <string>
+#include <vector>
 
 #include "viwo/api/params.hpp"
 

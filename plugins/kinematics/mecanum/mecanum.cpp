@@ -1,6 +1,5 @@
 // Base with N >= 3 mecanum wheels: one row per wheel, along the direction in which its rollers
 // cannot roll. Equations: model.md beside this file.
-#include <array>
 #include <cmath>
 #include <span>
 #include <string>

@@ -1,5 +1,4 @@
 // Sensor asl_calibration: true calibration parameters from a log folder (model.md).
-#include <array>
 
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/asl.hpp"

@@ -1,5 +1,4 @@
 // Sensor asl_features: feature tracks from a log folder (model.md).
-#include <array>
 
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/asl.hpp"

@@ -1,7 +1,6 @@
 // Sensor asl_images: the images of a log folder (model.md).
 #include "viwo/log/asl_images.hpp"
 
-#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -1,7 +1,6 @@
 // Sensor contact_simulator: a base on tyres that slip, with IMU, cameras, encoders and the truth
 // (model.md).
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>

@@ -86,7 +86,7 @@ std::optional<PoseSample> pose_from(const RowReader& row) {
 
 }  // namespace
 
-Sequence::Sequence(fs::path folder, const log::LogLimits& limits)
+Sequence::Sequence(fs::path folder, const LogLimits& limits)
     : folder_(std::move(folder)), limits_(limits) {}
 
 log::ImuRecording Sequence::imu() const {

@@ -12,7 +12,7 @@ namespace viwo::kaist {
 /// that is not there is named, with what it is for and the parameter that does without it.
 class Sequence {
  public:
-  Sequence(std::filesystem::path folder, const log::LogLimits& limits);
+  Sequence(std::filesystem::path folder, const LogLimits& limits);
 
   /// Angular rate and specific force from sensor_data/xsens_imu.csv.
   log::ImuRecording imu() const;
@@ -28,7 +28,7 @@ class Sequence {
   std::int64_t encoder_resolution() const;
 
   std::filesystem::path folder_;
-  log::LogLimits limits_;
+  LogLimits limits_;
 };
 
 }  // namespace viwo::kaist

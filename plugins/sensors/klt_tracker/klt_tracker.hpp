@@ -1,7 +1,6 @@
 // Sensor klt_tracker: images to feature tracks.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <exception>

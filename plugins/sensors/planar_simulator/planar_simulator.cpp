@@ -1,6 +1,5 @@
 // Sensor planar_simulator: encoders and reference poses of a base on a plane (model.md).
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 #include <vector>

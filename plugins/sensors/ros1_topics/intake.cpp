@@ -221,7 +221,7 @@ bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
   }
   if (state.last_ns && t_ns <= *state.last_ns) {
     if (!is_clock_set_back(state, t_ns)) {
-      reject(topic, log::kStampNotAfter, t_ns);
+      reject(topic, kStampNotAfter, t_ns);
       return false;
     }
     count(topic, "clock set back", t_ns, "its messages are taken from here on");
@@ -229,12 +229,12 @@ bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
   }
   state.n_behind = 0;
   if (!state.jump.is_believed(t_ns)) {
-    reject(topic, log::kStampFarAhead, t_ns);
+    reject(topic, kStampFarAhead, t_ns);
     return false;
   }
   if (state.last_ns && !is_slow(topic) &&
       seconds_between(*state.last_ns, t_ns) > options_.max_gap_s) {
-    count(topic, log::gap_reason(options_.max_gap_s), t_ns, "it is counted");
+    count(topic, gap_reason(options_.max_gap_s), t_ns, "it is counted");
   }
   state.last_ns = t_ns;
   state.last_use = Clock::now();

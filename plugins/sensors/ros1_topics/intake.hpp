@@ -19,7 +19,7 @@
 #include "topic_options.hpp"
 #include "viwo/api/host_services.hpp"
 #include "viwo/api/rejections.hpp"
-#include "viwo/math/stamp_jump.hpp"
+#include "viwo/api/stamp_order.hpp"
 
 namespace viwo::ros1 {
 

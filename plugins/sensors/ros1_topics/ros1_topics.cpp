@@ -1,6 +1,5 @@
 // Sensor ros1_topics: measurements of a running ROS 1 system as they come, and the estimate back to
 // it (model.md).
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <memory>

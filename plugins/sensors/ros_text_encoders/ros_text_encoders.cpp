@@ -1,5 +1,4 @@
 // Sensor ros_text_encoders: wheel encoders from printed JointState messages (model.md).
-#include <array>
 
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/ros_text.hpp"

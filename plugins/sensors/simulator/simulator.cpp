@@ -1,7 +1,6 @@
 // Sensor simulator: IMU, cameras, encoders and the truth of a base that drives on a ground
 // (model.md).
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <string>

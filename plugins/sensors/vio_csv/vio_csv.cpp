@@ -63,7 +63,7 @@ void read_numbers(const log::TableReader& table, const std::array<std::size_t, N
   for (std::size_t i = 0; i < N; ++i) out[i] = table.number(from[i]);
 }
 
-log::ImuRecording read_imu(const fs::path& folder, const log::LogLimits& limits) {
+log::ImuRecording read_imu(const fs::path& folder, const LogLimits& limits) {
   log::TableReader table(table_file(folder, "imu"));
   const std::size_t t = table.column("t");
   const auto gyro = columns<3>(table, {"wx", "wy", "wz"});
@@ -79,7 +79,7 @@ log::ImuRecording read_imu(const fs::path& folder, const log::LogLimits& limits)
   return collector.finish(table.reader());
 }
 
-log::FeatureRecording read_features(const fs::path& folder, const log::LogLimits& limits) {
+log::FeatureRecording read_features(const fs::path& folder, const LogLimits& limits) {
   log::TableReader table(table_file(folder, "features"));
   const std::size_t t = table.column("t");
   const std::size_t camera = table.column("cam_id");
@@ -94,7 +94,7 @@ log::FeatureRecording read_features(const fs::path& folder, const log::LogLimits
   return collector.finish(table.reader());
 }
 
-log::StateRecording read_states(const fs::path& folder, const log::LogLimits& limits) {
+log::StateRecording read_states(const fs::path& folder, const LogLimits& limits) {
   const fs::path truth = table_file(folder, "groundtruth");
   const fs::path start = table_file(folder, "init_state");
   log::TableReader table(!is_there(truth) && is_there(start) ? start : truth);
@@ -132,7 +132,7 @@ class VioCsv final : public Sensor {
  public:
   VioCsv(const Params& params, const HostServices& /*services*/) {
     const fs::path folder = params.folder;
-    const log::LogLimits limits = params.limits();
+    const LogLimits limits = params.limits();
     if (!params.imu && !params.features && !params.truth) {
       throw ParamError("folder", "nothing to read: imu, features and truth are all false");
     }

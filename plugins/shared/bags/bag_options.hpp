@@ -32,7 +32,7 @@ struct BagOptions : TopicOptions, log::StrideParams, log::ClockParams, log::MaxR
     log::MaxRejectedParams::bind(b);
   }
 
-  log::LogLimits limits() const { return {max_gap_s, max_rejected_fraction}; }
+  LogLimits limits() const { return {max_gap_s, max_rejected_fraction}; }
   /// Itself; ParamError for parameters that contradict each other.
   const BagOptions& checked() const {
     check("path", "read");

@@ -1,4 +1,4 @@
-// The order of stamps (viwo/log/stamp_order.hpp) of the messages of one topic.
+// The order of stamps (viwo/api/stamp_order.hpp) of the messages of one topic.
 #pragma once
 
 #include <cstdint>
@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "bag.hpp"
-#include "viwo/log/stamp_order.hpp"
+#include "viwo/api/stamp_order.hpp"
 
 namespace viwo::bag {
 
 class TopicFilter {
  public:
   /// `topic` is for error messages.
-  TopicFilter(const log::LogLimits& limits, const std::string& topic)
+  TopicFilter(const LogLimits& limits, const std::string& topic)
       : topic_(topic), order_(limits, topic + ": ") {}
 
   /// True for a stamp after all that were accepted before; others, and gaps, are counted.
@@ -38,7 +38,7 @@ class TopicFilter {
   };
 
   std::string topic_;
-  log::StampOrder order_;
+  StampOrder order_;
 };
 
 }  // namespace viwo::bag

@@ -27,7 +27,7 @@ class TopicReader {
   void finish(const std::string& bag, BagSamples& out);
 
  protected:
-  TopicReader(const BagOptions& options, const std::string& topic, const log::LogLimits& limits)
+  TopicReader(const BagOptions& options, const std::string& topic, const LogLimits& limits)
       : filter_(limits, topic), by_reception_(options.by_reception()) {}
   virtual void move_samples(BagSamples& out) = 0;
   /// Before the number of messages is judged.

@@ -5,7 +5,6 @@
 // d_j = [cos delta_j, sin delta_j]^T (four_wis_wid/model.md, S-1).
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <vector>
 

@@ -1,7 +1,6 @@
 // Fixes of a satellite receiver whose antenna sits on the IMU, in the coordinates of the Earth. How
 // the Earth lies in the filter's world is found while driving. Equations: model.md.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>

@@ -1,10 +1,10 @@
 // Parameters of the update, and the blocks of the state that follow from them.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 

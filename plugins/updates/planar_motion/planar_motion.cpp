@@ -1,6 +1,5 @@
 // A base that drives on a plane: between two clones the odometry frame O turns about its z axis
 // only and does not leave its x-y plane. Equations: model.md.
-#include <array>
 
 #include "planar_pair.hpp"
 #include "viwo/api/plugin.hpp"

@@ -1,7 +1,6 @@
 // Fixes of a body on the IMU from outside: positions (GNSS) or poses (motion capture), each at its
 // own instant between two clones. Equations: model.md.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>

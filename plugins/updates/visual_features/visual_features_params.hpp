@@ -1,8 +1,6 @@
 // Parameters of the update visual_features.
 #pragma once
 
-#include <array>
-
 #include "viwo/api/params.hpp"
 
 namespace viwo::visual {

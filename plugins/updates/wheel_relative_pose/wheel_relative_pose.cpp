@@ -1,7 +1,6 @@
 // The wheel measurement of the paper as it is published: the preintegrated relative pose between
 // consecutive clones, linearised once and at the measured readings. Equations: model.md beside this
 // file. What the paper does not say is a parameter; wheel_odometry is what to use on a robot.
-#include <array>
 #include <cmath>
 #include <optional>
 #include <span>

@@ -8,8 +8,8 @@
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/rejections.hpp"
+#include "viwo/api/stamp_order.hpp"
 #include "viwo/filter/imu_watch.hpp"
-#include "viwo/math/stamp_jump.hpp"
 
 namespace viwo {
 

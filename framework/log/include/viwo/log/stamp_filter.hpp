@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "viwo/log/stamp_order.hpp"
+#include "viwo/api/stamp_order.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text_reader.hpp"
 

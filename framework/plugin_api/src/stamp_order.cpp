@@ -1,12 +1,22 @@
-#include "viwo/log/stamp_order.hpp"
+#include "viwo/api/stamp_order.hpp"
 
+#include <array>
+#include <charconv>
 #include <cmath>
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/status.hpp"
-#include "viwo/log/text.hpp"
 
-namespace viwo::log {
+namespace viwo {
+namespace {
+
+/// Shortest text that reads back to the same number.
+std::string number_text(double value) {
+  std::array<char, 32> text{};
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
+
+}  // namespace
 
 std::string gap_reason(double max_gap_s) {
   return "gap longer than " + number_text(max_gap_s) + " s";
@@ -37,4 +47,4 @@ void StampOrder::require_enough(const std::string& source, const char* data) con
   throw InputError(text);
 }
 
-}  // namespace viwo::log
+}  // namespace viwo
