@@ -8,8 +8,13 @@ import subprocess
 import sys
 import unittest
 
-import jsonschema
-import yaml
+try:
+    import jsonschema
+    import yaml
+except ImportError as error:
+    print(f'skipped: {error}; scripts/install_dependencies.sh --tests installs it for '
+          '/usr/bin/python3')
+    sys.exit(77)
 
 VIWO, CONFIGS = sys.argv[1], pathlib.Path(sys.argv[2])
 
