@@ -36,6 +36,12 @@ struct WheelUpdateParams {
     b(VIWO_PARAM(find_noise), {.help = "the noise is scaled to what the residuals tell, and "
                                        "reported; false: as configured"});
   }
+
+  /// For data without noise, linearised once: nothing is found out or left out.
+  void make_exact() {
+    second_order_noise = find_noise = false;
+    motion_sigmas = wheel_check_probability = 0.;
+  }
 };
 
 }  // namespace viwo

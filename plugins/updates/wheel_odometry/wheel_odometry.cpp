@@ -57,17 +57,14 @@ struct Point {
 
 class WheelOdometry final : public Update {
  public:
-  WheelOdometry(const Params& params, const HostServices& services)
-      : params_(params),
-        max_iterations_(services.exact ? 1 : params.max_iterations),
-        second_order_noise_(!services.exact && params.second_order_noise),
-        wheel_check_probability_(services.exact ? 0. : params.wheel_check_probability) {
-    noise_.set_enabled(!services.exact && params.find_noise);
+  WheelOdometry(const Params& params, const HostServices& services) : params_(params) {
+    if (services.exact) params_.make_exact();
+    noise_.set_enabled(params_.find_noise);
     options_.twist.noise_weighted = params.twist == Params::TwistWeights::kNoise;
     options_.parity_gate_probability = params.sample_gate_probability;
     options_.parity = false;
     options_.twist.fitted_jacobian = true;
-    options_.twist.motion_sigmas = services.exact ? 0. : params.motion_sigmas;
+    options_.twist.motion_sigmas = params_.motion_sigmas;
   }
 
   void declare(Declarations& host) override {
@@ -79,7 +76,7 @@ class WheelOdometry final : public Update {
     noise_.reset();
     ground_tilt_ = wheel_odometry::GroundTilt(options_.twist.motion_sigmas);
     small_turn_ = wheel_odometry::SmallTurn(options_.twist.motion_sigmas);
-    checked_.start(wheel_model_of(blocks_), wheel_check_probability_);
+    checked_.start(wheel_model_of(blocks_), params_.wheel_check_probability);
     preintegrator_.emplace(wheel_model_of(blocks_), options_);
     shifted_preintegrator_.emplace(wheel_model_of(blocks_), options_);
     curvature_.start(wheel_model_of(blocks_), options_);
@@ -110,7 +107,7 @@ class WheelOdometry final : public Update {
     }
     ResidualFactor& factor = sink.add_residual();
     set_columns(wheels, filter.P(), first, last, factor.columns);
-    if (second_order_noise_) {
+    if (params_.second_order_noise) {
       const auto n = P_.cols() - n_geometry_;
       curvature_noise_ = curvature_.noise(encoders, interval->begin_ns, interval->end_ns, at_.x_WI,
                                           P_.bottomRightCorner(n, n), wheels.wander_time_s, pose_);
@@ -328,7 +325,7 @@ class WheelOdometry final : public Update {
     Step step = Step::Zero(P_.cols());
     Eigen::Vector3d moved_back = residual_;
     double missed = residual_.dot(R_.llt().solve(residual_));
-    for (int i = 1; i < max_iterations_; ++i) {
+    for (int i = 1; i < params_.max_iterations; ++i) {
       const Jacobian HP = H_ * P_;
       Eigen::Matrix3d S = R_;
       S.noalias() += HP * H_.transpose();
@@ -356,7 +353,7 @@ class WheelOdometry final : public Update {
       moved_back = residual_ + H_ * step;
       if (missed < kConverged) break;
     }
-    if (second_order_noise_) add_second_order_noise(wheels);
+    if (params_.second_order_noise) add_second_order_noise(wheels);
     factor.set_rows(3);
     factor.H.leftCols(H_.cols()) = H_;
     const auto wandering = factor.H.cols() - H_.cols();
@@ -412,9 +409,6 @@ class WheelOdometry final : public Update {
 
   Params params_;
   PreintegrationOptions options_;
-  int max_iterations_;
-  bool second_order_noise_;
-  double wheel_check_probability_;
 
   WheelsBlocks blocks_;
   StreamId encoders_;

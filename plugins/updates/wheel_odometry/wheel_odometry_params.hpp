@@ -48,6 +48,11 @@ struct Params : WheelUpdateParams {
        .help = "intervals with longer holes in the encoder data are left out"});
     WheelUpdateParams::bind(b);
   }
+
+  void make_exact() {
+    WheelUpdateParams::make_exact();
+    max_iterations = 1;
+  }
 };
 
 }  // namespace viwo::wheel_odometry

@@ -42,6 +42,11 @@ struct Params : WheelUpdateParams {
       {.min = 1, .max = 100, .help = "linearisations per interval at most; 1: a plain EKF update"});
     WheelUpdateParams::bind(b);
   }
+
+  void make_exact() {
+    WheelUpdateParams::make_exact();
+    max_iterations = 1;
+  }
 };
 
 using Square = IntrinsicMatrix;
@@ -65,14 +70,11 @@ constexpr double kMostBeyond = 4.;
 
 class WheelParity final : public Update {
  public:
-  WheelParity(const Params& params, const HostServices& services)
-      : params_(params),
-        max_iterations_(services.exact ? 1 : params.max_iterations),
-        second_order_noise_(!services.exact && params.second_order_noise),
-        wheel_check_probability_(services.exact ? 0. : params.wheel_check_probability) {
-    noise_.set_enabled(!services.exact && params.find_noise);
+  WheelParity(const Params& params, const HostServices& services) : params_(params) {
+    if (services.exact) params_.make_exact();
+    noise_.set_enabled(params_.find_noise);
     options_.twist.noise_weighted = true;
-    options_.twist.motion_sigmas = services.exact ? 0. : params.motion_sigmas;
+    options_.twist.motion_sigmas = params_.motion_sigmas;
     options_.parity_gate_probability = params.sample_gate_probability;
     options_.parity = true;
   }
@@ -84,7 +86,7 @@ class WheelParity final : public Update {
 
   void start(const UpdateSetup& /*setup*/) override {
     noise_.reset();
-    checked_.start(wheel_model_of(blocks_), wheel_check_probability_);
+    checked_.start(wheel_model_of(blocks_), params_.wheel_check_probability);
     preintegrator_.emplace(wheel_model_of(blocks_), options_);
     if (noise_.enabled()) wheel_noise_.emplace(wheel_model_of(blocks_));
   }
@@ -132,7 +134,7 @@ class WheelParity final : public Update {
     }
     tallies_.add(pose_, data.end_ns);
     ++intervals_used_;
-    if (second_order_noise_ && --unchecked_ < 0) {
+    if (params_.second_order_noise && --unchecked_ < 0) {
       add_second_order_noise(
           encoders, *interval,
           intervals_alike(intervals_used_, wheels.wander_time_s, pose_.duration_s));
@@ -180,7 +182,7 @@ class WheelParity final : public Update {
     x = x0;
     Intrinsics z_before = Intrinsics::Zero(n_free_);
     double gain = std::numeric_limits<double>::quiet_NaN();
-    for (int i = 0; i < max_iterations_; ++i) {
+    for (int i = 0; i < params_.max_iterations; ++i) {
       preintegrator_->set_intrinsics(x);
       preintegrator_->set_weights_at(x);
       preintegrator_->integrate(encoders, interval.begin_ns, interval.end_ns, pose_);
@@ -193,7 +195,7 @@ class WheelParity final : public Update {
       const Intrinsics step = C_ * z;
       if (!step.allFinite()) break;
       gain = eta_.dot(step);
-      if (i + 1 == max_iterations_) break;
+      if (i + 1 == params_.max_iterations) break;
       const Intrinsics change = z - z_before;
       const Intrinsics further = C_ * change;
       if (further.dot(Lambda_ * further) + change.dot(further) < kConverged) break;
@@ -322,9 +324,6 @@ class WheelParity final : public Update {
 
   Params params_;
   PreintegrationOptions options_;
-  int max_iterations_;
-  bool second_order_noise_;
-  double wheel_check_probability_;
 
   WheelsBlocks blocks_;
   StreamId encoders_;
