@@ -40,11 +40,10 @@ constexpr Command kCommands[] = {
      evaluate_command},
     {"plugins", "plugins list | describe NAME | schema | check FILE | new KIND NAME [--out DIR]",
      "Lists the plugins that are found (kinematics, sensors, updates), the parameters of one or of "
-     "a "
-     "section (estimator, imu, cameras, wheels, odometry, evaluation, run), or why a file is "
-     "refused; "
-     "schema gives a JSON Schema of run configurations, for editors; new writes the source of a "
-     "plugin (kinematics, sensor or update) that "
+     "a section (estimator, imu, cameras, wheels, odometry, evaluation, run), or why a file is "
+     "refused; schema gives a JSON Schema of run configurations, for editors; new writes the "
+     "source "
+     "of a plugin (kinematics, sensor or update) that "
      "builds, runs and passes its tests, as a start for one of your own.",
      "out", -1, plugins_command}};
 

@@ -51,8 +51,9 @@ int describe(PluginRegistry& plugins, const std::string& name) {
               << "\ntype: " << info.name << "\n"
               << config::describe_params(info.params);
   }
-  if (!found)
+  if (!found) {
     throw InputError("no plugin or section '" + name + "'" + config::did_you_mean(name, names));
+  }
   return 0;
 }
 

@@ -14,7 +14,7 @@
 //     }
 //   };
 //
-// Structures that several plugins share are bases of it: their bind() is called first.
+// Structures that several plugins share are bases of it, whose bind() it calls.
 #pragma once
 
 #include <cstdint>
