@@ -16,14 +16,8 @@
 namespace viwo::config {
 namespace {
 
-std::vector<std::string> split(std::string_view text, char separator) {
-  std::vector<std::string> parts;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find(separator), text.size());
-    parts.emplace_back(text.substr(0, end));
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return parts;
+bool is_allowed(const std::string& text, const std::vector<std::string>& choices) {
+  return choices.empty() || std::find(choices.begin(), choices.end(), text) != choices.end();
 }
 
 std::string join(std::string_view path, std::string_view key) {
@@ -130,20 +124,17 @@ class ValueReader {
   }
 
   std::optional<std::string> read_choice(const Node& node, const std::string& path) {
-    const std::vector<std::string> choices = split(spec_.choices, '|');
+    const std::vector<std::string> choices = choices_of(spec_);
     const std::string& text = node.scalar();
-    if (choices.empty() || std::find(choices.begin(), choices.end(), text) != choices.end()) {
-      return text;
-    }
+    if (is_allowed(text, choices)) return text;
     error(node, path, "unknown value '" + text + "'" + did_you_mean(text, choices));
     return std::nullopt;
   }
 
   /// An empty path means "none", where that is the default.
   std::optional<ParamValue> read_path(const Node& node) {
-    if (!node.is_null() && !expect_scalar(node)) return std::nullopt;
-    const bool is_empty = node.is_null() || node.scalar().empty();
-    if (!is_empty) return resolve_path(node.scalar(), node.mark());
+    if (!expect_scalar(node)) return std::nullopt;
+    if (!node.scalar().empty()) return resolve_path(node.scalar(), node.mark());
     if (!spec_.required && std::get<std::string>(spec_.fallback).empty()) return std::string();
     error(node, path_, "is empty" + meaning_text(spec_));
     return std::nullopt;
@@ -268,10 +259,7 @@ void check_fallback(const ParamSpec& spec) {
     if (!within_bounds(value, spec)) refuse(number_text(value) + " violates " + bounds_text(spec));
   };
   const auto check_choice = [&](const std::string& text) {
-    const auto choices = split(spec.choices, '|');
-    if (!choices.empty() && std::find(choices.begin(), choices.end(), text) == choices.end()) {
-      refuse("'" + text + "' is none of " + spec.choices);
-    }
+    if (!is_allowed(text, choices_of(spec))) refuse("'" + text + "' is none of " + spec.choices);
   };
   switch (spec.type) {
     case ParamType::kInt:
@@ -296,6 +284,16 @@ void check_fallback(const ParamSpec& spec) {
 }
 
 }  // namespace
+
+std::vector<std::string> choices_of(const ParamSpec& spec) {
+  std::vector<std::string> choices;
+  for (std::string_view text = spec.choices; !text.empty();) {
+    const std::size_t end = std::min(text.find('|'), text.size());
+    choices.emplace_back(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return choices;
+}
 
 ParamSet read_params(const Node& map, const Mark& where, std::string_view what,
                      std::span<const ParamSpec> specs, std::span<const std::string_view> other_keys,

@@ -68,13 +68,9 @@ std::string comment_text(const ParamSpec& spec) {
     text += (spec.excludes_lowest() ? ", > " : ", >= ") + number_text(spec.lowest());
   }
   if (std::isfinite(spec.max)) text += ", <= " + number_text(spec.max);
-  if (!spec.choices.empty()) {
-    std::string choices = spec.choices;
-    for (std::size_t bar = 0; (bar = choices.find('|', bar)) != std::string::npos;) {
-      choices.replace(bar, 1, " | ");
-      bar += 3;
-    }
-    text += ", " + choices;
+  const char* before = ", ";
+  for (const std::string& choice : choices_of(spec)) {
+    text += std::exchange(before, " | ") + choice;
   }
   if (!spec.help.empty()) text += ": " + spec.help;
   return text;

@@ -252,6 +252,11 @@ TEST(Params, ResolvePathsAgainstTheFileTheyAreWrittenIn) {
   EXPECT_TRUE(errors.empty());
 }
 
+TEST(Params, RefuseNothingWhereAnEmptyPathWouldBeNone) {
+  EXPECT_EQ(entry_error("log: ''"), "no error");
+  EXPECT_EQ(entry_error("log: "), "kinematics.log: expected a file or folder, got nothing");
+}
+
 TEST(Params, RefuseAnEmptyPathWithoutSuchADefault) {
   const std::vector<ParamSpec> specs{
       spec("a", ParamType::kPath, std::string(), {.required = true})};

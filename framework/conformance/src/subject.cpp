@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "findings.hpp"
+#include "viwo/config/params.hpp"
 #include "viwo/config/yaml.hpp"
 
 namespace viwo::conformance {
@@ -50,8 +51,7 @@ Node made_up(const ParamSpec& spec, int n) {
     for (int j = 0; j < count; ++j) node.items().push_back(Node::scalar_of(item(j)));
     return node;
   };
-  const std::string choices = spec.choices;
-  const std::string choice = choices.empty() ? "a" : choices.substr(0, choices.find('|'));
+  const std::string choice = spec.choices.empty() ? "a" : config::choices_of(spec).front();
   switch (spec.type) {
     case ParamType::kBool:
       return Node::scalar_of("true");

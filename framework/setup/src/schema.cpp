@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "section_params.hpp"
+#include "viwo/config/params.hpp"
 
 namespace viwo {
 namespace {
@@ -32,11 +33,7 @@ void add_bounds(const ParamSpec& spec, json& out) {
 
 json text_of(const ParamSpec& spec) {
   json out{{"type", "string"}};
-  for (std::size_t begin = 0; begin < spec.choices.size();) {
-    const std::size_t end = std::min(spec.choices.find('|', begin), spec.choices.size());
-    out["enum"].push_back(spec.choices.substr(begin, end - begin));
-    begin = end + 1;
-  }
+  if (!spec.choices.empty()) out["enum"] = config::choices_of(spec);
   return out;
 }
 
@@ -60,7 +57,7 @@ json type_of(const ParamSpec& spec) {
     case ParamType::kString:
       return text_of(spec);
     case ParamType::kPath:
-      return {{"type", {"string", "null"}}};
+      return {{"type", "string"}};
     case ParamType::kNumbers:
       return list_of(number, spec.size);
     case ParamType::kStrings:

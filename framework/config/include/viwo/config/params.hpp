@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "viwo/api/params.hpp"
 #include "viwo/api/status.hpp"
@@ -34,6 +35,9 @@ struct ReadContext {
 ParamSet read_params(const Node& map, const Mark& where, std::string_view what,
                      std::span<const ParamSpec> specs, std::span<const std::string_view> other_keys,
                      const ReadContext& context, Errors& errors);
+
+/// The texts that a parameter may be; none: any.
+std::vector<std::string> choices_of(const ParamSpec& spec);
 
 /// Throws std::logic_error when a table is wrong: a name missing or twice, a default that its own
 /// row refuses (kKinematics: that is not a section).
