@@ -6,10 +6,13 @@
 #include "checks.hpp"
 #include "update_declarations.hpp"
 #include "update_hostile.hpp"
-#include "update_rig.hpp"
 #include "update_watch.hpp"
+#include "viwo/robot/robot.hpp"
 
 namespace viwo::conformance {
+
+using namespace robot;
+
 namespace {
 
 /// What an update did over a drive.

@@ -5,11 +5,14 @@
 #include <utility>
 #include <vector>
 
-#include "update_rig.hpp"
-#include "viwo/filter/declarations.hpp"
+#include "viwo/estimator/declarations.hpp"
 #include "viwo/plugin_host/sample_kinds.hpp"
+#include "viwo/robot/robot.hpp"
 
 namespace viwo::conformance {
+
+using namespace robot;
+
 namespace {
 
 /// One call of Declarations, as text.

@@ -142,12 +142,8 @@ void Filter::see_position(const Factor& factor) {
 template <class Factor>
 FactorResult Filter::apply_factor(const Factor& factor) {
   see_position(factor);
-  held_.before(covariance_.matrix());
-  const FactorResult result = covariance_.apply(factor, dx_);
-  if (is_applied(result)) {
-    covariance_.hold(held_, dx_);
-    correct();
-  }
+  const FactorResult result = covariance_.apply(factor, held_, dx_);
+  if (is_applied(result)) correct();
   return result;
 }
 
@@ -170,11 +166,9 @@ FactorResult Filter::apply(InformationFactor& factor, std::span<const AddedBlock
   see_position(factor);
   if (!covariance_.split(new_columns_, factor)) return FactorResult::kRejected;
   if (covariance_.ties_known_columns()) {
-    held_.before(covariance_.matrix());
-    const FactorResult result = covariance_.apply(factor, dx_);
+    const FactorResult result = covariance_.apply(factor, held_, dx_);
     if (result == FactorResult::kFailed) covariance_failed_ = true;
     if (result != FactorResult::kApplied) return result;
-    covariance_.hold(held_, dx_);
   }
   covariance_.initialise(dx_);
   for (const AddedBlock& block : added) blocks_.add(block);

@@ -33,11 +33,11 @@ void HeldDirections::add(std::span<const int> columns,
   ++n_;
 }
 
-void HeldDirections::before(const Eigen::MatrixXd& P) {
+void HeldDirections::remember(const Eigen::MatrixXd& P) {
   if (n_ > 0) G_ = P.block(first_, first_, count_, count_);
 }
 
-void HeldDirections::after(Eigen::VectorXd& dx, Eigen::Ref<Eigen::MatrixXd> P) {
+void HeldDirections::restore(Eigen::VectorXd& dx, Eigen::Ref<Eigen::MatrixXd> P) {
   if (n_ == 0) return;
   const auto DN = DN_.leftCols(n_);
   const auto Dinv_N = Dinv_N_.leftCols(n_);

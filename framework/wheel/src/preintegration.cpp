@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "pieces.hpp"
@@ -11,7 +12,10 @@
 namespace viwo {
 namespace {
 
-/// Readings of `a` moved towards those of `b`: (1 - weight) a + weight b.
+constexpr double kFullTurn = 2. * std::numbers::pi;
+
+/// Readings of `a` moved towards those of `b`: (1 - weight) a + weight b; angles by the shorter way
+/// round, for an encoder may begin anew between the two.
 EncoderSample blend(const EncoderSample& a, const EncoderSample& b, double weight) {
   EncoderSample mixed = a;
   mixed.bad_drives |= b.bad_drives;
@@ -20,7 +24,7 @@ EncoderSample blend(const EncoderSample& a, const EncoderSample& b, double weigh
     mixed.drive_rad_per_s[i] += weight * (b.drive_rad_per_s[i] - a.drive_rad_per_s[i]);
   }
   for (std::size_t i = 0; i < static_cast<std::size_t>(a.n_steer); ++i) {
-    mixed.steer_rad[i] += weight * (b.steer_rad[i] - a.steer_rad[i]);
+    mixed.steer_rad[i] += weight * std::remainder(b.steer_rad[i] - a.steer_rad[i], kFullTurn);
   }
   return mixed;
 }
@@ -206,14 +210,14 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
   }
   const bool gate = options_.parity_gate_probability > 0.;
   if (gate || options_.parity) {
-    const double chi2 = solver_.parity_chi2();
-    const int dof = solver_.parity_dof();
+    const TwistSolver::Parity parity = solver_.parity();
+    const int dof = parity.dof();
     if (gate && dof > 0) {
       if (dof != parity_gate_dof_) {
         parity_gate_dof_ = dof;
         parity_gate_ = chi2_quantile(1. - options_.parity_gate_probability, dof);
       }
-      if (!(chi2 <= parity_gate_)) {
+      if (!(parity.chi2() <= parity_gate_)) {
         ++out.gated;
         bridge(dt, &solution, out);
         return;
@@ -221,8 +225,9 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
     }
     // A cut sample appears in two intervals: its parity counts in each by its share of the cell.
     const double cell = seconds_between(y.begin_ns, y.end_ns);
-    if (options_.parity && dof > 0)
-      solver_.add_parity(cell > 0. ? std::min(dt / cell, 1.) : 1., out.parity);
+    if (options_.parity && dof > 0) {
+      solver_.add_parity(parity, cell > 0. ? std::min(dt / cell, 1.) : 1., out.parity);
+    }
   }
   if (solution.rank_deficient) ++out.rank_deficient;
   step(solution, dt, noise, out);

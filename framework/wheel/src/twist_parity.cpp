@@ -12,20 +12,29 @@ constexpr double kParityRankTolerance = 1e-6;
 
 }  // namespace
 
-double TwistSolver::parity_chi2() {
-  if (!options_.noise_weighted || weighted_.rank < 3) fit_weighted(kParityRankTolerance);
-  return weighted_chi2_;
+TwistSolver::Parity TwistSolver::parity() {
+  Parity parity;
+  if (options_.noise_weighted && weighted_.rank == 3) {
+    parity.fit_ = weighted_;
+    parity.chi2_ = weighted_chi2_;
+  } else {
+    parity.fit_.resize(model_->n_rows());
+    parity.chi2_ = fit_weighted(kParityRankTolerance, parity.fit_);
+  }
+  parity.dof_ = model_->n_rows() - n_left_out_ - parity.fit_.rank;
+  return parity;
 }
 
-void TwistSolver::add_parity(double weight, ParityInformation& out) {
-  differentiate_fitted(weighted_.xi, weighted_.M_inv.topRows<3>(), weighted_.e);
+void TwistSolver::add_parity(const Parity& parity, double weight, ParityInformation& out) {
+  const Fit& fit = parity.fit_;
+  differentiate_fitted(fit.xi, fit.M_inv.topRows<3>(), fit.e);
   with_block_size(model_->description().noise_block, [&](auto size) {
     constexpr int kSize = decltype(size)::value;
     weigh_jacobian<kSize>();
-    add_information<kSize>(weight, out);
+    add_information<kSize>(fit, weight, out);
   });
-  out.chi2 += weight * weighted_chi2_;
-  out.dof += parity_dof();
+  out.chi2 += weight * parity.chi2();
+  out.dof += parity.dof();
 }
 
 /// W J: of each column the rows of the noise blocks that it touches.
@@ -48,12 +57,12 @@ void TwistSolver::weigh_jacobian() {
 
 /// (W-10) as Lambda += J^T G with G = W J - W A (A^T W A)^-1 V, V = A^T W J; eta += J^T W e.
 template <int kSize>
-void TwistSolver::add_information(double weight, ParityInformation& out) const {
+void TwistSolver::add_information(const Fit& fit, double weight, ParityInformation& out) const {
   const int size = block_size<kSize>();
   const int m = model_->n_rows();
   const int n = model_->n_intrinsics();
   Eigen::Matrix<double, 4, kMaxRows> U;  // (A^T W A)^-1 A^T W
-  for (int i = 0; i < m; ++i) U.col(i) = weighted_.M_inv * weighted_.WA.col(i).head<3>();
+  for (int i = 0; i < m; ++i) U.col(i) = fit.M_inv * fit.WA.col(i).head<3>();
   in_pieces(n, [&](int first, auto width) {
     constexpr int kWidth = decltype(width)::value;
     using Piece = Eigen::Matrix<double, kWidth, 1>;
@@ -63,7 +72,7 @@ void TwistSolver::add_information(double weight, ParityInformation& out) const {
       v0 += rows_.A(i, 0) * WJ;
       v1 += rows_.A(i, 1) * WJ;
       v2 += rows_.A(i, 2) * WJ;
-      eta += weighted_.e[i] * WJ;
+      eta += fit.e[i] * WJ;
     }
     out.eta.segment<kWidth>(first) += eta;
     std::array<Piece, kMaxRows> G;  // its rows, of these columns

@@ -56,6 +56,12 @@ void ParityInformation::reset(int n) {
   dof = 0;
 }
 
+void TwistSolver::Fit::resize(int n_rows) {
+  WA.setZero(4, n_rows);
+  b.setZero(n_rows);
+  e.setZero(n_rows);
+}
+
 TwistSolver::TwistSolver(std::shared_ptr<const WheelModel> model, const TwistOptions& options)
     : model_(std::move(model)), options_(options) {
   const ModelDescription& d = model_->description();
@@ -66,11 +72,8 @@ TwistSolver::TwistSolver(std::shared_ptr<const WheelModel> model, const TwistOpt
     rows->A.setZero(m, 3);
     rows->b.setZero(m);
   }
-  for (Fit* fit : {&plain_, &weighted_}) {
-    fit->WA.setZero(4, m);
-    fit->b.setZero(m);
-    fit->e.setZero(m);
-  }
+  plain_.resize(m);
+  weighted_.resize(m);
   A_plus_.setZero(4, m);
   We_.setZero(m);
   no_residual_.setZero(m);
@@ -127,7 +130,7 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
     weight_A_is_current_ = model_->description().constant_A && n_left_out_ == 0;
     model.noise_derivatives(y, weights_at_, weight_rows_, weight_rows_.b, weight_twist(), plain_.e,
                             by_n_);
-    fit_weighted(options_.rank_tolerance);
+    weighted_chi2_ = fit_weighted(options_.rank_tolerance, weighted_);
     set_gain(weighted_);
   } else {
     model.noise_derivatives(y, x_WI_, rows_, rows_.b, plain_.xi, plain_.e, by_n_);
@@ -220,26 +223,26 @@ Twist TwistSolver::weight_twist() const {
   return invert_normal_matrix(A.transpose() * A, options_.rank_tolerance).inverse * Atb;
 }
 
-void TwistSolver::fit_weighted(double rank_tolerance) {
+/// Returns the whitened squared residual.
+double TwistSolver::fit_weighted(double rank_tolerance, Fit& fit) {
   Eigen::Matrix3d M;
   with_block_size(model_->description().noise_block,
-                  [&](auto size) { M = weigh_rows<decltype(size)::value>(); });
-  factor(M, rank_tolerance, weighted_);
-  solve(weighted_);
+                  [&](auto size) { M = weigh_rows<decltype(size)::value>(fit.WA); });
+  factor(M, rank_tolerance, fit);
+  solve(fit);
   double chi2 = 0.;
   for (int i = 0; i < model_->n_rows(); ++i) {
-    const double* w = weighted_.WA.col(i).data();
-    const double We =
-        w[3] - w[0] * weighted_.xi[0] - w[1] * weighted_.xi[1] - w[2] * weighted_.xi[2];
-    chi2 += We * weighted_.e[i];
+    const double* w = fit.WA.col(i).data();
+    const double We = w[3] - w[0] * fit.xi[0] - w[1] * fit.xi[1] - w[2] * fit.xi[2];
+    chi2 += We * fit.e[i];
     We_[i] = We;
   }
-  weighted_chi2_ = chi2;
+  return chi2;
 }
 
 /// R and W = R^-1 block by block, W A and in its fourth lane W b; returns A^T W A.
 template <int kSize>
-Eigen::Matrix3d TwistSolver::weigh_rows() {
+Eigen::Matrix3d TwistSolver::weigh_rows(RowLanes& WA) {
   const int size = block_size<kSize>();
   OuterProducts AtWA;
   int i0 = 0;
@@ -256,7 +259,7 @@ Eigen::Matrix3d TwistSolver::weigh_rows() {
     for (int i = 0; i < size; ++i) {
       Lanes w = W(i, 0) * row(i0);
       for (int l = 1; l < size; ++l) w += W(i, l) * row(i0 + l);
-      weighted_.WA.col(i0 + i) = w;
+      WA.col(i0 + i) = w;
       AtWA.add(w, row(i0 + i));
     }
     i0 += size;

@@ -70,10 +70,11 @@ WheelCheck::Verdict WheelCheck::judge(const EncoderSample& y) {
   if (solver_.solve(y, solution_) != Status::kOk || solution_.rank_deficient) return {};
   const double variance = noise_.variance();
   // Of readings beyond all measure rounding takes the sign.
-  Verdict verdict{std::abs(solver_.parity_chi2()) / variance, solver_.parity_dof()};
+  const TwistSolver::Parity residual = solver_.parity();
+  Verdict verdict{std::abs(residual.chi2()) / variance, residual.dof()};
   if (verdict.dof < 1 || verdict.chi2 <= gate(verdict.dof)) return verdict;
   parity_.reset(static_cast<int>(P_.rows()));
-  solver_.add_parity(1. / variance, parity_);
+  solver_.add_parity(residual, 1. / variance, parity_);
   IntrinsicMatrix M = parity_.Lambda * P_;
   M.diagonal().array() += 1.;
   const Intrinsics explained = P_ * M.partialPivLu().solve(parity_.eta);

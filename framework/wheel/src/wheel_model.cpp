@@ -36,6 +36,8 @@ WheelModel::WheelModel(std::shared_ptr<const KinematicModel> model) : model_(std
     require(std::isfinite(spec.nominal), "nominal value of '" + spec.name + "' is not finite");
     require(spec.prior_sigma > 0. && std::isfinite(spec.prior_sigma),
             "prior sigma of '" + spec.name + "' is not positive");
+    require(spec.lowest <= spec.nominal && spec.nominal <= spec.highest,
+            "nominal value of '" + spec.name + "' is outside of its bounds");
     fill_range(spec.rows, d.n_rows, "intrinsic '" + spec.name + "'");
   }
   for (NoiseSpec& spec : d.noises) {

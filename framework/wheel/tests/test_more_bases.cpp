@@ -161,8 +161,7 @@ double information_along(const WheelModel& model, const Intrinsics& direction) {
     const EncoderSample y = testing::with_noise(model, xi, clean, 20., rng);
     TwistSolution solution;
     EXPECT_EQ(solver.solve(y, solution), Status::kOk);
-    solver.parity_chi2();
-    solver.add_parity(1., parity);
+    solver.add_parity(solver.parity(), 1., parity);
   }
   return (parity.Lambda * direction).norm() / (parity.Lambda.norm() * direction.norm());
 }

@@ -46,8 +46,9 @@ int null_dimension(const std::string& yaml, const std::function<Twist(double)>& 
     TwistSolution solution;
     EXPECT_EQ(solver.solve(y, solution), Status::kOk);
     normal += 1e6 * solution.J_xi_WI.transpose() * solution.J_xi_WI;  // 1 mm/s, 1 mrad/s
-    solver.parity_chi2();
-    if (information == Information::kTwistAndParity) solver.add_parity(1., parity);
+    if (information == Information::kTwistAndParity) {
+      solver.add_parity(solver.parity(), 1., parity);
+    }
   }
   normal += parity.Lambda;
   Eigen::VectorXd sigma(n);

@@ -317,6 +317,29 @@ TEST(Preintegration, GivesWhatWasCountedHoweverIntervalsCutAndStampsJitter) {
   }
 }
 
+TEST(Preintegration, IsTheSameWhereSteeringReadingsBeginAnew) {
+  for (const auto& yaml : {swerve("four_wis_wid"), swerve("four_wis_wid_drive_only")}) {
+    const auto model = load_model(yaml);
+    // Crabs round and round: all wheels pass the end of the circle, at another time each.
+    auto samples = sample_motion(
+        *model, [](double t) { return Twist(0.5 * std::cos(2. * t), 0.5 * std::sin(2. * t), 0.1); },
+        8., 50.);
+    auto wrapped = samples;
+    for (EncoderSample& sample : wrapped) {
+      for (double& angle : sample.steer_rad) angle = std::remainder(angle, 2. * M_PI);
+    }
+    EXPECT_GT(samples.back().steer_rad[0], 2. * M_PI);
+    Preintegrator preintegrator(model, {});
+    PreintegratedPose pose, of_wrapped;
+    for (std::int64_t from = 3'000'000; from < 7 * kSecond; from += 33'000'000) {
+      ASSERT_TRUE(preintegrator.integrate(samples, from, from + 33'000'000, pose));
+      ASSERT_TRUE(preintegrator.integrate(wrapped, from, from + 33'000'000, of_wrapped));
+      EXPECT_LT((pose.g - of_wrapped.g).norm(), 1e-13) << from;
+      EXPECT_LT((pose.P_g - of_wrapped.P_g).norm(), 1e-13) << from;
+    }
+  }
+}
+
 TEST(Preintegration, SaysWhenTheSamplesDoNotReachOverTheInterval) {
   const auto model = load_model(swerve("four_wis_wid"));
   const auto samples = sample_motion(*model, wavy, 1., 100.);

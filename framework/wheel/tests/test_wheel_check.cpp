@@ -117,8 +117,8 @@ TEST(WheelCheck, GivesTheTwistOfTheThreeOthers) {
     ASSERT_EQ(solver.solve(y, of_three), Status::kOk);
     EXPECT_LT((of_three.xi - truth).norm(), 1e-9);
     EXPECT_GT((of_four.xi - truth).norm(), 0.01);
-    EXPECT_EQ(solver.parity_dof(), 3);
-    EXPECT_LT(solver.parity_chi2(), 1e-9);
+    EXPECT_EQ(solver.parity().dof(), 3);
+    EXPECT_LT(solver.parity().chi2(), 1e-9);
   }
 }
 

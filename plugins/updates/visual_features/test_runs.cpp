@@ -10,7 +10,7 @@
 
 #include "anchored_point.hpp"
 #include "test_support.hpp"
-#include "viwo/filter/estimator.hpp"
+#include "viwo/estimator/estimator.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/chi2.hpp"
 #include "viwo/sim/body_trajectory.hpp"

@@ -22,8 +22,8 @@
 #include <GeographicLib/LocalCartesian.hpp>
 
 #include "filter_fixture.hpp"
+#include "viwo/estimator/estimator.hpp"
 #include "viwo/eval/consistency.hpp"
-#include "viwo/filter/estimator.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/sim/imu_simulator.hpp"
 

@@ -57,24 +57,26 @@ double root_mean(const std::vector<double>& squares) {
   return std::sqrt(sum / static_cast<double>(squares.size()));
 }
 
+RunSetup read_husky(PluginRegistry& registry, const std::filesystem::path& data,
+                    std::vector<std::string> assignments) {
+  assignments.push_back("placeholders.data=" + std::filesystem::canonical(data).string());
+  return read_run(
+      resolve_placeholders(load_run_configuration(
+          std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/husky_gnss.yaml", assignments)),
+      registry, 1);
+}
+
 HuskyRun run_husky(const std::filesystem::path& data, std::vector<std::string> assignments) {
   testing::Frames frames;
   PluginRegistry registry(
       {VIWO_TEST_PLUGIN_DIR},
       [&](const PluginInfo&, LogLevel, std::string_view text) { frames.read(std::string(text)); });
-  assignments.push_back("placeholders.data=" + std::filesystem::canonical(data).string());
-  const auto read = [&] {
-    return read_run(
-        resolve_placeholders(load_run_configuration(
-            std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/husky_gnss.yaml", assignments)),
-        registry, 1);
-  };
-  auto all = read();
+  auto all = read_husky(registry, data, assignments);
   const auto fixes = collect(all).recorded.of<GnssSample>();
   std::vector<GnssSample> left_out;
   for (std::size_t i = 1; i < fixes.size(); i += 2) left_out.push_back(fixes[i]);
   assignments.push_back("sensors.bag0.gnss_stride=2");
-  auto setup = read();
+  auto setup = read_husky(registry, data, assignments);
   const auto measurements = collect(setup);
   FixJudge judge(left_out, frames);
   RunHooks hooks;
@@ -105,6 +107,18 @@ TEST(HuskyRecording, HasTheFixesThatAreLeftOutWhereItClaimsThem) {
   // filter's.
   EXPECT_LT(run.rms_m, std::hypot(run.sigma_m, std::sqrt(2.) * 2.));
   EXPECT_LT(run.sigma_m, 3.);
+}
+
+/// The twist alone, as it was recorded.
+TEST(HuskyRecording, DrivesAsFarAsItsOdometryDid) {
+  const auto data = std::filesystem::path(VIWO_TEST_SHARED_DIR) / "data/real";
+  if (!std::filesystem::exists(data / "husky_bag")) GTEST_SKIP() << "the recording is not here";
+  PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
+  auto setup = read_husky(registry, data, {"estimator.type=dead_reckoning"});
+  const RunResult result = viwo::run(setup, collect(setup), {});
+  ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
+  EXPECT_NEAR(result.total.path_length_m, 359., 0.5)
+      << "which the recording's description has in whole metres";
 }
 
 TEST(HuskyRecording, ShowsThatItsMessagesDoNotSayWhatTheirFixesAre) {

@@ -59,6 +59,13 @@ class Covariance {
   FactorResult apply(const ResidualFactor& factor, Eigen::VectorXd& dx);
   /// Update by normal equations (F-8). Columns without variance are left out.
   FactorResult apply(const InformationFactor& factor, Eigen::VectorXd& dx);
+  /// The same, but for what it does to directions that are held.
+  template <class Factor>
+  FactorResult apply(const Factor& factor, HeldDirections& held, Eigen::VectorXd& dx) {
+    FactorResult result{};
+    held.keep(P_, dx, [&] { return is_applied(result = apply(factor, dx)); });
+    return result;
+  }
   /// Takes new columns, without variance so far, out of an information factor (F-22): what it tells
   /// about the others remains. False: it does not determine them. Columns without variance that are
   /// not new stay in it and are left out by apply().
@@ -68,8 +75,6 @@ class Covariance {
   /// After apply() of what split() has left: the new columns (F-23). `dx` is that of apply() and
   /// gains what the new columns are corrected by.
   void initialise(Eigen::VectorXd& dx);
-  /// Takes from what apply() did what it did to the directions; held.before() came before it.
-  void hold(HeldDirections& held, Eigen::VectorXd& dx) { held.after(dx, P_); }
 
  private:
   double gate(int rows, double probability);

@@ -27,13 +27,18 @@ class HeldDirections {
   void add(std::span<const int> columns, const Eigen::Ref<const Eigen::VectorXd>& unit,
            const Eigen::Ref<const Eigen::VectorXd>& sigma);
 
-  /// Before an update: remembers the covariance of the columns.
-  void before(const Eigen::MatrixXd& P);
-  /// After it: takes from the correction and from the covariance what it did to the directions
-  /// (F-20).
-  void after(Eigen::VectorXd& dx, Eigen::Ref<Eigen::MatrixXd> P);
+  /// `apply` makes an update with the covariance P and says whether that was applied; then what it
+  /// did to the directions is taken from its correction and from the covariance (F-20).
+  template <class Apply>
+  void keep(Eigen::MatrixXd& P, Eigen::VectorXd& dx, Apply&& apply) {
+    remember(P);
+    if (apply()) restore(dx, P);
+  }
 
  private:
+  void remember(const Eigen::MatrixXd& P);
+  void restore(Eigen::VectorXd& dx, Eigen::Ref<Eigen::MatrixXd> P);
+
   int first_ = 0;
   int count_ = 0;
   int n_ = 0;

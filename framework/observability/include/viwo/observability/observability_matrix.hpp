@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "viwo/filter/estimator.hpp"
+#include "viwo/estimator/estimator.hpp"
 
 namespace viwo {
 

@@ -34,6 +34,7 @@ struct RunData {
   std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor
 
   std::span<const ImuSample> imu() const { return recorded.of<ImuSample>(); }
+  std::span<const HeadingSample> headings() const { return recorded.of<HeadingSample>(); }
   /// Of the first wheel set.
   std::span<const EncoderSample> wheels() const { return recorded.of<EncoderSample>(wheels_name); }
   /// Truth of the inertial state, if there is one.

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "viwo/estimator/estimator.hpp"
 #include "viwo/eval/accuracy.hpp"
-#include "viwo/filter/estimator.hpp"
 #include "viwo/math/trajectory.hpp"
 #include "viwo/wheel/preintegration.hpp"
 

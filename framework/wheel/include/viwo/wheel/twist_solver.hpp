@@ -89,14 +89,12 @@ class TwistSolver {
   /// blocks. Keeps a reference to `y` for the calls about the sample last solved.
   Status solve(const EncoderSample& y, TwistSolution& out);
 
-  /// For the sample last solved: whitened squared parity residual (chi-square with n_rows - 3
-  /// degrees of freedom for white noise of the stated size), and what add_parity() needs.
-  double parity_chi2();
-  int parity_dof() const { return model_->n_rows() - n_left_out_ - weighted_.rank; }
-
-  /// Adds `weight` times the sample last solved (after parity_chi2()). The Jacobian is that at the
-  /// fitted signal (W-9).
-  void add_parity(double weight, ParityInformation& out);
+  class Parity;
+  /// Of the sample last solved.
+  Parity parity();
+  /// Adds `weight` times the parity of the sample last solved. The Jacobian is that at the fitted
+  /// signal (W-9).
+  void add_parity(const Parity& parity, double weight, ParityInformation& out);
 
  private:
   // What has three entries gets a fourth lane, so that it is one register; the lane holds zero or
@@ -112,6 +110,8 @@ class TwistSolver {
     int rank = 3;
     Twist xi;
     RowVector b, e;  // A xi, and what it leaves of the measured b
+
+    void resize(int n_rows);
   };
 
   void differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P, const RowVector& e);
@@ -120,9 +120,9 @@ class TwistSolver {
   void clear_left_out(Rows& rows) const;
   void fit_plain();
   Twist weight_twist() const;
-  void fit_weighted(double rank_tolerance);
+  double fit_weighted(double rank_tolerance, Fit& fit);
   template <int kSize>
-  Eigen::Matrix3d weigh_rows();
+  Eigen::Matrix3d weigh_rows(RowLanes& WA);
   void factor(const Eigen::Matrix3d& M, double rank_tolerance, Fit& fit) const;
   void solve(Fit& fit) const;
   Twist least_squares(const Fit& fit, const RowVector& b) const;
@@ -135,7 +135,7 @@ class TwistSolver {
   template <int kSize>
   void weigh_jacobian();
   template <int kSize>
-  void add_information(double weight, ParityInformation& out) const;
+  void add_information(const Fit& fit, double weight, ParityInformation& out) const;
 
   /// kSize if that is known, else what the model says.
   template <int kSize>
@@ -182,6 +182,21 @@ class TwistSolver {
   NoiseDerivatives by_n_;
   // W J of the parity residual; only what the noise blocks of a column touch is ever written.
   Eigen::Matrix<double, kMaxRows, kMaxIntrinsics, Eigen::RowMajor> WJ_;
+};
+
+/// What the rows of a sample leave when their weighted fit is taken out.
+class TwistSolver::Parity {
+ public:
+  /// Whitened squared residual: chi-square with dof() degrees of freedom for white noise of the
+  /// stated size.
+  double chi2() const { return chi2_; }
+  int dof() const { return dof_; }
+
+ private:
+  friend class TwistSolver;
+  Fit fit_;
+  double chi2_ = 0.;
+  int dof_ = 0;
 };
 
 }  // namespace viwo

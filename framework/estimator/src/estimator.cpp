@@ -1,0 +1,190 @@
+#include "viwo/estimator/estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <time.h>
+
+#include "viwo/filter/health.hpp"
+
+namespace viwo {
+namespace {
+
+constexpr std::size_t kFirstWindow = 3;
+constexpr std::size_t kEpochsPerClone = 3;
+
+/// CPU time of this thread: what an epoch costs, however busy the machine is with other things.
+double thread_ms() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+/// Times the stages of an epoch, one after the other.
+class StageClock {
+ public:
+  explicit StageClock(std::span<double> stage_ms) : stage_ms_(stage_ms) {}
+  void done() {
+    const double now_ms = thread_ms();
+    stage_ms_[stage_++] = now_ms - begin_ms_;
+    begin_ms_ = now_ms;
+  }
+
+ private:
+  std::span<double> stage_ms_;
+  std::size_t stage_ = 0;
+  double begin_ms_ = thread_ms();
+};
+
+DeclarationTable declare_all(std::span<const UpdateEntry> updates,
+                             const std::vector<ExtraStream>& extra) {
+  DeclarationTable declared;
+  for (const UpdateEntry& entry : updates) {
+    try {
+      declared.declare(entry);
+    } catch (const InputError&) {
+      throw;
+    } catch (const std::exception& error) {
+      throw UpdateFailure(entry.name, error.what());
+    } catch (...) {
+      throw UpdateFailure(entry.name, "threw something that is not a std::exception");
+    }
+  }
+  for (const ExtraStream& stream : extra) declared.add_stream(stream.spec, stream.taker);
+  declared.finish();
+  return declared;
+}
+
+std::vector<BlockSpec> continued(std::vector<BlockSpec> blocks, const Continuation& before) {
+  for (BlockSpec& block : blocks) {
+    for (const auto& [name, value] : before.blocks) {
+      if (name == block.name && value.size() == block.value.size()) block.value = value;
+    }
+  }
+  return blocks;
+}
+
+}  // namespace
+
+ImuPrior moved_to(const Continuation::Place& place, ImuPrior prior) {
+  // The turn that makes the trace of R R_ItoG(prior) R_GtoI(place) largest.
+  const Eigen::Matrix3d M = prior.state.R_GtoI.transpose() * place.R_GtoI;
+  const double turn = std::atan2(M(0, 1) - M(1, 0), M(0, 0) + M(1, 1));
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  prior.state.R_GtoI = prior.state.R_GtoI * R.transpose();
+  prior.state.p_IinG = place.p_IinG + R * prior.state.p_IinG;
+  prior.state.v_IinG = R * prior.state.v_IinG;
+  ImuMatrix turned = ImuMatrix::Identity();
+  turned.block<3, 3>(kPositionColumn, kPositionColumn) = R;
+  turned.block<3, 3>(kVelocityColumn, kVelocityColumn) = R;
+  prior.P = turned * prior.P * turned.transpose();
+  return prior;
+}
+
+Estimator::Estimator(const EstimatorOptions& options, std::vector<UpdateEntry> updates,
+                     const std::vector<ExtraStream>& extra)
+    : Estimator(options, updates, extra.size(), declare_all(updates, extra)) {}
+
+Estimator::Estimator(const EstimatorOptions& options, std::vector<UpdateEntry> updates,
+                     std::size_t n_extra, DeclarationTable declared)
+    : options_(options),
+      declared_(std::move(declared)),
+      filter_(options.filter, continued(declared_.blocks(), options.continuation),
+              declared_.rooms()),
+      runner_(options.runner, std::move(updates), declared_, filter_),
+      first_extra_(declared_.taken().size() - n_extra),
+      intake_(declared_, options.imu),
+      stage_ms_(runner_.updates().size() + 2, 0.) {
+  if (!options.monitor.enabled) return;
+  for (const BlockGroup& group : filter_.blocks().groups()) {
+    ExcitationMonitor monitor(options.monitor, filter_.blocks(), group);
+    if (!monitor.parameters().empty()) monitors_.push_back(std::move(monitor));
+  }
+}
+
+std::vector<RejectionCount> Estimator::rejections() const {
+  std::vector<RejectionCount> all = intake_.rejections().counts();
+  runner_.rejections(all);
+  return all;
+}
+
+std::vector<NoiseFound> Estimator::noises() const {
+  std::vector<NoiseFound> all;
+  runner_.noises(all);
+  return all;
+}
+
+std::vector<std::string> Estimator::stage_names() const {
+  std::vector<std::string> names{"propagate"};
+  for (const UpdateEntry& entry : updates()) names.push_back(entry.name);
+  names.emplace_back("marginalise");
+  return names;
+}
+
+void Estimator::start(const ImuPrior& prior) {
+  filter_.initialize(prior);
+  intake_.start_at(prior.t_ns, filter_.blocks());
+}
+
+bool Estimator::find_start() {
+  const auto prior = intake_.find_start(search_, filter_.blocks());
+  if (!prior) return false;
+  const auto& place = options_.continuation.place;
+  start(place ? moved_to(*place, *prior) : *prior);
+  return true;
+}
+
+bool Estimator::step() {
+  if (!failure_.empty()) return false;
+  if (intake_.set_back_s() > 0.) {
+    failure_ =
+        "the clock of the IMU was set back by " + std::to_string(intake_.set_back_s()) + " s";
+    return false;
+  }
+  if (!filter_.initialized() && !find_start()) return false;
+  const auto t_ns = intake_.next_epoch_ns(options_.schedule, filter_.t_ns(), filter_.blocks());
+  if (!t_ns) return false;
+  StageClock clock(stage_ms_);
+  const EpochData data = intake_.take(filter_.t_ns(), *t_ns, filter_.blocks());
+  propagate(data);
+  clock.done();
+  for (std::size_t i = 0; i < updates().size(); ++i) {
+    runner_.run(i, data, filter_, monitors_);
+    clock.done();
+  }
+  watch(data);
+  if (filter_.window_full()) filter_.drop_oldest_clone();
+  const auto clones = filter_.clones();
+  intake_.forget(filter_.t_ns(), clones.empty() ? filter_.t_ns() : clones.front().t_ns,
+                 filter_.blocks());
+  failure_ = failure_of(filter_, options_.health);
+  if (failure_.empty()) failure_ = contact_.epoch(runner_.counts(), filter_);
+  ++epochs_;
+  clock.done();
+  return true;
+}
+
+void Estimator::propagate(const EpochData& data) {
+  if (options_.growing_window) {
+    filter_.limit_window(kFirstWindow + static_cast<std::size_t>(epochs_) / kEpochsPerClone);
+  }
+  const ImuTransition transition = filter_.propagate(data.imu, intake_.gaps_s());
+  filter_.clone(data.imu.back());
+  if (runner_.observer() != nullptr) runner_.observer()->on_clone(filter_, transition.Phi);
+}
+
+void Estimator::watch(const EpochData& data) {
+  bool any_new = false;
+  for (ExcitationMonitor& monitor : monitors_) {
+    if (monitor.epoch(filter_, data.imu)) any_new = true;
+  }
+  if (any_new && options_.monitor.hold) {
+    filter_.held().clear();
+    for (const ExcitationMonitor& monitor : monitors_) monitor.hold(filter_.held());
+  }
+  if (runner_.observer() != nullptr) runner_.observer()->on_epoch(filter_, data);
+}
+
+}  // namespace viwo
