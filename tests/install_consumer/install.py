@@ -44,9 +44,9 @@ class Install(unittest.TestCase):
             for name, path in paths.items():
                 dynamic = dynamic_section(prefix / name)
                 self.assertEqual(re.findall(r'R(?:UN)?PATH\).*\[(.*)\]', dynamic), [path], name)
-                self.assertIn('[libviwo_api.so.8]', dynamic, name)
+                self.assertIn('[libviwo_api.so.9]', dynamic, name)
         with self.subTest('the library has its name and version'):
-            self.assertIn('soname: [libviwo_api.so.8]',
+            self.assertIn('soname: [libviwo_api.so.9]',
                           dynamic_section(prefix / 'lib/libviwo_api.so'))
         with self.subTest('what people read is there'):
             for name in ('share/doc/viwo/LICENSE', 'share/doc/viwo/NOTICE',

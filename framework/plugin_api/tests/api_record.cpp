@@ -86,6 +86,10 @@ void measurements() {
   MEMBER(PoseSample, p_BinW_m);
   MEMBER(PoseSample, q_BtoW_xyzw);
   SAMPLE(PoseSample);
+  RECORD(HeadingSample);
+  MEMBER(HeadingSample, t_ns);
+  MEMBER(HeadingSample, yaw_rad);
+  SAMPLE(HeadingSample);
   RECORD(GnssSample);
   MEMBER(GnssSample, t_ns);
   MEMBER(GnssSample, latitude_deg);
@@ -188,6 +192,8 @@ void kinematics() {
   MEMBER(IntrinsicSpec, prior_sigma);
   MEMBER(IntrinsicSpec, gauge_fixed);
   MEMBER(IntrinsicSpec, rows);
+  MEMBER(IntrinsicSpec, lowest);
+  MEMBER(IntrinsicSpec, highest);
   ENUM(NoiseKind);
   RECORD(NoiseSpec);
   MEMBER(NoiseSpec, kind);

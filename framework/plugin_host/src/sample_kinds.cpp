@@ -13,8 +13,8 @@ std::string size_of(const SampleType& type) {
 }  // namespace
 
 SampleTypes built_in_sample_types() {
-  return sample_types<EncoderSample, ImuSample, FeatureSample, PoseSample, GnssSample, StateSample,
-                      CalibrationSample, ImageSample>();
+  return sample_types<EncoderSample, ImuSample, FeatureSample, PoseSample, HeadingSample,
+                      GnssSample, StateSample, CalibrationSample, ImageSample>();
 }
 
 SampleKinds::SampleKinds() {

@@ -92,7 +92,11 @@ Routes Routes::resolve(std::span<const SensorYield> sensors, const Wanted& wante
   if (wanted.filter) {
     const auto& imu = sample_type<ImuSample>();
     add(resolver.find("", imu, "the filter", false, ""), imu, Consumer::kImu);
+  } else if (const auto all = resolver.of(sample_type<ImuSample>()); all.size() == 1) {
+    add(all.front()->name, sample_type<ImuSample>(), Consumer::kImu);
   }
+  const auto& headings = sample_type<HeadingSample>();
+  add(resolver.only(resolver.of(headings), headings, ""), headings, Consumer::kHeading);
   const auto& poses = sample_type<PoseSample>();
   for (std::size_t i = 0; i < wanted.streams.size(); ++i) {
     const SharedStream& stream = wanted.streams[i];

@@ -73,12 +73,12 @@ Wanted measuring_with(const std::string& sensor) {
   return wanted;
 }
 
-/// Who gets samples of a kind, "imu", "stream 1", ...
+/// Who gets samples of a kind, "imu", "heading", "stream 1", ...
 template <Sample T>
 std::vector<std::string> takers_of(const Routes& routes, const std::string& sensor) {
   std::vector<std::string> takers;
   routes.dispatch(sensor, sample_type<T>(), [&](const Route& route) {
-    constexpr const char* kNames[] = {"imu",    "stream",           "wheels",  "reference poses",
+    constexpr const char* kNames[] = {"imu",    "heading",          "stream",   "wheels", "reference poses",
                                       "states", "true calibration", "pictures"};
     std::string taker = kNames[static_cast<int>(route.consumer)];
     if (route.consumer == Consumer::kStream) taker += " " + std::to_string(route.stream);

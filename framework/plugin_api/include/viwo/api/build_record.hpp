@@ -18,7 +18,7 @@ namespace viwo {
 
 /// Bump when any header in viwo/api changes the layout of a type, the order of virtual functions or
 /// the meaning of a value. Plugins built for another number are refused.
-inline constexpr int kApiVersion = 8;
+inline constexpr int kApiVersion = 9;
 
 inline constexpr std::string_view kBuildRecordBegin = "viwo-build-record{";
 inline constexpr char kBuildRecordEnd = '}';

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,10 @@ struct IntrinsicSpec {
   double prior_sigma = 0.;   ///< in `unit`, > 0: how well the nominal value is known
   bool gauge_fixed = false;  ///< held to place the odometry frame O on the body
   RowRange rows{};           ///< rows whose derivative by this entry is not zero
+  // In `unit`: what no base exceeds. A radius is not negative, or it would be one of a mirrored
+  // base.
+  double lowest = -std::numeric_limits<double>::infinity();
+  double highest = std::numeric_limits<double>::infinity();
 };
 
 /// What n_i in y = y_true + n_i (encoder channels) or in b (slip) a noise source is.

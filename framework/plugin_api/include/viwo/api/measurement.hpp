@@ -98,6 +98,16 @@ struct PoseSample {
   }
 };
 
+/// How a base is turned, by a gyro that integrates for itself: from an unknown zero, drifting.
+struct HeadingSample {
+  std::int64_t t_ns = 0;  ///< stamp in the clock of the gyro
+  double yaw_rad = 0.;    ///< counter-clockwise positive, seen from above; may wrap or count turns
+
+  const char* fault() const {
+    return std::isfinite(yaw_rad) ? nullptr : "value that is not finite";
+  }
+};
+
 /// Where a satellite receiver says that its antenna is, WGS84.
 struct GnssSample {
   std::int64_t t_ns = 0;      ///< stamp in the clock of the receiver
@@ -176,6 +186,8 @@ VIWO_SAMPLE(viwo::FeatureSample, "tracks", 1, &viwo::FeatureSample::t_ns,
             &viwo::FeatureSample::camera, &viwo::FeatureSample::points);
 VIWO_SAMPLE(viwo::PoseSample, "poses", 1, &viwo::PoseSample::t_ns, &viwo::PoseSample::p_BinW_m,
             &viwo::PoseSample::q_BtoW_xyzw);
+VIWO_SAMPLE(viwo::HeadingSample, "headings", 1, &viwo::HeadingSample::t_ns,
+            &viwo::HeadingSample::yaw_rad);
 VIWO_SAMPLE(viwo::GnssSample, "gnss fixes", 1, &viwo::GnssSample::t_ns,
             &viwo::GnssSample::latitude_deg, &viwo::GnssSample::longitude_deg,
             &viwo::GnssSample::altitude_m, &viwo::GnssSample::covariance_ENU_m2);

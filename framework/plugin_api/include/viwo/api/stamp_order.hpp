@@ -102,6 +102,13 @@ class VIWO_API StampOrder {
     counts_.add(prefix_.empty() ? std::string(reason) : prefix_ + std::string(reason), where);
   }
 
+  /// The same for the datum that was accepted last: its stamp was right, and it was not.
+  template <class Where>
+  void reject_last(std::string_view reason, const Where& where) {
+    --accepted_;
+    reject(reason, where);
+  }
+
   /// Counts a datum that is not used, and is no fault of the source: for no limit.
   template <class Where>
   void leave_out(std::string_view reason, const Where& where) {

@@ -9,7 +9,7 @@
 
 #include "viwo/config/errors.hpp"
 #include "viwo/config/node.hpp"
-#include "viwo/filter/estimator.hpp"
+#include "viwo/estimator/estimator.hpp"
 #include "viwo/plugin_host/registry.hpp"
 #include "viwo/wheel/wheel_model.hpp"
 

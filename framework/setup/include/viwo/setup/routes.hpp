@@ -10,12 +10,13 @@
 #include "viwo/api/sample.hpp"
 #include "viwo/config/errors.hpp"
 #include "viwo/config/node.hpp"
-#include "viwo/filter/declarations.hpp"
+#include "viwo/estimator/declarations.hpp"
 
 namespace viwo {
 
 enum class Consumer {
-  kImu,             ///< the filter's propagation
+  kImu,             ///< the filter's propagation, and whoever compares the wheels with a gyro
+  kHeading,         ///< whoever compares the wheels with a gyro
   kStream,          ///< a stream of the estimator: Route::stream
   kWheels,          ///< dead reckoning, and whoever wants to know how the wheels turned
   kReferencePoses,  ///< evaluation
