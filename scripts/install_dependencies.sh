@@ -47,7 +47,8 @@ done
 required=("${missing[@]}")
 missing=()
 for package in librosbag-storage-dev libroscpp-dev libsensor-msgs-dev libnav-msgs-dev \
-  libgeometry-msgs-dev libtf2-msgs-dev libdiagnostic-msgs-dev libsqlite3-dev libfastcdr-dev; do
+  libgeometry-msgs-dev libtf2-msgs-dev libdiagnostic-msgs-dev libsqlite3-dev libfastcdr-dev \
+  liblz4-dev libzstd-dev; do
   need_package "$package"
 done
 # Ubuntu 22.04 has it by another name.

@@ -1,13 +1,18 @@
 // Wheels and IMU of real bases, with noises that are first guesses.
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <filesystem>
 #include <limits>
+#include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "support.hpp"
+#include "viwo/log/text_reader.hpp"
 
 namespace viwo {
 namespace {
@@ -81,12 +86,61 @@ INSTANTIATE_TEST_SUITE_P(Recordings, SkidSteer,
                                            Guess{"run_20 of its readme", "run_20", kOfItsReadme},
                                            Guess{"run_21 of its readme", "run_21", kOfItsReadme}));
 
+/// The mean of columns `a` and `b` of a row, as the log would have it.
+std::string mean_of(const std::vector<std::string>& fields, std::size_t a, std::size_t b) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), ",%.17g",
+                0.5 * (std::stod(fields.at(a)) + std::stod(fields.at(b))));
+  return text.data();
+}
+
+/// Of four wheels two sides, for the model of two: as if the log had them.
+TEST_F(RealWheels, OfOneSideAreAveragedAsByHand) {
+  for (const std::string recording : {"run_20", "run_21"}) {
+    std::string averaged = "timestamp_ns,drive_1 [rad],drive_2 [rad]\n";
+    log::TextReader reader(kData / "ucsd_skid_steer" / recording / "wheels0/data.csv.gz");
+    std::string_view line;
+    reader.next(line);
+    while (reader.next(line)) {
+      std::istringstream row{std::string(line)};
+      std::vector<std::string> fields;
+      for (std::string field; std::getline(row, field, ',');) fields.push_back(field);
+      averaged += fields.at(0) + mean_of(fields, 1, 3) + mean_of(fields, 2, 4) + "\n";
+    }
+    write("averaged.csv", averaged);
+    const std::vector<std::string> two_sides{"placeholders.run=" + recording,
+                                             "kinematics.left_drives=[1]",
+                                             "kinematics.right_drives=[2]"};
+    const auto with = [&](const std::string& more) {
+      std::vector<std::string> all = two_sides;
+      all.push_back(more);
+      return run("ucsd_skid_steer.yaml", all);
+    };
+    with("sensors.wheels0.drive_channel=[1, 2, 1, 2]");
+    const std::string of_four = read("out/trajectory.tum");
+    with("sensors.wheels0.path=" + at("averaged.csv").string());
+    EXPECT_EQ(of_four, read("out/trajectory.tum")) << recording;
+    with("sensors.wheels0.drive_channel=[1, 1, 2, 2]");
+    EXPECT_NE(of_four, read("out/trajectory.tum")) << "front and rear are no sides";
+  }
+}
+
 /// Its wheels are good to centimetres in twelve metres, but where it is and looks to comes from a
 /// rough start: iterations that led astray had put one interval in eight beyond the gate.
 TEST_F(RealWheels, OfACarOnAHighwayAreBelieved) {
   const nlohmann::json car = run("comma2k19_car.yaml");
   EXPECT_EQ(car["status"], "ok");
   EXPECT_LT(rejected(car), 0.02);
+}
+
+/// Two modules of a swerve robot, out of the log of its program: nearer with them where they are
+/// than with them on the other diagonal.
+TEST_F(RealWheels, OfARobotOfFrcAreWhereTheirNamesSay) {
+  const nlohmann::json right = run("frc_swerve.yaml");
+  EXPECT_EQ(right["status"], "ok");
+  EXPECT_EQ(right["wheels"]["rejected"], 0);
+  const nlohmann::json wrong = run("frc_swerve.yaml", {"kinematics.y_m=[-0.28575, 0.28575]"});
+  EXPECT_LT(ate_m(right), ate_m(wrong));
 }
 
 }  // namespace

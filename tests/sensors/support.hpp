@@ -16,6 +16,26 @@
 
 namespace viwo {
 
+/// A fixture with an empty folder of its own: tests run side by side.
+class SensorsInFolder : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::path(::testing::TempDir()) /
+              (std::string("viwo_") + info->test_suite_name() + "_" + info->name());
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return (folder_ / name).string();
+  }
+
+  std::filesystem::path folder_;
+};
+
 inline PluginRegistry& registry() {
   static PluginRegistry the_registry({VIWO_TEST_PLUGIN_DIR});
   return the_registry;
@@ -38,6 +58,17 @@ inline std::string error_of(const std::string& yaml) {
     return error.what();
   }
   return {};
+}
+
+/// "reason | count | first", one each.
+inline std::vector<std::string> rejections_of(const Sensor& sensor) {
+  std::vector<RejectionCount> counts;
+  sensor.rejections(counts);
+  std::vector<std::string> out;
+  for (const RejectionCount& r : counts) {
+    out.push_back(r.reason + " | " + std::to_string(r.count) + " | " + r.first);
+  }
+  return out;
 }
 
 /// The names of the kinds of samples that a sensor says it yields.

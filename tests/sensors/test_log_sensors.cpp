@@ -4,25 +4,7 @@
 namespace viwo {
 namespace {
 
-class LogSensors : public ::testing::Test {
- protected:
-  void SetUp() override {
-    // One per test: tests run side by side.
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              ("viwo_log_sensors_" +
-               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-    return (folder_ / name).string();
-  }
-
-  std::filesystem::path folder_;
-};
+class LogSensors : public SensorsInFolder {};
 
 constexpr const char* kJoints =
     ".header.stamp.secs;.header.stamp.nsecs;time;.name;.position;.velocity\n"
@@ -57,6 +39,54 @@ TEST_F(LogSensors, AslEncodersTakeAnglesWithAStride) {
   EXPECT_EQ(error_of("{type: asl_encoders, stride: 2, path: " + path + "}"),
             "test.yaml:1:30  sensor.stride: a stride needs drive_input: angle (rates between the "
             "used readings would be lost)");
+}
+
+TEST_F(LogSensors, AslEncodersTakeJointsAsTheyAreMounted) {
+  const auto path = write("data.csv",
+                          "timestamp_ns,drive_1 [deg/s],drive_2 [rpm],steer_1 [counts]\n"
+                          "0,90,30,1024\n10,180,60,0\n");
+  const std::string of_the_log = "{type: asl_encoders, path: " + path;
+  const std::string units = ", drive_scale: [0.0174532925199433, -0.10471975511966]";
+  const auto samples = play_only<EncoderSample>(
+      of_the_log + units + ", drive_channel: [2, 1], steer_scale: [0.00153398078788564], " +
+      "steer_shift_rad: [3]}");
+  ASSERT_EQ(samples.size(), 2U);
+  EXPECT_NEAR(samples[0].drive_rad_per_s[0], -M_PI, 1e-12);
+  EXPECT_NEAR(samples[0].drive_rad_per_s[1], 0.5 * M_PI, 1e-12);
+  EXPECT_NEAR(samples[0].steer_rad[0], 0.5 * M_PI + 3., 1e-12);
+  EXPECT_EQ(samples[1].steer_rad[0], 3.);
+  EXPECT_EQ(error_of(of_the_log + units + "}"),
+            "test.yaml:1:1  sensor (asl_encoders): " + path +
+                ":1  column 'steer_1 [counts]' has another unit than 'steer_1 [rad]'");
+  const std::string error = error_of(of_the_log + ", drive_scale: [1], steer_scale: [1]}");
+  EXPECT_NE(
+      error.find("  sensor.drive_scale: has 1 number for 2 drive channels of the log: one for "
+                 "each, in their order"),
+      std::string::npos)
+      << error;
+}
+
+TEST_F(LogSensors, AslEncodersCountWhatLeavesTurnsOpenOnce) {
+  std::string text = "timestamp_ns,drive_1\n";
+  for (int k = 0; k < 20; ++k) {
+    text += std::to_string(10'000'000 * k) + "," + std::to_string(k == 9 ? 200 : 10 * k) + "\n";
+  }
+  const std::string section =
+      "{type: asl_encoders, drive_input: angle, drive_scale: [1], drive_turn: [360], path: " +
+      write("data.csv", text);
+  const auto sensor = make_sensor(section + "}");
+  // Neither side of the reading that was dropped, nor the one behind it: that one begins anew.
+  const auto cells = only<EncoderSample>(play(*sensor));
+  ASSERT_EQ(cells.size(), 17U);
+  for (const EncoderSample& cell : cells) EXPECT_NEAR(cell.drive_rad_per_s[0], 1000., 1e-9);
+  std::vector<RejectionCount> rejections;
+  sensor->rejections(rejections);
+  ASSERT_EQ(rejections.size(), 1U);
+  EXPECT_EQ(rejections[0].reason,
+            "reading that leaves open how many turns a joint has gone (drive_turn, steer_turn)");
+  EXPECT_EQ(rejections[0].first, "data.csv:11");
+  const std::string error = error_of(section + ", max_rejected_fraction: 0.04}");
+  EXPECT_NE(error.find("  1 of 20 data rejected"), std::string::npos) << error;
 }
 
 TEST_F(LogSensors, ABrokenLogFailsAtConstruction) {

@@ -36,6 +36,18 @@ TEST(PlanarSimulator, YieldsEncodersAndTrueOdometryPosesInTimeOrder) {
   EXPECT_NEAR(encoders.back().drive_rad_per_s[1], (0.5 + 0.25 * 0.6) / 0.1, 1e-12);
 }
 
+TEST(PlanarSimulator, MountsJointsAsItIsTold) {
+  const auto right = play_only<EncoderSample>(config(kRobot, "motion: circle, duration_s: 2"));
+  const auto wrong = play_only<EncoderSample>(
+      config(kRobot, "motion: circle, duration_s: 2, drive_scale: [-1, 2], drive_channel: [2, 1]"));
+  ASSERT_EQ(wrong.size(), right.size());
+  EXPECT_EQ(wrong.back().drive_rad_per_s[0], 2. * right.back().drive_rad_per_s[1]);
+  EXPECT_EQ(wrong.back().drive_rad_per_s[1], -right.back().drive_rad_per_s[0]);
+  EXPECT_NE(error_of(config(kRobot, "motion: circle, drive_scale: [1]"))
+                .find("sensor.drive_scale: has 1 number for 2 drive channels"),
+            std::string::npos);
+}
+
 TEST(PlanarSimulator, DrawsTrueIntrinsicsFromTheSeedWhenAsked) {
   const std::string nominal = "motion: straight, noise: false, duration_s: 5";
   const std::string drawn = nominal + ", true_intrinsics_scale: 1";

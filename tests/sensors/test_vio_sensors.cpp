@@ -13,22 +13,8 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class VioSensors : public ::testing::Test {
+class VioSensors : public SensorsInFolder {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("viwo_vio_") +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-    return (folder_ / name).string();
-  }
-
   std::string vio(const std::string& rest = "") const {
     return "{type: vio_csv, folder: " + folder_.string() + rest + "}";
   }
@@ -46,8 +32,6 @@ class VioSensors : public ::testing::Test {
 
   static constexpr const char* kStateHeader =
       "t,qx,qy,qz,qw,px,py,pz,vx,vy,vz,bgx,bgy,bgz,bax,bay,baz\n";
-
-  std::filesystem::path folder_;
 };
 
 std::vector<std::string> kinds(const std::vector<Measurement>& measurements) {

@@ -1,11 +1,14 @@
-// viwo_bag: a log folder, as a bag, read back by ros1_bag, gives the same samples.
+// viwo_bag: a log folder, as a bag, read back by ros1_bag or ros2_bag, gives the same samples.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <random>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <sys/wait.h>
+#include <yaml-cpp/yaml.h>
 
 #include "support.hpp"
 #include "viwo/image/image_file.hpp"
@@ -93,16 +96,8 @@ void expect_same(const std::vector<Measurement>& expected, const std::vector<Mea
   }
 }
 
-TEST_F(ViwoBag, ALogComesBackToTheBit) {
-  const auto log = write_log("log");
-  ASSERT_EQ(run(path("log") + " " + path("a.bag")), 0) << output_;
-  EXPECT_EQ(output_,
-            path("a.bag") + ": 235 messages (100 IMU, 100 wheels, 10 images, 20 poses, 5 fixes)\n");
-  const auto played = play(*make_sensor(
-      "{type: ros1_bag, path: " + path("a.bag") +
-      ", imu_topic: /imu0, image_topics: [/cam0/image_raw, /cam1/image_raw], joint_topic: "
-      "/joint_states, drive_joints: [drive_1, drive_2], steer_joints: [steer_1, steer_2], "
-      "pose_topic: /ground_truth, gnss_topic: /fix}"));
+/// That what is played is what was logged.
+void expect_log(const std::vector<Measurement>& log, const std::vector<Measurement>& played) {
   EXPECT_EQ(played.size(), log.size());
   expect_same<ImuSample>(log, played, [](const ImuSample& a, const ImuSample& b) {
     EXPECT_EQ(a.gyro_rad_per_s, b.gyro_rad_per_s);
@@ -130,6 +125,23 @@ TEST_F(ViwoBag, ALogComesBackToTheBit) {
     EXPECT_EQ(x.width_px, y.width_px);
     EXPECT_EQ(x.pixels, y.pixels);
   });
+}
+
+class ViwoBagFormats : public ViwoBag,
+                       public ::testing::WithParamInterface<std::pair<const char*, const char*>> {};
+
+TEST_P(ViwoBagFormats, ALogComesBackToTheBit) {
+  const auto [sensor, name] = GetParam();
+  const auto log = write_log("log");
+  ASSERT_EQ(run(path("log") + " " + path(name)), 0) << output_;
+  EXPECT_EQ(output_,
+            path(name) + ": 235 messages (100 IMU, 100 wheels, 10 images, 20 poses, 5 fixes)\n");
+  const auto played = play(*make_sensor(
+      std::string("{type: ") + sensor + ", path: " + path(name) +
+      ", imu_topic: /imu0, image_topics: [/cam0/image_raw, /cam1/image_raw], joint_topic: "
+      "/joint_states, drive_joints: [drive_1, drive_2], steer_joints: [steer_1, steer_2], "
+      "pose_topic: /ground_truth, gnss_topic: /fix}"));
+  expect_log(log, played);
   // The cells of the wheels are those of the log, too.
   const auto from_log =
       play_only<EncoderSample>("{type: asl_encoders, path: " + path("log/wheels0") + "}");
@@ -139,6 +151,36 @@ TEST_F(ViwoBag, ALogComesBackToTheBit) {
     EXPECT_EQ(from_log[i].begin_ns, from_bag[i].begin_ns);
     EXPECT_EQ(from_log[i].end_ns, from_bag[i].end_ns);
   }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ViwoBagFormats,
+                         ::testing::Values(std::pair("ros1_bag", "a.bag"),
+                                           std::pair("ros2_bag", "a.mcap"),
+                                           std::pair("ros2_bag", "a")));
+
+/// What `ros2 bag info` prints.
+TEST_F(ViwoBag, TheFolderOfARos2BagSaysWhatIsInIt) {
+  write_log("log");
+  ASSERT_EQ(run(path("log") + " " + path("robot")), 0) << output_;
+  const YAML::Node info =
+      YAML::LoadFile(path("robot/metadata.yaml"))["rosbag2_bagfile_information"];
+  EXPECT_EQ(info["storage_identifier"].as<std::string>(), "mcap");
+  EXPECT_EQ(info["message_count"].as<int>(), 235);
+  EXPECT_EQ(info["starting_time"]["nanoseconds_since_epoch"].as<std::int64_t>(), 0);
+  EXPECT_EQ(info["duration"]["nanoseconds"].as<std::int64_t>(), 99 * 9'999'991 + 1);
+  EXPECT_EQ(info["relative_file_paths"][0].as<std::string>(), "robot_0.mcap");
+  std::map<std::string, std::string> types;
+  int n = 0;
+  for (const YAML::Node& topic : info["topics_with_message_count"]) {
+    types[topic["topic_metadata"]["name"].as<std::string>()] =
+        topic["topic_metadata"]["type"].as<std::string>();
+    EXPECT_EQ(topic["topic_metadata"]["serialization_format"].as<std::string>(), "cdr");
+    n += topic["message_count"].as<int>();
+  }
+  EXPECT_EQ(n, 235);
+  EXPECT_EQ(types.size(), 6U);
+  EXPECT_EQ(types["/fix"], "sensor_msgs/msg/NavSatFix");
+  EXPECT_TRUE(fs::exists(folder_ / "robot/robot_0.mcap"));
 }
 
 TEST_F(ViwoBag, WhatTheLogDoesNotHaveIsNotRead) {
@@ -157,7 +199,7 @@ TEST_F(ViwoBag, WhatTheLogDoesNotHaveIsNotRead) {
 
 TEST_F(ViwoBag, SaysHowItIsUsed) {
   EXPECT_EQ(run("--help"), 0);
-  EXPECT_THAT(output_, HasSubstr("viwo_bag LOG_FOLDER OUT.bag"));
+  EXPECT_THAT(output_, HasSubstr("viwo_bag LOG_FOLDER OUT.bag|OUT.mcap|OUT"));
   EXPECT_EQ(run(""), 2);
   EXPECT_EQ(run("--fast a b"), 2);
 }
@@ -170,13 +212,22 @@ TEST_F(ViwoBag, RefusesWrongInputAndWritesNothing) {
   EXPECT_EQ(run(path("empty") + " " + out), 2);
   EXPECT_THAT(output_, HasSubstr(path("empty") + "  is no log folder: it has none of imu0, "));
   write_log("log");
-  std::ofstream(path("text.txt")) << "important\n";
-  EXPECT_EQ(run(path("log") + " " + path("text.txt")), 2);
-  EXPECT_EQ(output_, path("text.txt") + "  exists and is no bag\n");
+  for (const char* name : {"text.bag", "text.mcap"}) {
+    std::ofstream(path(name)) << "important\n";
+    EXPECT_EQ(run(path("log") + " " + path(name)), 2);
+    EXPECT_EQ(output_, path(name) + std::string("  exists and is no bag\n"));
+  }
+  EXPECT_EQ(run(path("log") + " " + path("a.db3")), 2);
+  EXPECT_THAT(output_, HasSubstr(path("a.db3") + "  ends with '.db3': .bag makes a ROS 1 bag, "));
+  EXPECT_EQ(run(path("log") + " " + path("empty")), 2);
+  EXPECT_EQ(output_, path("empty") + "  exists\n");
   fs::remove(folder_ / "log/cam1/data/2.png");
   EXPECT_EQ(run(path("log") + " " + out), 2);
   EXPECT_EQ(output_, path("log/cam1/data/2.png") + ": the image is missing or cannot be read\n");
   EXPECT_FALSE(fs::exists(out));
+  EXPECT_EQ(run(path("log") + " " + path("out")), 2);
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  EXPECT_FALSE(fs::exists(folder_ / "out.part"));
 }
 
 TEST_F(ViwoBag, KeepsTheBagThatIsThereUntilThereIsAnother) {
@@ -204,6 +255,10 @@ TEST_F(ViwoBag, AFullDiskIsAnError) {
   EXPECT_THAT(output_, HasSubstr("/dev/full  cannot be written: "));
   EXPECT_EQ(run(path("log") + " " + path("no/such/folder/a.bag")), 1);
   EXPECT_THAT(output_, HasSubstr("a.bag.part  cannot be written: "));
+  fs::create_symlink("/dev/full", folder_ / "full.mcap");
+  EXPECT_EQ(run(path("log") + " " + path("full.mcap")), 1);
+  EXPECT_THAT(output_, HasSubstr("full.mcap  cannot be written: No space left on device"));
+  EXPECT_EQ(run(path("log") + " " + path("no/such/folder/a")), 1);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// viwo_bag: a log folder as a ROS 1 bag.
+// viwo_bag: a log folder as a bag of ROS 1 or ROS 2.
 // Exit codes: 0 done; 1 writing failed; 2 the input is wrong.
 #include <algorithm>
 #include <cstddef>
@@ -8,12 +8,19 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
 
+#include "bag_writer.hpp"
+#ifdef VIWO_HAS_ROS1
 #include "ros1_writer.hpp"
+#endif
+#ifdef VIWO_HAS_ROS2
+#include "ros2_writer.hpp"
+#endif
 #include "viwo/api/status.hpp"
 #include "viwo/image/image_file.hpp"
 #include "viwo/log/asl.hpp"
@@ -27,8 +34,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kHelp =
-    "viwo_bag LOG_FOLDER OUT.bag\n\n"
-    "Writes a log folder, as `viwo simulate` makes it, as a ROS 1 bag:\n"
+    "viwo_bag LOG_FOLDER OUT.bag|OUT.mcap|OUT\n\n"
+    "Writes a log folder, as `viwo simulate` makes it, as a bag:\n"
+    "  OUT.bag    of ROS 1\n"
+    "  OUT.mcap   of ROS 2, one file\n"
+    "  OUT        of ROS 2, a folder with metadata.yaml and OUT_0.mcap\n"
+    "What of the folder becomes which messages (in ROS 2 their types have /msg/ in them):\n"
     "  imu0                         /imu0             sensor_msgs/Imu\n"
     "  wheels0                      /joint_states     sensor_msgs/JointState, joints drive_1 ..\n"
     "                                                 (velocity) and steer_1 .. (position); NaN "
@@ -138,7 +149,7 @@ std::vector<Entry> schedule(const Log& log) {
   return entries;
 }
 
-void write_wheels(const EncoderSample& sample, const bag::Stamps& stamps, bag::Ros1Writer& out) {
+void write_wheels(const EncoderSample& sample, const bag::Stamps& stamps, bag::BagWriter& out) {
   // A reader that asks for what the log does not have shall not take it for a wheel that stands.
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   std::vector<std::string> names;
@@ -156,7 +167,7 @@ void write_wheels(const EncoderSample& sample, const bag::Stamps& stamps, bag::R
   out.write_joints("/joint_states", stamps, names, positions, velocities);
 }
 
-void write_image(const ImageOnDisk& image, const bag::Stamps& stamps, bag::Ros1Writer& out) {
+void write_image(const ImageOnDisk& image, const bag::Stamps& stamps, bag::BagWriter& out) {
   Image pixels;
   read_image(image.file, pixels);
   const auto width_px = static_cast<std::uint32_t>(pixels.width_px);
@@ -165,14 +176,14 @@ void write_image(const ImageOnDisk& image, const bag::Stamps& stamps, bag::Ros1W
                    std::move(pixels.pixels)});
 }
 
-void write_fix(const GnssSample& fix, const bag::Stamps& stamps, bag::Ros1Writer& out) {
+void write_fix(const GnssSample& fix, const bag::Stamps& stamps, bag::BagWriter& out) {
   constexpr int kUnknown = 0, kKnown = 3;
   out.write_fix("/fix", stamps,
                 {0, fix.latitude_deg, fix.longitude_deg, fix.altitude_m, fix.covariance_ENU_m2,
                  fix.has_covariance() ? kKnown : kUnknown});
 }
 
-void write(const Log& log, const Entry& entry, bag::Ros1Writer& out) {
+void write(const Log& log, const Entry& entry, bag::BagWriter& out) {
   const bag::Stamps stamps{entry.t_ns, entry.t_ns};
   switch (entry.kind) {
     case Entry::kImu: {
@@ -196,31 +207,67 @@ void write(const Log& log, const Entry& entry, bag::Ros1Writer& out) {
   }
 }
 
+enum class Format : std::uint8_t { kRos1, kMcap, kMcapFolder };
+
+/// By what it is to be called; what is no file, such as a device, takes a ROS 1 bag.
+Format format_of(const fs::path& out) {
+  std::error_code ignored;
+  const std::string suffix = out.extension().string();
+  if (suffix == ".mcap") return Format::kMcap;
+  if (suffix == ".bag" || fs::is_other(out, ignored)) return Format::kRos1;
+  if (suffix.empty()) return Format::kMcapFolder;
+  throw InputError(out.string() + "  ends with '" + suffix +
+                   "': .bag makes a ROS 1 bag, .mcap a file and a name without an end the folder "
+                   "of a ROS 2 bag");
+}
+
 /// A file that is no bag is not replaced.
-void check_output(const fs::path& file) {
+void check_file(const fs::path& file, std::string_view magic) {
   std::error_code ignored;
   if (fs::is_directory(file, ignored)) throw InputError(file.string() + "  is a folder");
   if (!fs::is_regular_file(file, ignored) || fs::file_size(file, ignored) == 0) return;
-  constexpr std::string_view kMagic = "#ROSBAG V";
-  std::string begin(kMagic.size(), '\0');
+  std::string begin(magic.size(), '\0');
   std::ifstream(file, std::ios::binary)
       .read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  if (begin != kMagic) throw InputError(file.string() + "  exists and is no bag");
+  if (begin != magic) throw InputError(file.string() + "  exists and is no bag");
+}
+
+void check_output(const fs::path& out, Format format) {
+  std::error_code ignored;
+  if (format == Format::kRos1) return check_file(out, "#ROSBAG V");
+  if (format == Format::kMcap) return check_file(out, "\x89MCAP");
+  if (fs::exists(out, ignored)) throw InputError(out.string() + "  exists");
+}
+
+/// `file` is for ROS 2 a file in any case.
+std::unique_ptr<bag::BagWriter> open_bag(const fs::path& file, Format format) {
+#ifdef VIWO_HAS_ROS1
+  if (format == Format::kRos1) return std::make_unique<bag::Ros1Writer>(file.string());
+#endif
+#ifdef VIWO_HAS_ROS2
+  if (format != Format::kRos1) return std::make_unique<bag::Ros2Writer>(file.string());
+#endif
+  throw InputError(file.string() + "  cannot be written: this viwo_bag was built without ROS " +
+                   (format == Format::kRos1 ? "1" : "2"));
+}
+
+void write_messages(const Log& log, const std::vector<Entry>& entries, bag::BagWriter& out) {
+  for (const Entry& entry : entries) write(log, entry, out);
+  out.close();
 }
 
 /// Writes a bag beside `file`, which it replaces when it is complete. What is no regular file is
 /// written as it is.
-void write_bag(const Log& log, const std::vector<Entry>& entries, const fs::path& file) {
+void write_file(const Log& log, const std::vector<Entry>& entries, const fs::path& file,
+                Format format) {
   std::error_code ignored;
   const bool in_place = fs::exists(file, ignored) && !fs::is_regular_file(file, ignored);
   // A link stays one.
   const fs::path whole = fs::is_symlink(file, ignored) ? fs::weakly_canonical(file) : file;
   const fs::path part = in_place ? file : fs::path(whole.string() + ".part");
-  if (!in_place) check_output(part);
+  if (!in_place) check_output(part, format);
   try {
-    bag::Ros1Writer out(part.string());
-    for (const Entry& entry : entries) write(log, entry, out);
-    out.close();
+    write_messages(log, entries, *open_bag(part, format));
     if (!in_place) fs::rename(part, whole);
   } catch (...) {
     if (!in_place) fs::remove(part, ignored);  // half a bag is of no use
@@ -228,16 +275,43 @@ void write_bag(const Log& log, const std::vector<Entry>& entries, const fs::path
   }
 }
 
-void convert(const fs::path& folder, const fs::path& file) {
+/// The same for a folder, which is not there yet.
+void write_folder([[maybe_unused]] const Log& log,
+                  [[maybe_unused]] const std::vector<Entry>& entries, const fs::path& out) {
+  const fs::path part = out.string() + ".part";
+  check_output(part, Format::kMcapFolder);
+#ifdef VIWO_HAS_ROS2
+  fs::create_directory(part);
+  try {
+    bag::Ros2Writer writer((part / (out.filename().string() + "_0.mcap")).string());
+    write_messages(log, entries, writer);
+    writer.write_metadata();
+    fs::rename(part, out);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(part, ignored);
+    throw;
+  }
+#else
+  open_bag(out, Format::kMcapFolder);
+#endif
+}
+
+void convert(const fs::path& folder, const fs::path& out) {
+  const Format format = format_of(out);
   const Log log = read_log(folder);
   const std::vector<Entry> entries = schedule(log);
   if (entries.front().t_ns < 0) {
     throw InputError(folder.string() + "  has stamps before 0, which a bag cannot hold");
   }
-  check_output(file);
-  write_bag(log, entries, file);
-  std::cout << file.string() << ": " << entries.size() << " messages (" << log.imu.size()
-            << " IMU, " << log.wheels.size() << " wheels, " << log.images.size() << " images, "
+  check_output(out, format);
+  if (format == Format::kMcapFolder) {
+    write_folder(log, entries, out);
+  } else {
+    write_file(log, entries, out, format);
+  }
+  std::cout << out.string() << ": " << entries.size() << " messages (" << log.imu.size() << " IMU, "
+            << log.wheels.size() << " wheels, " << log.images.size() << " images, "
             << log.poses.size() + log.truth.size() << " poses, " << log.fixes.size() << " fixes)\n";
 }
 

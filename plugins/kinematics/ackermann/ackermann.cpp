@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "ackermann_params.hpp"
@@ -61,6 +62,7 @@ class Ackermann final : public KinematicModel {
     const char* offsets[] = {n_steer_ == 1 ? "delta_o" : "delta_o_left", "delta_o_right"};
     const auto add = [&](const char* name, const char* unit, double sigma, RowRange rows) {
       out.intrinsics.push_back({name, unit, nominal_[out.intrinsics.size()], sigma, false, rows});
+      if (unit == std::string_view("m")) out.intrinsics.back().lowest = 0.;  // radii and lengths
     };
     for (int i = 0; i < n_drive_; ++i) add(wheels[i], "m", params_.prior_sigma_radius_m, all);
     add("wheel_base", "m", params_.prior_sigma_length_m, front);

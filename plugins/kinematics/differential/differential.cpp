@@ -74,9 +74,15 @@ class Differential final : public KinematicModel {
     out.n_rows = n + 1;
     out.constant_A = true;
     out.intrinsics = {
-        {"r_left", "m", nominal_[0], params_.prior_sigma_radius_m, false, {0, n_left_}},
-        {"r_right", "m", nominal_[1], params_.prior_sigma_radius_m, false, {n_left_, n - n_left_}},
-        {"baseline", "m", nominal_[2], params_.prior_sigma_baseline_m, false, {0, n}}};
+        {"r_left", "m", nominal_[0], params_.prior_sigma_radius_m, false, {0, n_left_}, 0.},
+        {"r_right",
+         "m",
+         nominal_[1],
+         params_.prior_sigma_radius_m,
+         false,
+         {n_left_, n - n_left_},
+         0.},
+        {"baseline", "m", nominal_[2], params_.prior_sigma_baseline_m, false, {0, n}, 0.}};
     for (int i = 0; i < n; ++i) {
       const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
       out.noises.push_back({NoiseKind::kDrive,

@@ -1,6 +1,7 @@
 // Base with N >= 3 mecanum wheels: one row per wheel, along the direction in which its rollers
 // cannot roll. Equations: model.md beside this file.
 #include <cmath>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -101,8 +102,9 @@ class Mecanum final : public KinematicModel {
       const char* unit;
       double prior_sigma;
       int held;  // the first so many entries hold the gauge (MC-8)
+      double lowest = -std::numeric_limits<double>::infinity();
     };
-    const Group groups[] = {{"r_", "m", params_.prior_sigma_radius_m, 0},
+    const Group groups[] = {{"r_", "m", params_.prior_sigma_radius_m, 0, 0.},
                             {"gamma_", "rad", params_.prior_sigma_roller_angle_rad, 1},
                             {"k_", "m", params_.prior_sigma_lever_m, 2}};
     for (const Group& group : groups) {
@@ -112,7 +114,8 @@ class Mecanum final : public KinematicModel {
                                   .nominal = nominal_[out.intrinsics.size()],
                                   .prior_sigma = group.prior_sigma,
                                   .gauge_fixed = j < group.held,
-                                  .rows = {j, 1}});
+                                  .rows = {j, 1},
+                                  .lowest = group.lowest});
       }
     }
     for (int j = 0; j < n_; ++j) {

@@ -100,8 +100,8 @@ class SkidSteer final : public KinematicModel {
     out.n_rows = n + 1;
     out.constant_A = true;
     out.intrinsics = {
-        {"r_left", "m", nominal_[kRLeft], params_.prior_sigma_radius_m, false, left},
-        {"r_right", "m", nominal_[kRRight], params_.prior_sigma_radius_m, false, right},
+        {"r_left", "m", nominal_[kRLeft], params_.prior_sigma_radius_m, false, left, 0.},
+        {"r_right", "m", nominal_[kRRight], params_.prior_sigma_radius_m, false, right, 0.},
         {"y_icr_left", "m", nominal_[kYLeft], params_.prior_sigma_icr_m, params_.hold_frame,
          left},  // (K-7)
         {"y_icr_right", "m", nominal_[kYRight], params_.prior_sigma_icr_m, false, right},

@@ -7,7 +7,7 @@
 namespace viwo {
 namespace {
 
-struct Params : log::StrideParams, log::LimitParams {
+struct Params : log::StrideParams, log::JointParams, log::LimitParams {
   std::filesystem::path path;
   enum class Drive { kRate, kAngle };
   Drive drive_input = Drive::kRate;
@@ -16,15 +16,16 @@ struct Params : log::StrideParams, log::LimitParams {
     b(VIWO_PARAM(path),
       {.required = true, .help = "the encoder table, or the folder of its data.csv"});
     b(VIWO_PARAM(drive_input), {{"rate", Drive::kRate}, {"angle", Drive::kAngle}},
-      {.help = "drive columns are rates [rad/s] or multi-turn angles [rad]"});
+      {.help = "drive columns are rates [rad/s] or angles [rad]; other units: drive_scale"});
     log::StrideParams::bind(b);
+    log::JointParams::bind(b);
     log::LimitParams::bind(b);
   }
 
   log::EncoderRecordingOptions options() const {
     const bool is_angle = drive_input == Drive::kAngle;
     check_stride(is_angle, "angle");
-    return {limits(), is_angle, stride};
+    return {limits(), is_angle, stride, joints()};
   }
 };
 

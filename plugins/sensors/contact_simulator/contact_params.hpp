@@ -7,12 +7,13 @@
 
 #include "encoders.hpp"
 #include "viwo/api/params.hpp"
+#include "viwo/log/joints.hpp"
 #include "viwo/sim/drive_params.hpp"
 #include "viwo/sim/rig_simulator.hpp"
 
 namespace viwo::contact {
 
-struct Params : sim::DriveParams, sim::RigParams {
+struct Params : log::JointParams, sim::DriveParams, sim::RigParams {
   std::string base;
   std::vector<double> x_m;
   std::vector<double> y_m;
@@ -142,6 +143,7 @@ struct Params : sim::DriveParams, sim::RigParams {
       {.unit = "Hz", .min = 1., .max = 10000., .help = "rate of the encoder samples"});
     b(VIWO_PARAM(t_OtoI_s),
       {.unit = "s", .min = -10., .max = 10., .help = "t_imu = t_odom + t_OtoI"});
+    log::JointParams::bind(b);
     sim::DriveParams::bind(b);
     sim::RigParams::bind(b);
   }

@@ -126,7 +126,9 @@ log::Recording<Measurement> simulate(const Params& params, const HostServices& s
   add(sim::mounting_truth(rig.mounting, start_ns));
   out.samples.emplace_back(CalibrationSample{start_ns, "t_OtoI", params.t_OtoI_s});
   add(sim::simulate_rig(trajectory, rig, services.seed));
-  add(encoders(params, trajectory, vehicle, solver, services.seed));
+  auto from_wheels = encoders(params, trajectory, vehicle, solver, services.seed);
+  log::mount_joints(params, from_wheels, out.rejections);
+  add(std::move(from_wheels));
   sim::sort_by_time(out.samples);
   return out;
 }

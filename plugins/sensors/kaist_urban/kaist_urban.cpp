@@ -22,7 +22,7 @@
 namespace viwo {
 namespace {
 
-struct Params : log::LimitParams {
+struct Params : log::JointParams, log::LimitParams {
   std::filesystem::path path;
   bool imu = true;
   bool wheels = true;
@@ -55,6 +55,7 @@ struct Params : log::LimitParams {
                                .max = 1e6,
                                .help = "leave out what is later than this behind start_s; "
                                        "0: nothing"});
+    log::JointParams::bind(b);
     log::LimitParams::bind(b);
   }
 };
@@ -92,7 +93,7 @@ class KaistUrban final : public Sensor {
     const kaist::Sequence sequence(folder, params.limits());
     if (params.reference) keep(sequence.reference());
     if (params.imu) keep(sequence.imu());
-    if (params.wheels) keep(sequence.wheels(params.encoder_resolution));
+    if (params.wheels) keep(sequence.wheels(params.encoder_resolution, params.joints()));
     if (params.images) {
       keep<0>(sequence.images(0));
       keep<1>(sequence.images(1));

@@ -132,7 +132,8 @@ std::int64_t Sequence::encoder_resolution() const {
                    "  has no line 'Encoder resolution: N' (encoder_resolution: N does without)");
 }
 
-log::EncoderRecording Sequence::wheels(std::int64_t ticks_per_turn) const {
+log::EncoderRecording Sequence::wheels(std::int64_t ticks_per_turn,
+                                       const log::JointParams& joints) const {
   RowReader row(required(folder_ / "sensor_data" / "encoder.csv",
                          "the counts of the wheel encoders are in it", "wheels: false"),
                 "timestamp_ns, left count, right count");
@@ -141,7 +142,8 @@ log::EncoderRecording Sequence::wheels(std::int64_t ticks_per_turn) const {
   log::EncoderRecordingOptions options;
   options.limits = limits_;
   options.drive_is_angle = true;
-  log::EncoderCollector collector(options);
+  options.joints = joints;
+  log::EncoderCollector collector(options, 2, 0);
   log::EncoderReading reading;
   reading.n_drive = 2;
   while (row.next()) {

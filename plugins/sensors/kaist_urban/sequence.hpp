@@ -17,8 +17,8 @@ class Sequence {
   /// Angular rate and specific force from sensor_data/xsens_imu.csv.
   log::ImuRecording imu() const;
   /// Mean rates of the left and the right rear wheel between the rows of sensor_data/encoder.csv.
-  /// `ticks_per_turn`: 0 for what calibration/EncoderParameter.txt says.
-  log::EncoderRecording wheels(std::int64_t ticks_per_turn) const;
+  /// `ticks_per_turn`: 0 for what calibration/EncoderParameter.txt says. `joints`: of its angles.
+  log::EncoderRecording wheels(std::int64_t ticks_per_turn, const log::JointParams& joints) const;
   /// Poses of the vehicle from global_pose.csv.
   log::PoseRecording reference() const;
   /// The images of camera 0 (left) or 1 (right) at the stamps of sensor_data/stereo_stamp.csv.

@@ -81,6 +81,10 @@ TEST_F(KaistUrban, TurnsCountsIntoTheMeanRatesBetweenTheRows) {
   EXPECT_DOUBLE_EQ(cells[0].drive_rad_per_s[1], 0.);
   EXPECT_DOUBLE_EQ(cells[1].drive_rad_per_s[0], 0.);
   EXPECT_NEAR(cells[1].drive_rad_per_s[1], 10. * tick / 0.02, 1e-9);
+  const auto reversed = play_only<EncoderSample>(only_yaml("wheels", ", drive_scale: [1, -1]"));
+  ASSERT_EQ(reversed.size(), 2U);
+  EXPECT_EQ(reversed[0].drive_rad_per_s[0], cells[0].drive_rad_per_s[0]);
+  EXPECT_EQ(reversed[1].drive_rad_per_s[1], -cells[1].drive_rad_per_s[1]);
 }
 
 TEST_F(KaistUrban, PrefersTheResolutionOfTheConfigurationToThatOfTheFile) {

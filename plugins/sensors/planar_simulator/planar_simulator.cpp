@@ -14,7 +14,7 @@
 namespace viwo {
 namespace {
 
-struct Params : sim::EncoderParams {
+struct Params : sim::EncoderParams, log::JointParams {
   NestedKinematics robot;
   std::string motion = "icr_sweep";
   double duration_s = 60.;
@@ -54,6 +54,7 @@ struct Params : sim::EncoderParams {
     b(VIWO_PARAM(noise),
       {.help = "noise of encoders and wheel slip as the robot's description says"});
     sim::EncoderParams::bind(b);
+    log::JointParams::bind(b);
   }
 };
 
@@ -94,7 +95,8 @@ log::Recording<Measurement> simulate(const Params& params, const HostServices& s
   const sim::PlanarMotion motion(params.motion, {params.speed_m_per_s, params.yaw_rate_rad_per_s,
                                                  params.ramp_s, params.pivot_m});
   log::Recording<Measurement> out;
-  const auto from_wheels = encoders(params, motion, services);
+  auto from_wheels = encoders(params, motion, services);
+  log::mount_joints(params, from_wheels, out.rejections);
   const auto from_reference = poses(params, motion);
   out.samples.assign(from_wheels.begin(), from_wheels.end());
   out.samples.insert(out.samples.end(), from_reference.begin(), from_reference.end());

@@ -90,7 +90,8 @@ class Ros1Recording final : public Bag {
   std::int64_t begin_ns() const override { return begin_ns_; }
 
   void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
-            const std::function<void(const Message&)>& visit) const override {
+            const std::function<void(const Message&)>& visit,
+            Rejections& /*damage*/) const override {  // is an error
     for (const auto& file : files_) {
       const std::scoped_lock lock(file->mutex);
       try {

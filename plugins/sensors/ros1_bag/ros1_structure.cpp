@@ -1,7 +1,6 @@
 #include "ros1_structure.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -9,9 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include <fcntl.h>
-#include <unistd.h>
-
+#include "file_bytes.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo::bag {
@@ -31,14 +28,7 @@ std::uint32_t u32_at(std::string_view bytes) {
 
 class Structure {
  public:
-  explicit Structure(const std::string& file) : file_(file), fd_(::open(file.c_str(), O_RDONLY)) {
-    if (fd_ < 0) throw InputError(file_ + "  cannot be read: " + std::strerror(errno));
-    const off_t end = ::lseek(fd_, 0, SEEK_END);
-    size_ = end > 0 ? static_cast<std::uint64_t>(end) : 0;
-  }
-  ~Structure() { ::close(fd_); }
-  Structure(const Structure&) = delete;
-  Structure& operator=(const Structure&) = delete;
+  explicit Structure(const std::string& file) : file_(file), in_(file), size_(in_.size()) {}
 
   void check() {
     check_magic();
@@ -87,8 +77,7 @@ class Structure {
 
   std::string read(std::uint64_t at, std::size_t n) const {
     std::string bytes(n, '\0');
-    const ssize_t got = ::pread(fd_, bytes.data(), n, static_cast<off_t>(at));
-    if (got != static_cast<ssize_t>(n)) fail(at, "the file cannot be read");
+    in_.read(at, {reinterpret_cast<std::uint8_t*>(bytes.data()), n});
     return bytes;
   }
 
@@ -221,8 +210,8 @@ class Structure {
   }
 
   std::string file_;
-  int fd_;
-  std::uint64_t size_ = 0;
+  FileBytes in_;
+  std::uint64_t size_;
   std::set<std::uint64_t> chunks_, wanted_chunks_;
   std::set<std::uint32_t> connections_, indexed_;
   // Of the last chunk:

@@ -8,64 +8,39 @@
 #include <string>
 #include <vector>
 
+#include "bag_writer.hpp"
+
 namespace viwo::bag {
 
-/// Of a message: in its header, and of its recording. From 0 to 4294967295.999999999 s.
-struct Stamps {
-  std::int64_t header_ns = 0;
-  std::int64_t received_ns = 0;
-};
-
-/// Fields of a sensor_msgs/Image.
-struct RawImage {
-  std::uint32_t width_px = 0;
-  std::uint32_t height_px = 0;
-  std::string encoding;
-  bool big_endian = false;
-  std::uint32_t row_bytes = 0;
-  std::vector<std::uint8_t> pixels;
-};
-
-/// Fields of a sensor_msgs/NavSatFix.
-struct RawFix {
-  int status = 0;  ///< -1: no fix
-  double latitude_deg = 0.;
-  double longitude_deg = 0.;
-  double altitude_m = 0.;
-  std::array<double, 9> covariance_m2{};
-  int covariance_type = 0;  ///< 0 unknown, 1 approximated, 2 diagonal known, 3 known
-};
-
 /// Everything that fails is a std::runtime_error "file  cannot be written: why".
-class Ros1Writer {
+class Ros1Writer final : public BagWriter {
  public:
   /// `compression`: "none", "bz2" or "lz4"; chunks hold at least `chunk_bytes`.
   explicit Ros1Writer(const std::string& file, const std::string& compression = "none",
                       std::uint32_t chunk_bytes = 768 * 1024);
-  ~Ros1Writer();
+  ~Ros1Writer() override;
   Ros1Writer(const Ros1Writer&) = delete;
   Ros1Writer& operator=(const Ros1Writer&) = delete;
 
   void write_imu(const std::string& topic, const Stamps& stamps,
                  const std::array<double, 3>& gyro_rad_per_s,
-                 const std::array<double, 3>& accel_m_per_s2);
+                 const std::array<double, 3>& accel_m_per_s2) override;
   void write_joints(const std::string& topic, const Stamps& stamps,
                     const std::vector<std::string>& names, const std::vector<double>& positions,
-                    const std::vector<double>& velocities);
+                    const std::vector<double>& velocities) override;
   void write_pose(const std::string& topic, const Stamps& stamps, const std::array<double, 3>& p,
-                  const std::array<double, 4>& q_xyzw);
+                  const std::array<double, 4>& q_xyzw) override;
   void write_pose_with_covariance(const std::string& topic, const Stamps& stamps,
                                   const std::array<double, 3>& p,
                                   const std::array<double, 4>& q_xyzw);
   void write_odometry(const std::string& topic, const Stamps& stamps,
                       const std::array<double, 3>& p, const std::array<double, 4>& q_xyzw,
                       double v_x = 0., double omega_z = 0.);
-  void write_fix(const std::string& topic, const Stamps& stamps, const RawFix& fix);
-  void write_image(const std::string& topic, const Stamps& stamps, const RawImage& image);
+  void write_fix(const std::string& topic, const Stamps& stamps, const RawFix& fix) override;
+  void write_image(const std::string& topic, const Stamps& stamps, const RawImage& image) override;
   void write_compressed_image(const std::string& topic, const Stamps& stamps,
                               const std::string& format, const std::vector<std::uint8_t>& bytes);
-  /// Must be called: the last bytes may fail, too.
-  void close();
+  void close() override;
 
  private:
   struct Bag;

@@ -149,13 +149,21 @@ TEST_F(Ros1Bag, TakesPositionsOfDrivesAsMultiTurnAngles) {
   EXPECT_NEAR(wheels[1].drive_rad_per_s[0], 15., 1e-12);
   EXPECT_NEAR(wheels[1].steer_rad[0], 0.15, 1e-15);
   EXPECT_EQ(wheels[1].begin_ns, kStart + 10 * kMs);
+  const auto mounted = play_only<EncoderSample>(
+      section("joint_topic: /j, drive_joints: [d], steer_joints: [s], drive_input: position, "
+              "drive_scale: [-2], steer_scale: [-1], steer_shift_rad: [1]"));
+  ASSERT_EQ(mounted.size(), 2U);
+  EXPECT_NEAR(mounted[1].drive_rad_per_s[0], -30., 1e-12);
+  EXPECT_NEAR(mounted[1].steer_rad[0], 0.85, 1e-15);
+  EXPECT_THAT(error_of(section("imu_topic: /imu0, drive_scale: [1]")),
+              HasSubstr("sensor.drive_scale: has 1 number for 0 drive channels of the log"));
   EXPECT_THAT(
       error_of(section("joint_topic: /j, drive_joints: [d]")),
       HasSubstr("3 of 3 messages rejected, allowed is a fraction of 0.1: /j: message without the "
                 "velocities of the joints (3, first at a.bag: message 1)"));
 }
 
-TEST_F(Ros1Bag, TakesTheTwistOfAnOdometryForTwoWheels) {
+TEST_F(Ros1Bag, TakesTheTwistOfAnOdometryForDrives) {
   {
     Ros1Writer out(file());
     for (const std::int64_t t : {kStart, kStart + 100 * kMs}) {
@@ -164,13 +172,13 @@ TEST_F(Ros1Bag, TakesTheTwistOfAnOdometryForTwoWheels) {
     out.close();
   }
   const auto wheels =
-      play_only<EncoderSample>(section("joint_topic: /o, drive_joints: [left, right]"));
+      play_only<EncoderSample>(section("joint_topic: /o, drive_joints: [v_x, omega_z]"));
   ASSERT_EQ(wheels.size(), 2U);
-  EXPECT_EQ(wheels[0].drive_rad_per_s[0], 0.5);
-  EXPECT_EQ(wheels[0].drive_rad_per_s[1], 1.);
-  EXPECT_THAT(error_of(section("joint_topic: /o, drive_joints: [Left, right]")),
-              HasSubstr("sensor.drive_joints: no joint 'Left' on topic '/o' in " + file() +
-                        " - did you mean 'left'?"));
+  EXPECT_EQ(wheels[0].drive_rad_per_s[0], 0.75);
+  EXPECT_EQ(wheels[0].drive_rad_per_s[1], 0.5);
+  EXPECT_THAT(error_of(section("joint_topic: /o, drive_joints: [v_X, omega_z]")),
+              HasSubstr("sensor.drive_joints: no joint 'v_X' on topic '/o' in " + file() +
+                        " - did you mean 'v_x'?"));
 }
 
 TEST_F(Ros1Bag, ReadsPosesWithCovarianceAndOdometry) {

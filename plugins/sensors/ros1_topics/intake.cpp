@@ -55,13 +55,14 @@ Intake::Intake(const bag::TopicOptions& options, const HostServices& services, L
     : options_(options),
       services_(services),
       queue_(queue),
+      joints_(options.joint_map()),
       cells_(options.drive_is_angle(), options.max_gap_s),
       image_order_(options.image_topics.size()) {
   const auto want = [this](const std::string& name, std::vector<Kind> kinds, int camera = -1) {
     if (!name.empty()) topics_.push_back({name, std::move(kinds), camera});
   };
   want(options.imu_topic, {Kind::kImu});
-  want(options.joint_topic, {Kind::kJoints});
+  want(options.joint_topic, {Kind::kJoints, Kind::kOdometry});
   want(options.pose_topic, {Kind::kPose, Kind::kPoseWithCovariance});
   want(options.odometry_topic, {Kind::kOdometry});
   want(options.gnss_topic, {Kind::kNavSatFix});
@@ -99,9 +100,13 @@ void Intake::read(std::size_t topic, Kind kind,
       return take_imu(topic, bag::read_imu(in));
     case Kind::kJoints:
       return take_joints(topic, bag::read_joints(in));
+    case Kind::kOdometry:
+      if (topics_[topic].kinds.front() == Kind::kJoints) {
+        return take_joints(topic, bag::read_twist(in));
+      }
+      [[fallthrough]];
     case Kind::kPose:
     case Kind::kPoseWithCovariance:
-    case Kind::kOdometry:
       return take_pose(topic, bag::read_pose(kind, in));
     case Kind::kNavSatFix:
       return take_fix(topic, bag::read_fix(in));
@@ -160,6 +165,7 @@ void Intake::take_joints(std::size_t topic, const bag::Joints& joints) {
   }
   if (const char* const why = log::why_rejected(reading)) return reject(topic, why, joints.t_ns);
   if (!accept(topic, reading.t_ns)) return;
+  if (const char* const why = joints_.convert(reading)) return reject(topic, why, reading.t_ns);
   if (const auto cell = cells_.add(reading)) queue_.push(*cell);
 }
 
@@ -209,7 +215,10 @@ void Intake::begin_again(std::size_t topic) {
   state.last_ns.reset();
   state.jump = jump_of(topics_[topic]);
   const Kind kind = topics_[topic].kinds.front();
-  if (kind == Kind::kJoints) cells_ = LiveCells(options_.drive_is_angle(), options_.max_gap_s);
+  if (kind == Kind::kJoints) {
+    joints_.restart();
+    cells_ = LiveCells(options_.drive_is_angle(), options_.max_gap_s);
+  }
   if (kind == Kind::kImage) image_order_ = ImageOrder(options_.image_topics.size());
 }
 

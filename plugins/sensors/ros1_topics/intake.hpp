@@ -81,6 +81,7 @@ class Intake {
 
   mutable std::mutex mutex_;
   std::vector<State> states_;
+  log::JointMap joints_;
   LiveCells cells_;
   ImageOrder image_order_;
   std::vector<ImageSample> ready_;

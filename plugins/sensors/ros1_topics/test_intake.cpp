@@ -230,6 +230,28 @@ TEST_F(IntakeTest, MakesCausalCellsOfRates) {
   EXPECT_NEAR(std::abs(cell.steer_rad[0]), M_PI, 1e-12) << "the shorter way round";
 }
 
+TEST_F(IntakeTest, TakesTheTwistOfAnOdometryForDrives) {
+  TopicOptions options = wheels();
+  options.drive_joints = {"v_x", "v_y", "omega_z"};
+  options.steer_joints.clear();
+  Intake intake = make(options);
+  for (const std::int64_t t_ns : {kTime, kTime + 10'000'000}) {
+    msg::Odometry odometry;
+    odometry.header.stamp = time_of(t_ns);
+    odometry.twist.twist.linear.x = 0.75;
+    odometry.twist.twist.linear.y = 0.25;
+    odometry.twist.twist.angular.z = 0.5;
+    take(intake, 0, odometry);
+  }
+  const auto all = taken();
+  ASSERT_EQ(all.size(), 1U);
+  const auto& cell = *all[0].get_if<EncoderSample>();
+  EXPECT_EQ(cell.n_drive, 3);
+  EXPECT_EQ(cell.drive_rad_per_s[0], 0.75);
+  EXPECT_EQ(cell.drive_rad_per_s[1], 0.25);
+  EXPECT_EQ(cell.drive_rad_per_s[2], 0.5);
+}
+
 TEST_F(IntakeTest, MakesCellsOfAnglesWhoseRatesAreExactInTheMean) {
   TopicOptions options = wheels();
   options.drive_input = TopicOptions::Drive::kPosition;
@@ -249,6 +271,36 @@ TEST_F(IntakeTest, MakesCellsOfAnglesWhoseRatesAreExactInTheMean) {
   EXPECT_NEAR(behind.drive_rad_per_s[0], 10. / 0.1, 1e-9);
   EXPECT_THAT(rejections(intake), ElementsAre("/joint_states: gap longer than 0.2 s | 1 | stamp " +
                                               std::to_string(kTime + 400'000'000) + " ns"));
+}
+
+TEST_F(IntakeTest, TakesJointsAsTheyAreMounted) {
+  TopicOptions options = wheels();
+  options.drive_input = TopicOptions::Drive::kPosition;
+  options.drive_scale = {-1., 0.5};
+  options.drive_turn = {100., 0.};
+  options.drive_channel = {2., 1.};
+  options.steer_shift_rad = {2.};
+  Intake intake = make(options);
+  take(intake, 0, joint_message(kTime, 9.5, 2., 0.1));
+  take(intake, 0, joint_message(kTime + 10'000'000, 0.5, 2.5, 0.3));  // 95 to 105
+  take(intake, 0, joint_message(kTime + 20'000'000, 5., 2.5, 0.3));   // 105 to 150, or 50?
+  take(intake, 0, joint_message(kTime + 30'000'000, 5., 2.5, 0.3));
+  take(intake, 0, joint_message(kTime + 40'000'000, 5.5, 2.5, 0.3));
+  const auto all = taken();
+  ASSERT_EQ(all.size(), 2U);
+  const auto& cell = *all[0].get_if<EncoderSample>();
+  EXPECT_NEAR(cell.drive_rad_per_s[0], 0.5 * 5. / 0.01, 1e-9);
+  EXPECT_NEAR(cell.drive_rad_per_s[1], -10. / 0.01, 1e-9);
+  EXPECT_NEAR(cell.steer_rad[0], 2.2, 1e-15);
+  const auto& behind = *all[1].get_if<EncoderSample>();
+  EXPECT_EQ(behind.begin_ns, kTime + 30'000'000);
+  EXPECT_NEAR(behind.drive_rad_per_s[1], -5. / 0.01, 1e-9);
+  EXPECT_THAT(rejections(intake),
+              ElementsAre("/joint_states: reading that leaves open how many turns a joint has gone "
+                          "(drive_turn, steer_turn) | 1 | stamp " +
+                          std::to_string(kTime + 20'000'000) + " ns"));
+  options.steer_scale = {1., 2.};
+  EXPECT_THROW(make(options), ParamError);
 }
 
 TEST_F(IntakeTest, NamesTheJointThatIsNotThere) {

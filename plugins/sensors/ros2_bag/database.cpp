@@ -101,7 +101,8 @@ void Database::load(std::int64_t id, std::size_t limit, Bytes& out) const {
 }
 
 void Database::read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
-                    const std::function<void(const Message&)>& visit) const {
+                    const std::function<void(const Message&)>& visit,
+                    Rejections& /*damage*/) const {
   constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
   std::vector<std::int64_t> numbers(wanted.size(), 0);
   Bytes bytes;

@@ -12,23 +12,21 @@
 
 #include <sqlite3.h>
 
-#include "bag.hpp"
+#include "bag_file.hpp"
 
 namespace viwo::bag {
 
-/// All of it may be called from any thread. InputError "file  what" for everything that is wrong.
-class Database {
+class Database final : public BagFile {
  public:
   explicit Database(const std::filesystem::path& file);
 
-  const std::string& name() const { return name_; }
-  const std::vector<Topic>& topics() const { return topics_; }
-  bool is_empty() const { return is_empty_; }
-  std::int64_t begin_ns() const { return begin_ns_; }  ///< of the first message
-
-  /// As Bag::read(); the messages of topics that this file does not have are none.
+  const std::string& name() const override { return name_; }
+  const std::vector<Topic>& topics() const override { return topics_; }
+  bool is_empty() const override { return is_empty_; }
+  std::int64_t begin_ns() const override { return begin_ns_; }
+  /// Damage is an error.
   void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
-            const std::function<void(const Message&)>& visit) const;
+            const std::function<void(const Message&)>& visit, Rejections& damage) const override;
 
  private:
   struct CloseDatabase {

@@ -12,7 +12,7 @@ struct Params : bag::BagOptions {
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(path),
-      {.required = true, .help = "the folder of a bag, with metadata.yaml, or its .db3"});
+      {.required = true, .help = "the folder of a bag, with metadata.yaml, or its .mcap or .db3"});
     bag::BagOptions::bind(b);
   }
 };
@@ -24,7 +24,8 @@ class Ros2Bag final : public bag::BagSensor {
 };
 
 VIWO_REGISTER(Sensor, Ros2Bag, "ros2_bag", "1.0.0",
-              "IMU, images, wheels and poses of a ROS 2 bag (SQLite)", "Apache-2.0", Params);
+              "IMU, images, wheels and poses of a ROS 2 bag (MCAP or SQLite)", "Apache-2.0",
+              Params);
 
 }  // namespace
 }  // namespace viwo

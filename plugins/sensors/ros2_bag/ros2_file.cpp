@@ -9,7 +9,9 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "bag_file.hpp"
 #include "database.hpp"
+#include "mcap_file.hpp"
 #include "ros2_fields.hpp"
 #include "viwo/api/status.hpp"
 
@@ -19,8 +21,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kRemedy =
-    ": what is read is SQLite (storage_id sqlite3) without compression - `ros2 bag convert` makes "
-    "it";
+    ": what is read is mcap (whatever its chunks are compressed by) and sqlite3 without "
+    "compression "
+    "- `ros2 bag convert` makes it";
+constexpr const char* kMcap = ".mcap";
 
 /// The files that metadata.yaml lists.
 std::vector<fs::path> files_of(const fs::path& folder, const fs::path& metadata) {
@@ -31,9 +35,9 @@ std::vector<fs::path> files_of(const fs::path& folder, const fs::path& metadata)
       throw InputError(metadata.string() + "  has no rosbag2_bagfile_information");
     }
     const auto text = [&info](const char* key) { return info[key].as<std::string>(""); };
-    if (text("storage_identifier") != "sqlite3") {
-      throw InputError(folder.string() + "  is stored as '" + text("storage_identifier") + "'" +
-                       kRemedy);
+    const std::string storage = text("storage_identifier");
+    if (storage != "sqlite3" && storage != "mcap") {
+      throw InputError(folder.string() + "  is stored as '" + storage + "'" + kRemedy);
     }
     if (!text("compression_format").empty()) {
       throw InputError(folder.string() + "  is compressed (" + text("compression_format") + ")" +
@@ -54,7 +58,7 @@ std::vector<fs::path> files_of(const fs::path& path) {
   std::error_code ignored;
   if (!fs::is_directory(path, ignored)) {
     const std::string extension = path.extension().string();
-    if (extension == ".mcap" || extension == ".zstd" || extension == ".lz4") {
+    if (extension == ".zstd" || extension == ".lz4") {
       throw InputError(path.string() + "  is a file " + extension + kRemedy);
     }
     return {path};
@@ -63,17 +67,19 @@ std::vector<fs::path> files_of(const fs::path& path) {
   if (fs::exists(metadata, ignored)) return files_of(path, metadata);
   std::vector<fs::path> files;  // its recording was not ended
   for (const auto& entry : fs::directory_iterator(path)) {
-    if (entry.path().extension() == ".db3") files.push_back(entry.path());
+    const fs::path extension = entry.path().extension();
+    if (extension == ".db3" || extension == kMcap) files.push_back(entry.path());
   }
   if (files.empty()) {
-    throw InputError(path.string() + "  is no ROS 2 bag: it has neither metadata.yaml nor *.db3");
+    throw InputError(path.string() +
+                     "  is no ROS 2 bag: it has neither metadata.yaml nor *.mcap or *.db3");
   }
   return files;
 }
 
 class Ros2Recording final : public Bag {
  public:
-  Ros2Recording(std::string name, std::vector<std::unique_ptr<Database>> files)
+  Ros2Recording(std::string name, std::vector<std::unique_ptr<BagFile>> files)
       : name_(std::move(name)), files_(std::move(files)) {
     std::sort(files_.begin(), files_.end(), [](const auto& a, const auto& b) {
       return std::pair(a->begin_ns(), a->name()) < std::pair(b->begin_ns(), b->name());
@@ -91,8 +97,8 @@ class Ros2Recording final : public Bag {
   const std::vector<Topic>& topics() const override { return topics_; }
   std::int64_t begin_ns() const override { return begin_ns_; }
   void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
-            const std::function<void(const Message&)>& visit) const override {
-    for (const auto& file : files_) file->read(wanted, from_ns, to_ns, visit);
+            const std::function<void(const Message&)>& visit, Rejections& damage) const override {
+    for (const auto& file : files_) file->read(wanted, from_ns, to_ns, visit, damage);
   }
   std::unique_ptr<FieldReader> fields(std::span<const std::uint8_t> message) const override {
     return std::make_unique<Ros2Fields>(message);
@@ -100,7 +106,7 @@ class Ros2Recording final : public Bag {
 
  private:
   std::string name_;
-  std::vector<std::unique_ptr<Database>> files_;
+  std::vector<std::unique_ptr<BagFile>> files_;
   std::vector<Topic> topics_;
   std::int64_t begin_ns_ = 0;
 };
@@ -108,8 +114,14 @@ class Ros2Recording final : public Bag {
 }  // namespace
 
 std::shared_ptr<const Bag> open_ros2(const fs::path& path) {
-  std::vector<std::unique_ptr<Database>> files;
-  for (const fs::path& file : files_of(path)) files.push_back(std::make_unique<Database>(file));
+  std::vector<std::unique_ptr<BagFile>> files;
+  for (const fs::path& file : files_of(path)) {
+    if (file.extension() == kMcap) {
+      files.push_back(std::make_unique<McapFile>(file));
+    } else {
+      files.push_back(std::make_unique<Database>(file));
+    }
+  }
   return std::make_shared<Ros2Recording>(path.string(), std::move(files));
 }
 

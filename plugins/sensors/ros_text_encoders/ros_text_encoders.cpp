@@ -7,7 +7,7 @@
 namespace viwo {
 namespace {
 
-struct Params : log::TextClockParams, log::StrideParams, log::LimitParams {
+struct Params : log::TextClockParams, log::StrideParams, log::JointParams, log::LimitParams {
   std::filesystem::path path;
   std::vector<std::string> drive;
   std::vector<std::string> steer;
@@ -23,13 +23,14 @@ struct Params : log::TextClockParams, log::StrideParams, log::LimitParams {
       {.help = "drive rates from differences of positions, or from velocities"});
     log::TextClockParams::bind(b);
     log::StrideParams::bind(b);
+    log::JointParams::bind(b);
     log::LimitParams::bind(b);
   }
 
   log::RosEncoderOptions options() const {
     const bool is_angle = drive_input == Drive::kPosition;
     check_stride(is_angle, "position");
-    return {{limits(), is_angle, stride}, ros_clock(), drive, steer};
+    return {{limits(), is_angle, stride, joints()}, ros_clock(), drive, steer};
   }
 };
 

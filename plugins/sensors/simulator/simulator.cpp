@@ -23,7 +23,7 @@ namespace {
 /// A base that cannot move sideways slides by what the spline deviates from its motion, m/s.
 constexpr double kSliding = 1e-4;
 
-struct Params : sim::EncoderParams, sim::DriveParams, PoseParams, sim::RigParams {
+struct Params : sim::EncoderParams, log::JointParams, sim::DriveParams, PoseParams, sim::RigParams {
   NestedKinematics robot;
   Eigen::Vector3d true_sigma_p_IinO_m{0., 0., 0.};
   Eigen::Vector3d true_sigma_R_ItoO_rad{0., 0., 0.};
@@ -50,6 +50,7 @@ struct Params : sim::EncoderParams, sim::DriveParams, PoseParams, sim::RigParams
     b(VIWO_PARAM(t_OtoI_s),
       {.unit = "s", .min = -10., .max = 10., .help = "t_imu = t_odom + t_OtoI"});
     sim::EncoderParams::bind(b);
+    log::JointParams::bind(b);
     sim::DriveParams::bind(b);
     PoseParams::bind(b);
     sim::RigParams::bind(b);
@@ -127,9 +128,10 @@ log::Recording<Measurement> simulate(const Params& params, const HostServices& s
   out.samples.insert(out.samples.end(), poses.begin(), poses.end());
   if (params.wheels) {
     try {
-      const auto from_wheels = sim::simulate_encoders(
+      auto from_wheels = sim::simulate_encoders(
           robot, x_WI, [&trajectory](double t_s) { return trajectory.twist(t_s); }, params.motion,
           wheels, services.seed);
+      log::mount_joints(params, from_wheels, out.rejections);
       out.samples.insert(out.samples.end(), from_wheels.begin(), from_wheels.end());
     } catch (const InputError& error) {
       throw ParamError("motion", error.what());

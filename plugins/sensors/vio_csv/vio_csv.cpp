@@ -42,13 +42,6 @@ bool is_there(const fs::path& file) {
   return fs::exists(file, ignored);
 }
 
-/// folder/name.csv, or folder/name.csv.gz when only that exists.
-fs::path table_file(const fs::path& folder, const std::string& name) {
-  const fs::path plain = folder / (name + ".csv");
-  const fs::path packed = folder / (name + ".csv.gz");
-  return !is_there(plain) && is_there(packed) ? packed : plain;
-}
-
 template <std::size_t N>
 std::array<std::size_t, N> columns(const log::TableReader& table,
                                    const std::array<const char*, N>& names) {
@@ -64,7 +57,7 @@ void read_numbers(const log::TableReader& table, const std::array<std::size_t, N
 }
 
 log::ImuRecording read_imu(const fs::path& folder, const LogLimits& limits) {
-  log::TableReader table(table_file(folder, "imu"));
+  log::TableReader table(log::table_in(folder, "imu.csv"));
   const std::size_t t = table.column("t");
   const auto gyro = columns<3>(table, {"wx", "wy", "wz"});
   const auto accel = columns<3>(table, {"ax", "ay", "az"});
@@ -80,7 +73,7 @@ log::ImuRecording read_imu(const fs::path& folder, const LogLimits& limits) {
 }
 
 log::FeatureRecording read_features(const fs::path& folder, const LogLimits& limits) {
-  log::TableReader table(table_file(folder, "features"));
+  log::TableReader table(log::table_in(folder, "features.csv"));
   const std::size_t t = table.column("t");
   const std::size_t camera = table.column("cam_id");
   const std::size_t id = table.column("feat_id");
@@ -95,8 +88,8 @@ log::FeatureRecording read_features(const fs::path& folder, const LogLimits& lim
 }
 
 log::StateRecording read_states(const fs::path& folder, const LogLimits& limits) {
-  const fs::path truth = table_file(folder, "groundtruth");
-  const fs::path start = table_file(folder, "init_state");
+  const fs::path truth = log::table_in(folder, "groundtruth.csv");
+  const fs::path start = log::table_in(folder, "init_state.csv");
   log::TableReader table(!is_there(truth) && is_there(start) ? start : truth);
   const std::size_t t = table.column("t");
   const auto q = columns<4>(table, {"qx", "qy", "qz", "qw"});

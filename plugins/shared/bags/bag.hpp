@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "field_reader.hpp"
+#include "viwo/api/rejections.hpp"
 
 namespace viwo::bag {
 
@@ -55,9 +56,9 @@ class Bag {
   /// When the first message of any topic was received; 0 of an empty bag.
   virtual std::int64_t begin_ns() const = 0;
   /// Visits the messages that were received in [from_ns, to_ns], file after file in the order in
-  /// which they were received.
+  /// which they were received. What a damaged file has lost is counted in `damage`.
   virtual void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
-                    const std::function<void(const Message&)>& visit) const = 0;
+                    const std::function<void(const Message&)>& visit, Rejections& damage) const = 0;
   /// The fields of a message of this bag; BrokenMessage when it is none.
   virtual std::unique_ptr<FieldReader> fields(std::span<const std::uint8_t> message) const = 0;
 };

@@ -118,15 +118,18 @@ BagSamples read_samples(const std::shared_ptr<const Bag>& bag, const BagOptions&
   if (options.duration_s > 0.) {
     to_ns = bag->begin_ns() + nanoseconds(options.start_s) + nanoseconds(options.duration_s);
   }
-  bag->read(all.wanted, from_ns, to_ns, [&](const Message& message) {
+  Rejections damage;
+  const auto take = [&](const Message& message) {
     TopicReader& reader = *all.readers[message.topic];
     try {
       reader.take(*bag->fields(message.bytes), message);
     } catch (const BrokenMessage& broken) {
       reader.reject(std::string("broken message: ") + broken.what(), message);
     }
-  });
+  };
+  bag->read(all.wanted, from_ns, to_ns, take, damage);
   BagSamples out;
+  damage.append_to(out.rejections);
   for (const auto& reader : all.readers) reader->finish(bag->name(), out);
   // Cameras of one time stay in their order.
   std::stable_sort(out.images.begin(), out.images.end(),

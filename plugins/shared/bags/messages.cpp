@@ -142,10 +142,11 @@ Joints read_twist(FieldReader& in) {
   in.text();         // child_frame_id
   skip(in, 7 + 36);  // the pose and its covariance
   const double v_x = in.f64();
-  skip(in, 4);
+  const double v_y = in.f64();
+  skip(in, 3);
   const double omega_z = in.f64();
-  joints.names = {"left", "right"};
-  joints.velocities = {v_x - 0.5 * omega_z, v_x + 0.5 * omega_z};
+  joints.names = {"v_x", "v_y", "omega_z"};
+  joints.velocities = {v_x, v_y, omega_z};
   return joints;
 }
 

@@ -55,8 +55,8 @@ struct ImageHead {
 /// All throw BrokenMessage.
 ImuSample read_imu(FieldReader& in);
 Joints read_joints(FieldReader& in);
-/// The twist of a nav_msgs/Odometry as the velocities of two joints, `left` and `right`: wheels of
-/// 1 m radius that stand 1 m apart, so that their rates are speeds, v_x -+ omega_z / 2.
+/// The twist of a nav_msgs/Odometry as the velocities of three joints: `v_x`, `v_y` [m/s] and
+/// `omega_z` [rad/s].
 Joints read_twist(FieldReader& in);
 /// PoseStamped, PoseWithCovarianceStamped or Odometry.
 PoseSample read_pose(Kind kind, FieldReader& in);

@@ -21,6 +21,10 @@ class TopicFilter {
   bool accept(std::int64_t t_ns, const Message& at) { return order_.accept(t_ns, Place{at}); }
   /// Counts a message that is dropped.
   void reject(std::string_view reason, const Message& at) { order_.reject(reason, Place{at}); }
+  /// The same for the message that was accepted last.
+  void reject_last(std::string_view reason, const Message& at) {
+    order_.reject_last(reason, Place{at});
+  }
   /// The same for one that says itself that it has nothing to say.
   void leave_out(std::string_view reason, const Message& at) {
     order_.leave_out(reason, Place{at});

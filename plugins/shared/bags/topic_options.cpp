@@ -1,34 +1,16 @@
 #include "topic_options.hpp"
 
-#include <algorithm>
-#include <cstddef>
-
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/log/asl.hpp"
+#include "viwo/log/sensor_params.hpp"
 
 namespace viwo::bag {
-namespace {
-
-void check_list(const std::string& key, const std::vector<std::string>& names, std::size_t most) {
-  if (names.size() > most) {
-    throw ParamError(key, std::to_string(names.size()) + " names, at most " + std::to_string(most) +
-                              " are possible");
-  }
-  for (auto name = names.begin(); name != names.end(); ++name) {
-    if (name->empty()) throw ParamError(key, "an empty name");
-    if (std::find(names.begin(), name, *name) != name) {
-      throw ParamError(key, "'" + *name + "' is there twice");
-    }
-  }
-}
-
-}  // namespace
 
 void TopicOptions::check(const std::string& key, const std::string& verb) const {
-  check_list("image_topics", image_topics, log::kMaxCamera + 1);
-  check_list("drive_joints", drive_joints, kMaxDrives);
-  check_list("steer_joints", steer_joints, kMaxSteers);
+  log::check_names("image_topics", image_topics, log::kMaxCamera + 1);
+  log::check_names("drive_joints", drive_joints, kMaxDrives);
+  log::check_names("steer_joints", steer_joints, kMaxSteers);
   if (imu_topic.empty() && image_topics.empty() && joint_topic.empty() && pose_topic.empty() &&
       odometry_topic.empty() && gnss_topic.empty()) {
     throw ParamError(key, "nothing to " + verb +
@@ -42,11 +24,17 @@ void TopicOptions::check(const std::string& key, const std::string& verb) const 
     throw ParamError(drive_joints.empty() ? "steer_joints" : "drive_joints",
                      "names of joints need the joint_topic that they are on");
   }
+  joint_map();
   if (!pose_topic.empty() && !odometry_topic.empty()) {
     throw ParamError("odometry_topic",
                      "pose_topic and odometry_topic both give poses, which could not be told "
                      "apart: make two sensors of them");
   }
+}
+
+log::JointMap TopicOptions::joint_map() const {
+  return {*this, static_cast<int>(drive_joints.size()), static_cast<int>(steer_joints.size()),
+          drive_is_angle(), max_gap_s};
 }
 
 SampleTypes kinds_of(const TopicOptions& topics) {

@@ -6,11 +6,12 @@
 
 #include "viwo/api/params.hpp"
 #include "viwo/api/sample.hpp"
+#include "viwo/log/joints.hpp"
 #include "viwo/log/sensor_params.hpp"
 
 namespace viwo::bag {
 
-struct TopicOptions : log::MaxGapParams {
+struct TopicOptions : log::JointParams, log::MaxGapParams {
   std::string imu_topic;
   std::vector<std::string> image_topics;
   std::string joint_topic;
@@ -27,12 +28,14 @@ struct TopicOptions : log::MaxGapParams {
     b(VIWO_PARAM(image_topics),
       {.help = "sensor_msgs/Image or CompressedImage, in the order of the cameras"});
     b(VIWO_PARAM(joint_topic),
-      {.help = "sensor_msgs/JointState of the wheels; of a bag also nav_msgs/Odometry, whose "
-               "twist is taken as joints left and right: wheels of 1 m radius, 1 m apart"});
+      {.help =
+           "sensor_msgs/JointState of the wheels; or nav_msgs/Odometry, whose twist is taken as "
+           "joints v_x, v_y and omega_z, for the kinematic model body_twist"});
     b(VIWO_PARAM(drive_joints), {.help = "joints that drive, in the order of the wheels"});
     b(VIWO_PARAM(steer_joints), {.help = "joints that steer, in the order of the wheels"});
     b(VIWO_PARAM(drive_input), {{"velocity", Drive::kVelocity}, {"position", Drive::kPosition}},
       {.help = "drive rates from velocities, or from differences of positions"});
+    log::JointParams::bind(b);
     b(VIWO_PARAM(pose_topic), {.help = "geometry_msgs/PoseStamped or PoseWithCovarianceStamped"});
     b(VIWO_PARAM(odometry_topic), {.help = "nav_msgs/Odometry, whose poses are taken"});
     b(VIWO_PARAM(gnss_topic), {.help = "sensor_msgs/NavSatFix"});
@@ -40,6 +43,8 @@ struct TopicOptions : log::MaxGapParams {
   }
 
   bool drive_is_angle() const { return drive_input == Drive::kPosition; }
+  /// Of the joints that are wanted; ParamError when they do not fit.
+  log::JointMap joint_map() const;
   /// ParamError for parameters that contradict each other; where no topic is wanted, for `key`:
   /// "nothing to <verb>".
   void check(const std::string& key, const std::string& verb) const;

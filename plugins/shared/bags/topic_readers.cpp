@@ -115,7 +115,10 @@ class ImageReader final : public TopicReader {
 class JointReader final : public TopicReader {
  public:
   JointReader(const BagOptions& options, Kind kind)
-      : TopicReader(options, options.joint_topic), options_(options), kind_(kind) {}
+      : TopicReader(options, options.joint_topic),
+        options_(options),
+        kind_(kind),
+        joints_(options.joint_map()) {}
 
   void take(FieldReader& in, const Message& message) override {
     Joints joints = kind_ == Kind::kOdometry ? read_twist(in) : read_joints(in);
@@ -131,7 +134,9 @@ class JointReader final : public TopicReader {
     if (missing) return filter_.reject(reason_of(missing->what), message);
     if (const char* const why = log::why_rejected(reading)) return filter_.reject(why, message);
     reading.t_ns = stamp(joints.t_ns, message);
-    if (filter_.accept(reading.t_ns, message)) readings_.push_back(reading);
+    if (!filter_.accept(reading.t_ns, message)) return;
+    if (const char* const why = joints_.convert(reading)) return filter_.reject_last(why, message);
+    readings_.push_back(reading);
   }
 
  private:
@@ -151,26 +156,16 @@ class JointReader final : public TopicReader {
   }
 
   void move_samples(BagSamples& out) override {
-    if (options_.drive_is_angle()) {
-      out.wheels = log::cells_from_angles(readings_, options_.max_gap_s, options_.stride);
-      if (!out.wheels.empty()) return;
-      throw InputError("topic '" + filter_.topic() +
-                       "' has too few messages without a gap for a rate");
-    }
-    for (const log::EncoderReading& reading : readings_) {
-      EncoderSample sample;
-      sample.t_ns = reading.t_ns;
-      sample.n_drive = reading.n_drive;
-      sample.n_steer = reading.n_steer;
-      sample.drive_rad_per_s = reading.drive;
-      sample.steer_rad = reading.steer_rad;
-      out.wheels.push_back(sample);
-    }
-    log::make_cells(out.wheels, options_.max_gap_s);
+    out.wheels = log::samples_from(readings_, options_.drive_is_angle(), options_.max_gap_s,
+                                   options_.stride);
+    if (!out.wheels.empty()) return;
+    throw InputError("topic '" + filter_.topic() +
+                     "' has too few messages without a gap for a rate");
   }
 
   BagOptions options_;
   Kind kind_;
+  log::JointMap joints_;
   std::vector<std::string> names_;  ///< of the last message
   std::vector<std::string> known_;  ///< of all messages
   bool any_has_all_ = false;

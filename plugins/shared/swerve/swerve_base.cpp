@@ -1,6 +1,7 @@
 #include "swerve_base.hpp"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <string>
@@ -60,8 +61,9 @@ void SwerveBase::describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& 
     const char* unit;
     double prior_sigma;
     bool holds_gauge;
+    double lowest = -std::numeric_limits<double>::infinity();
   };
-  const Group groups[] = {{"r_", "m", params_.prior_sigma_radius_m, false},
+  const Group groups[] = {{"r_", "m", params_.prior_sigma_radius_m, false, 0.},
                           {"x_", "m", params_.prior_sigma_position_m, true},
                           {"y_", "m", params_.prior_sigma_position_m, true},
                           {"delta_o", "rad", params_.prior_sigma_steer_offset_rad, true},
@@ -74,7 +76,8 @@ void SwerveBase::describe_wheels(RowsPerWheel rows_per_wheel, ModelDescription& 
                                 .nominal = nominal_[out.intrinsics.size()],
                                 .prior_sigma = group.prior_sigma,
                                 .gauge_fixed = group.holds_gauge && j == 0,  // (S-11)
-                                .rows = {k * j, k}});
+                                .rows = {k * j, k},
+                                .lowest = group.lowest});
     }
   }
   for (int j = 0; j < n_; ++j) {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "filter_fixture.hpp"
-#include "viwo/filter/declarations.hpp"
+#include "viwo/estimator/declarations.hpp"
 
 namespace viwo {
 namespace {

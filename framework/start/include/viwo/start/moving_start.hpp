@@ -7,7 +7,7 @@
 #include <span>
 
 #include "viwo/api/rig.hpp"
-#include "viwo/filter/start_search.hpp"
+#include "viwo/estimator/start_search.hpp"
 #include "viwo/wheel/wheel_model.hpp"
 
 namespace viwo {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "viwo/api/measurement.hpp"
-#include "viwo/filter/start_search.hpp"
+#include "viwo/estimator/start_search.hpp"
 
 namespace viwo {
 

@@ -8,7 +8,7 @@
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/rig.hpp"
-#include "viwo/filter/start_search.hpp"
+#include "viwo/estimator/start_search.hpp"
 
 namespace viwo {
 

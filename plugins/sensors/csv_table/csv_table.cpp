@@ -1,0 +1,173 @@
+// Sensor csv_table: wheels, IMU and poses from the columns of any table (model.md).
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "csv_table_params.hpp"
+#include "viwo/api/plugin.hpp"
+#include "viwo/log/recording.hpp"
+
+namespace viwo {
+namespace {
+
+using csv_table::Params;
+
+/// The table, once for each kind of samples in it.
+class Table {
+ public:
+  explicit Table(const Params& params)
+      : reader_(params.path, params.layout()), unit_(params.time_unit) {
+    time_ = column("time_column", params.time_column);
+  }
+
+  std::size_t column(const char* key, const std::string& name) const {
+    try {
+      return reader_.column(name);
+    } catch (const InputError& error) {
+      throw ParamError(key, error.what());
+    }
+  }
+  std::vector<std::size_t> columns(const char* key, const std::vector<std::string>& names) const {
+    std::vector<std::size_t> out;
+    for (const std::string& name : names) out.push_back(column(key, name));
+    return out;
+  }
+
+  /// Calls `row` with the stamp of each row that has something in `columns`, if only in one.
+  template <class Collector, class Row>
+  void read(const std::vector<std::size_t>& columns, Collector& collector, Row&& row) {
+    reader_.for_each_row(
+        [&] {
+          for (const std::size_t i : columns) {
+            if (!reader_.text(i).empty()) return row(reader_.time_ns(time_, unit_));
+          }
+        },
+        [&](const BadRow& bad) { collector.reject_row(bad, reader_.reader()); });
+  }
+
+  double number(std::size_t column) const { return reader_.number(column); }
+  const log::TextReader& at() const { return reader_.reader(); }
+
+ private:
+  using BadRow = log::BadRow;
+
+  log::TableReader reader_;
+  log::TimeUnit unit_;
+  std::size_t time_ = 0;
+};
+
+log::EncoderRecording read_wheels(const Params& params) {
+  Table table(params);
+  const auto drives = table.columns("drive_columns", params.drive_columns);
+  const auto steers = table.columns("steer_columns", params.steer_columns);
+  const double drive_factor = params.drive_factor(params.is_angle());
+  const double steer_factor = params.steer_factor();
+  log::EncoderCollector collector(
+      {params.limits(), params.is_angle(), params.stride, params.joints()}, drives.size(),
+      steers.size());
+  log::EncoderReading reading;
+  reading.n_drive = static_cast<int>(drives.size());
+  reading.n_steer = static_cast<int>(steers.size());
+  auto all = drives;
+  all.insert(all.end(), steers.begin(), steers.end());
+  table.read(all, collector, [&](std::int64_t t_ns) {
+    reading.t_ns = t_ns;
+    for (std::size_t i = 0; i < drives.size(); ++i) {
+      reading.drive[i] = drive_factor * table.number(drives[i]);
+    }
+    for (std::size_t i = 0; i < steers.size(); ++i) {
+      reading.steer_rad[i] = steer_factor * table.number(steers[i]);
+    }
+    collector.add(reading, table.at());
+  });
+  return collector.finish(table.at());
+}
+
+log::ImuRecording read_imu(const Params& params) {
+  Table table(params);
+  auto all = table.columns("gyro_columns", params.gyro_columns);
+  const auto accel = table.columns("accel_columns", params.accel_columns);
+  all.insert(all.end(), accel.begin(), accel.end());
+  log::ImuCollector collector(params.limits());
+  table.read(all, collector, [&](std::int64_t t_ns) {
+    ImuSample imu;
+    imu.t_ns = t_ns;
+    for (std::size_t i = 0; i < 3; ++i) {
+      imu.gyro_rad_per_s[i] = params.gyro_factor() * table.number(all[i]);
+      imu.accel_m_per_s2[i] = params.accel_factor() * table.number(all[3 + i]);
+    }
+    collector.add(imu, table.at());
+  });
+  return collector.finish(table.at());
+}
+
+log::PoseRecording read_poses(const Params& params) {
+  Table table(params);
+  const auto p = table.columns("position_columns", params.position_columns);
+  auto q = table.columns("quaternion_columns", params.quaternion_columns);
+  if (!params.yaw_column.empty()) q = {table.column("yaw_column", params.yaw_column)};
+  auto all = p;
+  all.insert(all.end(), q.begin(), q.end());
+  log::PoseCollector collector(params.limits());
+  table.read(all, collector, [&](std::int64_t t_ns) {
+    PoseSample pose;
+    pose.t_ns = t_ns;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      pose.p_BinW_m[i] = params.position_factor() * table.number(p[i]);
+    }
+    if (q.size() == 1) {
+      const double half_rad = 0.5 * params.yaw_factor() * table.number(q[0]);
+      pose.q_BtoW_xyzw = {0., 0., std::sin(half_rad), std::cos(half_rad)};
+    } else {
+      for (std::size_t i = 0; i < q.size(); ++i) pose.q_BtoW_xyzw[i] = table.number(q[i]);
+    }
+    collector.add(pose, table.at());
+  });
+  return collector.finish(table.at());
+}
+
+log::HeadingRecording read_headings(const Params& params) {
+  Table table(params);
+  const std::size_t yaw = table.column("yaw_column", params.yaw_column);
+  log::HeadingCollector collector(params.limits());
+  table.read({yaw}, collector, [&](std::int64_t t_ns) {
+    collector.add({t_ns, params.yaw_factor() * table.number(yaw)}, table.at());
+  });
+  return collector.finish(table.at());
+}
+
+SampleTypes kinds_of(const Params& params) {
+  SampleTypes out;
+  if (params.has_poses()) out.push_back(&sample_type<PoseSample>());
+  if (params.has_heading()) out.push_back(&sample_type<HeadingSample>());
+  if (params.has_imu()) out.push_back(&sample_type<ImuSample>());
+  if (params.has_wheels()) out.push_back(&sample_type<EncoderSample>());
+  return out;
+}
+
+log::Recording<Measurement> read(const Params& params) {
+  params.check();
+  log::Recording<Measurement> out;
+  if (params.has_poses()) log::append(out, read_poses(params), "poses");
+  if (params.has_heading()) log::append(out, read_headings(params), "headings");
+  if (params.has_imu()) log::append(out, read_imu(params), "IMU");
+  if (params.has_wheels()) log::append(out, read_wheels(params), "wheels");
+  log::sort_by_time(out);
+  return out;
+}
+
+class CsvTable final : public log::RecordingSensor<Measurement> {
+ public:
+  CsvTable(const Params& params, const HostServices& /*services*/)
+      : RecordingSensor(read(params), kinds_of(params)) {}
+};
+
+VIWO_REGISTER(Sensor, CsvTable, "csv_table", "1.0.0",
+              "wheel encoders, IMU and poses from the columns of any table", "Apache-2.0", Params);
+
+}  // namespace
+}  // namespace viwo

@@ -1,0 +1,230 @@
+// The sensor csv_table as the host loads it.
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <zlib.h>
+
+#include "support.hpp"
+
+namespace viwo {
+namespace {
+
+using ::testing::DoubleNear;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class CsvTable : public SensorsInFolder {
+ protected:
+  /// The section of a sensor on a table of this text.
+  std::string table(const std::string& text, const std::string& rest,
+                    const std::string& name = "t.csv") const {
+    return "{type: csv_table, path: " + write(name, text) + ", " + rest + "}";
+  }
+};
+
+TEST_F(CsvTable, WheelsComeFromColumnsInAnyOrderAndUnit) {
+  const auto samples = play_only<EncoderSample>(
+      table("steer fl;t_ms;rpm r;note;rpm l\n90;1000.5;60;\"x; y\";-30\n-45;1010.5;120;;0\n",
+            "time_column: t_ms, time_unit: ms, drive_columns: [rpm l, rpm r], drive_unit: rpm, "
+            "steer_columns: [steer fl], steer_unit: deg"));
+  ASSERT_EQ(samples.size(), 2U);
+  EXPECT_EQ(samples[0].t_ns, 1'000'500'000);
+  EXPECT_EQ(samples[0].n_drive, 2);
+  EXPECT_EQ(samples[0].n_steer, 1);
+  EXPECT_NEAR(samples[0].drive_rad_per_s[0], -M_PI, 1e-12);
+  EXPECT_NEAR(samples[0].drive_rad_per_s[1], 2. * M_PI, 1e-12);
+  EXPECT_NEAR(samples[0].steer_rad[0], M_PI / 2., 1e-12);
+  EXPECT_NEAR(samples[1].steer_rad[0], -M_PI / 4., 1e-12);
+}
+
+struct DriveUnit {
+  const char* parameters;
+  double factor;
+};
+
+TEST_F(CsvTable, EveryUnitOfADriveBecomesRadiansPerSecond) {
+  for (const auto& [parameters, factor] :
+       std::vector<DriveUnit>{{"drive_unit: rad", 1.},
+                              {"drive_unit: deg", M_PI / 180.},
+                              {"drive_unit: turn", 2. * M_PI},
+                              {"drive_unit: rpm", 2. * M_PI / 60.},
+                              {"drive_unit: m, wheel_radius_m: 0.05", 20.},
+                              {"drive_unit: count, drive_counts_per_turn: 1000", 2e-3 * M_PI}}) {
+    const auto samples = play_only<EncoderSample>(table("t,d\n0,3\n0.1,4\n",
+                                                        "time_column: t, time_unit: s, "
+                                                        "drive_columns: [d], " +
+                                                            std::string(parameters)));
+    ASSERT_EQ(samples.size(), 2U);
+    EXPECT_NEAR(samples[0].drive_rad_per_s[0], 3. * factor, 1e-12) << parameters;
+  }
+}
+
+TEST_F(CsvTable, AnglesAreDifferencedOverTheTimeBetweenThem) {
+  // 100 counts of 1000 in 0.1 s
+  const auto samples = play_only<EncoderSample>(
+      table("t,d\n1000000,5000\n1100000,5100\n1200000,5400\n",
+            "time_column: t, time_unit: us, drive_columns: [d], drive_input: angle, "
+            "drive_unit: count, drive_counts_per_turn: 1000"));
+  ASSERT_EQ(samples.size(), 2U);
+  EXPECT_EQ(samples[0].t_ns, 1'050'000'000);
+  EXPECT_NEAR(samples[0].drive_rad_per_s[0], 2. * M_PI, 1e-9);
+  EXPECT_NEAR(samples[1].drive_rad_per_s[0], 6. * M_PI, 1e-9);
+}
+
+TEST_F(CsvTable, TimesOfEveryUnitAreExactToTheNanosecond) {
+  for (const auto& [unit, text] :
+       std::vector<std::pair<std::string, std::string>>{{"s", "1700000000.123456789"},
+                                                        {"ms", "1700000000123.456789"},
+                                                        {"us", "1.700000000123456789e15"},
+                                                        {"ns", "1700000000123456789"}}) {
+    const auto samples = play_only<PoseSample>(
+        table("t,x,y\n" + text + ",1,2\n",
+              "time_column: t, time_unit: " + unit + ", position_columns: [x, y]"));
+    ASSERT_EQ(samples.size(), 1U);
+    EXPECT_EQ(samples[0].t_ns, 1'700'000'000'123'456'789) << unit;
+  }
+}
+
+TEST_F(CsvTable, ImuAndPosesOfOneTableComeMergedAndOnlyWhereTheyAre) {
+  const auto sensor = make_sensor(
+      table(",time,wx,wy,wz,ax,ay,az,x,y,z,qx,qy,qz,qw\n"
+            "0,10,1,2,3,0,0,1,,,,,,,\n"
+            "1,10,,,,,,,100,200,300,0,0,0.6,0.8\n"
+            "2,11,1,2,3,0,0.5,1,,,,,,,\n",
+            "time_column: time, time_unit: ms, gyro_columns: [wx, wy, wz], gyro_unit: deg, "
+            "accel_columns: [ax, ay, az], accel_unit: g, position_columns: [x, y, z], "
+            "position_unit: cm, quaternion_columns: [qx, qy, qz, qw]"));
+  EXPECT_THAT(kinds_of(*sensor), ElementsAre("imu", "poses"));
+  const auto all = play(*sensor);
+  ASSERT_EQ(all.size(), 3U);
+  const auto* pose = all[0].get_if<PoseSample>();
+  ASSERT_NE(pose, nullptr) << "of one time, poses come first";
+  EXPECT_THAT(pose->p_BinW_m,
+              ElementsAre(DoubleNear(1., 1e-12), DoubleNear(2., 1e-12), DoubleNear(3., 1e-12)));
+  EXPECT_EQ(pose->q_BtoW_xyzw, (std::array{0., 0., 0.6, 0.8}));
+  const auto imu = only<ImuSample>(all);
+  ASSERT_EQ(imu.size(), 2U);
+  EXPECT_NEAR(imu[0].gyro_rad_per_s[1], M_PI / 90., 1e-12);
+  EXPECT_NEAR(imu[1].accel_m_per_s2[1], 0.5 * 9.80665, 1e-12);
+  EXPECT_THAT(rejections_of(*sensor), IsEmpty());
+}
+
+TEST_F(CsvTable, AYawIsAboutTheVerticalAxis) {
+  const auto samples =
+      play_only<PoseSample>(table("t,x,y,h\n0,1,2,90\n",
+                                  "time_column: t, time_unit: s, position_columns: [x, y], "
+                                  "yaw_column: h, yaw_unit: deg"));
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].p_BinW_m, (std::array{1., 2., 0.}));
+  EXPECT_NEAR(samples[0].q_BtoW_xyzw[2], std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(samples[0].q_BtoW_xyzw[3], std::sqrt(0.5), 1e-12);
+}
+
+TEST_F(CsvTable, AYawAloneIsAHeading) {
+  const auto samples =
+      play_only<HeadingSample>(table("t,h\n0,90\n0.1,\n0.2,370\n0.3,nan\n",
+                                     "time_column: t, time_unit: s, yaw_column: h, yaw_unit: deg, "
+                                     "max_rejected_fraction: 0.5"));
+  ASSERT_EQ(samples.size(), 2U);
+  EXPECT_NEAR(samples[0].yaw_rad, M_PI / 2., 1e-12);
+  EXPECT_NEAR(samples[1].yaw_rad, 370. * M_PI / 180., 1e-12);
+}
+
+TEST_F(CsvTable, ColumnsAreFoundByNumberInTablesWithoutAHeaderAndWithBlanks) {
+  const std::string rest = "time_column: 1, time_unit: s, drive_columns: [4, 2], ";
+  const auto samples =
+      play_only<EncoderSample>(table("# written by nobody\n0.0   1  x   2\n 0.1\t3  x   4\n",
+                                     rest + "header: false, skip_lines: 1"));
+  ASSERT_EQ(samples.size(), 2U);
+  EXPECT_EQ(samples[0].drive_rad_per_s[0], 2.);
+  EXPECT_EQ(samples[1].drive_rad_per_s[1], 3.);
+  EXPECT_EQ(samples[1].t_ns, 100'000'000);
+  // Names that are there twice or not at all can still be numbered.
+  const auto twice = table("t,v,,v\n0,1,x,2\n", rest + "max_gap_s: 1");
+  EXPECT_EQ(play_only<EncoderSample>(twice).at(0).drive_rad_per_s[0], 2.);
+  EXPECT_THAT(
+      error_of(table("t,v,,v\n0,1,x,2\n", "time_column: t, time_unit: s, drive_columns: [v]")),
+      HasSubstr("t.csv:1  the header has the column 'v' twice: give its number"));
+}
+
+TEST_F(CsvTable, ATabSeparatesAlsoWhereAFieldIsEmpty) {
+  const auto samples = play_only<EncoderSample>(
+      table("\tt\td\n0\t0.5\t3\n", "time_column: t, time_unit: s, drive_columns: [d]"));
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].drive_rad_per_s[0], 3.);
+}
+
+TEST_F(CsvTable, AGzippedTableIsRead) {
+  const std::string file = (folder_ / "t.csv.gz").string(), text = "t,d\n0,1\n0.1,2\n";
+  gzFile out = gzopen(file.c_str(), "wb");
+  gzwrite(out, text.data(), static_cast<unsigned>(text.size()));
+  gzclose(out);
+  EXPECT_EQ(play_only<EncoderSample>("{type: csv_table, time_column: t, time_unit: s, "
+                                     "drive_columns: [d], path: " +
+                                     file + "}")
+                .size(),
+            2U);
+}
+
+TEST_F(CsvTable, BadRowsAreCountedWithTheirPlaceUpToTheLimit) {
+  const std::string text = "t,d\n0,1\n0.1,oops\n0.1\n0.1,nan\n0.05,2\n0.0,3\n0.2,4\n0.3,5\n0.4";
+  const std::string rest = "time_column: t, time_unit: s, drive_columns: [d], ";
+  const auto sensor = make_sensor(table(text, rest + "max_rejected_fraction: 0.7"));
+  EXPECT_EQ(play(*sensor).size(), 4U);
+  EXPECT_THAT(rejections_of(*sensor),
+              ElementsAre("wheels: row that cannot be read | 2 | t.csv:3  column 'd': 'oops' is "
+                          "not a number",
+                          "wheels: value that is not finite | 1 | t.csv:5",
+                          "wheels: stamp not after the previous one | 1 | t.csv:7",
+                          "wheels: last line cut short | 1 | t.csv:10"));
+  EXPECT_THAT(error_of(table(text, rest + "max_rejected_fraction: 0.5")),
+              HasSubstr("t.csv  5 of 9 data rejected, allowed is a fraction of 0.5"));
+}
+
+TEST_F(CsvTable, SaysWhatIsWrongWithItsParameters) {
+  const std::string text = "t,d,s\n0,1,2\n0.1,1,2\n", time = "time_column: t, time_unit: s, ";
+  const auto error = [&](const std::string& rest) { return error_of(table(text, rest)); };
+  EXPECT_THAT(error("drive_columns: [d]"), HasSubstr("time_column"));
+  EXPECT_THAT(error("time_column: t, drive_columns: [d]"), HasSubstr("time_unit"));
+  EXPECT_THAT(error(time + "max_gap_s: 1"),
+              HasSubstr("sensor.path: nothing to read: give drive_columns, or gyro_columns"));
+  EXPECT_THAT(error("time_column: time, time_unit: s, drive_columns: [d]"),
+              HasSubstr("t.csv:1  no column 'time' - there are: t, d, s"));
+  EXPECT_THAT(error(time + "drive_columns: [4]"), HasSubstr("no column '4'"));
+  EXPECT_THAT(error(time + "drive_columns: [d], drive_unit: m"),
+              HasSubstr("sensor.wheel_radius_m: drive_unit: m needs wheel_radius_m"));
+  EXPECT_THAT(error(time + "drive_columns: [d], drive_unit: rpm, drive_input: angle"),
+              HasSubstr("sensor.drive_unit: rpm is no unit of angles"));
+  EXPECT_THAT(error(time + "drive_columns: [d], drive_unit: count"),
+              HasSubstr("sensor.drive_counts_per_turn: counts need drive_counts_per_turn"));
+  EXPECT_THAT(error(time + "drive_columns: [d], steer_columns: [s], steer_unit: count"),
+              HasSubstr("sensor.steer_counts_per_turn: counts need steer_counts_per_turn"));
+  EXPECT_THAT(error(time + "drive_columns: [d], stride: 2"),
+              HasSubstr("sensor.stride: a stride needs drive_input: angle"));
+  EXPECT_THAT(error(time + "steer_columns: [s]"), HasSubstr("steering angles need drive_columns"));
+  EXPECT_THAT(error(time + "gyro_columns: [t, d, s]"), HasSubstr("an IMU has both"));
+  EXPECT_THAT(error(time + "gyro_columns: [d, s], accel_columns: [t, d, s]"),
+              HasSubstr("sensor.gyro_columns: needs 3 names, not 2"));
+  EXPECT_THAT(error(time + "position_columns: [d]"),
+              HasSubstr("sensor.position_columns: needs 2 or 3 names, not 1"));
+  EXPECT_THAT(error(time + "quaternion_columns: [a, b, c, d]"),
+              HasSubstr("a pose needs position_columns"));
+  EXPECT_THAT(error(time + "drive_columns: [1, 2, 3, 4, 5, 6, 7, 8, 9]"),
+              HasSubstr("9 names, at most 8 are possible"));
+  EXPECT_THAT(error(time + "drive_columns: [d, d]"),
+              HasSubstr("sensor.drive_columns: 'd' is there twice"));
+}
+
+TEST_F(CsvTable, SaysWhatIsWrongWithTheTable) {
+  const std::string rest = "time_column: t, time_unit: s, drive_columns: [d]";
+  EXPECT_THAT(error_of(table("", rest)), HasSubstr("t.csv:1  the file is empty"));
+  EXPECT_THAT(error_of(table("t,d\n", rest)), HasSubstr("t.csv  holds no data after its header"));
+  EXPECT_THAT(error_of(table("t,d\n", rest + ", skip_lines: 3")),
+              HasSubstr("the file ends before the line that is the first of the table"));
+  EXPECT_THAT(error_of("{type: csv_table, path: " + folder_.string() + ", " + rest + "}"),
+              HasSubstr("is a folder, not a file"));
+}
+
+}  // namespace
+}  // namespace viwo

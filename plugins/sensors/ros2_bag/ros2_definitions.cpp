@@ -1,0 +1,95 @@
+#include "ros2_definitions.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string_view>
+#include <vector>
+
+namespace viwo::bag {
+namespace {
+
+struct Definition {
+  std::string_view type;
+  std::string_view fields;
+  std::vector<std::string_view> uses;
+};
+
+const std::vector<Definition>& definitions() {
+  static const std::vector<Definition> all{
+      {"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n", {}},
+      {"std_msgs/Header",
+       "builtin_interfaces/Time stamp\nstring frame_id\n",
+       {"builtin_interfaces/Time"}},
+      {"geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n", {}},
+      {"geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n", {}},
+      {"geometry_msgs/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n", {}},
+      {"geometry_msgs/Pose",
+       "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
+       {"geometry_msgs/Point", "geometry_msgs/Quaternion"}},
+      {"geometry_msgs/PoseStamped",
+       "std_msgs/Header header\ngeometry_msgs/Pose pose\n",
+       {"std_msgs/Header", "geometry_msgs/Pose"}},
+      {"sensor_msgs/Imu",
+       "std_msgs/Header header\n"
+       "geometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
+       "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
+       "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n",
+       {"std_msgs/Header", "geometry_msgs/Quaternion", "geometry_msgs/Vector3"}},
+      {"sensor_msgs/JointState",
+       "std_msgs/Header header\n"
+       "string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
+       {"std_msgs/Header"}},
+      {"sensor_msgs/Image",
+       "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
+       "uint8 is_bigendian\nuint32 step\nuint8[] data\n",
+       {"std_msgs/Header"}},
+      {"sensor_msgs/NavSatStatus",
+       "int8 STATUS_NO_FIX=-1\nint8 STATUS_FIX=0\nint8 status\n"
+       "uint16 SERVICE_GPS=1\nuint16 service\n",
+       {}},
+      {"sensor_msgs/NavSatFix",
+       "std_msgs/Header header\nsensor_msgs/NavSatStatus status\n"
+       "float64 latitude\nfloat64 longitude\nfloat64 altitude\n"
+       "float64[9] position_covariance\n"
+       "uint8 COVARIANCE_TYPE_UNKNOWN=0\nuint8 COVARIANCE_TYPE_APPROXIMATED=1\n"
+       "uint8 COVARIANCE_TYPE_DIAGONAL_KNOWN=2\nuint8 COVARIANCE_TYPE_KNOWN=3\n"
+       "uint8 position_covariance_type\n",
+       {"std_msgs/Header", "sensor_msgs/NavSatStatus"}}};
+  return all;
+}
+
+const Definition& definition_of(std::string_view type) {
+  const auto& all = definitions();
+  const auto found = std::find_if(all.begin(), all.end(),
+                                  [type](const Definition& one) { return one.type == type; });
+  if (found == all.end()) throw std::logic_error("no definition of " + std::string(type));
+  return *found;
+}
+
+/// Appends what is used and not yet there.
+void collect(const Definition& one, std::vector<std::string_view>& used) {
+  for (const std::string_view type : one.uses) {
+    if (std::find(used.begin(), used.end(), type) != used.end()) continue;
+    used.push_back(type);
+    collect(definition_of(type), used);
+  }
+}
+
+}  // namespace
+
+std::string ros2_definition(const std::string& type) {
+  constexpr std::string_view kMiddle = "/msg/";
+  std::string plain = type;
+  plain.replace(plain.find(kMiddle), kMiddle.size(), "/");
+  const Definition& whole = definition_of(plain);
+  std::vector<std::string_view> used;
+  collect(whole, used);
+  std::string out(whole.fields);
+  for (const std::string_view part : used) {
+    out += std::string(80, '=') + "\nMSG: " + std::string(part) + "\n";
+    out += definition_of(part).fields;
+  }
+  return out;
+}
+
+}  // namespace viwo::bag
