@@ -1,10 +1,16 @@
 #include "viwo/calibration/calibrate.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <set>
 
 #include <tbb/parallel_for.h>
 
+#include "joint_search.hpp"
+#include "judgement.hpp"
+#include "motion_reference.hpp"
+#include "segment_choice.hpp"
+#include "viwo/config/overrides.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/yaml.hpp"
 #include "wheel_wander.hpp"
@@ -14,17 +20,11 @@ namespace {
 
 using config::Node;
 
-struct CalibrationParams {
+struct CalibrationParams : CalibrationOptions {
   std::string calibration;
   std::string base;
   std::vector<std::string> leave_out_by;
   std::vector<std::string> report_by;
-  double segment_s = 0.;
-  bool parity = true;
-  bool estimate_extrinsics = false;
-  double prior_sigma_extrinsics_m = 0.01;
-  double prior_sigma_extrinsics_rad = 0.02;
-  double prior_sigma_clock_offset_s = 0.;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(calibration), {.required = true, .help = "name of the calibration"});
@@ -32,41 +32,24 @@ struct CalibrationParams {
     b(VIWO_PARAM(leave_out_by),
       {.help = "labels of the recordings whose values are left out of the fit in turn"});
     b(VIWO_PARAM(report_by), {.help = "labels of the recordings to break the tables down by"});
-    b(VIWO_PARAM(segment_s),
-      {.unit = "s",
-       .min = 0.,
-       .help = "length of the segments that are compared; 0: whole recordings"});
-    b(VIWO_PARAM(parity), {.help = "use the parity residual beside the relative poses"});
-    b(VIWO_PARAM(estimate_extrinsics),
-      {.help = "estimate where O is in the reference body; then the gauge entries are held"});
-    b(VIWO_PARAM(prior_sigma_extrinsics_m),
-      {.unit = "m",
-       .above = 0.,
-       .help = "how well the position of O in the reference body is known to be zero"});
-    b(VIWO_PARAM(prior_sigma_extrinsics_rad),
-      {.unit = "rad",
-       .above = 0.,
-       .help = "how well the yaw of O in the reference body is known to be zero"});
-    b(VIWO_PARAM(prior_sigma_clock_offset_s),
-      {.unit = "s",
-       .min = 0.,
-       .max = 1.,
-       .help = "prior of one clock offset per recording; 0: none is estimated"});
+    CalibrationOptions::bind(b);
   }
 };
 
-CalibrationOptions options_of(const CalibrationParams& params) {
-  CalibrationOptions options;
-  options.segment_s = params.segment_s;
-  options.parity = params.parity;
-  options.estimate_extrinsics = params.estimate_extrinsics;
-  options.extrinsics_sigma_m = params.prior_sigma_extrinsics_m;
-  options.extrinsics_sigma_rad = params.prior_sigma_extrinsics_rad;
-  options.clock_offset_sigma_s = params.prior_sigma_clock_offset_s;
-  return options;
+/// A fit has one noise for all turns, and one gauge.
+void require_one_kind(const std::vector<CalibrationRecording>& recordings) {
+  const auto other = std::find_if(recordings.begin(), recordings.end(), [&](const auto& r) {
+    return r.motion.kind != recordings.front().motion.kind;
+  });
+  if (other == recordings.end()) return;
+  throw InputError("recording '" + recordings.front().label.name + "' and recording '" +
+                   other->label.name +
+                   "': one has reference poses and one has a gyro only; say reference: gyro");
 }
 
 }  // namespace
+
+std::vector<ParamSpec> calibration_params() { return param_specs<CalibrationParams>(); }
 
 CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
                                         const std::vector<std::string>& assignments,
@@ -79,11 +62,24 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   errors.throw_if_any();
   CalibrationSetup setup;
   setup.name = params.calibration;
-  setup.options = options_of(params);
+  setup.options = params;
+  if (setup.options.segment_s > 0. && setup.options.segments == Segments::kAuto) {
+    setup.options.segments = Segments::kLength;
+  }
+  const bool by_length = setup.options.segments == Segments::kLength ||
+                         setup.options.segments == Segments::kTrajectory;
+  if (by_length != (setup.options.segment_s > 0.)) {
+    config::fail(file.mark(), by_length ? "segments: length and trajectory need segment_s above 0"
+                                        : "segment_s goes with segments: length or trajectory");
+  }
   setup.leave_out_by = params.leave_out_by;
   setup.report_by = params.report_by;
   const std::vector<Recording> recordings = read_recordings(file);
-  const Node base = load_base(file, assignments);
+  Node base = load_base(file, assignments);
+  // Of a filter's configuration the wheels alone are wanted.
+  if (base.find("updates") != nullptr) {
+    config::set_path(base, "estimator.type", Node::scalar_of("dead_reckoning"));
+  }
   require_labels(setup.report_by, recordings, file, "report_by");
   for (const Recording& recording : recordings) {
     for (const std::string& label : setup.leave_out_by) {
@@ -94,9 +90,39 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
     }
     RunSetup run = read_run(resolve_placeholders(base, recording.labels), plugins);
     RunData data = collect(run);
-    setup.recordings.push_back({recording, std::move(run), std::move(data)});
+    MotionReference motion = motion_reference(recording, run, data, params.reference);
+    setup.recordings.push_back({recording, std::move(run), std::move(data), std::move(motion)});
+    require_one_kind(setup.recordings);
   }
   return setup;
+}
+
+std::vector<std::size_t> all_of(const CalibrationSetup& setup) {
+  std::vector<std::size_t> all(setup.recordings.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return all;
+}
+
+FitStart start_of(const CalibrationSetup& setup, const JointSearch& search) {
+  constexpr double kFoundZero_rad = 0.1;
+  const WheelModel& model = *setup.recordings.front().setup.model;
+  FitStart start{model.nominal(), model.nominal()};
+  for (int i = 0; i < start.sigma.size(); ++i) {
+    start.sigma[i] = model.description().intrinsics[static_cast<std::size_t>(i)].prior_sigma;
+  }
+  for (const int zero : search.zeros) {
+    start.x_WI[zero] = search.x_WI[zero];
+    start.sigma[zero] = kFoundZero_rad;
+  }
+  return start;
+}
+
+RunResult dead_reckon(const CalibrationRecording& recording, const CalibrationEstimate& estimate) {
+  RunSetup calibrated = recording.setup;
+  calibrated.x_WI = estimate.x_WI;
+  calibrated.sigma = estimate.sigma;
+  calibrated.extrinsics = estimate.extrinsics;
+  return run_odometry(calibrated, recording.data);
 }
 
 namespace {
@@ -106,12 +132,8 @@ ValidationRun validate(const CalibrationSetup& setup, std::size_t index,
   const CalibrationRecording& recording = setup.recordings[index];
   RunSetup nominal = recording.setup;
   nominal.x_WI = nominal.model->nominal();
-  nominal.extrinsics.setZero();
-  RunSetup calibrated = recording.setup;
-  calibrated.x_WI = estimate.x_WI;
-  calibrated.sigma = estimate.sigma;
-  calibrated.extrinsics = estimate.extrinsics;
-  return {index, run_odometry(nominal, recording.data), run_odometry(calibrated, recording.data)};
+  nominal.extrinsics = setup.options.extrinsics_x_m_y_m_yaw_rad;
+  return {index, run_odometry(nominal, recording.data), dead_reckon(recording, estimate)};
 }
 
 /// A fit without the recordings that have one value of a label; with an empty label of all.
@@ -140,6 +162,16 @@ std::vector<FitOf> fits_of(const CalibrationSetup& setup) {
   return fits;
 }
 
+/// What is to be found before a fit; drives that turn backwards are put right in the recordings.
+JointSearch find_joints(CalibrationSetup& setup, WorkProgress& progress) {
+  if (!setup.options.find_steering_zeros && !setup.options.find_drive_signs) return {};
+  progress.begin("search", 1);
+  JointSearch search = search_joints(setup, all_of(setup));
+  progress.done("joints of the wheels");
+  reverse_drives(setup, search.drive_signs);
+  return search;
+}
+
 /// The jackknife over the values of a label (CAL-8).
 Intrinsics spread_of(const std::string& label, const std::vector<FitOf>& fits,
                      const std::vector<CalibrationEstimate>& estimates) {
@@ -156,8 +188,12 @@ Intrinsics spread_of(const std::string& label, const std::vector<FitOf>& fits,
 
 }  // namespace
 
-CalibrationResult calibrate(const CalibrationSetup& setup, WorkProgress& progress) {
+CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress) {
   const std::vector<FitOf> fits = fits_of(setup);
+  CalibrationResult result;
+  result.search = find_joints(setup, progress);
+  const FitStart start = start_of(setup, result.search);
+  const CalibrationOptions options = choose_segments(setup, start, result.lengths, progress);
   progress.begin("fits", static_cast<int>(fits.size()));
   std::vector<CalibrationEstimate> estimates(fits.size());
   tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t f) {
@@ -165,12 +201,11 @@ CalibrationResult calibrate(const CalibrationSetup& setup, WorkProgress& progres
     for (std::size_t i = 0; i < setup.recordings.size(); ++i) {
       if (!fits[f].leaves_out(setup.recordings[i])) used.push_back(i);
     }
-    estimates[f] = fit(setup, used);
+    estimates[f] = fit(setup, used, options, start);
     progress.done((fits[f].label.empty() ? "all recordings"
                                          : "without " + fits[f].label + " " + fits[f].value) +
                   ": " + std::to_string(estimates[f].iterations) + " iterations");
   });
-  CalibrationResult result;
   result.setup = &setup;
   result.all = estimates[0];
   result.wander = find_wander(setup, result.all.x_WI);
@@ -188,6 +223,7 @@ CalibrationResult calibrate(const CalibrationSetup& setup, WorkProgress& progres
       by->runs.push_back(validate(setup, i, estimates[f]));
     }
   }
+  judge(result);
   return result;
 }
 

@@ -1,5 +1,6 @@
 // The fit of a batch calibration: priors, noise scales found in the data, solver.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -16,67 +17,70 @@ namespace {
 /// held.
 struct Prior {
   Intrinsics x_WI, sigma;
-  PlanarExtrinsics extrinsics_sigma;
-  double clock_sigma_s;
+  PlanarExtrinsics extrinsics, extrinsics_sigma;
+  Eigen::Vector2d own_sigma;  ///< of the clock offset and the gyro bias of each recording
 
-  Prior(const RunSetup& setup, const CalibrationOptions& options)
-      : x_WI(setup.model->nominal()), sigma(setup.model->prior_sigma()) {
+  Prior(const CalibrationRecording& first, const CalibrationOptions& options, const FitStart& start)
+      : x_WI(start.x_WI), sigma(start.sigma) {
+    const bool poses = first.motion.kind == ReferenceKind::kPoses;
+    const auto& specs = first.setup.model->description().intrinsics;
     for (int i = 0; i < sigma.size(); ++i) {
-      // Without extrinsics the reference body is the frame O: nothing is left to a gauge.
-      if (!options.estimate_extrinsics) {
-        sigma[i] = setup.model->description().intrinsics[static_cast<std::size_t>(i)].prior_sigma;
-      }
+      // Where O is the reference body nothing is left to a gauge.
+      const bool held = specs[static_cast<std::size_t>(i)].gauge_fixed;
+      if (held && (!poses || options.estimate_extrinsics)) sigma[i] = 0.;
     }
-    const double m = options.estimate_extrinsics ? options.extrinsics_sigma_m : 0.;
-    const double rad = options.estimate_extrinsics ? options.extrinsics_sigma_rad : 0.;
+    const bool estimates = poses && options.estimate_extrinsics;
+    const double m = estimates ? options.prior_sigma_extrinsics_m : 0.;
+    const double rad = estimates ? options.prior_sigma_extrinsics_rad : 0.;
+    extrinsics = options.extrinsics_x_m_y_m_yaw_rad;
     extrinsics_sigma = {m, m, rad};
-    clock_sigma_s = options.clock_offset_sigma_s;
+    const bool gyro = first.motion.kind == ReferenceKind::kGyro;
+    const bool clock = first.motion.kind != ReferenceKind::kNone;
+    own_sigma = {clock ? options.prior_sigma_clock_offset_s : 0.,
+                 gyro ? options.prior_sigma_gyro_bias_rad_per_s : 0.};
   }
 
   int n_shared() const { return static_cast<int>(sigma.size()) + 3; }
 
-  CalibrationPoint point(const double* shared, double clock) const {
+  CalibrationPoint point(const double* shared, const double* own) const {
     CalibrationPoint at;
     const auto n = static_cast<int>(sigma.size());
     at.x_WI = x_WI + sigma.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(shared, n));
-    at.extrinsics = extrinsics_sigma.cwiseProduct(Eigen::Map<const Eigen::Vector3d>(shared + n));
-    at.clock_offset_s = clock_sigma_s * clock;
+    at.extrinsics =
+        extrinsics + extrinsics_sigma.cwiseProduct(Eigen::Map<const Eigen::Vector3d>(shared + n));
+    at.clock_offset_s = own_sigma[0] * own[0];
+    at.gyro_bias_rad_per_s = own_sigma[1] * own[1];
     return at;
   }
 
-  /// Derivative by the scaled unknowns [shared, clock].
+  /// Derivative by the scaled unknowns [shared, own].
   Eigen::VectorXd scale() const {
-    Eigen::VectorXd all(n_shared() + 1);
-    all << sigma, extrinsics_sigma, clock_sigma_s;
+    Eigen::VectorXd all(n_shared() + 2);
+    all << sigma, extrinsics_sigma, own_sigma;
     return all;
   }
 };
 
-/// Residuals of one recording, poses over parity, for the solver.
+/// Residuals of one recording for the solver.
 class RecordingCost final : public ceres::CostFunction {
  public:
   RecordingCost(RecordingProblem& problem, const Prior& prior) : problem_(problem), prior_(prior) {
-    set_num_residuals(problem.n_pose() + problem.n_parity());
-    *mutable_parameter_block_sizes() = {prior.n_shared(), 1};
+    set_num_residuals(static_cast<int>(problem.kinds().size()));
+    *mutable_parameter_block_sizes() = {prior.n_shared(), 2};
   }
 
   bool Evaluate(const double* const* parameters, double* residuals,
                 double** jacobians) const override {
     RecordingResiduals at;
-    problem_.evaluate(prior_.point(parameters[0], parameters[1][0]), jacobians != nullptr, at);
-    Eigen::Map<Eigen::VectorXd> r(residuals, num_residuals());
-    r << at.pose, at.parity;
-    if (jacobians == nullptr) return r.allFinite();
-    const int n = prior_.n_shared();
-    Eigen::MatrixXd J(r.size(), n + 1);
-    J << at.J_pose, at.J_parity;
-    J *= prior_.scale().asDiagonal();
+    problem_.evaluate(prior_.point(parameters[0], parameters[1]), jacobians != nullptr, at);
+    Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = at.r;
+    if (jacobians == nullptr) return at.r.allFinite();
+    const Eigen::MatrixXd J = at.J * prior_.scale().asDiagonal();
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    if (jacobians[0] != nullptr) {
-      Eigen::Map<RowMajor>(jacobians[0], r.size(), n) = J.leftCols(n);
-    }
-    if (jacobians[1] != nullptr) Eigen::Map<Eigen::VectorXd>(jacobians[1], r.size()) = J.col(n);
-    return r.allFinite() && J.allFinite();
+    const int n = prior_.n_shared();
+    if (jacobians[0] != nullptr) Eigen::Map<RowMajor>(jacobians[0], J.rows(), n) = J.leftCols(n);
+    if (jacobians[1] != nullptr) Eigen::Map<RowMajor>(jacobians[1], J.rows(), 2) = J.rightCols(2);
+    return at.r.allFinite() && J.allFinite();
   }
 
  private:
@@ -102,29 +106,49 @@ class PriorCost final : public ceres::CostFunction {
   }
 };
 
-/// Residuals of one size, and their information about all unknowns [shared, clock of each
+/// Residuals of one kind, and their information about all unknowns [shared, own of each
 /// recording].
 struct NoiseGroup {
   Eigen::MatrixXd information;  ///< J^T J
   double squares = 0.;
   int residuals = 0;
+  std::vector<Eigen::VectorXd> batches;  ///< J^T r, of segments that follow each other
 };
 
-/// All residuals at a solution.
-struct Linearisation {
-  NoiseGroup position, yaw, parity;
-};
+/// All residuals at a solution, by kind.
+using Linearisation = std::array<NoiseGroup, kResidualKinds>;
+
+/// By how much what is left adds up over time, where it would cancel if it were white: 1 for white
+/// noise (CAL-14).
+double persistence(const NoiseGroup& group) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(group.information);
+  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const double smallest = 1e-9 * values[values.size() - 1];
+  double sum = 0.;
+  int rank = 0;
+  for (int i = 0; i < values.size(); ++i) {
+    if (!(values[i] > smallest)) continue;
+    ++rank;
+    for (const Eigen::VectorXd& gradient : group.batches) {
+      const double along = eigen.eigenvectors().col(i).dot(gradient);
+      sum += along * along / values[i];
+    }
+  }
+  return rank > 0 ? sum / rank : 0.;
+}
 
 class Fit {
  public:
-  Fit(const CalibrationSetup& setup, const std::vector<std::size_t>& recordings)
+  Fit(const CalibrationSetup& setup, const std::vector<std::size_t>& recordings,
+      const CalibrationOptions& options, const FitStart& start)
       : setup_(setup),
-        prior_(setup.recordings[recordings.front()].setup, setup.options),
+        options_(options),
+        prior_(setup.recordings[recordings.front()], options, start),
         shared_(static_cast<std::size_t>(prior_.n_shared()), 0.),
-        clock_(recordings.size(), 0.) {
+        own_(recordings.size(), {0., 0.}) {
     for (const std::size_t index : recordings) {
-      problems_.push_back(
-          std::make_unique<RecordingProblem>(setup.recordings[index], setup.options));
+      problems_.push_back(std::make_unique<RecordingProblem>(setup.recordings[index], options));
+      problems_.back()->set_weights_at(start.x_WI);
     }
   }
 
@@ -135,6 +159,7 @@ class Fit {
     constexpr double kUnchanged = 1e-3;
     solve(kMostIterations);
     for (int round = 0; round < kMostRounds && rescale(linearise()) > kUnchanged; ++round) {
+      for (const auto& problem : problems_) problem->weigh_segments();
       solve(kFewIterations);
     }
     solve(kMostIterations);
@@ -142,17 +167,20 @@ class Fit {
   }
 
  private:
-  CalibrationPoint point(std::size_t k) const { return prior_.point(shared_.data(), clock_[k]); }
+  CalibrationPoint point(std::size_t k) const {
+    return prior_.point(shared_.data(), own_[k].data());
+  }
 
   void solve(int most_iterations) {
     for (const auto& problem : problems_) problem->set_noise(estimate_.noise);
     ceres::Problem problem;
     for (std::size_t k = 0; k < problems_.size(); ++k) {
       problem.AddResidualBlock(new RecordingCost(*problems_[k], prior_), nullptr, shared_.data(),
-                               &clock_[k]);
-      problem.AddResidualBlock(new PriorCost(1), nullptr, &clock_[k]);
+                               own_[k].data());
+      problem.AddResidualBlock(new PriorCost(2), nullptr, own_[k].data());
     }
     problem.AddResidualBlock(new PriorCost(prior_.n_shared()), nullptr, shared_.data());
+    set_bounds(problem);
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
     options.logging_type = ceres::SILENT;
@@ -165,60 +193,115 @@ class Fit {
     }
     estimate_.iterations += static_cast<int>(summary.iterations.size());
     estimate_.converged = summary.termination_type == ceres::CONVERGENCE;
+    estimate_.cost = summary.final_cost;
+  }
+
+  void set_bounds(ceres::Problem& problem) {
+    for (int i = 0; i < prior_.sigma.size(); ++i) {
+      const double sigma = prior_.sigma[i];
+      const IntrinsicSpec& spec = spec_of(i);
+      if (!(sigma > 0.)) continue;
+      const double lowest = (spec.lowest - prior_.x_WI[i]) / sigma;
+      const double highest = (spec.highest - prior_.x_WI[i]) / sigma;
+      if (std::isfinite(lowest)) problem.SetParameterLowerBound(shared_.data(), i, lowest);
+      if (std::isfinite(highest)) problem.SetParameterUpperBound(shared_.data(), i, highest);
+    }
+  }
+
+  const IntrinsicSpec& spec_of(int i) const {
+    return setup_.recordings.front().setup.model->description().intrinsics[static_cast<std::size_t>(
+        i)];
   }
 
   Linearisation linearise() {
     const int n = prior_.n_shared();
-    const int size = n + static_cast<int>(problems_.size());
+    const int size = n + 2 * static_cast<int>(problems_.size());
     Linearisation all;
-    for (NoiseGroup* group : {&all.position, &all.yaw, &all.parity}) {
-      group->information.setZero(size, size);
+    for (NoiseGroup& group : all) {
+      group.information.setZero(size, size);
+      group.batches.assign(n_batches(), Eigen::VectorXd::Zero(size));
     }
+    std::size_t first_batch = 0;
     const Eigen::VectorXd scale = prior_.scale();
     for (std::size_t k = 0; k < problems_.size(); ++k) {
       RecordingResiduals at;
       problems_[k]->evaluate(point(k), true, at);
-      const auto add = [&](double r, const Eigen::VectorXd& by_all, NoiseGroup& group) {
-        const Eigen::VectorXd scaled = scale.cwiseProduct(by_all);
-        Eigen::VectorXd J = Eigen::VectorXd::Zero(size);
+      Eigen::VectorXd J = Eigen::VectorXd::Zero(size);
+      for (int i = 0; i < at.r.size(); ++i) {
+        const Eigen::VectorXd scaled = scale.cwiseProduct(at.J.row(i).transpose());
         J.head(n) = scaled.head(n);
-        J[n + static_cast<int>(k)] = scaled[n];
-        if (r == 0. && J.isZero(0.)) return;  // a direction without parity information
+        J.segment<2>(n + 2 * static_cast<int>(k)) = scaled.tail<2>();
+        if (at.r[i] == 0. && J.isZero(0.)) continue;  // a direction without parity information
+        const ResidualKind kind = problems_[k]->kinds()[static_cast<std::size_t>(i)];
+        NoiseGroup& group = all[static_cast<std::size_t>(kind)];
         group.information.noalias() += J * J.transpose();
-        group.squares += r * r;
+        group.squares += at.r[i] * at.r[i];
         ++group.residuals;
-      };
-      for (int i = 0; i < at.pose.size(); ++i) {
-        add(at.pose[i], at.J_pose.row(i), i % 3 == 0 ? all.yaw : all.position);
+        if (kind == ResidualKind::kParity || kind == ResidualKind::kDistance) continue;
+        group.batches[first_batch + batch(k, i / problems_[k]->rows_per_segment())] += at.r[i] * J;
       }
-      for (int i = 0; i < at.parity.size(); ++i) add(at.parity[i], at.J_parity.row(i), all.parity);
+      const double parity = std::pow(estimate_.noise.parity_scale, -2);
+      auto& batches = all[static_cast<std::size_t>(ResidualKind::kParity)].batches;
+      const auto& gradients = problems_[k]->parity_gradients();
+      for (std::size_t i = 0; options_.parity && i < gradients.size(); ++i) {
+        const std::size_t b = first_batch + i * n_batches(k) / gradients.size();
+        batches[b].head(gradients[i].size()) += parity * prior_.sigma.cwiseProduct(gradients[i]);
+      }
+      first_batch += n_batches(k);
     }
     return all;
+  }
+
+  /// About thirty for all recordings, at least one for each.
+  std::size_t n_batches(std::size_t k) const {
+    double all_s = 0.;
+    for (const auto& problem : problems_) all_s += problem->duration_s();
+    const auto share = static_cast<int>(std::lround(30. * problems_[k]->duration_s() / all_s));
+    return static_cast<std::size_t>(std::max(share, 1));
+  }
+  std::size_t n_batches() const {
+    std::size_t sum = 0;
+    for (std::size_t k = 0; k < problems_.size(); ++k) sum += n_batches(k);
+    return sum;
+  }
+  std::size_t batch(std::size_t k, int segment) const {
+    return static_cast<std::size_t>(segment) * n_batches(k) /
+           static_cast<std::size_t>(problems_[k]->n_segments());
   }
 
   /// Variance components: squares over redundancy, group by group. Returns by what part the most
   /// changed of them did.
   double rescale(const Linearisation& at) {
-    const Eigen::MatrixXd P = covariance(at);
+    const Eigen::MatrixXd P = covariance(at, true);
     const auto factor = [&](const NoiseGroup& group) {
       const double redundancy = group.residuals - (P * group.information).trace();
       // What fits exactly, or has nothing to spare, says nothing about its own size.
-      if (redundancy < 1. || group.squares < 1e-12) return 1.;
+      if (redundancy < 1. || group.squares < 1e-12) return 0.;
       return std::sqrt(group.squares / redundancy);
     };
-    const double position = factor(at.position), yaw = factor(at.yaw);
-    const double parity = setup_.options.parity ? factor(at.parity) : 1.;
-    estimate_.noise.position_m *= position;
-    estimate_.noise.yaw_rad *= yaw;
-    estimate_.noise.parity_scale *= parity;
-    return std::max({std::abs(position - 1.), std::abs(yaw - 1.), std::abs(parity - 1.)});
+    double most = 0.;
+    const auto rescale_noise = [&](ResidualKind kind, double& noise) {
+      const NoiseGroup& group = at[static_cast<std::size_t>(kind)];
+      double by = factor(group);
+      // What is left of the parity is not in its residuals but in how it comes and goes.
+      if (kind == ResidualKind::kParity) by = std::max(by, std::sqrt(persistence(group)));
+      if (by < 1e-6) return;
+      noise *= by;
+      most = std::max(most, std::abs(by - 1.));
+    };
+    rescale_noise(ResidualKind::kPosition, estimate_.noise.position_m);
+    rescale_noise(ResidualKind::kYaw, estimate_.noise.yaw_rad);
+    rescale_noise(ResidualKind::kParity, estimate_.noise.parity_scale);
+    return most;
   }
 
-  static Eigen::MatrixXd covariance(const Linearisation& at) {
-    const auto size = at.position.information.rows();
-    const Eigen::MatrixXd information = at.position.information + at.yaw.information +
-                                        at.parity.information +
-                                        Eigen::MatrixXd::Identity(size, size);
+  /// `white`: as if what is left did not persist.
+  static Eigen::MatrixXd covariance(const Linearisation& at, bool white = false) {
+    const auto size = at[0].information.rows();
+    Eigen::MatrixXd information = Eigen::MatrixXd::Identity(size, size);
+    for (const NoiseGroup& group : at) {
+      information += group.information / (white ? 1. : std::max(1., persistence(group)));
+    }
     return information.llt().solve(Eigen::MatrixXd::Identity(size, size));
   }
 
@@ -231,9 +314,43 @@ class Fit {
     estimate_.sigma = prior_.sigma.cwiseProduct(P.diagonal().head(n).cwiseSqrt());
     estimate_.extrinsics_sigma =
         prior_.extrinsics_sigma.cwiseProduct(P.diagonal().segment<3>(n).cwiseSqrt());
-    for (const double u : clock_) estimate_.clock_offset_s.push_back(prior_.clock_sigma_s * u);
+    for (std::size_t k = 0; k < own_.size(); ++k) {
+      const auto at_own = prior_.n_shared() + 2 * static_cast<Eigen::Index>(k);
+      const CalibrationPoint found = point(k);
+      const Eigen::Vector2d sigma =
+          prior_.own_sigma.cwiseProduct(P.diagonal().segment<2>(at_own).cwiseSqrt());
+      estimate_.clock_offset_s.push_back(found.clock_offset_s);
+      estimate_.clock_offset_sigma_s.push_back(sigma[0]);
+      estimate_.gyro_bias_rad_per_s.push_back(found.gyro_bias_rad_per_s);
+      estimate_.gyro_bias_sigma_rad_per_s.push_back(sigma[1]);
+    }
+    count(at);
+    estimate_.segments = options_.segments;
+    estimate_.segment_s = options_.segments == Segments::kWhole ? 0. : options_.segment_s;
     find_undetermined(P);
     return estimate_;
+  }
+
+  /// How much there was to fit, and what moved.
+  void count(const Linearisation& at) {
+    for (const ResidualKind kind :
+         {ResidualKind::kYaw, ResidualKind::kPosition, ResidualKind::kDistance}) {
+      estimate_.residuals += at[static_cast<std::size_t>(kind)].residuals;
+    }
+    int segments = 0;
+    for (const auto& problem : problems_) {
+      estimate_.weighed_down += problem->n_weighed_down();
+      for (const Eigen::Vector3d& motion : problem->motions()) {
+        estimate_.turn_rms_rad += motion[0] * motion[0];
+        estimate_.way_rms_m += motion.tail<2>().squaredNorm();
+        ++segments;
+      }
+    }
+    estimate_.turn_rms_rad = std::sqrt(estimate_.turn_rms_rad / std::max(1, segments));
+    estimate_.way_rms_m = std::sqrt(estimate_.way_rms_m / std::max(1, segments));
+    const auto& parity = at[static_cast<std::size_t>(ResidualKind::kParity)].information;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(parity, Eigen::EigenvaluesOnly);
+    estimate_.parity_directions = static_cast<int>((eigen.eigenvalues().array() > 1.).count());
   }
 
   /// Directions whose posterior sigma is more than 0.7 of the prior's: the data say less than it.
@@ -243,6 +360,12 @@ class Fit {
       if (prior_.sigma[i] > 0.) free.push_back(i);
     }
     const auto n = static_cast<int>(free.size());
+    estimate_.unknowns = n;
+    const auto count = [](const auto& sigmas) {
+      return static_cast<int>((sigmas.array() > 0.).count());
+    };
+    estimate_.unknowns +=
+        count(prior_.extrinsics_sigma) + static_cast<int>(own_.size()) * count(prior_.own_sigma);
     Eigen::MatrixXd P_free(n, n);
     for (int i = 0; i < n; ++i) {
       for (int j = 0; j < n; ++j) {
@@ -250,6 +373,8 @@ class Fit {
       }
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(P_free);
+    // Below zero: by how many powers of e the data have narrowed what was known.
+    estimate_.log_volume = 0.5 * eigen.eigenvalues().array().log().sum();
     const auto& specs = setup_.recordings.front().setup.model->description().intrinsics;
     for (int k = n - 1; k >= 0 && eigen.eigenvalues()[k] > 0.5; --k) {
       UndeterminedDirection direction;
@@ -266,17 +391,19 @@ class Fit {
   }
 
   const CalibrationSetup& setup_;
+  const CalibrationOptions options_;
   Prior prior_;
   std::vector<double> shared_;
-  std::vector<double> clock_;
+  std::vector<std::array<double, 2>> own_;  ///< clock offset and gyro bias of each recording
   std::vector<std::unique_ptr<RecordingProblem>> problems_;
   CalibrationEstimate estimate_;
 };
 
 }  // namespace
 
-CalibrationEstimate fit(const CalibrationSetup& setup, const std::vector<std::size_t>& recordings) {
-  return Fit(setup, recordings).run();
+CalibrationEstimate fit(const CalibrationSetup& setup, const std::vector<std::size_t>& recordings,
+                        const CalibrationOptions& options, const FitStart& start) {
+  return Fit(setup, recordings, options, start).run();
 }
 
 }  // namespace viwo::calibration

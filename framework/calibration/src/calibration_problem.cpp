@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 
+#include "viwo/math/chi2.hpp"
 #include "viwo/math/se2.hpp"
 
 namespace viwo::calibration {
@@ -12,6 +13,16 @@ namespace {
 
 /// Half the step of the central difference by the clock offset: a fraction of a sample.
 constexpr double kClockStep_s = 1e-3;
+/// Length of the pieces whose straight lines add up to the path of a distance.
+constexpr double kPathPiece_s = 0.05;
+/// Probability of a normal residual that counts in full.
+constexpr double kBelievable = 0.999;
+/// Longest piece whose parity gradient is told.
+constexpr double kParityPiece_s = 1.;
+
+std::int64_t to_ns(double seconds) {
+  return static_cast<std::int64_t>(std::llround(seconds * 1e9));
+}
 
 PreintegrationOptions preintegration_of(const CalibrationRecording& recording,
                                         const CalibrationOptions& options) {
@@ -45,103 +56,227 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
       options_(options),
       n_(recording.setup.model->n_intrinsics()),
       preintegrator_(recording.setup.model, preintegration_of(recording, options)) {
-  const RunData& data = recording.data;
-  const std::string where = "recording '" + recording.label.name + "'";
-  if (data.reference.empty()) throw InputError(where + " has no reference to calibrate against");
-  const auto offset_ns =
-      static_cast<std::int64_t>(std::llround(recording.setup.reference_time_offset_s * 1e9));
-  // Room for the clock offset on both sides.
-  const auto margin_ns =
-      static_cast<std::int64_t>(std::llround(4e9 * options.clock_offset_sigma_s)) + 2'000'000;
-  const std::int64_t begin_ns =
-      std::max(data.wheels().front().begin_ns + offset_ns + margin_ns, data.reference.front().t_ns);
-  const std::int64_t end_ns =
-      std::min(data.wheels().back().end_ns + offset_ns - margin_ns, data.reference.back().t_ns);
+  const auto wheels = recording.data.wheels();
+  const Trajectory& poses = recording.motion.poses;
+  const std::int64_t offset_ns = to_ns(recording.motion.offset_s);
+  std::int64_t begin_ns = wheels.front().begin_ns, end_ns = wheels.back().end_ns;
+  if (!poses.empty()) {
+    // Room for the clock offset on both sides.
+    const std::int64_t margin_ns = to_ns(4. * options.prior_sigma_clock_offset_s) + 2'000'000;
+    begin_ns = std::max(begin_ns + margin_ns, poses.front().t_ns - offset_ns);
+    end_ns = std::min(end_ns - margin_ns, poses.back().t_ns - offset_ns);
+  }
+  if (!(seconds_between(begin_ns, end_ns) > 0.)) {
+    throw InputError("recording '" + recording.label.name +
+                     "': wheels and reference have no time in common");
+  }
+  for (const StampedPose& pose : poses) {
+    const double before = yaw_.empty() ? 0. : yaw_.back();
+    yaw_.push_back(before + wrap_angle(yaw(pose) - before));
+  }
+  cut(begin_ns, end_ns);
+  if (!poses.empty()) compare_with_reference();
+  for (auto* segments : {&segments_, &later_, &earlier_}) segments->resize(stamps_ns_.size() - 1);
+  squares_.assign(motions_.size(), 0.);
+  weights_.assign(motions_.size(), 1.);
+  for (std::size_t k = 0; k < motions_.size(); ++k) {
+    kinds_.push_back(ResidualKind::kYaw);
+    if (rows_per_segment() == 3) kinds_.insert(kinds_.end(), 2, ResidualKind::kPosition);
+  }
+  if (options.parity)
+    kinds_.insert(kinds_.end(), static_cast<std::size_t>(n_), ResidualKind::kParity);
+  if (recording.motion.distance_m) kinds_.push_back(ResidualKind::kDistance);
+}
+
+/// Where the segments end.
+void RecordingProblem::cut(std::int64_t begin_ns, std::int64_t end_ns) {
+  if (options_.segments == calibration::Segments::kPoses) {
+    const std::int64_t offset_ns = to_ns(recording_.motion.offset_s);
+    for (const StampedPose& pose : recording_.motion.poses) {
+      const std::int64_t t_ns = pose.t_ns - offset_ns;
+      if (t_ns >= begin_ns && t_ns <= end_ns) stamps_ns_.push_back(t_ns);
+    }
+    if (stamps_ns_.size() > 1) return;
+    stamps_ns_.clear();
+  }
+  const bool whole =
+      options_.segments == calibration::Segments::kWhole || !(options_.segment_s > 0.);
   const double duration_s = seconds_between(begin_ns, end_ns);
-  if (!(duration_s > 0.)) throw InputError(where + ": wheels and reference have no time in common");
-  const int count = options.segment_s > 0.
-                        ? std::max(1, static_cast<int>(std::lround(duration_s / options.segment_s)))
-                        : 1;
-  std::vector<StampedPose> ends;
-  for (int k = 0; k <= count; ++k) {
-    const std::int64_t t_ns = begin_ns + (end_ns - begin_ns) * k / count;
-    // A segment end in a gap of the reference is left out: its neighbours become one.
-    if (const auto pose = interpolate(data.reference, t_ns, recording.setup.reference_max_gap_s)) {
-      stamps_ns_.push_back(t_ns - offset_ns);
+  const auto count = whole
+                         ? std::int64_t{1}
+                         : std::max<std::int64_t>(1, std::llround(duration_s / options_.segment_s));
+  for (std::int64_t k = 0; k <= count; ++k) {
+    stamps_ns_.push_back(begin_ns + (end_ns - begin_ns) * k / count);
+  }
+}
+
+std::optional<Eigen::Vector3d> RecordingProblem::reference_at(std::int64_t t_ns) const {
+  const MotionReference& motion = recording_.motion;
+  const auto pose = interpolate(motion.poses, t_ns, motion.max_gap_s);
+  if (!pose) return std::nullopt;
+  const auto after =
+      std::lower_bound(motion.poses.begin(), motion.poses.end(), t_ns,
+                       [](const StampedPose& one, std::int64_t stamp) { return one.t_ns < stamp; });
+  const double near = yaw_[static_cast<std::size_t>(after - motion.poses.begin())];
+  Eigen::Vector3d planar_pose = planar(*pose);
+  planar_pose[0] = near + wrap_angle(planar_pose[0] - near);
+  return planar_pose;
+}
+
+/// Motion of the reference over each segment. A segment end in a gap of the reference is left out:
+/// its neighbours become one.
+void RecordingProblem::compare_with_reference() {
+  std::vector<std::int64_t> known_ns;
+  std::vector<Eigen::Vector3d> ends;
+  for (const std::int64_t t_ns : stamps_ns_) {
+    if (const auto pose = reference_at(t_ns + to_ns(recording_.motion.offset_s))) {
+      known_ns.push_back(t_ns);
       ends.push_back(*pose);
     }
   }
-  if (ends.size() < 2) throw InputError(where + ": the reference has gaps at all segment ends");
-  for (std::size_t k = 1; k < ends.size(); ++k) {
-    reference_.push_back(between(planar(ends[k - 1]), planar(ends[k])));
+  if (ends.size() < 2) {
+    throw InputError("recording '" + recording_.label.name +
+                     "': the reference has gaps at all segment ends");
   }
-  for (auto* segments : {&segments_, &later_, &earlier_}) segments->resize(reference_.size());
+  stamps_ns_ = std::move(known_ns);
+  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
+  for (std::size_t k = 1; k < ends.size(); ++k) {
+    motions_.push_back(between(ends[from_start ? 0 : k - 1], ends[k]));
+  }
 }
 
-void RecordingProblem::integrate(const CalibrationPoint& point,
-                                 std::vector<PreintegratedPose>& segments) {
+void RecordingProblem::integrate(const CalibrationPoint& point, Segments& segments) {
   preintegrator_.set_intrinsics(point.x_WI);
-  const auto shift_ns = static_cast<std::int64_t>(std::llround(point.clock_offset_s * 1e9));
+  const std::int64_t shift_ns = to_ns(point.clock_offset_s);
+  parity_.reset(n_);
+  parity_gradients_.clear();
   guarded(recording_.setup.kinematics.info, "preintegration", [&] {
     for (std::size_t k = 0; k < segments.size(); ++k) {
-      preintegrator_.integrate(recording_.data.wheels(), stamps_ns_[k] - shift_ns,
-                               stamps_ns_[k + 1] - shift_ns, segments[k]);
+      const std::int64_t begin_ns = stamps_ns_[k], length_ns = stamps_ns_[k + 1] - begin_ns;
+      const std::int64_t pieces = 1 + length_ns / to_ns(kParityPiece_s);
+      segments[k].reset(n_);
+      for (std::int64_t i = 0; i < pieces; ++i) {
+        preintegrator_.integrate(recording_.data.wheels(),
+                                 begin_ns + length_ns * i / pieces - shift_ns,
+                                 begin_ns + length_ns * (i + 1) / pieces - shift_ns, piece_);
+        append(segments[k], piece_);
+        parity_.Lambda += piece_.parity.Lambda;
+        parity_.eta += piece_.parity.eta;
+        parity_gradients_.push_back(piece_.parity.eta);
+      }
     }
   });
+  if (options_.segments != calibration::Segments::kTrajectory) return;
+  for (std::size_t k = 1; k < segments.size(); ++k) {
+    piece_ = segments[k - 1];
+    append(piece_, segments[k]);
+    std::swap(piece_, segments[k]);
+  }
 }
 
 void RecordingProblem::evaluate(const CalibrationPoint& point, bool jacobian,
                                 RecordingResiduals& out) {
-  // A solver asks for the residuals of a point, then for their derivatives, which are there.
-  if (!integrated_ || !(*integrated_ == point)) {
-    integrate(point, segments_);
-    integrated_ = point;
-  }
-  const bool clock = options_.clock_offset_sigma_s > 0.;
+  const bool clock = options_.prior_sigma_clock_offset_s > 0. && !motions_.empty();
   if (jacobian && clock) {
     CalibrationPoint shifted = point;
     shifted.clock_offset_s = point.clock_offset_s + kClockStep_s;
     integrate(shifted, later_);
     shifted.clock_offset_s = point.clock_offset_s - kClockStep_s;
     integrate(shifted, earlier_);
+    integrated_.reset();
   }
-  out.pose.setZero(n_pose());
-  out.J_pose.setZero(n_pose(), n_ + 4);
+  // A solver asks for the residuals of a point, then for their derivatives, which are there.
+  if (!integrated_ || !(*integrated_ == point)) {
+    integrate(point, segments_);
+    integrated_ = point;
+  }
+  out.r.setZero(static_cast<Eigen::Index>(kinds_.size()));
+  out.J.setZero(out.r.size(), n_unknowns());
+  int row = 0;
+  for (std::size_t k = 0; k < motions_.size(); ++k, row += rows_per_segment()) {
+    add_segment(row, k, point, jacobian, out);
+  }
+  if (options_.parity) {
+    add_parity(row, out);
+    row += n_;
+  }
+  if (recording_.motion.distance_m) add_distance(row, point, out);
+}
+
+void RecordingProblem::add_segment(int row, std::size_t k, const CalibrationPoint& point,
+                                   bool jacobian, RecordingResiduals& out) {
+  const bool clock = options_.prior_sigma_clock_offset_s > 0.;
+  const int rows = rows_per_segment();
   const Eigen::Vector3d whitening(1. / noise_.yaw_rad, 1. / noise_.position_m,
                                   1. / noise_.position_m);
-  ParityInformation parity;
-  parity.reset(n_);
-  for (std::size_t k = 0; k < segments_.size(); ++k) {
-    const auto row = static_cast<Eigen::Index>(3 * k);
-    const MotionOfBody motion = motion_of_body(segments_[k].g, point.extrinsics);
-    Eigen::Vector3d error = motion.h - reference_[k];
-    error[0] = wrap_angle(error[0]);
-    out.pose.segment<3>(row) = whitening.asDiagonal() * error;
-    parity.Lambda += segments_[k].parity.Lambda;
-    parity.eta += segments_[k].parity.eta;
-    if (!jacobian) continue;
-    const Eigen::Matrix3d by_g = whitening.asDiagonal() * motion.by_g;
-    out.J_pose.block(row, 0, 3, n_) = by_g * segments_[k].J_g_WI;
-    out.J_pose.block<3, 3>(row, n_) = whitening.asDiagonal() * motion.by_extrinsics;
-    if (clock) {
-      out.J_pose.block<3, 1>(row, n_ + 3) =
-          by_g * (later_[k].g - earlier_[k].g) / (2. * kClockStep_s);
-    }
+  const MotionOfBody motion = motion_of_body(segments_[k].g, point.extrinsics);
+  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
+  const double duration_s = seconds_between(stamps_ns_[from_start ? 0 : k], stamps_ns_[k + 1]);
+  Eigen::Vector3d error = motion.h - motions_[k];
+  const bool gyro = recording_.motion.kind == ReferenceKind::kGyro;
+  if (gyro) error[0] += point.gyro_bias_rad_per_s * duration_s;  // (CAL-10)
+  out.r.segment(row, rows) = whitening.cwiseProduct(error).head(rows);
+  squares_[k] = out.r.segment(row, rows).squaredNorm();
+  out.r.segment(row, rows) *= std::sqrt(weights_[k]);
+  if (!jacobian) return;
+  const Eigen::Matrix3d by_g = whitening.asDiagonal() * motion.by_g;
+  Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, n_unknowns());
+  J.leftCols(n_) = by_g * segments_[k].J_g_WI;
+  J.block<3, 3>(0, n_) = whitening.asDiagonal() * motion.by_extrinsics;
+  J.rightCols<2>().setZero();
+  if (clock) J.col(n_ + 3) = by_g * (later_[k].g - earlier_[k].g) / (2. * kClockStep_s);
+  if (gyro) J(0, n_ + 4) = whitening[0] * duration_s;
+  out.J.middleRows(row, rows) = std::sqrt(weights_[k]) * J.topRows(rows);
+}
+
+void RecordingProblem::weigh_segments() {
+  if (weights_.empty()) return;
+  const double most = chi2_quantile(kBelievable, rows_per_segment());
+  for (std::size_t k = 0; k < weights_.size(); ++k) {
+    weights_[k] = squares_[k] <= most ? 1. : most / squares_[k];
   }
-  out.parity.setZero(n_parity());
-  out.J_parity.setZero(n_parity(), n_ + 4);
-  if (!options_.parity) return;
-  // r = D^-1/2 V^T eta and J = D^1/2 V^T with Lambda = V D V^T have the gradient and the curvature
-  // of the parity cost; directions without information have no residual (CAL-4).
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(parity.Lambda);
+}
+
+int RecordingProblem::n_weighed_down() const {
+  return static_cast<int>(
+      std::count_if(weights_.begin(), weights_.end(), [](double weight) { return weight < 1.; }));
+}
+
+/// r = D^-1/2 V^T eta and J = D^1/2 V^T with Lambda = V D V^T have the gradient and the curvature
+/// of the parity cost; directions without information have no residual (CAL-4).
+void RecordingProblem::add_parity(int row, RecordingResiduals& out) const {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(parity_.Lambda);
   const double smallest = 1e-9 * eigen.eigenvalues()[n_ - 1];
   for (int i = 0; i < n_; ++i) {
     const double d = eigen.eigenvalues()[i];
     if (!(d > smallest)) continue;
     const Eigen::VectorXd v = eigen.eigenvectors().col(i);
-    out.parity[i] = v.dot(parity.eta) / std::sqrt(d) / noise_.parity_scale;
-    out.J_parity.row(i).head(n_) = std::sqrt(d) / noise_.parity_scale * v.transpose();
+    out.r[row + i] = v.dot(parity_.eta) / std::sqrt(d) / noise_.parity_scale;
+    out.J.row(row + i).head(n_) = std::sqrt(d) / noise_.parity_scale * v.transpose();
   }
+}
+
+/// The path of O, of straight pieces that are short (CAL-13).
+void RecordingProblem::add_distance(int row, const CalibrationPoint& point,
+                                    RecordingResiduals& out) {
+  const auto wheels = recording_.data.wheels();
+  const std::int64_t step_ns = to_ns(kPathPiece_s);
+  preintegrator_.set_intrinsics(point.x_WI);
+  double path_m = 0.;
+  guarded(recording_.setup.kinematics.info, "preintegration", [&] {
+    for (std::int64_t t_ns = wheels.front().begin_ns; t_ns < wheels.back().end_ns;
+         t_ns += step_ns) {
+      preintegrator_.integrate(wheels, t_ns, std::min(t_ns + step_ns, wheels.back().end_ns),
+                               piece_);
+      const double length_m = piece_.g.tail<2>().norm();
+      if (!(length_m > 0.)) continue;
+      path_m += length_m;
+      out.J.row(row).head(n_) +=
+          piece_.g.tail<2>().transpose() / length_m * piece_.J_g_WI.bottomRows<2>();
+    }
+  });
+  out.r[row] = (path_m - *recording_.motion.distance_m) / options_.sigma_distance_m;
+  out.J.row(row) /= options_.sigma_distance_m;
 }
 
 }  // namespace viwo::calibration

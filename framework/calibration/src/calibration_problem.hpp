@@ -1,6 +1,7 @@
 // The least-squares problem of a batch calibration: residuals and Jacobians of one recording.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -11,50 +12,90 @@
 namespace viwo::calibration {
 
 /// Values of everything that is estimated: [x_WI (n), extrinsics (3)] shared by all recordings, and
-/// the clock offset of one.
+/// what each recording has of its own.
 struct CalibrationPoint {
   Intrinsics x_WI;
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
   double clock_offset_s = 0.;
+  double gyro_bias_rad_per_s = 0.;
 
   bool operator==(const CalibrationPoint&) const = default;
 };
 
+/// What a residual is of; those of one kind have one noise (CAL-5), that of distances is known.
+enum class ResidualKind { kYaw, kPosition, kParity, kDistance };
+inline constexpr std::size_t kResidualKinds = 4;
+
 /// Residuals of one recording, whitened, with their derivatives by [x_WI, extrinsics, clock
-/// offset].
+/// offset, gyro bias].
 struct RecordingResiduals {
-  Eigen::VectorXd pose, parity;
-  Eigen::MatrixXd J_pose, J_parity;
+  Eigen::VectorXd r;
+  Eigen::MatrixXd J;
 };
 
 /// Cuts a recording into segments and compares each with the reference. Holds scratch memory: one
 /// object per thread.
 class RecordingProblem {
  public:
-  /// Throws InputError when wheels and reference have too little time in common.
+  /// `options.segments` is not kAuto. Throws InputError when wheels and reference have too little
+  /// time in common.
   RecordingProblem(const CalibrationRecording& recording, const CalibrationOptions& options);
 
-  int n_segments() const { return static_cast<int>(reference_.size()); }
-  int n_pose() const { return 3 * n_segments(); }
-  int n_parity() const { return options_.parity ? n_ : 0; }
+  int n_segments() const { return static_cast<int>(segments_.size()); }
+  int n_unknowns() const { return n_ + 5; }
+  /// A kind for each residual.
+  const std::vector<ResidualKind>& kinds() const { return kinds_; }
+  double duration_s() const { return seconds_between(stamps_ns_.front(), stamps_ns_.back()); }
+  /// Residuals that compare one segment with the reference; they come first, segment by segment.
+  int rows_per_segment() const {
+    if (motions_.empty()) return 0;
+    return recording_.motion.kind == ReferenceKind::kPoses ? 3 : 1;
+  }
+  /// Gradient of the parity cost by the intrinsics, of each piece of about a second or less, where
+  /// it was evaluated last.
+  const std::vector<Intrinsics>& parity_gradients() const { return parity_gradients_; }
+
+  /// Motion of the reference over each segment, [yaw, x, y].
+  const std::vector<Eigen::Vector3d>& motions() const { return motions_; }
 
   /// Noise that whitens the residuals (CAL-3).
   void set_noise(const CalibrationNoise& noise) { noise_ = noise; }
+  /// Weighs down the segments that fit no normal noise where they were evaluated last (CAL-15).
+  void weigh_segments();
+  /// Segments that count for less than one.
+  int n_weighed_down() const;
+  /// Where the weights of the wheels' rows are taken.
+  void set_weights_at(const Intrinsics& x_WI) { preintegrator_.set_weights_at(x_WI); }
 
   void evaluate(const CalibrationPoint& point, bool jacobian, RecordingResiduals& out);
 
  private:
+  using Segments = std::vector<PreintegratedPose>;
+
+  void cut(std::int64_t begin_ns, std::int64_t end_ns);
+  void compare_with_reference();
+  std::optional<Eigen::Vector3d> reference_at(std::int64_t t_ns) const;
   /// Motion of O over all segments with the reference shifted by clock_offset_s.
-  void integrate(const CalibrationPoint& point, std::vector<PreintegratedPose>& segments);
+  void integrate(const CalibrationPoint& point, Segments& segments);
+  void add_segment(int row, std::size_t k, const CalibrationPoint& point, bool jacobian,
+                   RecordingResiduals& out);
+  void add_parity(int row, RecordingResiduals& out) const;
+  void add_distance(int row, const CalibrationPoint& point, RecordingResiduals& out);
 
   const CalibrationRecording& recording_;
   CalibrationOptions options_;
   int n_;  ///< intrinsics
   Preintegrator preintegrator_;
-  std::vector<std::int64_t> stamps_ns_;     ///< segment ends, clock of the reference
-  std::vector<Eigen::Vector3d> reference_;  ///< motion of B over each segment
+  std::vector<double> yaw_;                ///< of the poses of the reference, turns counted
+  std::vector<std::int64_t> stamps_ns_;    ///< segment ends, clock of the wheels
+  std::vector<Eigen::Vector3d> motions_;   ///< of B over each segment; empty without a reference
+  std::vector<double> squares_, weights_;  ///< of each segment: whitened squares, and their weight
+  std::vector<ResidualKind> kinds_;
   CalibrationNoise noise_;
-  std::vector<PreintegratedPose> segments_, later_, earlier_;
+  Segments segments_, later_, earlier_;
+  ParityInformation parity_;  ///< of all segments
+  std::vector<Intrinsics> parity_gradients_;
+  PreintegratedPose piece_;
   std::optional<CalibrationPoint> integrated_;  ///< where segments_ are
 };
 

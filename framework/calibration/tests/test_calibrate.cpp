@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "motion_reference.hpp"
 #include "simulated.hpp"
 #include "told.hpp"
 #include "viwo/calibration/calibrate.hpp"
@@ -24,6 +25,7 @@ CalibrationSetup setup_of(const std::vector<std::string>& motions, std::uint64_t
                           const std::vector<std::string>& assignments = {}) {
   CalibrationSetup setup;
   setup.name = "test";
+  setup.options.segments = Segments::kLength;
   setup.options.segment_s = 2.;
   setup.options.estimate_extrinsics = true;
   for (const std::string& motion : motions) {
@@ -32,16 +34,18 @@ CalibrationSetup setup_of(const std::vector<std::string>& motions, std::uint64_t
     all.emplace_back("odometry.twist=noise_weighted");
     RunSetup run = read_run(simulated(motion, all), registry(), seed);
     RunData data = collect(run);
-    setup.recordings.push_back({{motion, {{"motion", motion}}}, std::move(run), std::move(data)});
+    const Recording label{motion, {{"motion", motion}}};
+    MotionReference reference = motion_reference(label, run, data, setup.options.reference);
+    setup.recordings.push_back({label, std::move(run), std::move(data), std::move(reference)});
   }
   return setup;
 }
 
-CalibrationEstimate fit_all(const CalibrationSetup& setup) {
-  std::vector<std::size_t> all;
-  for (std::size_t i = 0; i < setup.recordings.size(); ++i) all.push_back(i);
-  return fit(setup, all);
+CalibrationEstimate fit_of(const CalibrationSetup& setup, const std::vector<std::size_t>& used) {
+  return fit(setup, used, setup.options, start_of(setup, {}));
 }
+
+CalibrationEstimate fit_all(const CalibrationSetup& setup) { return fit_of(setup, all_of(setup)); }
 
 /// True intrinsics of the simulated robot: the sensor's seed is 1000 times the run's.
 Intrinsics truth_of(const CalibrationSetup& setup, std::uint64_t seed) {
@@ -107,7 +111,7 @@ TEST(Calibrate, FindsTheGainsOfTheSteeringWhereTheyAreAskedFor) {
 
 TEST(Calibrate, FindsTheClockOffset) {
   auto setup = setup_of({"icr_sweep"}, 1, {"sensors.simulator0.time_offset_s=0.013"});
-  setup.options.clock_offset_sigma_s = 0.05;
+  setup.options.prior_sigma_clock_offset_s = 0.05;
   const auto estimate = fit_all(setup);
   EXPECT_NEAR(estimate.clock_offset_s[0], 0.013, 1e-3);
 }
@@ -151,7 +155,7 @@ TEST(Calibrate, ReadsItsFileLeavesOutAndWritesACalibrationThatARunIncludes) {
       << "calibration: test\nbase: run.yaml\nset: {odometry.twist: noise_weighted}\n"
          "leave_out_by: [motion]\nreport_by: [motion]\nsegment_s: 2\nestimate_extrinsics: true\n"
          "motions: [icr_sweep, figure_eight]\n";
-  const auto setup = read_calibration_setup(folder / "calibration.yaml", {}, registry());
+  auto setup = read_calibration_setup(folder / "calibration.yaml", {}, registry());
   testing::Told told;
   const auto result = calibrate(setup, told);
   EXPECT_EQ(told.total(), 3);
@@ -186,7 +190,7 @@ TEST(Calibrate, KnowsNoMoreThanRecordingsThatAreLeftOutTell) {
     for (int i = 0; i < n; ++i) {
       if (i != left_out) used.push_back(static_cast<std::size_t>(i));
     }
-    without.col(left_out) = fit(setup, used).x_WI;
+    without.col(left_out) = fit_of(setup, used).x_WI;
   }
   const Eigen::VectorXd mean = without.rowwise().mean();
   int larger = 0;
@@ -205,7 +209,8 @@ TEST(Calibrate, KnowsNoMoreThanRecordingsThatAreLeftOutTell) {
 TEST(Calibrate, FindsHowTheWheelsWander) {
   const auto found = [](std::vector<std::string> assignments) {
     assignments.emplace_back("sensors.simulator0.duration_s=200");
-    return calibrate(setup_of({"icr_sweep", "figure_eight"}, 1, assignments)).wander;
+    auto setup = setup_of({"icr_sweep", "figure_eight"}, 1, assignments);
+    return calibrate(setup).wander;
   };
   const WheelWander wanders = found({"sensors.simulator0.intrinsics_wander=0.5",
                                      "sensors.simulator0.intrinsics_wander_time_s=1"});

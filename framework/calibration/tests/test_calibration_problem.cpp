@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include "calibration_problem.hpp"
+#include "motion_reference.hpp"
 #include "simulated.hpp"
+#include "viwo/math/arrays.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/testing/jacobian.hpp"
 
@@ -14,11 +16,33 @@ using namespace calibration;
 using testing::central_difference;
 using testing::jacobian_mismatch;
 
-CalibrationRecording recording(const std::vector<std::string>& assignments = {}) {
+CalibrationRecording recording(const std::vector<std::string>& assignments = {},
+                               ReferenceKind kind = ReferenceKind::kPoses) {
   CalibrationRecording recording;
   recording.setup = read_run(testing::simulated("icr_sweep", assignments), testing::registry());
   recording.data = collect(recording.setup);
+  recording.motion = motion_reference(recording.label, recording.setup, recording.data, kind);
   return recording;
+}
+
+/// A swerve robot with wheels and IMU that turns as it drives.
+CalibrationRecording with_gyro() {
+  CalibrationRecording recording;
+  recording.setup =
+      read_run(config::parse(testing::swerve_with_camera(0), "run.yaml"), testing::registry());
+  recording.data = collect(recording.setup);
+  recording.motion = motion_reference({"gyro", {{"distance_m", "3"}}}, recording.setup,
+                                      recording.data, ReferenceKind::kGyro);
+  return recording;
+}
+
+/// Indices of residuals that are of one kind, or that are not.
+std::vector<int> rows_of(const RecordingProblem& problem, ResidualKind kind, bool is = true) {
+  std::vector<int> rows;
+  for (std::size_t i = 0; i < problem.kinds().size(); ++i) {
+    if ((problem.kinds()[i] == kind) == is) rows.push_back(static_cast<int>(i));
+  }
+  return rows;
 }
 
 TEST(MotionOfBody, IsTheConjugationByTheExtrinsics) {
@@ -36,41 +60,59 @@ TEST(MotionOfBody, IsTheConjugationByTheExtrinsics) {
   EXPECT_EQ(jacobian_mismatch(motion.by_extrinsics, by_e, {"x", "y", "yaw"}), "");
 }
 
+/// Derivatives of all residuals but those of the parity, which are another thing.
+void expect_central_differences(RecordingProblem& problem, const CalibrationRecording& recording,
+                                double tolerance) {
+  const std::vector<int> rows = rows_of(problem, ResidualKind::kParity, false);
+  Eigen::VectorXd x(21);
+  x << recording.setup.model->nominal(), 0.02, -0.01, 0.05, 0.004, 0.01;
+  const auto at = [&](const Eigen::VectorXd& values) {
+    return CalibrationPoint{values.head<16>(), values.segment<3>(16), values[19], values[20]};
+  };
+  RecordingResiduals residuals;
+  problem.evaluate(at(x), true, residuals);
+  const Eigen::MatrixXd numeric = central_difference(
+      [&](const Eigen::VectorXd& moved) -> Eigen::VectorXd {
+        RecordingResiduals there;
+        problem.evaluate(at(moved), false, there);
+        return there.r(rows);
+      },
+      x, 1e-6);
+  std::vector<std::string> names;
+  for (const auto& spec : recording.setup.model->description().intrinsics) {
+    names.push_back(spec.name);
+  }
+  names.insert(names.end(), {"x_OinB", "y_OinB", "yaw_OinB", "clock", "bias"});
+  EXPECT_EQ(jacobian_mismatch(residuals.J(rows, Eigen::all), numeric, names, tolerance), "");
+}
+
 TEST(RecordingProblem, HasThePoseJacobianOfCentralDifferences) {
   const auto simulated = recording({"sensors.simulator0.true_intrinsics_scale=1"});
   CalibrationOptions options;
+  options.segments = Segments::kLength;
   options.segment_s = 2.;
   options.estimate_extrinsics = true;
-  options.clock_offset_sigma_s = 0.01;
+  options.prior_sigma_clock_offset_s = 0.01;
   for (const bool weighted : {false, true}) {
     auto copy = simulated;
     copy.setup.preintegration.twist.noise_weighted = weighted;
     RecordingProblem problem(copy, options);
-    CalibrationPoint at;
-    at.x_WI = copy.setup.model->nominal();
-    at.extrinsics = {0.02, -0.01, 0.05};
-    at.clock_offset_s = 0.004;
-    RecordingResiduals residuals;
-    problem.evaluate(at, true, residuals);
-    const Eigen::MatrixXd J = residuals.J_pose;
-    Eigen::VectorXd x(20);
-    x << at.x_WI, at.extrinsics, at.clock_offset_s;
-    const Eigen::MatrixXd numeric = central_difference(
-        [&](const Eigen::VectorXd& moved) -> Eigen::VectorXd {
-          CalibrationPoint point;
-          point.x_WI = moved.head<16>();
-          point.extrinsics = moved.segment<3>(16);
-          point.clock_offset_s = moved[19];
-          RecordingResiduals there;
-          problem.evaluate(point, false, there);
-          return there.pose;
-        },
-        x, 1e-6);
-    std::vector<std::string> names;
-    for (const auto& spec : copy.setup.model->description().intrinsics) names.push_back(spec.name);
-    names.insert(names.end(), {"x_OinB", "y_OinB", "yaw_OinB", "clock"});
     // The weights of the weighted fit are held, and the clock moves in whole nanoseconds.
-    EXPECT_EQ(jacobian_mismatch(J, numeric, names, weighted ? 2e-2 : 2e-3), "");
+    expect_central_differences(problem, copy, weighted ? 2e-2 : 2e-3);
+  }
+}
+
+TEST(RecordingProblem, HasTheJacobianOfTurnAndDistanceOfCentralDifferences) {
+  const CalibrationRecording recording = with_gyro();
+  CalibrationOptions options;
+  options.prior_sigma_clock_offset_s = 0.01;
+  options.segment_s = 1.;
+  for (const auto segments : {Segments::kLength, Segments::kTrajectory}) {
+    options.segments = segments;
+    RecordingProblem problem(recording, options);
+    EXPECT_EQ(rows_of(problem, ResidualKind::kDistance).size(), 1u);
+    EXPECT_GT(rows_of(problem, ResidualKind::kYaw).size(), 5u);
+    expect_central_differences(problem, recording, 2e-3);
   }
 }
 
@@ -87,8 +129,9 @@ TEST(RecordingProblem, HasTheParityGradientOfItsInformation) {
   PreintegratedPose pose;
   const auto samples = simulated.data.wheels();
   preintegrator.integrate(samples, samples.front().begin_ns, samples.back().end_ns, pose);
-  const Eigen::MatrixXd J = residuals.J_parity.leftCols(16);
-  const Eigen::VectorXd gradient = J.transpose() * residuals.parity;
+  const std::vector<int> rows = rows_of(problem, ResidualKind::kParity);
+  const Eigen::MatrixXd J = residuals.J(rows, Eigen::all).leftCols(16);
+  const Eigen::VectorXd gradient = J.transpose() * residuals.r(rows);
   // The margin at both ends leaves out a few samples of a robot at rest or in steady motion.
   EXPECT_LT((J.transpose() * J - pose.parity.Lambda).norm(), 1e-3 * pose.parity.Lambda.norm());
   EXPECT_LT((gradient - pose.parity.eta).norm(), 2e-2 * pose.parity.eta.norm());
@@ -99,8 +142,9 @@ TEST(RecordingProblem, IsZeroForTheTruthOfANoiseFreeRobotWithAClockOffset) {
   const auto simulated =
       recording({"sensors.simulator0.noise=false", "sensors.simulator0.time_offset_s=0.02"});
   CalibrationOptions options;
+  options.segments = Segments::kLength;
   options.segment_s = 2.;
-  options.clock_offset_sigma_s = 0.05;
+  options.prior_sigma_clock_offset_s = 0.05;
   RecordingProblem problem(simulated, options);
   CalibrationPoint at;
   at.x_WI = simulated.setup.model->nominal();
@@ -109,8 +153,54 @@ TEST(RecordingProblem, IsZeroForTheTruthOfANoiseFreeRobotWithAClockOffset) {
   problem.evaluate(at, false, right);
   at.clock_offset_s = -0.02;
   problem.evaluate(at, false, wrong);
-  EXPECT_LT(right.pose.norm(), 0.05);
-  EXPECT_GT(wrong.pose.norm(), 1.);
+  const std::vector<int> rows = rows_of(problem, ResidualKind::kParity, false);
+  EXPECT_LT(right.r(rows).norm(), 0.05);
+  EXPECT_GT(wrong.r(rows).norm(), 1.);
+}
+
+TEST(TurningAxis, PointsUpHoweverTheImuIsMountedAndDespiteABias) {
+  const Eigen::Vector3d up = Eigen::Vector3d(0.3, -0.9, 0.2).normalized();
+  for (const double tilt : {0., 0.3}) {
+    // What the accelerometer feels may be tilted by a drive in circles: the turn is not.
+    const Eigen::Vector3d force = 9.8 * (up + tilt * up.unitOrthogonal()).normalized();
+    std::vector<ImuSample> imu(200);
+    for (std::size_t i = 0; i < imu.size(); ++i) {
+      const Eigen::Vector3d rate =
+          std::sin(0.1 * static_cast<double>(i)) * up + Eigen::Vector3d(0.1, 0.05, -0.2);
+      imu[i].t_ns = static_cast<std::int64_t>(i) * 10'000'000;
+      Eigen::Map<Eigen::Vector3d>(imu[i].gyro_rad_per_s.data()) = rate;
+      Eigen::Map<Eigen::Vector3d>(imu[i].accel_m_per_s2.data()) = force;
+    }
+    EXPECT_LT((turning_axis(imu) - up).norm(), 1e-9) << tilt;
+  }
+}
+
+TEST(YawOfHeadings, CountsTurnsThatWrap) {
+  std::vector<HeadingSample> headings(200);
+  for (std::size_t i = 0; i < headings.size(); ++i) {
+    headings[i] = {static_cast<std::int64_t>(i) * 10'000'000,
+                   wrap_angle(0.1 * static_cast<double>(i))};
+  }
+  CalibrationRecording recording = with_gyro();
+  recording.motion.poses = yaw_of_headings(headings);
+  CalibrationOptions options;
+  options.segments = Segments::kWhole;
+  const RecordingProblem problem(recording, options);
+  ASSERT_EQ(problem.motions().size(), 1u);
+  EXPECT_NEAR(problem.motions()[0][0], 10. * problem.duration_s(), 0.05);
+}
+
+TEST(YawOfGyro, IsTheIntegralOfTheTurn) {
+  const CalibrationRecording recording = with_gyro();
+  const auto states = recording.data.states();
+  ASSERT_GT(states.size(), 10u);
+  const auto turned = [](const auto& q) { return yaw(to_quaternion(q)); };
+  const double truth =
+      wrap_angle(turned(states.back().q_ItoG_xyzw) - turned(states[0].q_ItoG_xyzw));
+  const auto begin = interpolate(recording.motion.poses, states[0].t_ns, 1.);
+  const auto end = interpolate(recording.motion.poses, states.back().t_ns, 1.);
+  ASSERT_TRUE(begin && end);
+  EXPECT_NEAR(wrap_angle(yaw(*end) - yaw(*begin) - truth), 0., 0.02);
 }
 
 }  // namespace

@@ -41,7 +41,7 @@ TEST_F(Recordings, NominalDeadReckoningEndsWhereOthersMeasured) {
 }
 
 TEST_F(Recordings, CalibrationPredictsTheRepetitionThatIsLeftOutAndHalfwaysTheMotion) {
-  const auto setup =
+  auto setup =
       read_calibration_setup(kConfigs / "calibrations" / "recordings.yaml", {}, registry());
   ASSERT_EQ(setup.recordings.size(), 18u);
   const auto result = calibrate(setup);

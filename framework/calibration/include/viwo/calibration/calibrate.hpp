@@ -1,4 +1,5 @@
-// Batch calibration of the wheel intrinsics from encoder logs and a reference trajectory.
+// Batch calibration of the wheel intrinsics from encoder logs and what is known of the motion: a
+// reference trajectory, a gyro, a ruler.
 // Equations: docs/math/batch_calibration.md.
 #pragma once
 
@@ -14,13 +15,39 @@
 
 namespace viwo::calibration {
 
+/// What the motion of the wheels is compared with.
+enum class ReferenceKind {
+  kAuto,   ///< poses where there are any, else the gyro
+  kPoses,  ///< relative poses of the reference body
+  kGyro,   ///< the turn by the gyro, about the mean direction of what the accelerometer feels
+  kNone,   ///< nothing: the wheels among themselves, and distances
+};
+
+/// What is compared with the reference (docs/math/batch_calibration.md).
+enum class Segments {
+  kAuto,        ///< of the length whose estimate is the surest (CAL-11)
+  kWhole,       ///< whole recordings
+  kLength,      ///< of segment_s
+  kPoses,       ///< from each pose of the reference to the next
+  kTrajectory,  ///< from the start to every segment_s
+};
+
 struct CalibrationOptions {
-  double segment_s = 0.;             ///< length of the compared segments; 0: whole recordings
+  ReferenceKind reference = ReferenceKind::kAuto;
+  Segments segments = Segments::kAuto;
+  double segment_s = 0.;
   bool parity = true;                ///< use the parity residual
+  bool find_steering_zeros = false;  ///< anywhere on the circle (CAL-12)
+  bool find_drive_signs = false;
   bool estimate_extrinsics = false;  ///< pose of O in the reference body; then the gauge is held
-  double extrinsics_sigma_m = 0.01;
-  double extrinsics_sigma_rad = 0.02;
-  double clock_offset_sigma_s = 0.;  ///< prior of one offset per recording; 0: not estimated
+  Eigen::Vector3d extrinsics_x_m_y_m_yaw_rad{0., 0., 0.};
+  double prior_sigma_extrinsics_m = 0.01;
+  double prior_sigma_extrinsics_rad = 0.02;
+  double prior_sigma_clock_offset_s = 0.;  ///< of one offset per recording; 0: not estimated
+  double prior_sigma_gyro_bias_rad_per_s = 0.02;
+  double sigma_distance_m = 0.005;
+
+  void bind(ParamBinder& b);
 };
 
 /// Sizes of what a fit cannot explain: of the end pose of a segment, and of the parity residual
@@ -31,11 +58,21 @@ struct CalibrationNoise {
   double parity_scale = 1.;
 };
 
+/// What the wheels of a recording are compared with.
+struct MotionReference {
+  ReferenceKind kind = ReferenceKind::kNone;  ///< never kAuto
+  Trajectory poses;                           ///< of B; of the gyro the yaw alone, positions zero
+  double offset_s = 0.;              ///< stamp of the reference = stamp of the wheels + offset
+  double max_gap_s = 0.5;            ///< not interpolated over more
+  std::optional<double> distance_m;  ///< how far O was driven, along its path
+};
+
 /// A recording read into memory.
 struct CalibrationRecording {
   Recording label;
   RunSetup setup;
   RunData data;
+  MotionReference motion;
 };
 
 /// A calibration file, read, with its recordings.
@@ -67,11 +104,43 @@ struct CalibrationEstimate {
   Intrinsics sigma;  ///< 0 where an entry was held
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
   PlanarExtrinsics extrinsics_sigma = PlanarExtrinsics::Zero();
-  std::vector<double> clock_offset_s;  ///< one per recording used
-  CalibrationNoise noise;              ///< found in the data (CAL-5)
+  // One per recording used; sigma 0 where it was not estimated.
+  std::vector<double> clock_offset_s, clock_offset_sigma_s;
+  std::vector<double> gyro_bias_rad_per_s, gyro_bias_sigma_rad_per_s;
+  CalibrationNoise noise;  ///< found in the data (CAL-5)
+  Segments segments = Segments::kWhole;
+  double segment_s = 0.;      ///< 0: whole recordings
+  int residuals = 0;          ///< of turns, positions and distances
+  int weighed_down = 0;       ///< segments that fit no normal noise (CAL-15)
+  int unknowns = 0;           ///< that were estimated, those of the recordings with them
+  int parity_directions = 0;  ///< about which the wheels alone tell more than the prior
+  double turn_rms_rad = 0., way_rms_m = 0.;  ///< of the segments, by the reference
+  double cost = 0.;
+  double log_volume = 0.;  ///< of the intrinsics' covariance in prior units, square root (CAL-11)
+  /// By how much dead reckoning misses the ends of recordings that are left out, where it was
+  /// tried.
+  std::optional<double> prediction_m;
   int iterations = 0;
   bool converged = false;
   std::vector<UndeterminedDirection> undetermined;
+
+  /// Twice as many as there are unknowns that the parity does not tell.
+  bool has_enough_residuals() const { return residuals >= 2 * (unknowns - parity_directions); }
+};
+
+/// Where a fit begins, and what is known of it: centre and sigmas of the prior.
+struct FitStart {
+  Intrinsics x_WI, sigma;
+};
+
+/// What was searched for and found (CAL-12).
+struct JointSearch {
+  std::vector<int> zeros;  ///< intrinsics that are zeros of the steering; empty: none searched
+  std::vector<int> drive_signs;  ///< -1 for a drive that turns backwards
+  Intrinsics x_WI;               ///< of the best solution
+  double cost = 0.;
+  Intrinsics other;        ///< of the best that is another one
+  double other_cost = 0.;  ///< infinite where there is none
 };
 
 /// A recording that a fit has not seen, with nominal and with calibrated intrinsics.
@@ -90,24 +159,44 @@ struct LeftOut {
 
 struct CalibrationResult {
   const CalibrationSetup* setup = nullptr;
+  JointSearch search;
+  std::vector<CalibrationEstimate> lengths;  ///< with segments of several lengths, if one is chosen
   CalibrationEstimate all;        ///< from all recordings; its sigmas are not below any `spread`
   Intrinsics sigma_of_fit;        ///< those that the fit itself believes
   std::vector<LeftOut> left_out;  ///< of each of leave_out_by
   WheelWander wander;             ///< at the estimate from all
   std::vector<ValidationRun> fitted;  ///< all recordings with the estimate from all of them
+  std::vector<std::string> doubts;    ///< why it is not to be trusted
+  std::vector<std::string> warnings;  ///< what its reader should know
+
+  bool is_trusted() const { return doubts.empty(); }
 };
+
+/// The keys of a calibration file, but for recordings, motions and set.
+std::vector<ParamSpec> calibration_params();
 
 /// Throws InputError for what is wrong in the configuration or in a recording.
 CalibrationSetup read_calibration_setup(const std::filesystem::path& file,
                                         const std::vector<std::string>& assignments,
                                         PluginRegistry& plugins);
 
-/// Fits the recordings named by index (CAL-1). Throws std::runtime_error when the solver fails.
-CalibrationEstimate fit(const CalibrationSetup& setup, const std::vector<std::size_t>& recordings);
+/// Nominal values and their sigmas; zeros where they have been found, to be refined.
+FitStart start_of(const CalibrationSetup& setup, const JointSearch& search);
 
-/// All of the data, and without what is left out in turn. Throws InputError where nothing is left
-/// to fit.
-CalibrationResult calibrate(const CalibrationSetup& setup, WorkProgress& progress = no_progress());
+/// All recordings by index.
+std::vector<std::size_t> all_of(const CalibrationSetup& setup);
+
+/// Fits the recordings named by index (CAL-1); the segments of `options` are not kAuto. Throws
+/// std::runtime_error when the solver fails.
+CalibrationEstimate fit(const CalibrationSetup& setup, const std::vector<std::size_t>& recordings,
+                        const CalibrationOptions& options, const FitStart& start);
+
+/// The wheels of a recording alone, with an estimate.
+RunResult dead_reckon(const CalibrationRecording& recording, const CalibrationEstimate& estimate);
+
+/// All of the data, and without what is left out in turn. Drives that turn backwards are put right
+/// in `setup`. Throws InputError where nothing is left to fit.
+CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress = no_progress());
 
 /// Writes calibration.yaml, summary.json and report.html.
 void write_calibration(const std::filesystem::path& folder, const CalibrationResult& result);

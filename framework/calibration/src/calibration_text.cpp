@@ -1,0 +1,154 @@
+#include "calibration_text.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "segment_choice.hpp"
+#include "viwo/eval/statistics.hpp"
+#include "viwo/math/significant.hpp"
+
+namespace viwo::calibration {
+namespace {
+
+EndErrors errors_of(const RunResult& run) {
+  if (!run.accuracy) return {std::nan(""), std::nan("")};
+  return {1e3 * run.accuracy->end_m, std::abs(run.accuracy->end_yaw_deg) * M_PI / 180.};
+}
+
+}  // namespace
+
+std::vector<ErrorRow> error_rows(const CalibrationSetup& setup,
+                                 const std::vector<ValidationRun>& runs) {
+  const auto mean_over = [&](const std::string& name, auto&& passes) {
+    std::vector<double> values[4];
+    for (const ValidationRun& run : runs) {
+      if (!passes(setup.recordings[run.recording].label.labels)) continue;
+      const EndErrors nominal = errors_of(run.nominal), calibrated = errors_of(run.calibrated);
+      values[0].push_back(nominal.mm);
+      values[1].push_back(nominal.yaw_rad);
+      values[2].push_back(calibrated.mm);
+      values[3].push_back(calibrated.yaw_rad);
+    }
+    return ErrorRow{name,
+                    values[0].size(),
+                    {eval::mean(values[0]), eval::mean(values[1])},
+                    {eval::mean(values[2]), eval::mean(values[3])}};
+  };
+  const bool known = std::any_of(runs.begin(), runs.end(), [](const ValidationRun& run) {
+    return run.nominal.accuracy || run.calibrated.accuracy;
+  });
+  if (!known) return {};
+  std::vector<ErrorRow> rows{mean_over("all", [](const auto&) { return true; })};
+  for (const std::string& label : setup.report_by) {
+    std::set<std::string> seen;
+    for (const auto& recording : setup.recordings) {
+      const auto found = recording.label.labels.find(label);
+      if (found == recording.label.labels.end() || !seen.insert(found->second).second) continue;
+      rows.push_back(mean_over(found->second, [&](const auto& labels) {
+        const auto at = labels.find(label);
+        return at != labels.end() && at->second == found->second;
+      }));
+    }
+  }
+  return rows;
+}
+
+const WheelModel& model_of(const CalibrationResult& result) {
+  return *result.setup->recordings.front().setup.model;
+}
+
+std::string direction_text(const UndeterminedDirection& direction) {
+  std::string text;
+  for (const auto& [name, weight] : direction.weights) {
+    if (std::abs(weight) < 0.25 * std::abs(direction.weights.front().second)) break;
+    if (!text.empty()) text += weight < 0. ? " - " : " + ";
+    if (text.empty() && weight < 0.) text += "-";
+    text += significant(std::abs(weight), 2) + " " + name;
+  }
+  return text;
+}
+
+std::string left_out_title(const LeftOut& left_out) {
+  return "End error of dead reckoning, recordings left out of the fit by " + left_out.by;
+}
+
+/// What was found, and what to write.
+std::string wander_text(const WheelWander& wander) {
+  if (wander.lag_s.empty()) {
+    return "whether the intrinsics wander cannot be told: only wheels that could contradict each "
+           "other, for longer than a second, tell it";
+  }
+  if (!(wander.sigma > 0.)) return "the wheels contradict each other as noise does: none wanders";
+  const std::string sigma = significant(wander.sigma, 2), time_s = significant(wander.time_s, 2);
+  return "the intrinsics wander by " + sigma + " prior sigmas, for " + time_s +
+         " s: wheels.intrinsics_wander=" + sigma + ", wheels.intrinsics_wander_time_s=" + time_s +
+         " in a filter";
+}
+
+std::vector<std::string> search_text(const CalibrationResult& result) {
+  std::vector<std::string> out;
+  const JointSearch& search = result.search;
+  const auto& specs = model_of(result).description().intrinsics;
+  for (std::size_t i = 0; i < search.zeros.size(); ++i) {
+    const auto zero = static_cast<std::size_t>(search.zeros[i]);
+    const double nominal = specs[zero].nominal;
+    const double found = result.all.x_WI[search.zeros[i]];
+    const double other = std::remainder(found + M_PI - nominal, 2. * M_PI);
+    std::string text =
+        "steering " + std::to_string(i + 1) + ": zero at " + significant(found, 4) + " rad";
+    if (std::abs(other) < M_PI / 2.) {
+      text += ", or at " + significant(nominal + other, 4) + " rad of a drive that turns backwards";
+    }
+    out.push_back(text);
+  }
+  for (std::size_t i = 0; i < search.drive_signs.size(); ++i) {
+    if (search.drive_signs[i] > 0) continue;
+    out.push_back("drive " + std::to_string(i + 1) +
+                  " turns backwards: the calibration is for readings of the other sign "
+                  "(drive_scale of the sensor)");
+  }
+  return out;
+}
+
+std::string left_over_text(const CalibrationResult& result) {
+  const CalibrationEstimate& estimate = result.all;
+  const ReferenceKind kind = result.setup->recordings.front().motion.kind;
+  std::string text = "what the fit leaves";
+  if (kind != ReferenceKind::kNone) {
+    text += " per segment (" + segments_text(estimate) + "): ";
+    if (kind == ReferenceKind::kPoses) {
+      text += significant(1e3 * estimate.noise.position_m, 3) + " mm, ";
+    }
+    text += significant(estimate.noise.yaw_rad, 3) + " rad; ";
+    if (estimate.weighed_down > 0) {
+      text += std::to_string(estimate.weighed_down) + " segments that do not fit count for less; ";
+    }
+  } else {
+    text += ": ";
+  }
+  return text + "parity residual " + significant(estimate.noise.parity_scale, 3) +
+         " x the model's sigmas";
+}
+
+std::string clock_text(const CalibrationResult& result) {
+  const CalibrationEstimate& estimate = result.all;
+  double most = 0.;
+  for (const double sigma : estimate.clock_offset_sigma_s) most = std::max(most, sigma);
+  if (!(most > 0.)) return "";
+  std::string text = "clock offsets of the recordings: mean " +
+                     significant(1e3 * eval::mean(estimate.clock_offset_s), 3) +
+                     " ms, each known to " + significant(1e3 * most, 2) + " ms or better";
+  if (estimate.clock_offset_s.size() > 1) {
+    text += ", spread " +
+            significant(1e3 * eval::sample_standard_deviation(estimate.clock_offset_s), 3) + " ms";
+  }
+  return text;
+}
+
+std::string status_of(const CalibrationResult& result) {
+  if (!result.all.converged) return "failed";
+  return result.is_trusted() ? "ok" : "doubtful";
+}
+
+}  // namespace viwo::calibration

@@ -1,0 +1,112 @@
+#include "motion_reference.hpp"
+
+#include <charconv>
+
+#include <Eigen/Dense>
+
+#include "viwo/math/arrays.hpp"
+
+namespace viwo::calibration {
+namespace {
+
+/// By how much the scatter about the axis of turning exceeds that about any other, at least.
+constexpr double kStandsOut = 30.;
+
+double distance_of(const std::string& name, const std::string& text) {
+  double distance_m = 0.;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, distance_m);
+  if (error != std::errc() || stop != end || !(distance_m > 0.)) {
+    throw InputError("recording '" + name + "': distance_m is '" + text +
+                     "', not a distance in metres above 0");
+  }
+  return distance_m;
+}
+
+StampedPose turned(std::int64_t t_ns, double yaw_rad) {
+  StampedPose pose;
+  pose.t_ns = t_ns;
+  pose.q_BtoW = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ());
+  return pose;
+}
+
+}  // namespace
+
+Eigen::Vector3d turning_axis(std::span<const ImuSample> imu) {
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero(), force = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : imu) {
+    rate += to_vector(sample.gyro_rad_per_s);
+    force += to_vector(sample.accel_m_per_s2);
+  }
+  rate /= static_cast<double>(imu.size());
+  if (!(force.norm() > 0.)) {
+    throw InputError("the accelerometer reads zero: which way is up is not known");
+  }
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const ImuSample& sample : imu) {
+    const Eigen::Vector3d deviation = to_vector(sample.gyro_rad_per_s) - rate;
+    scatter += deviation * deviation.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
+  if (eigen.eigenvalues()[2] < kStandsOut * eigen.eigenvalues()[1]) return force.normalized();
+  const Eigen::Vector3d axis = eigen.eigenvectors().col(2);
+  return axis.dot(force) < 0. ? Eigen::Vector3d(-axis) : axis;
+}
+
+Trajectory yaw_of_gyro(std::span<const ImuSample> imu) {
+  const Eigen::Vector3d axis = turning_axis(imu);
+  Trajectory out;
+  out.reserve(imu.size());
+  double yaw = 0., rate_before = 0.;
+  for (const ImuSample& sample : imu) {
+    const double rate = axis.dot(to_vector(sample.gyro_rad_per_s));
+    if (!out.empty()) {
+      yaw += 0.5 * (rate_before + rate) * seconds_between(out.back().t_ns, sample.t_ns);
+    }
+    rate_before = rate;
+    out.push_back(turned(sample.t_ns, yaw));
+  }
+  return out;
+}
+
+Trajectory yaw_of_headings(std::span<const HeadingSample> headings) {
+  Trajectory out;
+  out.reserve(headings.size());
+  for (const HeadingSample& heading : headings)
+    out.push_back(turned(heading.t_ns, heading.yaw_rad));
+  return out;
+}
+
+MotionReference motion_reference(const Recording& label, const RunSetup& setup, const RunData& data,
+                                 ReferenceKind kind) {
+  const std::string where = "recording '" + label.name + "'";
+  MotionReference out;
+  out.kind = kind;
+  const bool has_gyro = !data.imu().empty() || !data.headings().empty();
+  if (kind == ReferenceKind::kAuto) {
+    if (data.reference.empty() && !has_gyro) {
+      throw InputError(where +
+                       " has neither a reference nor a gyro to calibrate against; wheels alone, "
+                       "with distance_m as labels of the recordings, are reference: none");
+    }
+    out.kind = data.reference.empty() ? ReferenceKind::kGyro : ReferenceKind::kPoses;
+  }
+  if (out.kind == ReferenceKind::kPoses) {
+    if (data.reference.empty()) {
+      throw InputError(where + " has no reference poses to calibrate against");
+    }
+    out.poses = data.reference;
+    out.offset_s = setup.reference_time_offset_s;
+    out.max_gap_s = setup.reference_max_gap_s;
+  } else if (out.kind == ReferenceKind::kGyro) {
+    if (!has_gyro) throw InputError(where + " has no gyro to calibrate against");
+    out.poses = data.imu().empty() ? yaw_of_headings(data.headings()) : yaw_of_gyro(data.imu());
+    // Headings are often logged where they change only.
+    out.max_gap_s = data.imu().empty() ? 0.5 : 0.1;
+  }
+  const auto distance = label.labels.find("distance_m");
+  if (distance != label.labels.end()) out.distance_m = distance_of(label.name, distance->second);
+  return out;
+}
+
+}  // namespace viwo::calibration

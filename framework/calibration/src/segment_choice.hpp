@@ -1,0 +1,19 @@
+// How long the segments are that wheels and reference are compared over.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "viwo/calibration/calibrate.hpp"
+
+namespace viwo::calibration {
+
+/// The options of a fit, segments chosen: those of the configuration, or, of several lengths, that
+/// with the smallest log_volume (CAL-11). `tried` gets the estimates of all lengths.
+CalibrationOptions choose_segments(const CalibrationSetup& setup, const FitStart& start,
+                                   std::vector<CalibrationEstimate>& tried, WorkProgress& progress);
+
+/// "2 s", "whole recordings", ...
+std::string segments_text(const CalibrationEstimate& estimate);
+
+}  // namespace viwo::calibration
