@@ -41,6 +41,7 @@ TEST_F(CommandLineTest, EveryCommandExplainsItself) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> commands = {
       {"run", {"--out", "--seed", "--set"}},
       {"experiment", {"--out", "--jobs", "--seeds", "--set", "--keep-runs"}},
+      {"inspect", {"--out", "--set", "--fix"}},
       {"calibrate", {"--out", "--set"}},
       {"simulate", {"--out", "--seed", "--set"}},
       {"evaluate", {"--reference", "--estimate", "--align", "--out"}},

@@ -88,6 +88,29 @@ TEST_F(LogTest, OfTheSimulatorGivesTheSameErrorsAsTheSimulator) {
   EXPECT_TRUE(summary("out").at("rejected_measurements").empty());
 }
 
+TEST_F(LogTest, OfJointsThatAreMountedWronglyIsPutRightByTheInverse) {
+  expect_done({"run", "log.yaml", "--out", "right"});
+  expect_done({"simulate", "run.yaml", "--out", "log", "--set",
+               "sensors.sim.drive_scale=[-1, 2, 0.5, 1]", "--set",
+               "sensors.sim.drive_channel=[2, 1, 3, 4]", "--set",
+               "sensors.sim.steer_scale=[1, 1, -1, 1]"});
+  expect_done({"run", "log.yaml", "--out", "out"});
+  const auto end_m = [&](const char* folder) -> double {
+    return summary(folder)["accuracy"]["end"]["m"];
+  };
+  EXPECT_GT(end_m("out"), 10. * end_m("right")) << "a wrong one is seen";
+  // The first channel of the log is twice the second drive, the second the first one backwards.
+  expect_done({"run", "log.yaml", "--out", "out", "--set",
+               "sensors.wheels0.drive_scale=[0.5, -1, 2, 1]", "--set",
+               "sensors.wheels0.drive_channel=[2, 1, 3, 4]", "--set",
+               "sensors.wheels0.steer_scale=[1, 1, -1, 1]"});
+  EXPECT_EQ(read("out/trajectory.tum"), read("right/trajectory.tum"));
+  std::filesystem::remove_all(at("out"));
+  expect_refused({"run", "log.yaml", "--out", "out", "--set", "sensors.wheels0.drive_scale=[1, 1]"},
+                 "--set sensors.wheels0.drive_scale  sensors.wheels0.drive_scale: has 2 "
+                 "numbers for 4 drive channels of the log: one for each, in their order");
+}
+
 TEST_F(LogTest, CanBeCompressed) {
   const gzFile file = gzopen(at(kWheels).c_str(), "wb");
   const std::string all = text();

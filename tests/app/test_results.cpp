@@ -393,6 +393,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                                           "runs/euroc.yaml",
                                           "runs/euroc_board.yaml",
                                           "runs/husky_gnss.yaml",
+                                          "runs/frc_swerve.yaml",
                                           "runs/hybrid.yaml",
                                           "runs/kaist_urban.yaml",
                                           "runs/openvins_sim.yaml",

@@ -42,6 +42,9 @@ void add_option(const std::string& name, po::options_description& options) {
   } else if (name == "figures") {
     add("figures", po::value<std::string>()->value_name("FORMAT"),
         "every plot also as a static figure for a paper: svg or pdf (needs gnuplot)");
+  } else if (name == "fix") {
+    add("fix", po::value<std::string>()->value_name("FILE"),
+        "the configuration with all that is to be written into it, as a file of its own");
   } else if (name == "show") {
     add("show", "a window with the tracks in the images, the trajectory and the calibration");
   } else if (name == "video") {
@@ -111,6 +114,9 @@ void check_ranges(const Command& command, const po::variables_map& values) {
   if (values.contains("out") && values["out"].as<std::string>().empty()) {
     refuse(command, "--out needs the name of a folder");
   }
+  if (values.contains("fix") && values["fix"].as<std::string>().empty()) {
+    refuse(command, "--fix needs the name of a file");
+  }
   if (values.contains("video") && values["video"].as<std::string>().empty()) {
     refuse(command, "--video needs the name of a file");
   }
@@ -157,6 +163,7 @@ Arguments arguments_of(const po::variables_map& values) {
   arguments.show = values.contains("show");
   arguments.video = text("video");
   arguments.figures = text("figures");
+  arguments.fix = text("fix");
   arguments.reference = text("reference");
   arguments.estimate = text("estimate");
   arguments.align = text("align");

@@ -28,6 +28,7 @@ struct Arguments {
   bool show = false;
   std::filesystem::path video;  ///< none if empty
   std::string figures;          ///< "svg", "pdf" or none
+  std::filesystem::path fix;    ///< none if empty
   std::string reference, estimate, align;
 };
 
@@ -51,6 +52,7 @@ int run_command(const Arguments& arguments);
 int experiment_command(const Arguments& arguments);
 int observability_command(const Arguments& arguments);
 int evaluate_command(const Arguments& arguments);
+int inspect_command(const Arguments& arguments);
 int simulate_command(const Arguments& arguments);
 int calibrate_command(const Arguments& arguments);
 int plugins_command(const Arguments& arguments);

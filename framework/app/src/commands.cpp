@@ -12,6 +12,7 @@
 #include "viwo/eval/accuracy.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/experiment/folder_lock.hpp"
+#include "viwo/inspect/inspection.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/math/significant.hpp"
@@ -198,7 +199,7 @@ int observability_command(const Arguments& arguments) {
 
 int calibrate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
-  const calibration::CalibrationSetup setup =
+  calibration::CalibrationSetup setup =
       calibration::read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
   const auto folder = out_folder(arguments);
   make_folder(folder);
@@ -209,7 +210,22 @@ int calibrate_command(const Arguments& arguments) {
   write_calibration(folder, result);
   std::cout << describe(result) << "\ncalibration: " << (folder / "calibration.yaml").string()
             << "\nreport: " << (folder / "report.html").string() << "\n";
-  return result.all.converged ? 0 : 1;
+  return result.is_trusted() ? 0 : 1;
+}
+
+int inspect_command(const Arguments& arguments) {
+  PluginRegistry plugins = make_registry(arguments);
+  RunSetup setup = read_run_of(arguments, plugins);
+  const auto folder = out_folder(arguments);
+  make_folder(folder);
+  const inspect::Inspection inspection = inspect::inspect(setup);
+  write_inspection(folder, inspection);
+  std::cout << describe(inspection) << "report: " << (folder / "report.html").string() << "\n";
+  if (!arguments.fix.empty()) {
+    write_text(arguments.fix, fixed_configuration(setup, inspection, plugins));
+    std::cout << "configuration: " << arguments.fix.string() << "\n";
+  }
+  return inspection.has_faults() ? 1 : 0;
 }
 
 int simulate_command(const Arguments& arguments) {

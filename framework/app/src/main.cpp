@@ -19,6 +19,13 @@ constexpr Command kCommands[] = {
      "Runs one configuration, the filter or wheel odometry alone; writes trajectory, summary.json "
      "and report.html.",
      "out seed set figures show video", 1, run_command},
+    {"inspect", "inspect CONFIG [--out DIR] [--set KEY=VALUE]... [--fix FILE]",
+     "Looks at what the sensors of a run configuration gave, before any filter: rates and gaps, "
+     "units, signs, axes, noises, order of the joints, clocks. Says what is wrong and what to "
+     "write "
+     "into the configuration; writes inspection.json and report.html. Exit code 1: there are "
+     "findings. Sensors that work on images are left out (docs/inspect.md).",
+     "out seed set fix", 1, inspect_command},
     {"experiment",
      "experiment EXPERIMENT [--out DIR] [--jobs N] [--seeds N] [--resume] [--shard I/N | "
      "--collect] [--set KEY=VALUE]...",
@@ -29,8 +36,10 @@ constexpr Command kCommands[] = {
      "observe; CONFIG is a run or an experiment (variants x motions).",
      "out set figures", 1, observability_command},
     {"calibrate", "calibrate CONFIG [--out DIR] [--set KEY=VALUE]...",
-     "Estimates the wheel intrinsics from encoder logs and a reference trajectory.", "out set", 1,
-     calibrate_command},
+     "Estimates the wheel intrinsics from recordings with a gyro, reference poses or a measured "
+     "distance; says when they are not to be trusted (exit code 1). Keys of CONFIG: viwo plugins "
+     "describe calibration.",
+     "out set", 1, calibrate_command},
     {"simulate", "simulate CONFIG --out DIR [--seed N] [--set KEY=VALUE]...",
      "Writes what the sensors of a configuration yield (IMU, images' tracks, encoders, truth) as a "
      "log folder.",
@@ -40,7 +49,8 @@ constexpr Command kCommands[] = {
      evaluate_command},
     {"plugins", "plugins list | describe NAME | schema | check FILE | new KIND NAME [--out DIR]",
      "Lists the plugins that are found (kinematics, sensors, updates), the parameters of one or of "
-     "a section (estimator, imu, cameras, wheels, odometry, evaluation, run), or why a file is "
+     "a section (estimator, imu, cameras, wheels, odometry, evaluation, run, calibration), or why "
+     "a file is "
      "refused; schema gives a JSON Schema of run configurations, for editors; new writes the "
      "source "
      "of a plugin (kinematics, sensor or update) that "

@@ -4,6 +4,7 @@
 
 #include "command_line.hpp"
 #include "new_plugin.hpp"
+#include "viwo/calibration/calibrate.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/setup/schema.hpp"
@@ -33,11 +34,15 @@ int list(PluginRegistry& plugins) {
 int describe(PluginRegistry& plugins, const std::string& name) {
   std::vector<std::string> names;
   bool found = false;
-  for (const HostSection& section : host_sections()) {
+  std::vector<HostSection> sections = host_sections();
+  sections.push_back({"calibration",
+                      "a file of viwo calibrate, beside recordings or motions, and set",
+                      calibration::calibration_params()});
+  for (const HostSection& section : sections) {
     names.push_back(section.name);
     if (section.name != name) continue;
     found = true;
-    std::cout << "# section of a run configuration: " << section.summary << "\n"
+    std::cout << "# section of a configuration: " << section.summary << "\n"
               << config::describe_params(section.params);
   }
   for (const PluginListing& listing : plugins.list()) {

@@ -9,67 +9,16 @@
 
 namespace viwo {
 
-EncoderCheck::EncoderCheck(std::string name, std::shared_ptr<const WheelModel> model,
-                           const WheelsPrior& prior)
-    : name_(std::move(name)), solver_(model, {}), n_steer_(model->description().n_steer) {
+EncoderCheck::EncoderCheck(std::string name, std::string sensor,
+                           std::shared_ptr<const WheelModel> model, const WheelsPrior& prior)
+    : name_(std::move(name)),
+      sensor_(std::move(sensor)),
+      solver_(model, {}),
+      n_steer_(model->description().n_steer) {
   solver_.set_intrinsics(prior.wheels.x_WI);
-  const auto channels = [](int n, Change::Kind sign, Change::Kind exchanged,
-                           std::vector<Change>& out) {
-    for (std::size_t a = 0; a < static_cast<std::size_t>(n); ++a) {
-      out.push_back({sign, a, a});
-      for (std::size_t b = a + 1; b < static_cast<std::size_t>(n); ++b) {
-        out.push_back({exchanged, a, b});
-      }
-    }
-  };
-  changes_.push_back({});
-  channels(model->description().n_drive, Change::kDriveSign, Change::kDrivesExchanged, changes_);
-  channels(n_steer_, Change::kSteerSign, Change::kSteersExchanged, changes_);
-  if (n_steer_ > 1) changes_.push_back({Change::kSteerSigns});
-}
-
-void EncoderCheck::Change::undo(EncoderSample& sample) const {
-  switch (kind) {
-    case kNone:
-      break;
-    case kDriveSign:
-      sample.drive_rad_per_s[a] *= -1.;
-      break;
-    case kDrivesExchanged:
-      std::swap(sample.drive_rad_per_s[a], sample.drive_rad_per_s[b]);
-      break;
-    case kSteerSign:
-      sample.steer_rad[a] *= -1.;
-      break;
-    case kSteersExchanged:
-      std::swap(sample.steer_rad[a], sample.steer_rad[b]);
-      break;
-    case kSteerSigns:
-      for (double& angle : sample.steer_rad) angle *= -1.;
-      break;
+  for (const ChannelChange& change : channel_changes(model->description())) {
+    changes_.push_back({change});
   }
-}
-
-std::string EncoderCheck::Change::text() const {
-  const std::string first = std::to_string(a + 1), second = std::to_string(b + 1);
-  switch (kind) {
-    case kNone:
-      break;
-    case kDriveSign:
-      return "drive_" + first + " turns opposite to what the other wheels say: its sign";
-    case kDrivesExchanged:
-      return "drives contradict each other, and do not with drive_" + first + " and drive_" +
-             second + " exchanged: their order";
-    case kSteerSign:
-      return "steer_" + first + " turns opposite to what the other wheels say: its sign";
-    case kSteersExchanged:
-      return "wheels contradict each other, and do not with steer_" + first + " and steer_" +
-             second + " exchanged: their order";
-    case kSteerSigns:
-      return "wheels contradict each other, and do not with all steering angles reversed: their "
-             "sign, or left and right of the wheels are exchanged";
-  }
-  return "";
 }
 
 std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
@@ -101,12 +50,12 @@ void EncoderCheck::watch_steering(const EncoderSample& sample) {
 
 void EncoderCheck::try_changes(const EncoderSample& sample) {
   if (solver_.model().n_rows() <= 3) return;  // nothing can contradict anything
-  for (Change& change : changes_) {
+  for (Tried& tried : changes_) {
     EncoderSample changed = sample;
-    change.undo(changed);
+    tried.change.undo(changed);
     if (solver_.solve(changed, solution_) != Status::kOk || solution_.rank_deficient) return;
-    change.residual += solution_.e.squaredNorm();
-    change.signal += solution_.xi.head<2>().squaredNorm();
+    tried.residual += solution_.e.squaredNorm();
+    tried.signal += solution_.xi.head<2>().squaredNorm();
   }
   ++tried_;
 }
@@ -120,9 +69,12 @@ void EncoderCheck::findings(Findings& out) const {
 /// Angles beyond a turn are right where an encoder counts turns, but not so fast.
 void EncoderCheck::find_degrees(Findings& out) const {
   if (samples_ < 100 || 10 * beyond_turn_ < samples_ || 100 * too_fast_ < samples_) return;
-  out.push_back({name_ + " steering", name_ + ": steering angles up to " +
-                                          significant(largest_steer_, 3) +
-                                          " rad: they are in degrees"});
+  out.push_back({name_ + " steering",
+                 name_ + ": steering angles up to " + significant(largest_steer_, 3) +
+                     " rad: they are in degrees",
+                 false,
+                 {{"sensors." + sensor_ + ".steer_scale",
+                   yaml_list(n_steer(), [](std::size_t) { return "0.0174532925199433"; })}}});
 }
 
 /// One change, and no other, makes the contradictions of the wheels vanish: to a tenth of what they
@@ -131,17 +83,18 @@ void EncoderCheck::find_change(Findings& out) const {
   if (tried_ < 50) return;
   const auto best =
       std::min_element(changes_.begin(), changes_.end(),
-                       [](const Change& a, const Change& b) { return a.residual < b.residual; });
+                       [](const Tried& a, const Tried& b) { return a.residual < b.residual; });
   if (best == changes_.begin()) return;
   const double n_rows = solver_.model().n_rows();
   const double least = 1e-4 * n_rows * static_cast<double>(tried_);  // 1 cm/s each
-  const Change& none = changes_.front();
+  const Tried& none = changes_.front();
   if (none.residual < least || none.residual < 0.01 * none.signal) return;
-  for (const Change& other : changes_) {
+  for (const Tried& other : changes_) {
     if (&other != &*best && other.residual < 3. * best->residual) return;
   }
   if (best->residual < 0.1 * none.residual)
-    out.push_back({name_ + " order", name_ + ": " + best->text()});
+    out.push_back({name_ + " order", name_ + ": " + best->change.text(), false,
+                   best->change.remedies(sensor_, n_drive(), n_steer())});
 }
 
 }  // namespace viwo

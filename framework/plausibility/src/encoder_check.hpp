@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "viwo/api/rig.hpp"
+#include "viwo/plausibility/channel_change.hpp"
 #include "viwo/plausibility/finding.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
@@ -16,34 +17,35 @@ namespace viwo {
 
 class EncoderCheck {
  public:
-  EncoderCheck(std::string name, std::shared_ptr<const WheelModel> model, const WheelsPrior& prior);
+  /// `name` is what texts call the wheels, `sensor` what the configuration calls it.
+  EncoderCheck(std::string name, std::string sensor, std::shared_ptr<const WheelModel> model,
+               const WheelsPrior& prior);
 
   /// Samples in time order; the twist that they say, if they say one.
   std::optional<Twist> add(const EncoderSample& sample);
   void findings(Findings& out) const;
 
  private:
-  /// What may have been done to the channels.
-  struct Change {
-    enum Kind { kNone, kDriveSign, kDrivesExchanged, kSteerSign, kSteersExchanged, kSteerSigns };
-    Kind kind = kNone;
-    std::size_t a = 0, b = 0;
+  struct Tried {
+    ChannelChange change;
     double residual = 0.;  ///< sum of the squares of the parity residuals
     double signal = 0.;    ///< of what the rows say, (m/s)^2
-    void undo(EncoderSample& sample) const;
-    std::string text() const;
   };
 
+  std::size_t n_drive() const {
+    return static_cast<std::size_t>(solver_.model().description().n_drive);
+  }
+  std::size_t n_steer() const { return static_cast<std::size_t>(n_steer_); }
   void watch_steering(const EncoderSample& sample);
   void try_changes(const EncoderSample& sample);
   void find_degrees(Findings& out) const;
   void find_change(Findings& out) const;
 
-  std::string name_;
+  std::string name_, sensor_;
   TwistSolver solver_;
   TwistSolution solution_;
   int n_steer_;
-  std::vector<Change> changes_;  ///< the first is none
+  std::vector<Tried> changes_;  ///< the first is none
   std::int64_t samples_ = 0;
   std::int64_t tried_ = 0;
   std::optional<EncoderSample> last_;

@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "viwo/api/measurement.hpp"
-#include "viwo/filter/imu_watch.hpp"
+#include "viwo/estimator/imu_watch.hpp"
 #include "viwo/plausibility/finding.hpp"
 
 namespace viwo {

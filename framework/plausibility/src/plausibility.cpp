@@ -48,6 +48,14 @@ struct Plausibility::Checks {
     return std::abs(stream.ahead_s(streams.front().watch)) > kFar_s;
   }
 
+  /// `imu_text`, `wheels_text`: what texts call them.
+  void add(const std::string& sensor, const std::string& imu_text, const std::string& wheels_text,
+           const WheelSet& set) {
+    wheels.push_back({sensor, EncoderCheck(wheels_text, sensor, set.model, set.prior),
+                      TwistCheck(imu_text, wheels_text, "sensors." + sensor + ".drive_scale",
+                                 set.model->description().n_drive, set.prior)});
+  }
+
   void add(WheelsCheck& check, const EncoderSample& sample) {
     try {
       const std::optional<Twist> xi = check.encoders.add(sample);
@@ -90,7 +98,10 @@ Finding of_another_clock(const std::string& name, double ahead_s) {
 }  // namespace
 
 Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
-  if (!setup.filter) return;
+  if (!setup.filter) {
+    watch_wheels_alone(setup);
+    return;
+  }
   const FilterSetup& filter = *setup.filter;
   const std::string imu = setup.routes.sensor_of(Consumer::kImu);
   // A simulator is all of them.
@@ -111,11 +122,24 @@ Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
     if (sensor.empty()) sensor = setup.routes.sensor_of(Consumer::kWheels);
     if (sensor.empty()) continue;
     try {
-      checks_->wheels.push_back({sensor, EncoderCheck(told(sensor, "wheels"), set.model, set.prior),
-                                 TwistCheck(told(imu, "imu"), told(sensor, "wheels"), set.prior)});
+      checks_->add(sensor, told(imu, "imu"), told(sensor, "wheels"), set);
     } catch (const std::exception&) {
       continue;
     }
+  }
+}
+
+/// Of dead reckoning, which has neither an IMU nor streams.
+void Plausibility::watch_wheels_alone(const RunSetup& setup) {
+  const std::string sensor = setup.routes.sensor_of(Consumer::kWheels);
+  if (!setup.model || sensor.empty()) return;
+  checks_ = std::make_unique<Checks>(Checks{"", ImuCheck("", 0.), {}, StereoCheck({}), {}});
+  WheelSet set{setup.model, {}};
+  set.prior.wheels.x_WI = setup.x_WI;
+  try {
+    checks_->add(sensor, "", sensor, set);
+  } catch (const std::exception&) {
+    checks_.reset();
   }
 }
 
@@ -195,8 +219,7 @@ void Plausibility::finish() {
 
 void Plausibility::look(bool at_end) {
   findings_.clear();
-  if (!now_ns_) return;
-  checks_->imu.findings(*zero_ns_, findings_);
+  if (now_ns_) checks_->imu.findings(*zero_ns_, findings_);
   for (const auto& wheels : checks_->wheels) {
     const std::size_t before = findings_.size();
     wheels.encoders.findings(findings_);
@@ -204,6 +227,7 @@ void Plausibility::look(bool at_end) {
     if (findings_.size() == before) wheels.twist.findings(checks_->imu.up(), findings_);
   }
   checks_->stereo.findings(findings_);
+  if (!now_ns_ || checks_->streams.empty()) return;
   const StreamWatch& imu = checks_->streams.front().watch;
   for (const auto& stream : checks_->streams) {
     if (checks_->is_of_another_clock(stream)) {

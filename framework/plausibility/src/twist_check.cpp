@@ -8,9 +8,11 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/plausibility/channel_change.hpp"
 
 namespace viwo {
 namespace {
@@ -39,6 +41,22 @@ struct Mounting {
   Eigen::Matrix2d P;
   const char* text;
 };
+
+/// About z of the base.
+Eigen::Matrix3d embedded(const Eigen::Matrix2d& P) {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = P.transpose();
+  return R;
+}
+
+/// The quarter or half turn that takes the axis next to `is` to z.
+Eigen::Matrix3d upright(const Eigen::Vector3d& is) {
+  int i = 0;
+  is.cwiseAbs().maxCoeff(&i);
+  if (i == 2 && is.z() < 0.) return Eigen::Vector3d(1., -1., -1.).asDiagonal();
+  const Eigen::Vector3d axis = i == 2 ? is : std::copysign(1., is[i]) * Eigen::Vector3d::Unit(i);
+  return Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+}
 
 Eigen::Matrix2d matrix(double a, double b, double c, double d) {
   return (Eigen::Matrix2d() << a, b, c, d).finished();
@@ -69,9 +87,12 @@ auto CellMeans<kSize>::mean(std::int64_t cell) const -> std::optional<Vector> {
   return found.sum / static_cast<double>(found.covered_ns);
 }
 
-TwistCheck::TwistCheck(std::string imu, std::string wheels, const WheelsPrior& prior)
+TwistCheck::TwistCheck(std::string imu, std::string wheels, std::string drives, int n_drive,
+                       const WheelsPrior& prior)
     : imu_(std::move(imu)),
       wheels_(std::move(wheels)),
+      drives_(std::move(drives)),
+      n_drive_(n_drive),
       R_ItoO_(prior.wheels.R_ItoO),
       p_IinO_(prior.wheels.p_IinO.head<2>()),
       t_OtoI_s_(prior.wheels.t_OtoI_s),
@@ -188,11 +209,20 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
   if (is_about(std::abs(slope), kDeg)) {
     out.push_back({key, imu_ + ": the gyro turns " + fast + ": it is in deg/s"});
   } else if (is_about(std::abs(slope), 1. / kDeg)) {
-    out.push_back({key, wheels_ + ": turn " + slow + ": drives are in deg/s"});
+    out.push_back({key,
+                   wheels_ + ": turn " + slow + ": drives are in deg/s",
+                   false,
+                   {drives_times(1. / kDeg)}});
   } else if (is_about(std::abs(slope), std::numbers::pi / 30.)) {
-    out.push_back({key, wheels_ + ": turn " + slow + ": drives are in revolutions per minute"});
+    out.push_back({key,
+                   wheels_ + ": turn " + slow + ": drives are in revolutions per minute",
+                   false,
+                   {drives_times(std::numbers::pi / 30.)}});
   } else if (is_about(std::abs(slope), 2. * std::numbers::pi)) {
-    out.push_back({key, wheels_ + ": turn " + slow + ": drives are in revolutions per second"});
+    out.push_back({key,
+                   wheels_ + ": turn " + slow + ": drives are in revolutions per second",
+                   false,
+                   {drives_times(2. * std::numbers::pi)}});
   } else if (is_about(slope, -1.)) {
     find_reversed(C, out);
   } else if (!is_about(slope, 1.) && std::abs(r) > kVeryAlike) {
@@ -206,6 +236,24 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
   }
 }
 
+Remedy TwistCheck::drives_times(double scale) const {
+  const auto entry = [scale](std::size_t) { return significant(scale, 10); };
+  return {drives_, yaml_list(static_cast<std::size_t>(n_drive_), entry)};
+}
+
+/// The mounting with a turn of the IMU on the base.
+Remedy TwistCheck::turned_by(const Eigen::Matrix3d& R) const {
+  const Eigen::Matrix3d M = R * R_ItoO_;
+  const double pitch = std::asin(std::clamp(-M(2, 0), -1., 1.));
+  const bool is_singular = std::abs(M(2, 0)) > 1. - 1e-9;
+  const double roll = is_singular ? 0. : std::atan2(M(2, 1), M(2, 2));
+  const double yaw = is_singular ? std::atan2(-M(0, 1), M(1, 1)) : std::atan2(M(1, 0), M(0, 0));
+  const auto text = [](double angle) {
+    return significant(1e-6 * std::round(1e6 * angle) + 0., 8);
+  };
+  return {"wheels.rpy_ItoO_rad", "[" + text(roll) + ", " + text(pitch) + ", " + text(yaw) + "]"};
+}
+
 /// A base that drives on the ground is level on average, to the 30 deg of the worst ramp.
 bool TwistCheck::finds_gravity(const Eigen::Vector3d& up, double slope, Findings& out) const {
   const Eigen::Vector3d is = R_ItoO_ * up;
@@ -214,6 +262,7 @@ bool TwistCheck::finds_gravity(const Eigen::Vector3d& up, double slope, Findings
   }
   std::string text = imu_ + ": gravity is on " + axis_of(up) +
                      " where wheels.rpy_ItoO_rad puts it on " + axis_of(R_ItoO_.row(2)) + ": ";
+  Finding finding{imu_ + " up", ""};
   const bool is_opposite = is.z() < -std::sqrt(0.75) * up.norm();
   if (is_opposite && slope < 0.) {
     text += "the IMU is mounted upside down, or its axes are exchanged";
@@ -222,7 +271,9 @@ bool TwistCheck::finds_gravity(const Eigen::Vector3d& up, double slope, Findings
   } else {
     text += "the IMU is mounted otherwise, its axes are exchanged or reversed";
   }
-  out.push_back({imu_ + " up", text});
+  finding.text = text;
+  if (!is_opposite || slope <= 0.) finding.remedies = {turned_by(upright(is))};
+  out.push_back(std::move(finding));
   return true;
 }
 
@@ -255,11 +306,13 @@ void TwistCheck::find_reversed(const Eigen::MatrixXd& C, Findings& out) const {
   const double all = C(kForce, kForce) + C(kForce + 1, kForce + 1);
   const bool is_clear = all > kLeastForce * kLeastForce && variances[order[0]] < 0.7 * all &&
                         variances[order[1]] - variances[order[0]] > 0.1 * all;
-  out.push_back({imu_ + " rate",
-                 is_clear ? texts[order[0]]
-                          : imu_ + ": the gyro turns opposite to " + wheels_ +
-                                ": sign of the gyro's z, sign of all drives, or drives on the left "
-                                "and on the right exchanged"});
+  Finding finding{imu_ + " rate",
+                  imu_ + ": the gyro turns opposite to " + wheels_ +
+                      ": sign of the gyro's z, sign of all drives, or drives on the left and on "
+                      "the right exchanged"};
+  if (is_clear) finding.text = texts[order[0]];
+  if (is_clear && order[0] == 1) finding.remedies = {drives_times(-1.)};
+  out.push_back(std::move(finding));
 }
 
 /// The rates agree: so should the accelerometer and what the wheels' velocity takes.
@@ -307,8 +360,12 @@ void TwistCheck::find_axes(const Eigen::MatrixXd& C, Findings& out) const {
            (axis == 0 ? " of the accelerometer follows " : " follows ") + "xy"[other] +
            " of the wheels (correlation " + significant(r, 2) + ")";
   };
-  out.push_back({imu_ + " axes", imu_ + ": in the base's frame " + follows(0) + ", " + follows(1) +
-                                     ": " + kMountings[best].text});
+  out.push_back({imu_ + " axes",
+                 imu_ + ": in the base's frame " + follows(0) + ", " + follows(1) + ": " +
+                     kMountings[best].text,
+                 false,
+                 best >= 1 && best <= 3 ? std::vector{turned_by(embedded(kMountings[best].P))}
+                                        : std::vector<Remedy>{}});
 }
 
 /// What is left of the squared differences, for each lag, `information` being what is known of the
@@ -356,8 +413,9 @@ void TwistCheck::find_lag(double rate_variance, Findings& out) const {
   std::string text = wheels_ + (lag_s < 0. ? ": lags behind " : ": is ahead of ") + imu_ + " by " +
                      ms(std::abs(lag_s)) + ", t_OtoI_s says " + ms(t_OtoI_s_);
   if (sigma_t_OtoI_s_ > 0.) text += " +- " + ms(sigma_t_OtoI_s_);
-  text += " - wheels.t_OtoI_s: " + significant(1e-3 * std::round(1e3 * (t_OtoI_s_ + lag_s)), 6);
-  out.push_back({wheels_ + " clock", text});
+  text += " - wheels.t_OtoI_s: ";
+  const std::string t_OtoI_s = significant(1e-3 * std::round(1e3 * (t_OtoI_s_ + lag_s)), 6);
+  out.push_back({wheels_ + " lag", text + t_OtoI_s, false, {{"wheels.t_OtoI_s", t_OtoI_s}}});
 }
 
 }  // namespace viwo

@@ -42,7 +42,10 @@ class CellMeans {
 
 class TwistCheck {
  public:
-  TwistCheck(std::string imu, std::string wheels, const WheelsPrior& prior);
+  /// What texts call IMU and wheels; `drives`: the key of the scales of the drives, of which there
+  /// are `n_drive`.
+  TwistCheck(std::string imu, std::string wheels, std::string drives, int n_drive,
+             const WheelsPrior& prior);
 
   void add_imu(const ImuSample& sample);
   /// `xi`: twist of O over the time of a sample of the wheels.
@@ -72,13 +75,16 @@ class TwistCheck {
   void add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi);
   void add_to_lags(double gyro, const Twist& xi);
   void end_window();
+  Remedy drives_times(double scale) const;
+  Remedy turned_by(const Eigen::Matrix3d& R) const;
   bool finds_gravity(const Eigen::Vector3d& up, double slope, Findings& out) const;
   void find_reversed(const Eigen::MatrixXd& C, Findings& out) const;
   void find_axes(const Eigen::MatrixXd& C, Findings& out) const;
   std::array<double, kLags> left_by_lag(const Eigen::Vector4d& information) const;
   void find_lag(double rate_variance, Findings& out) const;
 
-  std::string imu_, wheels_;
+  std::string imu_, wheels_, drives_;
+  int n_drive_;
   Eigen::Matrix3d R_ItoO_;
   Eigen::Vector2d p_IinO_;
   double t_OtoI_s_, sigma_t_OtoI_s_;

@@ -6,10 +6,17 @@
 
 namespace viwo {
 
+/// What to write into the run configuration: `key: value`.
+struct Remedy {
+  std::string key;    ///< dotted path
+  std::string value;  ///< YAML
+};
+
 struct Finding {
-  std::string key;       ///< the same for the same fault, whatever its figures are by now
-  std::string text;      ///< sensor, figure, most likely cause
-  bool is_over = false;  ///< it was so for a while
+  std::string key;                    ///< the same for the same fault, whatever its figures are now
+  std::string text;                   ///< sensor, figure, most likely cause
+  bool is_over = false;               ///< it was so for a while
+  std::vector<Remedy> remedies = {};  ///< of a cause that a configuration can undo
 };
 using Findings = std::vector<Finding>;
 

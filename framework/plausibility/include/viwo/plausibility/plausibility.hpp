@@ -35,6 +35,7 @@ class Plausibility {
  private:
   struct Checks;
   void watch_streams(const RunSetup& setup);
+  void watch_wheels_alone(const RunSetup& setup);
   void watch(const std::string& sensor, SampleView sample);
   void look_now_and_then();
   void look(bool at_end);

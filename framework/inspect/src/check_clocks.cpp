@@ -1,0 +1,285 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include <Eigen/Cholesky>
+
+#include "checks.hpp"
+#include "clock_finding.hpp"
+#include "lag.hpp"
+#include "viwo/eval/statistics.hpp"
+#include "viwo/math/arrays.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/math/so3.hpp"
+#include "viwo/math/time_text.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+double period_of(const std::vector<Turn>& turns) {
+  std::vector<double> periods;
+  for (const Turn& turn : turns) periods.push_back(seconds_between(turn.begin_ns, turn.end_ns));
+  return periods.empty() ? 0. : eval::median(periods);
+}
+
+/// A clock that was set: the lags of tenths of the time are of two values, one after the other.
+struct ClockChange {
+  double at_s = 0., first_s = 0., then_s = 0.;
+};
+std::optional<ClockChange> clock_change(const std::vector<std::pair<double, double>>& parts) {
+  std::optional<ClockChange> found;
+  double least = INFINITY;
+  for (std::size_t k = 2; k + 2 <= parts.size(); ++k) {
+    std::vector<double> first, then;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      (i < k ? first : then).push_back(parts[i].second);
+    }
+    const auto spread = [](const std::vector<double>& lags) {
+      const auto [low, high] = std::minmax_element(lags.begin(), lags.end());
+      return *high - *low;
+    };
+    // The tenth in which it was set is between the two.
+    const double within = std::max(spread(first), spread(then));
+    const double jump = eval::median(then) - eval::median(first);
+    constexpr double kLeast_s = 0.02, kClearly = 3.;
+    if (std::abs(jump) < std::max(kLeast_s, kClearly * within) || within >= least) continue;
+    least = within;
+    found = {0.5 * (parts[k - 1].first + parts[k].first), eval::median(first), eval::median(then)};
+  }
+  return found;
+}
+
+/// How the yaw rate that the gyro has comes from the twist that the wheels say, [b, c, 1]: wheels
+/// that are not quite as configured take a part of a velocity for a turn, a base that drives in
+/// curves both ways shows it, and it would be taken for a lag. Priors: 0.05 rad/m.
+Vector3d yaw_of_twist(const RateGrid& gyro, const RateGrid& twists, double lag_s) {
+  const auto lag = static_cast<std::int64_t>(std::lround(lag_s / RateGrid::kCell_s));
+  Eigen::Matrix4d N = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d h = Eigen::Vector4d::Zero();
+  double squares = 0., n = 0.;
+  for (std::size_t i = 0; i < gyro.size(); ++i) {
+    const std::int64_t j = static_cast<std::int64_t>(i) + lag;
+    if (j < 0 || j >= static_cast<std::int64_t>(twists.size())) continue;
+    const auto k = static_cast<std::size_t>(j);
+    if (!gyro.has(i) || !twists.has(k)) continue;
+    const Eigen::Vector4d by(1., twists[k].x(), twists[k].y(), twists[k].z());
+    const double difference = gyro[i].z() - twists[k].z();
+    N += by * by.transpose();
+    h += difference * by;
+    squares += difference * difference;
+    n += 1.;
+  }
+  if (n < 100.) return Vector3d::UnitZ();
+  const double left = (squares - h.dot(N.ldlt().solve(h))) / n;
+  // What else they differ by, slopes of the ground or slip, lasts for half a second.
+  constexpr double kSame = 0.5 / RateGrid::kCell_s, kPart = 0.05;
+  N.diagonal().tail<3>().array() += kSame * std::max(left, 0.) / (kPart * kPart);
+  const Eigen::Vector4d part = N.ldlt().solve(h);
+  if (!part.allFinite() || part[3] <= -0.9) return Vector3d::UnitZ();
+  return {part[1] / (1. + part[3]), part[2] / (1. + part[3]), 1.};
+}
+
+bool turns_meanwhile(const Recording& recording, std::int64_t from_ns, std::int64_t length_ns) {
+  constexpr double kTurns_rad_per_s = 0.05;
+  return std::any_of(recording.imu.begin(), recording.imu.end(), [&](const ImuSample& sample) {
+    return sample.t_ns > from_ns && sample.t_ns < from_ns + length_ns &&
+           to_vector(sample.gyro_rad_per_s).norm() > kTurns_rad_per_s;
+  });
+}
+
+/// Images that show nothing, or the same again, while others come.
+void check_tracks(const Recording& recording, const CameraTurns& camera, const std::string& label,
+                  Findings& out) {
+  constexpr double kLong_s = 1.;
+  std::int64_t blind_ns = 0, blind_from_ns = 0, same_from_ns = 0, longest_ns = 0,
+               longest_from_ns = 0;
+  for (std::size_t i = 0; i < camera.turns.size(); ++i) {
+    const Turn& turn = camera.turns[i];
+    if (i > 0 && turn.begin_ns - camera.turns[i - 1].end_ns > blind_ns) {
+      blind_ns = turn.begin_ns - camera.turns[i - 1].end_ns;
+      blind_from_ns = camera.turns[i - 1].end_ns;
+    }
+    // No camera finds a hundred points where they were, to the last bit.
+    constexpr double kSame = 1e-9;
+    if (turn.rate.norm() > kSame || i == 0) same_from_ns = turn.end_ns;
+    if (turn.end_ns - same_from_ns > longest_ns) {
+      longest_ns = turn.end_ns - same_from_ns;
+      longest_from_ns = same_from_ns;
+    }
+  }
+  const auto from = [&](std::int64_t t_ns) { return time_text(t_ns - recording.begin_ns()); };
+  const double blind_s = 1e-9 * static_cast<double>(blind_ns);
+  if (blind_s > kLong_s) {
+    out.push_back({label,
+                   Severity::kNote,
+                   "tracks",
+                   "no two images share eight points for " + significant(blind_s, 2) + " s from " +
+                       from(blind_from_ns) + " on",
+                   {{"longest without points", blind_s, "s"}}});
+  }
+  const double same_s = 1e-9 * static_cast<double>(longest_ns);
+  if (same_s > kLong_s && turns_meanwhile(recording, longest_from_ns, longest_ns)) {
+    out.push_back({label,
+                   Severity::kFault,
+                   "tracks",
+                   "the same points in all images for " + significant(same_s, 2) + " s from " +
+                       from(longest_from_ns) + " on, while the gyro turns: it was frozen",
+                   {{"frozen", same_s, "s"}}});
+  }
+}
+
+}  // namespace
+
+Finding clock_finding(const std::string& label, const ClockWords& words, const Lag& lag,
+                      double sigma_prior_s, double period_s) {
+  const auto ms = [](double seconds) { return significant(1e3 * seconds, 3) + " ms"; };
+  Finding finding{label,
+                  Severity::kFits,
+                  words.check,
+                  "",
+                  {{"lag", lag.lag_s, "s"},
+                   {"sigma", lag.sigma_s, "s"},
+                   {"correlation", lag.correlation, ""},
+                   {"correlation without lag", lag.at_zero, ""},
+                   {"rate, standard deviation", lag.rate_rad_per_s, "rad/s"},
+                   {"configured clock", words.configured_s, "s"}}};
+  if (const auto change = clock_change(lag.parts)) {
+    finding.severity = Severity::kFault;
+    finding.what = "its clock against that of " + words.other + " is " + ms(change->first_s) +
+                   " until about " + significant(change->at_s, 3) + " s, and " +
+                   ms(change->then_s) +
+                   " from then on: one of the two was set, or lost samples without their time";
+    finding.figures.push_back({"change", change->then_s - change->first_s, "s"});
+    return finding;
+  }
+  const std::string by = ms(std::abs(lag.lag_s)) + " +- " + ms(lag.sigma_s) + " (correlation " +
+                         significant(lag.correlation, 3) + ")";
+  // Beyond what the filter corrects by itself, from the prior it is given, and what stamps of
+  // samples of that length can mean.
+  const double most_s = 3. * std::hypot(sigma_prior_s, lag.sigma_s) + 0.25 * period_s;
+  // Two sensors that hardly say the same give no time.
+  constexpr double kTrusted = 0.8, kMostSigma_s = 0.02;
+  const bool differs = std::abs(lag.correlation) < kTrusted;
+  if (differs || (lag.sigma_s > kMostSigma_s && std::abs(lag.lag_s) < 5. * lag.sigma_s)) {
+    finding.severity = Severity::kNote;
+    finding.what = (differs ? "its rate and that of " + words.other + " are too different"
+                            : std::string("it turns too evenly")) +
+                   " to compare clocks (" + by + ")";
+    return finding;
+  }
+  if (std::abs(lag.lag_s) <= most_s) {
+    finding.what = words.clock + " fits: off by " + by + " against " + words.other;
+  } else {
+    finding.severity = Severity::kFault;
+    finding.what = std::string(lag.lag_s > 0. ? "lags behind " : "is ahead of ") + words.other +
+                   " by " + by + ", beyond what " + words.key + " says";
+    const double value = words.configured_s - lag.lag_s;
+    finding.remedies = {{words.key, significant(1e-4 * std::round(1e4 * value), 6)}};
+  }
+  return finding;
+}
+
+void check_wheel_clocks(const Recording& recording, Findings& out) {
+  if (recording.imu.empty()) return;
+  const std::string imu = recording.label<ImuSample>(recording.imu_sensor);
+  const Span span = span_of(recording);
+  for (const Wheels& wheels : recording.wheels) {
+    if (wheels.samples.empty()) continue;
+    const std::string label = recording.label<EncoderSample>(wheels.sensor);
+    std::vector<Turn> of_wheels = twists_of(wheels);
+    const auto gyro = about(turns_of(recording.imu), yaw_axis_of(recording, wheels.prior));
+    const RateGrid a(span.begin_ns, span.end_ns, gyro);
+    std::optional<Lag> lag =
+        find_lag(a, RateGrid(span.begin_ns, span.end_ns, about(of_wheels, Vector3d::UnitZ())));
+    if (lag && lag->correlation > 0.) {
+      const RateGrid twists(span.begin_ns, span.end_ns, of_wheels);
+      const Vector3d row = yaw_of_twist(a, twists, lag->lag_s);
+      const RateGrid b(span.begin_ns, span.end_ns, about(of_wheels, row));
+      if (const auto better = find_lag(a, b)) lag = better;
+    }
+    if (!lag) {
+      out.push_back({label, Severity::kNote, "clock",
+                     "too little rotation, or too little in common with " + imu +
+                         ", to compare its clock and sign with the gyro"});
+      continue;
+    }
+    const std::string key =
+        wheels.prior.name.empty() ? "wheels" : "wheel_sets." + wheels.prior.name + ".wheels";
+    Finding clock = clock_finding(
+        label, {"clock", "clock", key + ".t_OtoI_s", imu, wheels.prior.wheels.t_OtoI_s}, *lag,
+        wheels.prior.sigma_time_offset_s, std::max(period_of(gyro), period_of(of_wheels)));
+    clock.figures.push_back({"wheels by gyro", lag->slope, ""});
+    if (lag->correlation < -0.8) {
+      clock.severity = Severity::kFault;
+      clock.remedies.clear();
+      clock.what = "turns opposite to " + imu + " (correlation " +
+                   significant(lag->correlation, 3) +
+                   "): the IMU is upside down, all drives are reversed, or left and right are "
+                   "exchanged";
+    }
+    out.push_back(clock);
+  }
+}
+
+void check_camera_clocks(const Recording& recording, Findings& out) {
+  if (recording.imu.empty() || !recording.setup->filter) return;
+  const std::string imu = recording.label<ImuSample>(recording.imu_sensor);
+  const std::vector<Turn> gyro = turns_of(recording.imu);
+  const Span span = span_of(recording);
+  for (const CameraTurns& camera : recording.cameras) {
+    const CameraPrior& prior =
+        recording.setup->filter->cameras[static_cast<std::size_t>(camera.camera)];
+    const std::string label =
+        recording.label<FeatureSample>(camera.sensor) + ", camera " + std::to_string(camera.camera);
+    if (camera.turns.empty()) {
+      out.push_back({label, Severity::kNote, "tracks", "no two images share eight points"});
+      continue;
+    }
+    check_tracks(recording, camera, label, out);
+    const auto turns =
+        shifted(rotated(camera.turns, prior.camera.R_ItoC.transpose()), prior.camera.t_CtoI_s);
+    const RateGrid a(span.begin_ns, span.end_ns, gyro), b(span.begin_ns, span.end_ns, turns);
+    const auto R = rotation_between(a, b);
+    const double angle = R ? log_so3(*R).norm() * 180. / std::numbers::pi : NAN;
+    // Points that are near spoil the axes by less than that.
+    constexpr double kMostAngle = 15.;
+    if (R && angle > kMostAngle) {
+      const auto turned =
+          find_lag(a, RateGrid(span.begin_ns, span.end_ns, rotated(turns, R->transpose())));
+      if (turned && turned->correlation > 0.8) {
+        out.push_back({label,
+                       Severity::kFault,
+                       "axes",
+                       "turns as " + imu + " does only if it is mounted " + significant(angle, 3) +
+                           " deg otherwise than the calibration says (correlation " +
+                           significant(turned->correlation, 3) +
+                           "): T_cam_imu in the file of section cameras is inverted, of another "
+                           "camera, or of another IMU",
+                       {{"angle", angle, "deg"}, {"correlation", turned->correlation, ""}}});
+        continue;
+      }
+    }
+    const std::optional<Lag> lag = find_lag(a, b, 0.5);
+    if (!lag) {
+      out.push_back({label, Severity::kNote, "clock",
+                     "too little rotation to compare its clock with " + imu});
+      continue;
+    }
+    Finding clock =
+        clock_finding(label, {"clock", "clock", "timeshift_cam_imu", imu, prior.camera.t_CtoI_s},
+                      *lag, prior.sigma_clock_s, std::max(period_of(gyro), period_of(turns)));
+    clock.figures.push_back({"points in two images", eval::median(camera.points), ""});
+    clock.figures.push_back({"angle to calibration", angle, "deg"});
+    if (clock.severity == Severity::kFault) {
+      clock.what += " in the file of section cameras";
+    }
+    out.push_back(clock);
+  }
+}
+
+}  // namespace viwo::inspect

@@ -1,0 +1,270 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include "checks.hpp"
+#include "clock_finding.hpp"
+#include "lag.hpp"
+#include "viwo/eval/statistics.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/math/so3.hpp"
+#include "viwo/plausibility/channel_change.hpp"
+#include "viwo/wheel/twist_solver.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Turns about the vertical of the world, of a pose source.
+std::vector<Turn> yaw_turns_of(const Trajectory& poses) {
+  std::vector<Turn> turns = turns_of(poses);
+  std::size_t k = 0;
+  for (Turn& turn : turns) {
+    while (k + 1 < poses.size() && poses[k].t_ns < turn.begin_ns) ++k;
+    turn.rate = Vector3d(0., 0., (poses[k].q_BtoW * turn.rate).z());
+  }
+  return turns;
+}
+
+/// Displacements over windows: of the wheels by their speed, of the poses by their positions.
+struct Speeds {
+  std::vector<double> ratio;   ///< of the wheels to the poses
+  std::vector<double> cosine;  ///< of the direction in the plane, body frames as they are
+  double path_m = 0.;
+};
+
+Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
+  Speeds speeds;
+  TwistSolver solver(wheels.model, {});
+  solver.set_intrinsics(wheels.prior.wheels.x_WI);
+  TwistSolution solution;
+  constexpr double kWindow_s = 1., kLeast_m = 0.03;
+  const auto clock_ns = static_cast<std::int64_t>(std::llround(1e9 * wheels.prior.wheels.t_OtoI_s));
+  double path = 0., time_s = 0.;
+  Eigen::Vector2d along = Eigen::Vector2d::Zero();
+  std::int64_t begin_ns = 0;
+  for (const EncoderSample& sample : wheels.samples) {
+    if (time_s == 0.) begin_ns = sample.begin_ns;
+    const double dt_s = seconds_between(sample.begin_ns, sample.end_ns);
+    if (solver.solve(sample, solution) != Status::kOk || solution.rank_deficient) continue;
+    path += solution.xi.head<2>().norm() * dt_s;
+    along += solution.xi.head<2>() * dt_s;
+    time_s += dt_s;
+    if (seconds_between(begin_ns, sample.end_ns) < kWindow_s) continue;
+    const auto from = interpolate(poses, begin_ns + clock_ns, 0.5);
+    const auto to = interpolate(poses, sample.end_ns + clock_ns, 0.5);
+    const bool is_whole = time_s > 0.9 * seconds_between(begin_ns, sample.end_ns);
+    if (from && to && is_whole) {
+      const Vector3d moved = to->p_BinW - from->p_BinW;
+      const double angle = from->q_BtoW.angularDistance(to->q_BtoW);
+      // Nearly straight: the chord is the path, wherever the body is on the base.
+      constexpr double kStraight = 0.1;
+      if (moved.norm() > kLeast_m && angle < kStraight) {
+        const Vector3d in_B = from->q_BtoW.conjugate() * moved;
+        speeds.ratio.push_back(path / moved.norm());
+        if (along.norm() > 0. && in_B.head<2>().norm() > 0.) {
+          speeds.cosine.push_back(
+              along.normalized().dot(Eigen::Vector2d(in_B.head<2>().normalized())));
+        }
+        speeds.path_m += moved.norm();
+      }
+    }
+    path = time_s = 0.;
+    along.setZero();
+  }
+  return speeds;
+}
+
+struct Unit {
+  double factor;  ///< of rad/s
+  const char* name;
+};
+
+void check_heading(const Speeds& speeds, const std::string& label, const std::string& other,
+                   Findings& out) {
+  const double cosine = eval::median(speeds.cosine);
+  Finding heading{label,
+                  Severity::kFits,
+                  "heading",
+                  "goes where " + other + " goes",
+                  {{"cosine of the angle", cosine, ""}}};
+  constexpr double kReversed = -0.9;
+  if (cosine < kReversed) {
+    heading.severity = Severity::kFault;
+    heading.what =
+        "goes backwards where " + other +
+        " goes forwards: sign of all drives, or the frame of the poses is turned by half "
+        "a turn";
+  } else if (cosine < 0.5) {
+    heading.severity = Severity::kNote;
+    heading.what = "goes elsewhere than " + other + " (cosine " + significant(cosine, 2) +
+                   "): the body of the poses is turned on the base";
+  }
+  out.push_back(heading);
+}
+
+/// How far the wheels say that the base went, by how far the poses say.
+void check_speed(const Recording& recording, const Wheels& wheels, const Poses& poses,
+                 const std::string& other, Findings& out) {
+  const std::string label = recording.label<EncoderSample>(wheels.sensor);
+  const Speeds speeds = speeds_of(wheels, poses.poses);
+  constexpr std::size_t kFewest = 5;
+  if (speeds.ratio.size() < kFewest) return;
+  const double ratio = eval::median(speeds.ratio);
+  Finding finding{label,
+                  Severity::kFits,
+                  "speed",
+                  "goes " + significant(ratio, 3) + " times as far as " + other,
+                  {{"wheels by poses", ratio, ""},
+                   {"windows", static_cast<double>(speeds.ratio.size()), ""},
+                   {"path", speeds.path_m, "m"}}};
+  const std::array<Unit, 3> units = {Unit{180. / std::numbers::pi, "deg/s"},
+                                     Unit{30. / std::numbers::pi, "revolutions per minute"},
+                                     Unit{0.5 / std::numbers::pi, "revolutions per second"}};
+  // Slip, tyres and poses that are decimetres off stay within; a wrong diameter does not.
+  constexpr double kMost = 0.15;
+  const double spread = 1.2 *
+                        (eval::quantile(speeds.ratio, 0.75) - eval::quantile(speeds.ratio, 0.25)) /
+                        std::sqrt(static_cast<double>(speeds.ratio.size()));
+  finding.figures.push_back({"sigma", spread, ""});
+  if (std::abs(ratio - 1.) > kMost + 3. * spread) {
+    finding.severity = Severity::kFault;
+    const auto unit = std::find_if(units.begin(), units.end(), [&](const Unit& u) {
+      return std::abs(ratio / u.factor - 1.) < kMost;
+    });
+    if (unit != units.end()) {
+      finding.what += std::string(": drives are in ") + unit->name;
+      const auto entry = [&](std::size_t) { return significant(1. / unit->factor, 10); };
+      const auto n = static_cast<std::size_t>(wheels.model->description().n_drive);
+      finding.remedies = {{"sensors." + wheels.sensor + ".drive_scale", yaml_list(n, entry)}};
+    } else {
+      finding.what +=
+          ": radius of the wheels (a diameter?), gear ratio or counts per turn, or "
+          "their unit";
+    }
+  }
+  out.push_back(finding);
+  if (speeds.cosine.size() >= kFewest) check_heading(speeds, label, other, out);
+}
+
+/// Whether the body of reference states is the IMU, as they are taken.
+bool has_axes_of_imu(const Recording& recording, const Poses& poses, const std::string& label,
+                     Findings& out) {
+  const Span span = span_of(recording);
+  const auto R = rotation_between(RateGrid(span.begin_ns, span.end_ns, turns_of(recording.imu)),
+                                  RateGrid(span.begin_ns, span.end_ns, turns_of(poses.poses)));
+  const double angle = R ? log_so3(*R).norm() * 180. / std::numbers::pi : 0.;
+  constexpr double kMostAngle = 15.;
+  if (angle <= kMostAngle) return true;
+  const Eigen::Quaterniond q(*R);
+  out.push_back({label,
+                 Severity::kFault,
+                 "axes",
+                 "its body is turned by " + significant(angle, 3) +
+                     " deg from the IMU (quaternion xyzw of I in it " + significant(q.x(), 3) +
+                     " " + significant(q.y(), 3) + " " + significant(q.z(), 3) + " " +
+                     significant(q.w(), 3) +
+                     "): reference states must be those of the IMU - turn them, or choose asl_pose",
+                 {{"angle", angle, "deg"}}});
+  return false;
+}
+
+/// Clock and sign of the turns of poses against others of the same frame.
+void check_clock(const Recording& recording, std::vector<Turn> of_poses, const std::string& label,
+                 const std::vector<Turn>& turns, const std::string& other, double configured_s,
+                 Findings& out) {
+  const Span span = span_of(recording);
+  of_poses = shifted(std::move(of_poses), -configured_s);
+  const RateGrid a(span.begin_ns, span.end_ns, turns), b(span.begin_ns, span.end_ns, of_poses);
+  const std::optional<Lag> lag = find_lag(a, b);
+  if (!lag) {
+    out.push_back(
+        {label, Severity::kNote, "clock",
+         "too little rotation, or too little in common with " + other + ", to compare its clock"});
+    return;
+  }
+  std::vector<double> periods;
+  for (const Turn& turn : of_poses) periods.push_back(seconds_between(turn.begin_ns, turn.end_ns));
+  const double period_s = periods.empty() ? 0. : eval::median(periods);
+  const bool is_key = !recording.setup->filter;
+  Finding clock = clock_finding(
+      label,
+      {"clock", "clock", is_key ? "odometry.reference_time_offset_s" : "the clock of the poses",
+       other, -configured_s},
+      *lag, 0., 2. * period_s);
+  // t_reference = t_wheel + offset: what lags is later by that.
+  if (!clock.remedies.empty()) {
+    clock.remedies[0].value = significant(1e-4 * std::round(1e4 * (configured_s + lag->lag_s)), 6);
+    if (!is_key) clock.remedies.clear();
+  }
+  // A reference is not what the filter runs on.
+  if (clock.severity == Severity::kFault && !is_key) {
+    clock.severity = Severity::kNote;
+    clock.what += ": errors against it grow by the speed times that";
+  }
+  if (lag->correlation < -0.8) {
+    clock.severity = Severity::kFault;
+    clock.remedies.clear();
+    clock.what = "turns opposite to " + other + " (correlation " +
+                 significant(lag->correlation, 3) +
+                 "): its z axis points down, its quaternion is inverted (world in body), or " +
+                 other + " is reversed";
+  }
+  out.push_back(clock);
+}
+
+}  // namespace
+
+Span span_of(const Recording& recording) {
+  std::int64_t begin_ns = INT64_MIN, end_ns = INT64_MAX;
+  const auto include = [&](std::int64_t first_ns, std::int64_t last_ns) {
+    begin_ns = std::max(begin_ns, first_ns);
+    end_ns = std::min(end_ns, last_ns);
+  };
+  if (!recording.imu.empty()) {
+    include(recording.imu.front().t_ns, recording.imu.back().t_ns);
+  } else {
+    for (const Wheels& wheels : recording.wheels) {
+      if (wheels.samples.empty()) continue;
+      include(wheels.samples.front().begin_ns, wheels.samples.back().end_ns);
+      break;
+    }
+  }
+  return begin_ns < end_ns && begin_ns != INT64_MIN ? Span{begin_ns, end_ns} : Span{};
+}
+
+void check_poses(const Recording& recording, Findings& out) {
+  for (const Poses& poses : recording.poses) {
+    if (poses.poses.size() < 10) continue;
+    const std::string label = poses.of_imu ? recording.label<StateSample>(poses.sensor)
+                                           : recording.label<PoseSample>(poses.sensor);
+    if (!recording.imu.empty() && poses.of_imu) {
+      if (!has_axes_of_imu(recording, poses, label, out)) continue;
+      check_clock(recording, turns_of(poses.poses), label, turns_of(recording.imu),
+                  recording.label<ImuSample>(recording.imu_sensor), 0., out);
+    } else if (!recording.imu.empty()) {
+      Vector3d up = up_of(recording);
+      if (up.norm() == 0. && !recording.wheels.empty()) {
+        up = recording.wheels.front().prior.wheels.R_ItoO.row(2);
+      }
+      if (up.norm() > 0.) {
+        check_clock(recording, yaw_turns_of(poses.poses), label, about(turns_of(recording.imu), up),
+                    recording.label<ImuSample>(recording.imu_sensor), 0., out);
+      }
+    } else if (!recording.wheels.empty() && !recording.wheels.front().samples.empty()) {
+      const Wheels& wheels = recording.wheels.front();
+      check_clock(recording, yaw_turns_of(poses.poses), label, turns_of(wheels),
+                  recording.label<EncoderSample>(wheels.sensor),
+                  recording.setup->reference_time_offset_s, out);
+    }
+    for (const Wheels& wheels : recording.wheels) {
+      if (!wheels.samples.empty()) check_speed(recording, wheels, poses, label, out);
+    }
+  }
+}
+
+}  // namespace viwo::inspect

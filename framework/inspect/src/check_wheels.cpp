@@ -1,0 +1,275 @@
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include <Eigen/Cholesky>
+
+#include "checks.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/math/time_text.hpp"
+#include "viwo/wheel/twist_solver.hpp"
+#include "viwo/wheel/wheel_check.hpp"
+#include "viwo/wheel/wheel_noise.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+/// Every so many samples, so that what is done to each is done to no more than this of them.
+std::size_t stride_for(std::size_t n, std::size_t most) {
+  return std::max<std::size_t>(1, n / most);
+}
+
+struct Calibration {
+  Intrinsics x_WI;
+  IntrinsicMatrix P;
+};
+
+/// Where the wheels contradict each other least, within what the prior allows: its Gauss-Newton
+/// steps (W-10). What the wheels still contradict is noise, or lies.
+std::optional<Calibration> calibrated(const Wheels& wheels) {
+  const WheelsView& view = wheels.prior.wheels;
+  const int n = wheels.model->n_intrinsics();
+  Calibration found{view.x_WI, IntrinsicMatrix::Zero(n, n)};
+  const Intrinsics& sigma = wheels.prior.sigma_intrinsics;
+  if (sigma.size() != n || wheels.model->n_rows() <= 3) return {};
+  TwistSolver solver(wheels.model, {.noise_weighted = true});
+  TwistSolution solution;
+  ParityInformation parity;
+  constexpr int kSteps = 3;
+  constexpr std::size_t kMost = 4000;
+  const std::size_t stride = stride_for(wheels.samples.size(), kMost);
+  for (int step = 0; step < kSteps; ++step) {
+    solver.set_intrinsics(found.x_WI);
+    parity.reset(n);
+    for (std::size_t i = 0; i < wheels.samples.size(); i += stride) {
+      if (solver.solve(wheels.samples[i], solution) != Status::kOk) continue;
+      const auto residual = solver.parity();
+      const double dof = std::max(residual.dof(), 1);
+      // As Student's t with few degrees of freedom: a liar has a bounded say.
+      solver.add_parity(residual, 1. / (1. + residual.chi2() / (10. * dof)), parity);
+    }
+    IntrinsicMatrix N = parity.Lambda;
+    Intrinsics h = -parity.eta;
+    for (int i = 0; i < n; ++i) {
+      const double information = sigma[i] > 0. ? 1. / (sigma[i] * sigma[i]) : 1e18;
+      N(i, i) += information;
+      h[i] -= information * (found.x_WI[i] - view.x_WI[i]);
+    }
+    const Eigen::LDLT<IntrinsicMatrix> solve(N);
+    const Intrinsics d = solve.solve(h);
+    if (!d.allFinite()) return {};
+    found.x_WI += d;
+    found.P = solve.solve(IntrinsicMatrix::Identity(n, n));
+  }
+  return found;
+}
+
+/// A channel that gives one number all the time while another moves.
+void check_channels(const Wheels& wheels, const std::string& label, Findings& out) {
+  const auto& samples = wheels.samples;
+  const ModelDescription& description = wheels.model->description();
+  constexpr double kMoves_rad_per_s = 0.1;
+  double fastest = 0.;
+  for (const EncoderSample& sample : samples) {
+    for (int i = 0; i < description.n_drive; ++i) {
+      fastest = std::max(fastest, std::abs(sample.drive_rad_per_s[static_cast<std::size_t>(i)]));
+    }
+  }
+  if (fastest < kMoves_rad_per_s || samples.size() < 100) {
+    out.push_back({label,
+                   Severity::kNote,
+                   "motion",
+                   "the wheels do not turn in this recording",
+                   {{"fastest drive", fastest, "rad/s"}}});
+    return;
+  }
+  for (std::size_t i = 0; i < static_cast<std::size_t>(description.n_drive); ++i) {
+    const double value = samples.front().drive_rad_per_s[i];
+    if (std::any_of(samples.begin(), samples.end(), [&](const EncoderSample& sample) {
+          return sample.drive_rad_per_s[i] != value;
+        })) {
+      continue;
+    }
+    out.push_back({label, Severity::kFault, "channel",
+                   "drive_" + std::to_string(i + 1) + " reads " + significant(value, 3) +
+                       " rad/s all the time, while another turns with up to " +
+                       significant(fastest, 3) + " rad/s: not connected, or not read"});
+  }
+}
+
+/// What the others contradict (W-12), channel by channel: now and then it is slip, for long it is a
+/// fault.
+void check_liars(const Recording& recording, const Wheels& wheels, const Calibration& calibration,
+                 const std::string& label, Findings& out) {
+  constexpr double kProbability = 1e-4;
+  WheelCheck check(wheels.model, kProbability);
+  if (!check.is_on()) return;
+  check.set_calibration(calibration.x_WI, calibration.P);
+  struct Run {
+    std::int64_t samples = 0;                         ///< left out in all
+    std::int64_t from_ns = 0, to_ns = 0, now_ns = 0;  ///< the longest without a break, and this one
+    bool lasts = false;
+  };
+  const ModelDescription& description = wheels.model->description();
+  const auto n_drive = static_cast<std::size_t>(description.n_drive);
+  const auto n = n_drive + static_cast<std::size_t>(description.n_steer);
+  std::vector<Run> runs(n);
+  for (const EncoderSample& sample : wheels.samples) {
+    EncoderSample checked = sample;
+    check.check(checked);
+    for (std::size_t i = 0; i < n; ++i) {
+      Run& run = runs[i];
+      const bool is_bad = i < n_drive ? (checked.bad_drives >> i & 1u) != 0
+                                      : (checked.bad_steers >> (i - n_drive) & 1u) != 0;
+      if (is_bad && !run.lasts) run.now_ns = sample.t_ns;
+      run.lasts = is_bad;
+      if (!is_bad) continue;
+      ++run.samples;
+      if (sample.t_ns - run.now_ns > run.to_ns - run.from_ns) {
+        run.from_ns = run.now_ns;
+        run.to_ns = sample.t_ns;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const Run& run = runs[i];
+    const double longest_s = seconds_between(run.from_ns, run.to_ns);
+    const double share =
+        static_cast<double>(run.samples) / static_cast<double>(wheels.samples.size());
+    // Slip of a wheel is over after half a second.
+    constexpr double kLong_s = 0.5, kShare = 0.2;
+    if (longest_s < kLong_s && share < kShare) continue;
+    const std::string channel =
+        i < n_drive ? "drive_" + std::to_string(i + 1) : "steer_" + std::to_string(i - n_drive + 1);
+    out.push_back({label,
+                   Severity::kFault,
+                   "contradicted",
+                   channel + " is contradicted by all others in " + significant(100. * share, 2) +
+                       " % of the samples, for " + significant(longest_s, 2) + " s from " +
+                       time_text(run.from_ns - recording.begin_ns()) +
+                       " on: it was dead, blocked, slipped, or its encoder jumped",
+                   {{"share", share, ""}, {"longest", longest_s, "s"}}});
+  }
+}
+
+/// Samples of a tenth of a second each: means of those in it.
+std::vector<EncoderSample> merged(const std::vector<EncoderSample>& samples) {
+  constexpr double kLength_s = 0.1;
+  std::vector<EncoderSample> out;
+  for (std::size_t i = 0; i < samples.size();) {
+    EncoderSample sum = samples[i];
+    double n = 1.;
+    for (++i; i < samples.size() && samples[i].begin_ns == sum.end_ns &&
+              seconds_between(sum.begin_ns, samples[i].end_ns) <= 1.001 * kLength_s;
+         ++i, n += 1.) {
+      sum.end_ns = samples[i].end_ns;
+      for (std::size_t k = 0; k < kMaxDrives; ++k) {
+        sum.drive_rad_per_s[k] += samples[i].drive_rad_per_s[k];
+      }
+      for (std::size_t k = 0; k < kMaxSteers; ++k) sum.steer_rad[k] += samples[i].steer_rad[k];
+    }
+    for (double& rate : sum.drive_rad_per_s) rate /= n;
+    for (double& angle : sum.steer_rad) angle /= n;
+    sum.t_ns = sum.begin_ns + (sum.end_ns - sum.begin_ns) / 2;
+    out.push_back(sum);
+  }
+  return out;
+}
+
+std::vector<NoiseFound> noises_of(const Wheels& wheels, const Calibration& calibration,
+                                  const std::vector<EncoderSample>& samples) {
+  WheelNoise noise(wheels.model);
+  for (const EncoderSample& sample : samples) noise.add(sample, calibration.x_WI, calibration.P);
+  std::vector<NoiseFound> found;
+  noise.append_to(found);
+  return found;
+}
+
+/// From sample to sample, and over a tenth of a second, which is what an epoch has: the steps of an
+/// angle that is counted cancel out in it, slip does not. The smaller one counts.
+void check_noises(const Wheels& wheels, const Calibration& calibration, const std::string& label,
+                  Findings& out) {
+  std::vector<NoiseFound> found = noises_of(wheels, calibration, wheels.samples);
+  const std::vector<EncoderSample> longer = merged(wheels.samples);
+  const double times = std::sqrt(static_cast<double>(wheels.samples.size()) /
+                                 static_cast<double>(std::max<std::size_t>(1, longer.size())));
+  const std::vector<NoiseFound> over_epoch = noises_of(wheels, calibration, longer);
+  const std::string section = wheels.prior.name.empty()
+                                  ? "kinematics."
+                                  : "wheel_sets." + wheels.prior.name + ".kinematics.";
+  for (NoiseFound& part : found) {
+    const double per_sample = part.found;
+    for (const NoiseFound& other : over_epoch) {
+      if (other.name == part.name) part.found = std::min(part.found, other.found * times);
+    }
+    const double ratio = part.found / part.configured;
+    Finding finding{label,
+                    Severity::kFits,
+                    part.name,
+                    part.name + " " + significant(part.found, 2) + " " + part.unit + ", " +
+                        significant(ratio, 2) + " times what is configured",
+                    {{"found", part.found, part.unit},
+                     {"from sample to sample", per_sample, part.unit},
+                     {"configured", part.configured, part.unit},
+                     {"found by configured", ratio, ""},
+                     {"samples", static_cast<double>(part.count), ""}}};
+    // As a run warns of it.
+    constexpr double kMostFactor = 3.;
+    if (ratio > kMostFactor) {
+      finding.severity = Severity::kFault;
+      finding.what += ": the wheels contradict each other by more than it explains";
+      if (part.name.find(' ') == std::string::npos) {
+        finding.remedies = {{section + part.name, significant(part.found, 2)}};
+      } else {
+        finding.severity = Severity::kNote;  // one that is worse than the others of its kind
+      }
+    }
+    out.push_back(finding);
+  }
+}
+
+/// How much the wheels contradict each other, whatever the noises are.
+void check_parity(const Wheels& wheels, const Intrinsics& x_WI, const std::string& label,
+                  Findings& out) {
+  TwistSolver solver(wheels.model, {});
+  solver.set_intrinsics(x_WI);
+  TwistSolution solution;
+  double squares = 0., speeds = 0., rows = 0., samples = 0.;
+  for (const EncoderSample& sample : wheels.samples) {
+    if (solver.solve(sample, solution) != Status::kOk || solution.rank_deficient) continue;
+    squares += solution.e.squaredNorm();
+    speeds += solution.xi.head<2>().squaredNorm();
+    rows += static_cast<double>(solution.e.size());
+    samples += 1.;
+  }
+  if (rows == 0.) return;
+  const double rms = std::sqrt(squares / rows), speed = std::sqrt(speeds / samples);
+  out.push_back({label,
+                 Severity::kFits,
+                 "parity",
+                 "rows disagree by " + significant(1e3 * rms, 2) + " mm/s at " +
+                     significant(speed, 2) + " m/s",
+                 {{"parity residual", rms, "m/s"}, {"speed", speed, "m/s"}}});
+}
+
+}  // namespace
+
+void check_wheels(const Recording& recording, Findings& out) {
+  for (const Wheels& wheels : recording.wheels) {
+    const std::string label = recording.label<EncoderSample>(wheels.sensor);
+    if (!wheels.unusable.empty()) {
+      out.push_back({label, Severity::kFault, "channels", wheels.unusable});
+      continue;
+    }
+    if (wheels.samples.empty()) continue;
+    check_channels(wheels, label, out);
+    const std::optional<Calibration> calibration = calibrated(wheels);
+    if (!calibration) continue;
+    check_parity(wheels, calibration->x_WI, label, out);
+    check_liars(recording, wheels, *calibration, label, out);
+    check_noises(wheels, *calibration, label, out);
+  }
+}
+
+}  // namespace viwo::inspect

@@ -1,0 +1,48 @@
+// The checks of a recording, each by itself. What they need is in the recording or it is not there:
+// then they say nothing, or a note why.
+#pragma once
+
+#include <vector>
+
+#include "recording.hpp"
+#include "viwo/inspect/inspection.hpp"
+
+namespace viwo::inspect {
+
+/// Rate, jitter, gaps, what readers have rejected, sensors that broke off, what is in common.
+void check_stamps(const Recording& recording, Findings& out);
+/// Gravity at rest, biases, channels that repeat.
+void check_imu(const Recording& recording, Findings& out);
+/// Unit, signs and axes of the gyro against the tilt that the accelerometer shows.
+void check_tilt(const Recording& recording, Findings& out);
+/// White noise and random walk at rest, by Allan deviations, against the configuration.
+void check_imu_noise(const Recording& recording, Findings& out);
+/// Channels that never change, wheels that the others contradict, noises against the configuration.
+void check_wheels(const Recording& recording, Findings& out);
+/// Angles of drives that begin anew after a turn.
+void check_turns(const Recording& recording, Findings& out);
+/// Signs and order of wheels that cannot contradict each other, by the gyro's rate.
+void check_yaw_order(const Recording& recording, Findings& out);
+/// Constant offsets of steering angles that stop the wheels from contradicting each other.
+void check_steer_offsets(const Recording& recording, Findings& out);
+/// Clock, sign and scale of the wheels' yaw rate against the gyro's.
+void check_wheel_clocks(const Recording& recording, Findings& out);
+/// Clock and axes of each camera against the gyro.
+void check_camera_clocks(const Recording& recording, Findings& out);
+/// Clock, sign and speed of poses against gyro and wheels.
+void check_poses(const Recording& recording, Findings& out);
+
+/// Upwards in I, of length 1: the mean direction of the specific force; zero where that has no
+/// direction, or there is no IMU.
+Eigen::Vector3d up_of(const Recording& recording);
+
+/// The same, as the mounting has it where the accelerometer has no direction.
+Eigen::Vector3d yaw_axis_of(const Recording& recording, const WheelsPrior& prior);
+
+/// The time that all of the IMU, wheels and poses cover, and a bit more: of grids.
+struct Span {
+  std::int64_t begin_ns = 0, end_ns = 0;
+};
+Span span_of(const Recording& recording);
+
+}  // namespace viwo::inspect

@@ -1,0 +1,164 @@
+#include "viwo/inspect/inspection.hpp"
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <string_view>
+
+#include "checks.hpp"
+#include "plots.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+using Checks = std::span<const std::string_view>;
+
+/// Of a text "wheels0: turn 57.3 ..." with the key "imu0 rate".
+Finding of_plausibility(const viwo::Finding& found) {
+  Finding finding;
+  const std::size_t colon = found.text.find(": ");
+  finding.sensor = found.text.substr(0, colon);
+  finding.what = colon == std::string::npos ? found.text : found.text.substr(colon + 2);
+  // Sensors have no spaces in their names; "imu of simulator0" does.
+  std::string key = found.key;
+  const std::size_t of = key.find(" of ");
+  key = key.substr(key.find(' ', of == std::string::npos ? 0 : of + 4) + 1);
+  finding.check = key;
+  finding.severity = Severity::kFault;
+  finding.remedies = found.remedies;
+  return finding;
+}
+
+/// That nothing has come of what was not read.
+bool is_of_unread(const Recording& recording, const viwo::Finding& found) {
+  if (!found.key.ends_with(" none")) return false;
+  const auto& sensors = recording.setup->sensors;
+  for (std::string name : recording.unread) {
+    for (bool goes_on = true; goes_on;) {
+      const auto entry = std::find_if(sensors.begin(), sensors.end(),
+                                      [&](const SensorEntry& s) { return s.name == name; });
+      goes_on = entry != sensors.end() && !entry->input.empty();
+      if (goes_on) name = entry->input;
+    }
+    if (found.key.ends_with(name + " none")) return true;
+  }
+  return false;
+}
+
+bool is_fault_of(const Findings& findings, std::string_view sensor, Checks checks) {
+  return std::any_of(findings.begin(), findings.end(), [&](const Finding& f) {
+    return f.severity == Severity::kFault && f.sensor == sensor &&
+           std::find(checks.begin(), checks.end(), f.check) != checks.end();
+  });
+}
+
+/// What is the fault itself of a wheel or an IMU, and what follows from it: a sensor with a wrong
+/// unit, sign, order or zero disagrees in all that it is compared with.
+constexpr std::array<std::string_view, 6> kWheelCauses = {"order",   "turn", "steering",
+                                                          "channel", "rate", "steer offsets"};
+constexpr std::array<std::string_view, 2> kOrder = {"order", "steering"};
+constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
+constexpr std::array<std::string_view, 5> kImuCauses = {"gravity", "rate", "up", "tilt", "channel"};
+bool is_one_of(const std::string& check, Checks checks) {
+  return std::find(checks.begin(), checks.end(), check) != checks.end();
+}
+bool is_of_stamps(const std::string& check) {
+  constexpr std::array<std::string_view, 7> kStamps = {"stamps",   "gaps",     "end",  "none",
+                                                       "rejected", "readable", "clock"};
+  return is_one_of(check, kStamps);
+}
+
+void demote(Finding& finding, const std::string& cause) {
+  if (finding.severity == Severity::kFits) return;
+  finding.severity = Severity::kNote;
+  finding.what += " (look again when what is wrong with " + cause + " is mended)";
+  finding.remedies.clear();
+}
+
+void demote_consequences(const Recording& recording, Findings& findings) {
+  const std::string imu =
+      recording.imu_sensor.empty() ? "" : recording.label<ImuSample>(recording.imu_sensor);
+  const Findings all = findings;
+  const bool imu_is_wrong = std::any_of(all.begin(), all.end(), [&](const Finding& f) {
+    return f.sensor == imu && f.severity == Severity::kFault && is_one_of(f.check, kImuCauses);
+  });
+  for (Finding& finding : findings) {
+    if (finding.severity != Severity::kFault) continue;
+    const std::string& sensor = finding.sensor;
+    const auto follows = [&](Checks causes) {
+      return !is_one_of(finding.check, causes) && is_fault_of(all, sensor, causes);
+    };
+    if (finding.check == "steer offsets" && is_fault_of(all, sensor, kOrder)) {
+      demote(finding, sensor);
+    } else if (sensor != imu && follows(kWheelCauses)) {
+      if (!is_of_stamps(finding.check) || finding.check == "clock") demote(finding, sensor);
+    } else if (follows(kContradicted) &&
+               (finding.check.starts_with("sigma_") || finding.check == "speed")) {
+      demote(finding, sensor);
+    } else if (imu_is_wrong && finding.check == "clock") {
+      demote(finding, imu);
+    } else if (imu_is_wrong && sensor == imu && !is_one_of(finding.check, kImuCauses) &&
+               !is_of_stamps(finding.check) && finding.check != "axes") {
+      demote(finding, imu);
+    }
+  }
+}
+
+}  // namespace
+
+const char* name(Severity severity) {
+  switch (severity) {
+    case Severity::kFits:
+      return "fits";
+    case Severity::kNote:
+      return "note";
+    case Severity::kFault:
+      break;
+  }
+  return "fault";
+}
+
+bool Inspection::has_faults() const {
+  return std::any_of(findings.begin(), findings.end(),
+                     [](const Finding& f) { return f.severity == Severity::kFault; });
+}
+
+Inspection inspect(RunSetup& setup) {
+  const Recording recording = gather(setup);
+  Inspection inspection;
+  inspection.name = setup.name;
+  Findings& findings = inspection.findings;
+  check_stamps(recording, findings);
+  check_imu(recording, findings);
+  check_tilt(recording, findings);
+  check_imu_noise(recording, findings);
+  check_wheels(recording, findings);
+  check_turns(recording, findings);
+  check_yaw_order(recording, findings);
+  check_steer_offsets(recording, findings);
+  check_wheel_clocks(recording, findings);
+  check_camera_clocks(recording, findings);
+  check_poses(recording, findings);
+  for (const viwo::Finding& found : recording.implausible) {
+    // The lag of the wheels is told with more figures by check_wheel_clocks().
+    if (!found.key.ends_with(" lag") && !is_of_unread(recording, found)) {
+      findings.push_back(of_plausibility(found));
+    }
+  }
+  demote_consequences(recording, findings);
+  std::vector<std::string> sensors;
+  for (const Finding& finding : findings) {
+    if (std::find(sensors.begin(), sensors.end(), finding.sensor) == sensors.end()) {
+      sensors.push_back(finding.sensor);
+    }
+  }
+  const auto place = [&](const Finding& f) {
+    return std::find(sensors.begin(), sensors.end(), f.sensor) - sensors.begin();
+  };
+  std::stable_sort(findings.begin(), findings.end(),
+                   [&](const Finding& a, const Finding& b) { return place(a) < place(b); });
+  inspection.plots = plots_of(recording);
+  return inspection;
+}
+
+}  // namespace viwo::inspect

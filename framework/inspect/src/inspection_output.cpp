@@ -1,0 +1,208 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "viwo/api/status.hpp"
+#include "viwo/config/overrides.hpp"
+#include "viwo/config/yaml.hpp"
+#include "viwo/eval/json.hpp"
+#include "viwo/inspect/inspection.hpp"
+#include "viwo/log/files.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/report/html.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+std::vector<std::string> sensors_of(const Inspection& inspection) {
+  std::vector<std::string> sensors;
+  for (const Finding& finding : inspection.findings) {
+    if (sensors.empty() || sensors.back() != finding.sensor) sensors.push_back(finding.sensor);
+  }
+  return sensors;
+}
+
+std::size_t count_of(const Inspection& inspection, Severity severity) {
+  return static_cast<std::size_t>(
+      std::count_if(inspection.findings.begin(), inspection.findings.end(),
+                    [&](const Finding& f) { return f.severity == severity; }));
+}
+
+/// What is as it should be, and how many things are not.
+std::string verdict_of(const Inspection& inspection, const std::string& sensor) {
+  std::string text;
+  std::size_t faults = 0, notes = 0;
+  for (const Finding& finding : inspection.findings) {
+    if (finding.sensor != sensor) continue;
+    if (finding.severity == Severity::kFits) text += (text.empty() ? "" : "; ") + finding.what;
+    if (finding.severity == Severity::kNote) ++notes;
+    if (finding.severity == Severity::kFault) ++faults;
+  }
+  const std::string end = faults > 0  ? std::to_string(faults) + " wrong"
+                          : notes > 0 ? "fits, with notes"
+                                      : "fits";
+  return (text.empty() ? "" : text + ": ") + end;
+}
+
+std::string line_of(const Remedy& remedy) { return remedy.key + ": " + remedy.value; }
+
+std::string plural(std::size_t n, const std::string& what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+/// The first one that wants a key has it.
+std::vector<std::pair<Remedy, std::string>> remedies_of(const Inspection& inspection) {
+  std::vector<std::pair<Remedy, std::string>> all;
+  for (const Finding& finding : inspection.findings) {
+    if (finding.severity != Severity::kFault) continue;
+    for (const Remedy& remedy : finding.remedies) {
+      const bool is_known = std::any_of(
+          all.begin(), all.end(), [&](const auto& other) { return other.first.key == remedy.key; });
+      if (!is_known) all.emplace_back(remedy, finding.sensor + ": " + finding.what);
+    }
+  }
+  return all;
+}
+
+/// What is found of the channels of a model is found behind what the configuration does to those of
+/// the log already: scales multiply, shifts add. Nothing where channels have another order there.
+std::optional<config::Node> combined(const config::Node& configuration, const Remedy& remedy) {
+  config::Node value = config::parse(remedy.value, "--fix");
+  const config::Node& there = *configuration.at_path(remedy.key);
+  const bool scales = remedy.key.ends_with("_scale"), shifts = remedy.key.ends_with("_shift_rad");
+  const std::string section = remedy.key.substr(0, remedy.key.rfind('.') + 1);
+  const std::string joint = remedy.key.substr(section.size(), 5);  // drive or steer
+  const config::Node* channels = configuration.at_path(section + joint + "_channel");
+  const bool has_order = channels != nullptr && !channels->items().empty();
+  if (remedy.key.ends_with("_channel")) {
+    return has_order ? std::nullopt : std::optional(value);
+  }
+  if (!(scales || shifts) || !there.is_list() || (there.items().empty() && !has_order)) {
+    return value;
+  }
+  if (has_order || there.items().size() != value.items().size()) return {};
+  for (std::size_t i = 0; i < value.items().size(); ++i) {
+    const double a = std::stod(there.items()[i].scalar()), b = std::stod(value.items()[i].scalar());
+    value.items()[i] = config::Node::scalar_of(significant(scales ? a * b : a + b, 10));
+  }
+  return value;
+}
+
+}  // namespace
+
+std::string describe(const Inspection& inspection) {
+  std::string text;
+  for (const std::string& sensor : sensors_of(inspection)) {
+    text += sensor + ": " + verdict_of(inspection, sensor) + "\n";
+  }
+  for (const Severity severity : {Severity::kFault, Severity::kNote}) {
+    const std::size_t n = count_of(inspection, severity);
+    if (n == 0) continue;
+    text += "\n" + plural(n, severity == Severity::kFault ? "finding" : "note") + ":\n";
+    for (const Finding& finding : inspection.findings) {
+      if (finding.severity != severity) continue;
+      text += "  " + finding.sensor + ": " + finding.what + "\n";
+      for (const Remedy& remedy : finding.remedies) {
+        text += "      write  " + line_of(remedy) + "\n";
+      }
+    }
+  }
+  if (!inspection.has_faults()) text += "\nno findings\n";
+  return text;
+}
+
+nlohmann::json to_json(const Inspection& inspection) {
+  using nlohmann::json;
+  json findings = json::array();
+  for (const Finding& finding : inspection.findings) {
+    json figures = json::object(), remedies = json::object();
+    for (const Figure& figure : finding.figures) {
+      figures[figure.name] = {
+          {"value", std::isfinite(figure.value) ? json(figure.value) : json(nullptr)},
+          {"unit", figure.unit}};
+    }
+    for (const Remedy& remedy : finding.remedies) remedies[remedy.key] = remedy.value;
+    findings.push_back({{"sensor", finding.sensor},
+                        {"severity", name(finding.severity)},
+                        {"check", finding.check},
+                        {"what", finding.what},
+                        {"figures", figures},
+                        {"write", remedies}});
+  }
+  return {{"name", inspection.name},
+          {"faults", count_of(inspection, Severity::kFault)},
+          {"notes", count_of(inspection, Severity::kNote)},
+          {"findings", findings}};
+}
+
+report::Document report_of(const Inspection& inspection) {
+  using namespace report;
+  Document document;
+  document.title = "Inspection: " + inspection.name;
+  document.subtitle = plural(count_of(inspection, Severity::kFault), "finding") + ", " +
+                      plural(count_of(inspection, Severity::kNote), "note");
+  Section findings{"Findings"};
+  for (const Finding& finding : inspection.findings) {
+    if (finding.severity == Severity::kFits) continue;
+    std::string text = finding.sensor + ": " + finding.what;
+    for (const Remedy& remedy : finding.remedies) text += ". Write " + line_of(remedy);
+    findings.blocks.push_back(Paragraph{text, finding.severity == Severity::kFault
+                                                  ? Paragraph::Tone::kWarning
+                                                  : Paragraph::Tone::kNote});
+  }
+  if (findings.blocks.empty()) findings.blocks.push_back(Paragraph{"None."});
+  Section sensors{"Sensors"};
+  for (const std::string& sensor : sensors_of(inspection)) {
+    Table table;
+    table.caption = sensor;
+    table.columns = {{"check"}, {"figure"}, {"value"}, {"unit"}};
+    for (const Finding& finding : inspection.findings) {
+      if (finding.sensor != sensor) continue;
+      for (const Figure& figure : finding.figures) {
+        table.rows.push_back({finding.check, figure.name, figure.value, figure.unit});
+      }
+    }
+    if (!table.rows.empty()) sensors.blocks.push_back(std::move(table));
+  }
+  Section plots{"Plots"};
+  for (const Plot& plot : inspection.plots) plots.blocks.push_back(plot);
+  document.sections = {std::move(findings), std::move(plots), std::move(sensors)};
+  return document;
+}
+
+void write_inspection(const std::filesystem::path& folder, const Inspection& inspection) {
+  log::write_text(folder / "inspection.json", to_json(inspection).dump(2) + "\n");
+  log::write_text(folder / "report.html", report::to_html(report_of(inspection)));
+}
+
+std::string fixed_configuration(const RunSetup& setup, const Inspection& inspection,
+                                PluginRegistry& plugins) {
+  config::Node fixed = setup.resolved;
+  std::string head = "# " + setup.name + ", as viwo inspect would have it.\n";
+  std::map<std::string, std::string> comments;
+  for (const auto& [remedy, reason] : remedies_of(inspection)) {
+    // All keys that there are have a value here.
+    if (fixed.at_path(remedy.key) == nullptr) {
+      head += "# Not in here, for want of such a key: " + line_of(remedy) + "  (" + reason + ")\n";
+      continue;
+    }
+    const auto value = combined(fixed, remedy);
+    if (!value) {
+      head += "# To be combined by hand with what is there: " + line_of(remedy) + "  (" + reason +
+              ")\n";
+      continue;
+    }
+    config::set_path(fixed, remedy.key, *value);
+    comments[remedy.key] = reason;
+  }
+  std::string text = head + config::to_yaml(fixed, comments);
+  read_run(config::parse(text, "--fix"), plugins);
+  return text;
+}
+
+}  // namespace viwo::inspect

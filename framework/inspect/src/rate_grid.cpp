@@ -1,0 +1,112 @@
+#include "rate_grid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "viwo/math/arrays.hpp"
+#include "viwo/math/so3.hpp"
+#include "viwo/wheel/twist_solver.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+constexpr std::int64_t kLongestNs = 200'000'000;
+
+std::size_t cells_between(std::int64_t begin_ns, std::int64_t end_ns) {
+  constexpr std::int64_t kMostCells = 8'640'000;  // a day
+  const std::int64_t cells = (end_ns - begin_ns) / RateGrid::kCellNs;
+  return static_cast<std::size_t>(std::clamp<std::int64_t>(cells, 0, kMostCells));
+}
+
+}  // namespace
+
+RateGrid::RateGrid(std::int64_t begin_ns, std::int64_t end_ns, std::span<const Turn> turns)
+    : begin_ns_(begin_ns), rates_(cells_between(begin_ns, end_ns), Eigen::Vector3d::Zero()) {
+  std::vector<std::int64_t> covered(rates_.size());
+  for (const Turn& turn : turns) {
+    if (turn.end_ns <= turn.begin_ns || turn.end_ns - turn.begin_ns > kLongestNs) continue;
+    const std::int64_t first = std::max<std::int64_t>(0, (turn.begin_ns - begin_ns) / kCellNs);
+    for (std::int64_t i = first; begin_ns + i * kCellNs < turn.end_ns; ++i) {
+      if (static_cast<std::size_t>(i) >= rates_.size()) break;
+      const std::int64_t from = std::max(turn.begin_ns, begin_ns + i * kCellNs);
+      const std::int64_t part = std::min(turn.end_ns, begin_ns + (i + 1) * kCellNs) - from;
+      if (part <= 0) continue;
+      covered[static_cast<std::size_t>(i)] += part;
+      rates_[static_cast<std::size_t>(i)] += static_cast<double>(part) * turn.rate;
+    }
+  }
+  for (std::size_t i = 0; i < rates_.size(); ++i) {
+    if (10 * covered[i] >= 9 * kCellNs) {
+      rates_[i] /= static_cast<double>(covered[i]);
+    } else {
+      rates_[i].setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+}
+
+std::vector<Turn> turns_of(std::span<const ImuSample> imu) {
+  std::vector<Turn> turns;
+  turns.reserve(imu.size());
+  for (std::size_t i = 1; i < imu.size(); ++i) {
+    turns.push_back(
+        {imu[i - 1].t_ns, imu[i].t_ns,
+         0.5 * (to_vector(imu[i - 1].gyro_rad_per_s) + to_vector(imu[i].gyro_rad_per_s))});
+  }
+  return turns;
+}
+
+std::vector<Turn> turns_of(const Trajectory& poses) {
+  std::vector<Turn> turns;
+  turns.reserve(poses.size());
+  // Stamps of reception come in pairs: what is next to nothing in time is one instant.
+  constexpr double kShortest_s = 2e-3;
+  std::size_t before = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const double dt_s = seconds_between(poses[before].t_ns, poses[i].t_ns);
+    if (dt_s < kShortest_s) continue;
+    const Eigen::Quaterniond turn = poses[before].q_BtoW.conjugate() * poses[i].q_BtoW;
+    turns.push_back({poses[before].t_ns, poses[i].t_ns, log_so3(turn.toRotationMatrix()) / dt_s});
+    before = i;
+  }
+  return turns;
+}
+
+std::vector<Turn> twists_of(const Wheels& wheels) {
+  std::vector<Turn> turns;
+  turns.reserve(wheels.samples.size());
+  TwistSolver solver(wheels.model, {});
+  solver.set_intrinsics(wheels.prior.wheels.x_WI);
+  TwistSolution solution;
+  const auto clock_ns = static_cast<std::int64_t>(std::llround(1e9 * wheels.prior.wheels.t_OtoI_s));
+  for (const EncoderSample& sample : wheels.samples) {
+    if (solver.solve(sample, solution) != Status::kOk || solution.rank_deficient) continue;
+    turns.push_back({sample.begin_ns + clock_ns, sample.end_ns + clock_ns, solution.xi});
+  }
+  return turns;
+}
+
+std::vector<Turn> turns_of(const Wheels& wheels) {
+  return about(twists_of(wheels), Eigen::Vector3d::UnitZ());
+}
+
+std::vector<Turn> rotated(std::vector<Turn> turns, const Eigen::Matrix3d& R) {
+  for (Turn& turn : turns) turn.rate = R * turn.rate;
+  return turns;
+}
+
+std::vector<Turn> about(std::vector<Turn> turns, const Eigen::Vector3d& axis) {
+  for (Turn& turn : turns) turn.rate = axis.dot(turn.rate) * Eigen::Vector3d::UnitZ();
+  return turns;
+}
+
+std::vector<Turn> shifted(std::vector<Turn> turns, double seconds) {
+  const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * seconds));
+  for (Turn& turn : turns) {
+    turn.begin_ns += shift_ns;
+    turn.end_ns += shift_ns;
+  }
+  return turns;
+}
+
+}  // namespace viwo::inspect

@@ -1,0 +1,179 @@
+// Clocks and axes of wheels, cameras and poses against the gyro.
+#include <cmath>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "inspected.hpp"
+#include "lag.hpp"
+#include "viwo/math/arrays.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+template <class T>
+void shift(T& sample, double seconds) {
+  const auto ns = static_cast<std::int64_t>(std::llround(1e9 * seconds));
+  sample.t_ns += ns;
+  if constexpr (requires { sample.begin_ns; }) {
+    sample.begin_ns += ns;
+    sample.end_ns += ns;
+  }
+}
+
+TEST(FindLag, IsWithinItsOwnSigmaAndKnowsTheSign) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> draw(0., 0.05);
+  const auto rate = [](double t) { return std::sin(1.3 * t) + 0.5 * std::sin(0.4 * t * t / 10.); };
+  for (const double lag_s : {0., 0.0234, -0.2}) {
+    for (const double sign : {1., -1.}) {
+      std::vector<Turn> a, b;
+      for (std::int64_t i = 0; i < 6000; ++i) {
+        const double t = 0.01 * static_cast<double>(i) + 0.005;
+        const std::int64_t begin = i * 10'000'000;
+        a.push_back({begin, begin + 10'000'000, {0., 0., rate(t) + draw(random)}});
+        b.push_back({begin,
+                     begin + 10'000'000,
+                     {0., 0., sign * 1.2 * rate(t - lag_s) + 0.1 + draw(random)}});
+      }
+      const auto lag = find_lag(RateGrid(0, 60'000'000'000, a), RateGrid(0, 60'000'000'000, b));
+      ASSERT_TRUE(lag);
+      EXPECT_NEAR(lag->lag_s, lag_s, 4. * lag->sigma_s);
+      EXPECT_LT(lag->sigma_s, 2e-3);
+      EXPECT_NEAR(lag->correlation, sign, 0.02);
+      EXPECT_NEAR(lag->slope, sign * 1.2, 0.02);
+    }
+  }
+}
+
+TEST(FindLag, IsNothingWithoutRotation) {
+  std::vector<Turn> still;
+  for (std::int64_t i = 0; i < 6000; ++i) {
+    still.push_back({i * 10'000'000,
+                     (i + 1) * 10'000'000,
+                     {0., 0., 0.01 * std::sin(0.01 * static_cast<double>(i))}});
+  }
+  const RateGrid grid(0, 60'000'000'000, still);
+  EXPECT_FALSE(find_lag(grid, grid));
+}
+
+TEST(InspectClocks, FindsTheLagOfTheWheelsAndWritesTheClock) {
+  const Finding clean = finding_of(inspected(swerve(), {}), "wheels0", "clock");
+  EXPECT_EQ(clean.severity, Severity::kFits) << clean.what;
+  EXPECT_NEAR(figure_of(clean, "lag"), 0., 2e-3);
+  for (const double late_s : {0.06, -0.3}) {
+    const Inspection late = inspected(swerve(), {.wheels = [late_s](EncoderSample& s) {
+                                        shift(s, late_s);
+                                        return true;
+                                      }});
+    EXPECT_THAT(faults_of(late), ElementsAre("wheels0 clock"));
+    EXPECT_NEAR(std::stod(remedy_of(finding_of(late, "wheels0", "clock"), "wheels.t_OtoI_s")),
+                0.005 - late_s, 2e-3);
+  }
+}
+
+TEST(InspectClocks, FindsAClockThatWasSet) {
+  const Inspection set = inspected(simulated("viwo_ackermann"), {.wheels = [](EncoderSample& s) {
+                                     if (s.t_ns > 30'000'000'000) shift(s, 0.5);
+                                     return true;
+                                   }});
+  EXPECT_THAT(faults_of(set), Contains("wheels0 clock"));
+  const Finding clock = finding_of(set, "wheels0", "clock");
+  EXPECT_THAT(clock.what, HasSubstr("was set"));
+  EXPECT_NEAR(figure_of(clock, "change"), 0.5, 0.01);
+}
+
+class InspectRealCamera : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
+  }
+  static RunSetup board(std::vector<std::string> assignments = {}) {
+    return setup_of(testing::configuration("runs/euroc_board.yaml"), std::move(assignments));
+  }
+};
+
+TEST_F(InspectRealCamera, FindsTheLagOfItsTracks) {
+  EXPECT_THAT(faults_of(inspected(board(), {})), IsEmpty());
+  const Inspection late = inspected(board(), {.images = [](FeatureSample& s) {
+                                      shift(s, 0.06);
+                                      return true;
+                                    }});
+  EXPECT_THAT(faults_of(late), ElementsAre("images0, camera 0 clock", "images0, camera 1 clock"));
+  const Finding clock = finding_of(late, "images0, camera 0", "clock");
+  EXPECT_NEAR(figure_of(clock, "lag"), 0.06, 0.01);
+  EXPECT_NE(remedy_of(clock, "timeshift_cam_imu"), "");
+}
+
+TEST_F(InspectRealCamera, FindsAxesThatAreNotThoseOfTheCalibration) {
+  // x to the right and y down: an image that is turned by half a turn.
+  const Inspection turned = inspected(board(), {.images = [](FeatureSample& s) {
+                                        for (FeaturePoint& point : s.points) {
+                                          point.u_px = 751. - point.u_px;
+                                          point.v_px = 479. - point.v_px;
+                                        }
+                                        return true;
+                                      }});
+  EXPECT_THAT(faults_of(turned), Contains("images0, camera 0 axes"));
+  EXPECT_NEAR(figure_of(finding_of(turned, "images0, camera 0", "axes"), "angle"), 180., 5.);
+}
+
+TEST_F(InspectRealCamera, ComesWithAReferenceWhoseBodyMustBeTheImu) {
+  const Inspection turned =
+      inspected(board(), {.states = [](StateSample& s) {
+                  const Eigen::Quaterniond q =
+                      to_quaternion(s.q_ItoG_xyzw) *
+                      Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2., Eigen::Vector3d::UnitX()));
+                  s.q_ItoG_xyzw = {q.x(), q.y(), q.z(), q.w()};
+                  return true;
+                }});
+  EXPECT_THAT(faults_of(turned), ElementsAre("states0 axes"));
+  EXPECT_NEAR(figure_of(finding_of(turned, "states0", "axes"), "angle"), 90., 3.);
+}
+
+TEST_F(InspectRealCamera, FindsThatItWasFrozen) {
+  std::map<int, std::vector<FeaturePoint>> last;
+  const Inspection frozen =
+      inspected(board(), {.images = [&last](FeatureSample& s) {
+                  const double t_s = 1e-9 * static_cast<double>(s.t_ns % 1'000'000'000'000);
+                  static const double begin_s = t_s;
+                  auto& points = last[s.camera];
+                  const bool freezes = t_s > begin_s + 20. && t_s < begin_s + 23.;
+                  if (freezes) s.points = points;
+                  points = s.points;
+                  return true;
+                }});
+  EXPECT_THAT(faults_of(frozen), Contains("images0, camera 0 tracks"));
+}
+
+TEST(InspectPoses, FindsTheLagOfAReferenceAndWritesIt) {
+  const auto planar = [] { return setup_of(testing::configuration("runs/simulated_swerve.yaml")); };
+  const Finding clean = finding_of(inspected(planar(), {}), "poses0", "clock");
+  EXPECT_EQ(clean.severity, Severity::kFits) << clean.what;
+  const Inspection late = inspected(planar(), {.poses = [](PoseSample& s) {
+                                      shift(s, 0.08);
+                                      return true;
+                                    }});
+  EXPECT_THAT(faults_of(late), ElementsAre("poses0 clock"));
+  EXPECT_NEAR(
+      std::stod(remedy_of(finding_of(late, "poses0", "clock"), "odometry.reference_time_offset_s")),
+      0.08, 3e-3);
+}
+
+TEST(InspectPoses, FindsAReferenceThatTurnsTheOtherWay) {
+  const Inspection inverted = inspected(
+      setup_of(testing::configuration("runs/simulated_swerve.yaml")), {.poses = [](PoseSample& s) {
+        for (std::size_t i = 0; i < 3; ++i) s.q_BtoW_xyzw[i] *= -1.;
+        return true;
+      }});
+  EXPECT_THAT(finding_of(inverted, "poses0", "clock").what, HasSubstr("turns opposite to wheels0"));
+}
+
+}  // namespace
+}  // namespace viwo::inspect

@@ -1,0 +1,102 @@
+// What is to be written is written, and then it is well.
+#include <cstdlib>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "inspected.hpp"
+#include "viwo/run/simulate.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// A configuration of viwo_swerve that has clock and mounting wrong.
+RunSetup wrong() {
+  return simulated("viwo_swerve", {"sensors.simulator0.duration_s=40", "wheels.t_OtoI_s=0.1",
+                                   "wheels.rpy_ItoO_rad=[3.14159265, 0, 0]"});
+}
+
+TEST(FixedConfiguration, HasNoFindingsAnyMore) {
+  RunSetup setup = wrong();
+  EXPECT_TRUE(inspect(setup).has_faults());
+  // What an IMU that is upside down hides shows when it is mended.
+  constexpr int kRounds = 2;
+  for (int round = 0; round < kRounds; ++round) {
+    setup = read_run(setup.resolved, testing::registry());
+    const std::string text = fixed_configuration(setup, inspect(setup), testing::registry());
+    setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  }
+  EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
+  EXPECT_NEAR(setup.filter->wheels.front().prior.wheels.t_OtoI_s, 0.005, 2e-3);
+  EXPECT_LT((setup.filter->wheels.front().prior.wheels.R_ItoO - Eigen::Matrix3d::Identity()).norm(),
+            1e-6);
+}
+
+/// configs/runs/viwo_log.yaml on another log, without the true calibration.
+config::Node on_log(const std::filesystem::path& folder) {
+  const auto file = testing::configuration("runs/viwo_log.yaml");
+  config::Node run = config::load_file(file);
+  auto& sensors = run.at_path("sensors")->entries();
+  std::erase_if(sensors, [](const config::Node::Entry& entry) { return entry.key == "truth0"; });
+  config::set_path(run, "estimator.calibration_error_scale", config::Node::scalar_of("0"));
+  return resolve_placeholders(run, {{"log", folder.string()}});
+}
+
+TEST(FixedConfiguration, MendsTheJointsOfALog) {
+  std::string pattern = (std::filesystem::temp_directory_path() / "viwo_fix_XXXXXX").string();
+  ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+  const std::filesystem::path folder = pattern;
+  RunSetup faulty = changed(swerve(), {.wheels = [](EncoderSample& s) {
+                              s.drive_rad_per_s[1] *= -1.;
+                              s.steer_rad[2] += 0.3;
+                              return true;
+                            }});
+  write_log(faulty, folder);
+  RunSetup setup = read_run(on_log(folder), testing::registry());
+  const bool has_keys = setup.resolved.at_path("sensors.wheels0.drive_scale") != nullptr;
+  EXPECT_TRUE(inspect(setup).has_faults());
+  constexpr int kRounds = 2;  // the sign hides the offset
+  for (int round = 0; round < kRounds && has_keys; ++round) {
+    setup = read_run(setup.resolved, testing::registry());
+    const std::string text = fixed_configuration(setup, inspect(setup), testing::registry());
+    setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  }
+  const Inspection mended = inspect(setup);
+  std::filesystem::remove_all(folder);
+  if (!has_keys) GTEST_SKIP() << "sensors have no key drive_scale";
+  EXPECT_THAT(faults_of(mended), IsEmpty());
+}
+
+TEST(FixedConfiguration, SaysWhyAKeyIsChangedAndWhatItHasNoKeyFor) {
+  RunSetup setup = swerve();
+  Inspection inspection;
+  inspection.name = setup.name;
+  inspection.findings = {
+      {"wheels0", Severity::kFault, "clock", "lags behind", {}, {{"wheels.t_OtoI_s", "-0.05"}}},
+      {"wheels0", Severity::kNote, "other", "not to be written", {}, {{"wheels.t_OtoI_s", "7"}}},
+      {"wheels0", Severity::kFault, "x", "no such key", {}, {{"sensors.nowhere.key", "[1, 2]"}}}};
+  const std::string text = fixed_configuration(setup, inspection, testing::registry());
+  EXPECT_THAT(text, HasSubstr("t_OtoI_s: -0.05  # wheels0: lags behind"));
+  EXPECT_THAT(text,
+              HasSubstr("# Not in here, for want of such a key: sensors.nowhere.key: [1, 2]"));
+  const RunSetup fixed = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  EXPECT_EQ(fixed.filter->wheels.front().prior.wheels.t_OtoI_s, -0.05);
+}
+
+TEST(InspectionOutput, HasAllFiguresAndVerdicts) {
+  RunSetup setup = wrong();
+  const Inspection inspection = inspect(setup);
+  const nlohmann::json json = to_json(inspection);
+  EXPECT_EQ(json.at("name"), "viwo_swerve");
+  EXPECT_GE(json.at("faults").get<int>(), 1);
+  EXPECT_EQ(json.at("findings").size(), inspection.findings.size());
+  EXPECT_THAT(describe(inspection), HasSubstr("write  wheels.rpy_ItoO_rad: [0, 0, 0]"));
+  EXPECT_THAT(describe(inspected(swerve(), {})), HasSubstr("\nno findings\n"));
+}
+
+}  // namespace
+}  // namespace viwo::inspect

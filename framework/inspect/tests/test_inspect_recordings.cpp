@@ -1,0 +1,84 @@
+// Recordings without a fault, simulated and real, have no findings; what is known to be wrong with
+// some of the real ones is found.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "inspected.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
+
+std::vector<std::string> faults_in(RunSetup setup) { return faults_of(inspect(setup)); }
+
+TEST(Inspection, FindsNothingInSimulatedRecordings) {
+  for (const char* name : {"viwo_swerve", "viwo_skid_steer", "viwo_ackermann", "viwo_mecanum",
+                           "viwo_images", "viwo_gnss"}) {
+    EXPECT_THAT(faults_in(simulated(name)), IsEmpty()) << name;
+  }
+  EXPECT_THAT(faults_in(setup_of(testing::configuration("runs/simulated_swerve.yaml"))), IsEmpty());
+}
+
+TEST(Inspection, FindsNothingWhereTheCalibrationStartsWrongAsFarAsItsPriorSays) {
+  for (const char* name : {"viwo_swerve", "viwo_skid_steer", "viwo_ackermann", "viwo_mecanum"}) {
+    for (int seed = 1; seed <= 4; ++seed) {
+      const std::string seeded = "seed=" + std::to_string(seed);
+      EXPECT_THAT(faults_in(setup_of(testing::configuration("runs/" + std::string(name) + ".yaml"),
+                                     {seeded})),
+                  IsEmpty())
+          << name << " " << seed;
+    }
+  }
+}
+
+TEST(Inspection, FindsNothingInRealRecordingsThatAreWell) {
+  if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
+  for (const char* name :
+       {"comma2k19_car", "euroc_board", "husky_gnss", "hybrid", "openvins_sim"}) {
+    EXPECT_THAT(faults_in(setup_of(testing::configuration("runs/" + std::string(name) + ".yaml"))),
+                IsEmpty())
+        << name;
+  }
+  for (const char* recording : {"1", "6", "11", "16", "21", "26"}) {
+    EXPECT_THAT(faults_in(setup_of(testing::configuration("runs/recording.yaml"),
+                                   {std::string("placeholders.recording=") + recording})),
+                IsEmpty())
+        << recording;
+  }
+}
+
+// The ICRs of its configuration are first guesses: it skids more than they say.
+TEST(Inspection, FindsThatASkidSteeredBaseSkidsMoreThanThoughtByTheRateOfTheGyro) {
+  if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
+  EXPECT_THAT(faults_in(setup_of(testing::configuration("runs/ucsd_skid_steer.yaml"))),
+              ElementsAre("imu0 rate"));
+}
+
+// A helicopter on the floor with its rotors idling.
+TEST(Inspection, FindsAnImuThatIsShakenAtRest) {
+  const auto folder = shared_data() / "real/euroc_v1_01_start/mav0";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not there";
+  RunSetup setup = setup_of(testing::configuration("runs/euroc.yaml"),
+                            {"placeholders.data=" + (shared_data() / "real").string(),
+                             "placeholders.sequence=euroc_v1_01_start"});
+  const Inspection inspection = inspect(setup);
+  EXPECT_THAT(faults_of(inspection),
+              UnorderedElementsAre("imu0 gyro noise", "imu0 accelerometer noise"));
+  EXPECT_NEAR(figure_of(finding_of(inspection, "imu0", "gravity"), "gravity"), 9.78, 0.02);
+}
+
+TEST(Inspection, TellsTheJitterOfACanBus) {
+  if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
+  RunSetup setup = setup_of(testing::configuration("runs/comma2k19_car.yaml"));
+  const Finding stamps = finding_of(inspect(setup), "wheels0", "stamps");
+  EXPECT_NEAR(figure_of(stamps, "rate"), 83., 2.);
+  EXPECT_NEAR(figure_of(stamps, "longest interval"), 0.0265, 1e-3);
+  RunSetup again = setup_of(testing::configuration("runs/comma2k19_car.yaml"));
+  EXPECT_EQ(finding_of(inspect(again), "wheels0", "jitter").severity, Severity::kNote);
+}
+
+}  // namespace
+}  // namespace viwo::inspect

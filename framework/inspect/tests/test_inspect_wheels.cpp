@@ -1,0 +1,200 @@
+// Faults of encoders, put into simulated recordings.
+#include <numbers>
+#include <random>
+#include <utility>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "inspected.hpp"
+
+namespace viwo::inspect {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+Inspection with_wheels(RunSetup setup, const std::function<void(EncoderSample&)>& fault) {
+  return inspected(std::move(setup), {.wheels = [&fault](EncoderSample& s) {
+                     fault(s);
+                     return true;
+                   }});
+}
+
+TEST(InspectWheels, TellsADriveThatNeverChanges) {
+  const Inspection dead = with_wheels(simulated("viwo_skid_steer"),
+                                      [](EncoderSample& s) { s.drive_rad_per_s[0] = 0.; });
+  EXPECT_THAT(faults_of(dead), Contains("wheels0 channel"));
+  EXPECT_THAT(finding_of(dead, "wheels0", "channel").what, HasSubstr("drive_1 reads 0 rad/s"));
+}
+
+TEST(InspectWheels, TellsTheWheelThatAllOthersContradictAndSinceWhen) {
+  const Inspection blocked = with_wheels(swerve(), [](EncoderSample& s) {
+    if (s.t_ns > 15'000'000'000 && s.t_ns < 17'000'000'000) s.drive_rad_per_s[1] = 0.;
+  });
+  EXPECT_THAT(faults_of(blocked), ElementsAre("wheels0 contradicted"));
+  const Finding finding = finding_of(blocked, "wheels0", "contradicted");
+  EXPECT_THAT(finding.what, HasSubstr("drive_2 is contradicted"));
+  EXPECT_NEAR(figure_of(finding, "longest"), 2., 0.2);
+}
+
+TEST(InspectWheels, FindsTheSignOfADriveAndWritesIt) {
+  const Inspection reversed =
+      with_wheels(swerve(), [](EncoderSample& s) { s.drive_rad_per_s[1] *= -1.; });
+  EXPECT_THAT(faults_of(reversed), ElementsAre("wheels0 order"));
+  EXPECT_EQ(remedy_of(finding_of(reversed, "wheels0", "order"), "sensors.wheels0.drive_scale"),
+            "[1, -1, 1, 1]");
+}
+
+// A wheel that points the other way rolls the other way: no motion tells the two apart.
+TEST(InspectWheels, TakesASteeringThatIsOffByHalfATurnForAReversedDrive) {
+  const Inspection turned =
+      with_wheels(swerve(), [](EncoderSample& s) { s.steer_rad[2] += std::numbers::pi; });
+  EXPECT_EQ(remedy_of(finding_of(turned, "wheels0", "order"), "sensors.wheels0.drive_scale"),
+            "[1, 1, -1, 1]");
+}
+
+TEST(InspectWheels, FindsTheSignOfTheSteeringAndWritesIt) {
+  const Inspection one = with_wheels(swerve(), [](EncoderSample& s) { s.steer_rad[3] *= -1.; });
+  EXPECT_EQ(remedy_of(finding_of(one, "wheels0", "order"), "sensors.wheels0.steer_scale"),
+            "[1, 1, 1, -1]");
+  const Inspection all = with_wheels(swerve(), [](EncoderSample& s) {
+    for (double& angle : s.steer_rad) angle *= -1.;
+  });
+  EXPECT_EQ(remedy_of(finding_of(all, "wheels0", "order"), "sensors.wheels0.steer_scale"),
+            "[-1, -1, -1, -1]");
+}
+
+TEST(InspectWheels, FindsTheOrderAndWritesIt) {
+  const Inspection drives = with_wheels(
+      swerve(), [](EncoderSample& s) { std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[2]); });
+  EXPECT_EQ(remedy_of(finding_of(drives, "wheels0", "order"), "sensors.wheels0.drive_channel"),
+            "[3, 2, 1, 4]");
+  const Inspection wheels = with_wheels(swerve(), [](EncoderSample& s) {
+    std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[1]);
+    std::swap(s.steer_rad[0], s.steer_rad[1]);
+  });
+  EXPECT_EQ(remedy_of(finding_of(wheels, "wheels0", "order"), "sensors.wheels0.steer_channel"),
+            "[2, 1, 3, 4]");
+}
+
+TEST(InspectWheels, FindsSteeringInDegreesAndWritesTheScale) {
+  const Inspection degrees = with_wheels(swerve(), [](EncoderSample& s) {
+    for (double& angle : s.steer_rad) angle *= 180. / std::numbers::pi;
+  });
+  EXPECT_THAT(faults_of(degrees), ElementsAre("wheels0 steering"));
+  EXPECT_THAT(remedy_of(finding_of(degrees, "wheels0", "steering"), "sensors.wheels0.steer_scale"),
+              HasSubstr("[0.0174532925"));
+}
+
+TEST(InspectWheels, FindsTheZeroOfASteeringAndWritesTheOffset) {
+  EXPECT_EQ(
+      finding_of(with_wheels(swerve(), [](EncoderSample&) {}), "wheels0", "steer offsets").severity,
+      Severity::kFits);
+  for (const double offset : {0.3, -1.2}) {
+    const Inspection off =
+        with_wheels(swerve(), [offset](EncoderSample& s) { s.steer_rad[1] += offset; });
+    EXPECT_THAT(faults_of(off), ElementsAre("wheels0 steer offsets")) << offset;
+    const Finding finding = finding_of(off, "wheels0", "steer offsets");
+    EXPECT_NEAR(figure_of(finding, "offset of steer_2"), -offset, 0.02) << finding.what;
+    EXPECT_NEAR(figure_of(finding, "offset of steer_1"), 0., 0.02) << finding.what;
+    EXPECT_THAT(remedy_of(finding, "sensors.wheels0.steer_shift_rad"), ::testing::StartsWith("["));
+  }
+  const Inspection car =
+      with_wheels(simulated("viwo_ackermann"), [](EncoderSample& s) { s.steer_rad[0] += 0.15; });
+  EXPECT_THAT(faults_of(car), ElementsAre("wheels0 steer offsets"));
+  EXPECT_NEAR(figure_of(finding_of(car, "wheels0", "steer offsets"), "offset of steer_1"), -0.15,
+              0.03);
+}
+
+TEST(InspectWheels, FindsMoreNoiseThanConfiguredAndWritesIt) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> draw(0., 0.02);
+  const Inspection noisy = with_wheels(swerve(), [&](EncoderSample& s) {
+    for (int i = 0; i < s.n_drive; ++i) {
+      s.drive_rad_per_s[static_cast<std::size_t>(i)] += draw(random);
+    }
+  });
+  EXPECT_THAT(faults_of(noisy), Contains("wheels0 sigma_drive_rad_per_s"));
+  EXPECT_NEAR(std::stod("0" + remedy_of(finding_of(noisy, "wheels0", "sigma_drive_rad_per_s"),
+                                        "kinematics.sigma_drive_rad_per_s")),
+              0.02, 0.004);
+}
+
+TEST(InspectWheels, FindsDrivesInOtherUnitsByTheGyroAndByPoses) {
+  const auto in_rpm = [](EncoderSample& s) {
+    for (double& rate : s.drive_rad_per_s) rate *= 30. / std::numbers::pi;
+  };
+  const Inspection by_gyro = with_wheels(swerve(), in_rpm);
+  EXPECT_THAT(remedy_of(finding_of(by_gyro, "wheels0", "rate"), "sensors.wheels0.drive_scale"),
+              HasSubstr("[0.104719"));
+  const RunSetup planar = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
+  const Inspection by_poses = with_wheels(planar, in_rpm);
+  const Finding speed = finding_of(by_poses, "wheels0", "speed");
+  EXPECT_EQ(speed.severity, Severity::kFault);
+  EXPECT_THAT(speed.what, HasSubstr("revolutions per minute"));
+  EXPECT_THAT(remedy_of(speed, "sensors.wheels0.drive_scale"), HasSubstr("[0.104719"));
+}
+
+TEST(InspectWheels, FindsThatAllDrivesAreReversedByPoses) {
+  const Inspection reversed = with_wheels(
+      setup_of(testing::configuration("runs/simulated_swerve.yaml")), [](EncoderSample& s) {
+        for (double& rate : s.drive_rad_per_s) rate *= -1.;
+      });
+  EXPECT_THAT(faults_of(reversed), Contains("wheels0 heading"));
+}
+
+TEST(InspectWheels, FindsTheSignOfADriveOfABaseThatCannotContradictItselfByTheGyro) {
+  const Inspection reversed =
+      with_wheels(simulated("viwo_skid_steer", {"sensors.simulator0.duration_s=30"}),
+                  [](EncoderSample& s) { s.drive_rad_per_s[0] *= -1.; });
+  EXPECT_THAT(faults_of(reversed), ElementsAre("wheels0 order"));
+  EXPECT_EQ(remedy_of(finding_of(reversed, "wheels0", "order"), "sensors.wheels0.drive_scale"),
+            "[-1, 1]");
+}
+
+TEST(InspectWheels, FindsAnAngleThatBeginsAnewAfterATurn) {
+  double angle = 0.;
+  const Inspection wraps = with_wheels(swerve(), [&angle](EncoderSample& s) {
+    const double dt_s = seconds_between(s.begin_ns, s.end_ns);
+    const double before = std::floor(angle / (2. * std::numbers::pi));
+    angle += s.drive_rad_per_s[2] * dt_s;
+    const double turns = std::floor(angle / (2. * std::numbers::pi)) - before;
+    s.drive_rad_per_s[2] -= turns * 2. * std::numbers::pi / dt_s;
+  });
+  EXPECT_THAT(faults_of(wraps), Contains("wheels0 turn"));
+  EXPECT_THAT(remedy_of(finding_of(wraps, "wheels0", "turn"), "sensors.wheels0.drive_turn"),
+              ::testing::MatchesRegex("\\[0, 0, 6.2[0-9]+, 0\\]"));
+}
+
+TEST(InspectWheels, TellsSamplesWithoutTheChannelsOfTheModel) {
+  const Inspection few = with_wheels(swerve(), [](EncoderSample& s) { s.n_steer = 2; });
+  EXPECT_THAT(faults_of(few), Contains("wheels0 channels"));
+}
+
+TEST(InspectWheels, NamesWhatIsUpsideDownOrReversed) {
+  const Inspection imu = inspected(swerve(), {.imu = [](ImuSample& s) {
+                                     for (std::size_t i = 1; i < 3; ++i) {
+                                       s.gyro_rad_per_s[i] *= -1.;
+                                       s.accel_m_per_s2[i] *= -1.;
+                                     }
+                                     return true;
+                                   }});
+  EXPECT_THAT(faults_of(imu), ElementsAre("imu0 up"));
+  EXPECT_EQ(remedy_of(finding_of(imu, "imu0", "up"), "wheels.rpy_ItoO_rad"), "[3.141593, 0, 0]");
+  const Inspection drives = with_wheels(swerve(), [](EncoderSample& s) {
+    for (double& rate : s.drive_rad_per_s) rate *= -1.;
+  });
+  EXPECT_EQ(remedy_of(finding_of(drives, "wheels0", "rate"), "sensors.wheels0.drive_scale"),
+            "[-1, -1, -1, -1]");
+  const Inspection sides =
+      with_wheels(simulated("viwo_skid_steer", {"sensors.simulator0.duration_s=30"}),
+                  [](EncoderSample& s) { std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[1]); });
+  EXPECT_THAT(finding_of(sides, "wheels0", "rate").what,
+              HasSubstr("drives on the left and on the right are exchanged"));
+}
+
+}  // namespace
+}  // namespace viwo::inspect

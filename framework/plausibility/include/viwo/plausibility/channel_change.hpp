@@ -1,0 +1,48 @@
+// What may have been done to the channels of encoders on their way to a log: one sign, or two that
+// are exchanged.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "viwo/api/kinematic_model.hpp"
+#include "viwo/plausibility/finding.hpp"
+
+namespace viwo {
+
+struct ChannelChange {
+  enum Kind : std::uint8_t {
+    kNone,
+    kDriveSign,
+    kDrivesExchanged,
+    kSteerSign,
+    kSteersExchanged,
+    kSteerSigns,
+    kWheelsExchanged,
+  };
+  Kind kind = kNone;
+  std::size_t a = 0, b = 0;  ///< channels
+
+  void undo(EncoderSample& sample) const;
+  /// "drive_2 turns opposite to what the other wheels say: its sign"
+  std::string text() const;
+  /// What undoes it in the section of a sensor: signs as lists with -1 for what is reversed, an
+  /// order as lists that say which channel of the model each channel of the log is, from 1.
+  std::vector<Remedy> remedies(const std::string& sensor, std::size_t n_drive,
+                               std::size_t n_steer) const;
+};
+
+/// All that may have been done, one at a time; the first is none.
+std::vector<ChannelChange> channel_changes(const ModelDescription& description);
+
+/// A list in YAML: `entry(i)` as texts.
+template <class Entry>
+std::string yaml_list(std::size_t n, const Entry& entry) {
+  std::string text;
+  for (std::size_t i = 0; i < n; ++i) text += (i > 0 ? ", " : "") + std::string(entry(i));
+  return "[" + text + "]";
+}
+
+}  // namespace viwo

@@ -1,0 +1,106 @@
+#include "viwo/plausibility/channel_change.hpp"
+
+#include <utility>
+
+namespace viwo {
+
+std::vector<ChannelChange> channel_changes(const ModelDescription& description) {
+  std::vector<ChannelChange> changes = {{}};
+  const auto add_pairs = [&changes](std::size_t n, ChannelChange::Kind exchanged) {
+    for (std::size_t a = 0; a < n; ++a) {
+      for (std::size_t b = a + 1; b < n; ++b) changes.push_back({exchanged, a, b});
+    }
+  };
+  const auto add_channels = [&](std::size_t n, ChannelChange::Kind sign,
+                                ChannelChange::Kind exchanged) {
+    for (std::size_t a = 0; a < n; ++a) changes.push_back({sign, a, a});
+    add_pairs(n, exchanged);
+  };
+  const auto n_drive = static_cast<std::size_t>(description.n_drive);
+  const auto n_steer = static_cast<std::size_t>(description.n_steer);
+  add_channels(n_drive, ChannelChange::kDriveSign, ChannelChange::kDrivesExchanged);
+  add_channels(n_steer, ChannelChange::kSteerSign, ChannelChange::kSteersExchanged);
+  if (n_steer > 1) changes.push_back({ChannelChange::kSteerSigns});
+  if (n_steer == n_drive) add_pairs(n_drive, ChannelChange::kWheelsExchanged);
+  return changes;
+}
+
+void ChannelChange::undo(EncoderSample& sample) const {
+  switch (kind) {
+    case kNone:
+      break;
+    case kDriveSign:
+      sample.drive_rad_per_s[a] *= -1.;
+      break;
+    case kDrivesExchanged:
+      std::swap(sample.drive_rad_per_s[a], sample.drive_rad_per_s[b]);
+      break;
+    case kSteerSign:
+      sample.steer_rad[a] *= -1.;
+      break;
+    case kSteersExchanged:
+      std::swap(sample.steer_rad[a], sample.steer_rad[b]);
+      break;
+    case kSteerSigns:
+      for (double& angle : sample.steer_rad) angle *= -1.;
+      break;
+    case kWheelsExchanged:
+      std::swap(sample.drive_rad_per_s[a], sample.drive_rad_per_s[b]);
+      std::swap(sample.steer_rad[a], sample.steer_rad[b]);
+      break;
+  }
+}
+
+std::string ChannelChange::text() const {
+  const std::string first = std::to_string(a + 1), second = std::to_string(b + 1);
+  switch (kind) {
+    case kNone:
+      break;
+    case kDriveSign:
+      return "drive_" + first + " turns opposite to what the other wheels say: its sign";
+    case kDrivesExchanged:
+      return "drives contradict each other, and do not with drive_" + first + " and drive_" +
+             second + " exchanged: their order";
+    case kSteerSign:
+      return "steer_" + first + " turns opposite to what the other wheels say: its sign";
+    case kSteersExchanged:
+      return "wheels contradict each other, and do not with steer_" + first + " and steer_" +
+             second + " exchanged: their order";
+    case kSteerSigns:
+      return "wheels contradict each other, and do not with all steering angles reversed: their "
+             "sign, or left and right of the wheels are exchanged";
+    case kWheelsExchanged:
+      return "wheels contradict each other, and do not with drive and steering of wheels " + first +
+             " and " + second + " exchanged: their order";
+  }
+  return "";
+}
+
+std::vector<Remedy> ChannelChange::remedies(const std::string& sensor, std::size_t n_drive,
+                                            std::size_t n_steer) const {
+  const std::string section = "sensors." + sensor + ".";
+  const auto sign = [&](std::size_t i) { return i == a || kind == kSteerSigns ? "-1" : "1"; };
+  const auto order = [&](std::size_t i) {
+    return std::to_string((i == a ? b : i == b ? a : i) + 1);
+  };
+  const Remedy drives{section + "drive_channel", yaml_list(n_drive, order)};
+  const Remedy steers{section + "steer_channel", yaml_list(n_steer, order)};
+  switch (kind) {
+    case kNone:
+      break;
+    case kDriveSign:
+      return {{section + "drive_scale", yaml_list(n_drive, sign)}};
+    case kDrivesExchanged:
+      return {drives};
+    case kSteerSign:
+    case kSteerSigns:
+      return {{section + "steer_scale", yaml_list(n_steer, sign)}};
+    case kSteersExchanged:
+      return {steers};
+    case kWheelsExchanged:
+      return {drives, steers};
+  }
+  return {};
+}
+
+}  // namespace viwo
