@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <map>
+#include <string>
 
 #include <yaml-cpp/yaml.h>
 
@@ -13,12 +15,19 @@ bool needs_quotes(const std::string& text) {
          text == "NULL";
 }
 
+std::string join(const std::string& path, const std::string& key) {
+  return path.empty() ? key : path + "." + key;
+}
+
 void emit_text(YAML::Emitter& out, const std::string& text, bool quoted) {
   if (quoted || needs_quotes(text)) out << YAML::DoubleQuoted;
   out << text;
 }
 
-void emit(YAML::Emitter& out, const Node& node) {
+using Comments = std::map<std::string, std::string>;
+
+/// `path`: of the node.
+void emit(YAML::Emitter& out, const Node& node, const Comments& comments, const std::string& path) {
   switch (node.kind()) {
     case Node::Kind::kNull:
       out << YAML::Null;
@@ -31,7 +40,9 @@ void emit(YAML::Emitter& out, const Node& node) {
         return item.is_scalar() || item.is_null();
       });
       out << (flat ? YAML::Flow : YAML::Block) << YAML::BeginSeq;
-      for (const Node& item : node.items()) emit(out, item);
+      for (std::size_t i = 0; i < node.items().size(); ++i) {
+        emit(out, node.items()[i], comments, join(path, std::to_string(i)));
+      }
       out << YAML::EndSeq;
       return;
     }
@@ -41,7 +52,11 @@ void emit(YAML::Emitter& out, const Node& node) {
         out << YAML::Key;
         emit_text(out, entry.key, false);
         out << YAML::Value;
-        emit(out, entry.value);
+        const std::string place = join(path, entry.key);
+        emit(out, entry.value, comments, place);
+        if (const auto comment = comments.find(place); comment != comments.end()) {
+          out << YAML::Comment(comment->second);
+        }
       }
       out << YAML::EndMap;
       return;
@@ -50,9 +65,9 @@ void emit(YAML::Emitter& out, const Node& node) {
 
 }  // namespace
 
-std::string to_yaml(const Node& node) {
+std::string to_yaml(const Node& node, const std::map<std::string, std::string>& comments) {
   YAML::Emitter out;
-  emit(out, node);
+  emit(out, node, comments, "");
   return std::string(out.c_str(), out.size()) + "\n";
 }
 

@@ -44,7 +44,7 @@ class CameraTable {
   }
 
   void read(ImageRecording& out) {
-    TableReader table(folder_ / "data.csv");
+    TableReader table(table_in(folder_, "data.csv"));
     const std::size_t stamp = stamp_column(table, "timestamp [ns]");
     const std::size_t name = table.column("filename");
     while (table.next()) {

@@ -17,13 +17,13 @@ namespace {
 
 std::filesystem::path table_file(const std::filesystem::path& path) {
   std::error_code ignored;
-  return std::filesystem::is_directory(path, ignored) ? path / "data.csv" : path;
+  return std::filesystem::is_directory(path, ignored) ? table_in(path, "data.csv") : path;
 }
 
-/// Columns prefix_1, prefix_2, ... as far as the file has them.
+/// Columns prefix_1, prefix_2, ... as far as the file has them; in any unit when they are scaled.
 std::vector<std::size_t> channel_columns(const TableReader& table, const std::string& prefix,
-                                         const char* unit, std::size_t at_least,
-                                         std::size_t at_most) {
+                                         const char* unit, const std::vector<double>& scale,
+                                         std::size_t at_least, std::size_t at_most) {
   std::size_t n = 0;
   for (const std::string& name : table.columns()) n += name.starts_with(prefix) ? 1 : 0;
   if (n > at_most) {
@@ -32,7 +32,8 @@ std::vector<std::size_t> channel_columns(const TableReader& table, const std::st
   }
   std::vector<std::size_t> columns;
   for (std::size_t i = 1; i <= std::max(n, at_least); ++i) {
-    columns.push_back(table.column(prefix + std::to_string(i), unit));
+    const std::string name = prefix + std::to_string(i);
+    columns.push_back(scale.empty() ? table.column(name, unit) : table.column_in_any_unit(name));
   }
   return columns;
 }
@@ -66,10 +67,11 @@ EncoderRecording read_asl_encoders(const std::filesystem::path& path,
                                    const EncoderRecordingOptions& options) {
   TableReader table(table_file(path));
   const std::size_t stamp = stamp_column(table);
-  const auto drives =
-      channel_columns(table, "drive_", options.drive_is_angle ? "rad" : "rad/s", 1, kMaxDrives);
-  const auto steers = channel_columns(table, "steer_", "rad", 0, kMaxSteers);
-  EncoderCollector collector(options);
+  const JointParams& joints = options.joints;
+  const auto drives = channel_columns(table, "drive_", options.drive_is_angle ? "rad" : "rad/s",
+                                      joints.drive_scale, 1, kMaxDrives);
+  const auto steers = channel_columns(table, "steer_", "rad", joints.steer_scale, 0, kMaxSteers);
+  EncoderCollector collector(options, drives.size(), steers.size());
   EncoderReading reading;
   reading.n_drive = static_cast<int>(drives.size());
   reading.n_steer = static_cast<int>(steers.size());

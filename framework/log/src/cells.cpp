@@ -64,7 +64,7 @@ std::vector<EncoderSample> cells_from_angles(std::span<const EncoderReading> ang
   cells.reserve(angles.size() / static_cast<std::size_t>(stride));
   std::size_t begin = 0;
   for (std::size_t i = 1; i < angles.size(); ++i) {
-    if (seconds_between(angles[i - 1].t_ns, angles[i].t_ns) > max_gap_s) {
+    if (angles[i].is_start || seconds_between(angles[i - 1].t_ns, angles[i].t_ns) > max_gap_s) {
       begin = i;
     } else if (i - begin == static_cast<std::size_t>(stride)) {
       cells.push_back(cell_between(angles[begin], angles[i]));
@@ -72,6 +72,23 @@ std::vector<EncoderSample> cells_from_angles(std::span<const EncoderReading> ang
     }
   }
   return cells;
+}
+
+std::vector<EncoderSample> samples_from(std::span<const EncoderReading> readings,
+                                        bool drive_is_angle, double max_gap_s, int stride) {
+  if (drive_is_angle) return cells_from_angles(readings, max_gap_s, stride);
+  std::vector<EncoderSample> samples;
+  samples.reserve(readings.size());
+  for (const EncoderReading& reading : readings) {
+    EncoderSample& sample = samples.emplace_back();
+    sample.t_ns = reading.t_ns;
+    sample.n_drive = reading.n_drive;
+    sample.n_steer = reading.n_steer;
+    sample.drive_rad_per_s = reading.drive;
+    sample.steer_rad = reading.steer_rad;
+  }
+  make_cells(samples, max_gap_s);
+  return samples;
 }
 
 }  // namespace viwo::log

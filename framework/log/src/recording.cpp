@@ -1,9 +1,7 @@
 #include "viwo/log/recording.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 
 #include "quaternion.hpp"
 #include "viwo/api/status.hpp"
@@ -29,18 +27,14 @@ const char* why_rejected(StateSample& state) {
 }
 
 const char* why_rejected(const GnssSample& fix) { return fix.fault(); }
-
-EncoderSample rate_sample(const EncoderReading& reading) {
-  EncoderSample sample;
-  sample.t_ns = reading.t_ns;
-  sample.n_drive = reading.n_drive;
-  sample.n_steer = reading.n_steer;
-  sample.drive_rad_per_s = reading.drive;
-  sample.steer_rad = reading.steer_rad;
-  return sample;
-}
+const char* why_rejected(const HeadingSample& heading) { return heading.fault(); }
 
 }  // namespace
+
+void sort_by_time(Recording<Measurement>& recording) {
+  std::stable_sort(recording.samples.begin(), recording.samples.end(),
+                   [](const Measurement& a, const Measurement& b) { return a.t_ns() < b.t_ns(); });
+}
 
 const char* why_rejected(PoseSample& pose) {
   if (!all_finite(pose.p_BinW_m) || !all_finite(pose.q_BtoW_xyzw)) return kNotFinite;
@@ -55,31 +49,28 @@ const char* why_rejected(const EncoderReading& reading) {
   return all_finite(reading.drive) && all_finite(reading.steer_rad) ? nullptr : kNotFinite;
 }
 
-EncoderCollector::EncoderCollector(const EncoderRecordingOptions& options)
-    : options_(options), filter_(options.limits) {}
+EncoderCollector::EncoderCollector(const EncoderRecordingOptions& options, std::size_t n_drive,
+                                   std::size_t n_steer)
+    : options_(options),
+      filter_(options.limits),
+      joints_(options.joints, static_cast<int>(n_drive), static_cast<int>(n_steer),
+              options.drive_is_angle, options.limits.max_gap_s) {}
 
-void EncoderCollector::add(const EncoderReading& reading, const TextReader& at) {
-  if (const char* why = why_rejected(reading)) {
-    filter_.reject(why, at);
-  } else if (filter_.accept(reading.t_ns, at)) {
-    readings_.push_back(reading);
-  }
+void EncoderCollector::add(EncoderReading reading, const TextReader& at) {
+  if (const char* const why = why_rejected(reading)) return filter_.reject(why, at);
+  if (!filter_.accept(reading.t_ns, at)) return;
+  if (const char* const why = joints_.convert(reading)) return filter_.reject_last(why, at);
+  readings_.push_back(reading);
 }
 
 EncoderRecording EncoderCollector::finish(const TextReader& at) {
   filter_.finish(at);
   EncoderRecording out;
   out.rejections = filter_.counts();
-  const double max_gap_s = options_.limits.max_gap_s;
-  if (options_.drive_is_angle) {
-    out.samples = cells_from_angles(readings_, max_gap_s, options_.stride);
-    if (out.samples.empty()) {
-      throw InputError(at.file().string() + "  has too few readings without a gap for a rate");
-    }
-  } else {
-    std::transform(readings_.begin(), readings_.end(), std::back_inserter(out.samples),
-                   rate_sample);
-    make_cells(out.samples, max_gap_s);
+  out.samples =
+      samples_from(readings_, options_.drive_is_angle, options_.limits.max_gap_s, options_.stride);
+  if (out.samples.empty()) {
+    throw InputError(at.file().string() + "  has too few readings without a gap for a rate");
   }
   return out;
 }
@@ -102,6 +93,7 @@ Recording<Sample> SampleCollector<Sample>::finish(const TextReader& at) {
 template class SampleCollector<PoseSample>;
 template class SampleCollector<ImuSample>;
 template class SampleCollector<GnssSample>;
+template class SampleCollector<HeadingSample>;
 template class SampleCollector<StateSample>;
 
 std::size_t FeatureCollector::find(std::int64_t t_ns, int camera) const {

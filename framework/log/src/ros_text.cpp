@@ -216,7 +216,7 @@ EncoderRecording read_ros_encoders(const std::filesystem::path& file,
   const std::size_t position = table.column(".position");
   const std::size_t drive = options.recording.drive_is_angle ? position : table.column(".velocity");
   JointFinder joints(table, options);
-  EncoderCollector collector(options.recording);
+  EncoderCollector collector(options.recording, options.drive.size(), options.steer.size());
   EncoderReading reading;
   reading.n_drive = static_cast<int>(options.drive.size());
   reading.n_steer = static_cast<int>(options.steer.size());

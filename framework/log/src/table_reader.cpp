@@ -1,19 +1,40 @@
 #include "viwo/log/table_reader.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <system_error>
+#include <utility>
 
 #include "viwo/log/text.hpp"
 
 namespace viwo::log {
 namespace {
 
-void split(std::string_view line, char separator, std::vector<std::string_view>& fields) {
+/// Where the first field ends. With `quotes` not within them.
+std::size_t field_end(std::string_view line, char separator, bool quotes) {
+  std::size_t from = 0;
+  if (quotes && trim(line).starts_with('"')) {
+    const std::size_t closing = line.find('"', line.find('"') + 1);
+    if (closing != std::string_view::npos) from = closing + 1;
+  }
+  return separator == ' ' ? line.find_first_of(" \t", from) : line.find(separator, from);
+}
+
+std::string_view without_quotes(std::string_view field) {
+  const bool is_quoted = field.size() > 1 && field.front() == '"' && field.back() == '"';
+  return is_quoted ? trim(field.substr(1, field.size() - 2)) : field;
+}
+
+void split(std::string_view line, char separator, bool quotes,
+           std::vector<std::string_view>& fields) {
   fields.clear();
-  for (std::size_t begin = 0;;) {
-    const std::size_t end = line.find(separator, begin);
-    fields.push_back(trim(line.substr(begin, end - begin)));
+  for (;;) {
+    if (separator == ' ') line = trim(line);
+    const std::size_t end = field_end(line, separator, quotes);
+    const std::string_view field = trim(line.substr(0, end));
+    fields.push_back(quotes ? without_quotes(field) : field);
     if (end == std::string_view::npos) return;
-    begin = end + 1;
+    line.remove_prefix(end + 1);
   }
 }
 
@@ -31,18 +52,50 @@ std::string fields_text(std::size_t n) {
 
 }  // namespace
 
+std::filesystem::path table_in(const std::filesystem::path& folder, const std::string& name) {
+  const std::filesystem::path plain = folder / name;
+  const std::filesystem::path packed = folder / (name + ".gz");
+  std::error_code ignored;
+  if (!std::filesystem::exists(packed, ignored)) return plain;
+  if (!std::filesystem::exists(plain, ignored)) return packed;
+  throw InputError(folder.string() + "  holds both " + name + " and " + name +
+                   ".gz: name the file that is meant, or remove the other");
+}
+
 TableReader::TableReader(const std::filesystem::path& file) : reader_(file) {
-  std::string_view header;
-  reader_.next(header);  // an empty file throws
-  header = trim(header);
-  if (header.starts_with('#')) header.remove_prefix(1);
+  const std::string_view header = first_line(0);
   if (header.find(';') != std::string_view::npos) separator_ = ';';
-  split(header, separator_, fields_);
+  split(header, separator_, false, fields_);
   for (const std::string_view name : fields_) {
     if (name.empty()) reader_.fail("the header has a column without a name");
     if (has_column(name)) reader_.fail("the header has the column " + quoted(name) + " twice");
     columns_.emplace_back(name);
   }
+}
+
+TableReader::TableReader(const std::filesystem::path& file, const TableLayout& layout)
+    : reader_(file), separator_(layout.separator), is_own_(false), has_row_(!layout.has_header) {
+  const std::string_view line = first_line(layout.skip_lines);
+  if (separator_ == 0) {
+    separator_ = ' ';
+    for (const char candidate : {'\t', ',', ';'}) {
+      if (line.find(candidate) != std::string_view::npos) separator_ = candidate;
+    }
+  }
+  split(line, separator_, true, fields_);
+  for (std::size_t i = 0; i < fields_.size(); ++i) {
+    columns_.push_back(has_row_ ? std::to_string(i + 1) : std::string(fields_[i]));
+  }
+}
+
+std::string_view TableReader::first_line(int skip) {
+  std::string_view line;
+  for (int i = 0; i <= skip; ++i) {
+    if (reader_.next(line)) continue;  // an empty file throws
+    reader_.fail("the file ends before the line that is the first of the table");
+  }
+  if (!has_row_ && trim(line).starts_with('#')) line.remove_prefix(line.find('#') + 1);
+  return line;
 }
 
 std::optional<std::size_t> TableReader::find(std::string_view name) const {
@@ -52,7 +105,15 @@ std::optional<std::size_t> TableReader::find(std::string_view name) const {
 }
 
 std::size_t TableReader::column(std::string_view name) const {
-  if (const auto found = find(name)) return *found;
+  const auto found = find(name);
+  if (!is_own_ && found && std::count(columns_.begin(), columns_.end(), name) > 1) {
+    reader_.fail("the header has the column " + quoted(name) + " twice: give its number");
+  }
+  if (found) return *found;
+  const auto number = is_own_ ? std::nullopt : parse_integer(name);
+  if (number && *number >= 1 && *number <= std::ssize(columns_)) {
+    return static_cast<std::size_t>(*number - 1);
+  }
   reader_.fail("no column '" + std::string(name) + "'" + did_you_mean(name, columns_));
 }
 
@@ -68,12 +129,22 @@ std::size_t TableReader::column(std::string_view name, std::string_view unit) co
   return column(with_unit);
 }
 
+std::size_t TableReader::column_in_any_unit(std::string_view name) const {
+  const std::string with_unit = std::string(name) + " [";
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    if (columns_[i].starts_with(with_unit)) return i;
+  }
+  return column(name);
+}
+
 bool TableReader::next() {
-  std::string_view line;
-  do {
-    if (!reader_.next(line)) return false;
-  } while (trim(line).empty());
-  split(line, separator_, fields_);
+  if (!std::exchange(has_row_, false)) {
+    std::string_view line;
+    do {
+      if (!reader_.next(line)) return false;
+    } while (trim(line).empty());
+    split(line, separator_, !is_own_, fields_);
+  }
   if (reader_.unterminated() && (fields_.size() < columns_.size() ||
                                  (fields_.size() == columns_.size() && is_begun(fields_.back())))) {
     reader_.leave_out_last();
@@ -108,6 +179,11 @@ std::int64_t TableReader::stamp_ns(std::size_t column) const {
 std::int64_t TableReader::seconds_ns(std::size_t column) const {
   if (const auto value = parse_seconds_ns(fields_[column])) return *value;
   fail(column, quoted(fields_[column]) + " is no time in seconds");
+}
+
+std::int64_t TableReader::time_ns(std::size_t column, TimeUnit unit) const {
+  if (const auto value = parse_time_ns(fields_[column], unit)) return *value;
+  fail(column, quoted(fields_[column]) + " is no time");
 }
 
 void TableReader::fail(std::size_t column, const std::string& text) const {

@@ -104,10 +104,11 @@ std::optional<std::int64_t> parse_integer(std::string_view text) {
   return parse_whole<std::int64_t>(text);
 }
 
-std::optional<std::int64_t> parse_seconds_ns(std::string_view text) {
+std::optional<std::int64_t> parse_time_ns(std::string_view text, TimeUnit unit) {
   const auto decimal = take_apart(trim(text));
   if (!decimal) return std::nullopt;
-  const std::int64_t places = decimal->point + 9;  // digits of the number in nanoseconds
+  // Digits of the number in nanoseconds
+  const std::int64_t places = decimal->point + static_cast<std::int64_t>(unit);
   if (decimal->digits.empty() || places < 0) return 0;
   if (places > 19) return std::nullopt;
   const auto kept = static_cast<std::size_t>(places);

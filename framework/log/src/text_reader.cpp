@@ -1,11 +1,7 @@
 #include "viwo/log/text_reader.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
-#include <system_error>
-
-#include <zlib.h>
 
 #include "viwo/api/status.hpp"
 
@@ -13,30 +9,13 @@ namespace viwo::log {
 namespace {
 
 constexpr std::size_t kMaxLine = std::size_t{1} << 20;
-constexpr unsigned kBlock = 1U << 16;
-
-gzFile as_gz(void* handle) { return static_cast<gzFile>(handle); }
+constexpr std::size_t kBlock = std::size_t{1} << 16;
 
 }  // namespace
 
-void TextReader::Closer::operator()(void* handle) const { gzclose_r(as_gz(handle)); }
-
-TextReader::TextReader(const std::filesystem::path& file) : file_(file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    throw InputError(file.string() + "  is a folder, not a file");
-  }
-  errno = 0;
-  handle_.reset(gzopen(file.c_str(), "rb"));
-  if (handle_ == nullptr) {
-    const int error = errno;
-    throw InputError(file.string() +
-                     "  cannot be read: " + (error != 0 ? std::strerror(error) : "out of memory"));
-  }
+TextReader::TextReader(const std::filesystem::path& file) : file_(file), bytes_(file) {
   buffer_.resize(kBlock);
 }
-
-TextReader::~TextReader() = default;
 
 std::string TextReader::where() const {
   return file_.filename().string() + ":" + std::to_string(line_);
@@ -50,23 +29,11 @@ bool TextReader::fill() {
   end_ -= begin_;
   begin_ = 0;
   if (buffer_.size() < end_ + kBlock) buffer_.resize(end_ + kBlock);
-  const int n = gzread(as_gz(handle_.get()), buffer_.data() + end_, kBlock);
-  if (n > 0) {
-    end_ += static_cast<std::size_t>(n);
-    return true;
-  }
-  // zlib reports a stream that stops in the middle as "nothing more to read" with this error.
-  int error = Z_OK;
-  const char* text = gzerror(as_gz(handle_.get()), &error);
-  if (error == Z_OK) return false;
+  const std::size_t n = bytes_.read(buffer_.data() + end_, kBlock);
+  end_ += n;
+  if (n > 0 || bytes_.fault().empty()) return n > 0;
   ++line_;
-  if (error == Z_BUF_ERROR) fail("the gzip data end early: the file is truncated");
-  if (error == Z_ERRNO) fail(std::string("cannot be read: ") + std::strerror(errno));
-  // zlib puts the name of the file before its text; it is said already.
-  std::string_view reason = text;
-  const std::string prefix = file_.string() + ": ";
-  if (reason.starts_with(prefix)) reason.remove_prefix(prefix.size());
-  fail("the gzip data are corrupt: " + std::string(reason));
+  fail(bytes_.fault());
 }
 
 bool TextReader::next(std::string_view& line) {

@@ -51,6 +51,21 @@ TEST_F(AslTest, ReadsEncoderRatesFromAFileOrItsFolder) {
   }
 }
 
+TEST_F(AslTest, AFolderGivesItsTablePlainOrGzippedButNotBoth) {
+  const std::string text = "timestamp_ns,drive_1 [rad/s]\n1000,1\n2000,3\n";
+  std::filesystem::create_directories(folder_ / "wheels0");
+  write_gz("wheels0/data.csv.gz", text);
+  const EncoderRecording read = read_asl_encoders(folder_ / "wheels0", {});
+  ASSERT_EQ(read.samples.size(), 2U);
+  EXPECT_EQ(read.samples[1].drive_rad_per_s[0], 3.);
+  write("wheels0/data.csv", text);
+  EXPECT_EQ(message_of([&] { read_asl_encoders(folder_ / "wheels0", {}); }),
+            (folder_ / "wheels0").string() +
+                "  holds both data.csv and data.csv.gz: name the file "
+                "that is meant, or remove the other");
+  EXPECT_EQ(read_asl_encoders(folder_ / "wheels0/data.csv.gz", {}).samples.size(), 2U);
+}
+
 TEST_F(AslTest, ReadsAnglesAndTheEurocStampColumn) {
   const auto file =
       write("w.csv", "#timestamp [ns],drive_1 [rad]\n0,1\n500000000,2\n1000000000,5\n");

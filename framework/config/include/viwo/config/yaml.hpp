@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <string_view>
 
@@ -17,7 +18,8 @@ Node load_file(const std::filesystem::path& file);
 /// The same for a text; `origin` stands for the file in positions.
 Node parse(std::string_view text, const std::string& origin);
 
-/// YAML that parses back to the same tree. Lists of scalars are written on one line.
-std::string to_yaml(const Node& node);
+/// YAML that parses back to the same tree. Lists of scalars are written on one line. `comments`:
+/// behind the values at these dotted paths.
+std::string to_yaml(const Node& node, const std::map<std::string, std::string>& comments = {});
 
 }  // namespace viwo::config

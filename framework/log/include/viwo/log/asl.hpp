@@ -9,7 +9,7 @@
 //   state_groundtruth_estimate0/data.csv   the EuRoC columns; nan for what is not known
 //   calibration_groundtruth0/data.csv      timestamp_ns, name, value
 //   camN/data.csv, camN/data/*.png         timestamp_ns, file name; the images of camera N
-// Readers take a table as the file, plain or gzipped, or as the folder of its data.csv. The stamp
+// Readers take a table as the file or as the folder of its data.csv, plain or gzipped. The stamp
 // column is `timestamp_ns`, `timestamp [ns]` or `timestamp`. InputError for what is wrong with it.
 #pragma once
 
@@ -22,7 +22,8 @@
 
 namespace viwo::log {
 
-/// Drive channels are in rad/s, or in rad with drive_is_angle.
+/// Drive channels are in rad/s, or in rad with drive_is_angle; where the joints have a scale, in
+/// any unit. ParamError for joints that the table does not have.
 EncoderRecording read_asl_encoders(const std::filesystem::path& path,
                                    const EncoderRecordingOptions& options);
 

@@ -10,7 +10,7 @@
 
 namespace viwo::log {
 
-/// One reading of encoders as it stands in a log.
+/// One reading of encoders: as it stands in a log, or what JointMap makes of it.
 struct EncoderReading {
   std::int64_t t_ns = 0;
   int n_drive = 0;
@@ -18,6 +18,7 @@ struct EncoderReading {
   /// Rotation rates [rad/s] or multi-turn angles [rad], as the log has it.
   std::array<double, kMaxDrives> drive{};
   std::array<double, kMaxSteers> steer_rad{};
+  bool is_start = false;  ///< what was before does not count on: no difference reaches over to it
 };
 
 /// Sets begin and end of samples that hold rates at their stamps, in time order: the mid-points
@@ -31,9 +32,14 @@ void make_cells(std::vector<EncoderSample>& rates, double max_gap_s);
 /// mean, and the steering angle is the mean of both ends (the shorter way round).
 ///
 /// With `stride` n >= 1 every n-th reading is used: longer cells, less noise from the resolution of
-/// the angles. No cell reaches over a spacing longer than `max_gap_s`; counting starts again behind
-/// it, and readings before it that do not fill a cell are dropped, as at the end.
+/// the angles. No cell reaches over a spacing longer than `max_gap_s`, or to a reading that starts
+/// anew; counting starts again there, and readings before it that do not fill a cell are dropped,
+/// as at the end.
 std::vector<EncoderSample> cells_from_angles(std::span<const EncoderReading> angles,
                                              double max_gap_s, int stride = 1);
+
+/// Samples from readings at increasing stamps: cells_from_angles(), or make_cells() of rates.
+std::vector<EncoderSample> samples_from(std::span<const EncoderReading> readings,
+                                        bool drive_is_angle, double max_gap_s, int stride);
 
 }  // namespace viwo::log

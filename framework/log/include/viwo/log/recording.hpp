@@ -12,14 +12,16 @@
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/sensor.hpp"
 #include "viwo/log/cells.hpp"
+#include "viwo/log/joints.hpp"
 #include "viwo/log/stamp_filter.hpp"
 
 namespace viwo::log {
 
 struct EncoderRecordingOptions {
   LogLimits limits;
-  bool drive_is_angle = false;  ///< multi-turn angles [rad] instead of rates [rad/s]
+  bool drive_is_angle = false;  ///< angles [rad] instead of rates [rad/s]
   int stride = 1;               ///< with angles: use every n-th reading, see cells_from_angles()
+  JointParams joints = {};      ///< from the log to rad and rad/s
 };
 
 /// Samples in time order, and what was dropped on the way.
@@ -32,9 +34,23 @@ using EncoderRecording = Recording<EncoderSample>;
 using PoseRecording = Recording<PoseSample>;
 using ImuRecording = Recording<ImuSample>;
 using GnssRecording = Recording<GnssSample>;
+using HeadingRecording = Recording<HeadingSample>;
 using FeatureRecording = Recording<FeatureSample>;
 using StateRecording = Recording<StateSample>;
 using CalibrationRecording = Recording<CalibrationSample>;
+
+/// Takes over what was recorded of one kind, behind what is there; `name` stands before the
+/// reasons.
+template <class Sample>
+void append(Recording<Measurement>& out, Recording<Sample> more, const std::string& name) {
+  for (Sample& sample : more.samples) out.samples.emplace_back(std::move(sample));
+  for (RejectionCount& rejection : more.rejections) {
+    rejection.reason = name + ": " + rejection.reason;
+    out.rejections.push_back(std::move(rejection));
+  }
+}
+/// Into time order; samples of one time stay in the order in which their kinds were appended.
+void sort_by_time(Recording<Measurement>& recording);
 
 /// Why a datum cannot be used (kNotFinite, kNotUnit); nullptr when it can. A quaternion whose norm
 /// is off by less than 1e-3 is of unit norm then.
@@ -46,9 +62,11 @@ const char* why_rejected(const EncoderReading& reading);
 /// Takes readings in the order of the file.
 class EncoderCollector {
  public:
-  explicit EncoderCollector(const EncoderRecordingOptions& options);
+  /// Of a file with so many channels; ParamError for joints that it does not have.
+  EncoderCollector(const EncoderRecordingOptions& options, std::size_t n_drive,
+                   std::size_t n_steer);
   /// `at` is at the row of the reading.
-  void add(const EncoderReading& reading, const TextReader& at);
+  void add(EncoderReading reading, const TextReader& at);
   void reject(const std::string& reason, const TextReader& at) { filter_.reject(reason, at); }
   /// Counts a row that cannot be read.
   void reject_row(const BadRow& bad, const TextReader& at) { filter_.reject_row(bad, at); }
@@ -58,12 +76,13 @@ class EncoderCollector {
  private:
   EncoderRecordingOptions options_;
   StampFilter filter_;
+  JointMap joints_;
   std::vector<EncoderReading> readings_;
 };
 
 /// Takes samples that stand for themselves, in the order of the file: PoseSample, ImuSample,
-/// GnssSample and StateSample. Values must be finite; quaternions off the unit norm by less than
-/// 1e-3 are normalised, others rejected.
+/// HeadingSample, GnssSample and StateSample. Values must be finite; quaternions off the unit norm
+/// by less than 1e-3 are normalised, others rejected.
 template <class Sample>
 class SampleCollector {
  public:
@@ -82,11 +101,13 @@ class SampleCollector {
 using PoseCollector = SampleCollector<PoseSample>;
 using ImuCollector = SampleCollector<ImuSample>;
 using GnssCollector = SampleCollector<GnssSample>;
+using HeadingCollector = SampleCollector<HeadingSample>;
 using StateCollector = SampleCollector<StateSample>;
 
 extern template class SampleCollector<PoseSample>;
 extern template class SampleCollector<ImuSample>;
 extern template class SampleCollector<GnssSample>;
+extern template class SampleCollector<HeadingSample>;
 extern template class SampleCollector<StateSample>;
 
 /// Gathers points to images: one for each camera at each time, in the order in which they come

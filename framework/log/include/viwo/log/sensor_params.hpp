@@ -1,7 +1,10 @@
 // Parameters that the sensors which play logs back have in common.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <string>
+#include <vector>
 
 #include "viwo/api/params.hpp"
 #include "viwo/api/status.hpp"
@@ -9,6 +12,30 @@
 #include "viwo/log/ros_text.hpp"
 
 namespace viwo::log {
+
+/// ParamError for a list of names that is longer than `most`, or has an empty name, or one twice.
+inline void check_names(const std::string& key, const std::vector<std::string>& names,
+                        std::size_t most) {
+  if (names.size() > most) {
+    throw ParamError(key, std::to_string(names.size()) + " names, at most " + std::to_string(most) +
+                              " are possible");
+  }
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    if (name->empty()) throw ParamError(key, "an empty name");
+    if (std::find(names.begin(), name, *name) != name) {
+      throw ParamError(key, "'" + *name + "' is there twice");
+    }
+  }
+}
+/// The same for a list that has as many as one of two numbers, or none.
+inline void check_names(const std::string& key, const std::vector<std::string>& names,
+                        std::size_t either, std::size_t or_else) {
+  check_names(key, names, names.size());
+  if (names.empty() || names.size() == either || names.size() == or_else) return;
+  const std::string two = either == or_else ? "" : std::to_string(either) + " or ";
+  throw ParamError(key, "needs " + two + std::to_string(or_else) + " names, not " +
+                            std::to_string(names.size()));
+}
 
 struct MaxGapParams {
   double max_gap_s = 0.2;

@@ -28,6 +28,9 @@ class StampFilter {
     return order_.accept_or_same(t_ns, Place{at});
   }
   void reject(std::string_view reason, const TextReader& at) { order_.reject(reason, Place{at}); }
+  void reject_last(std::string_view reason, const TextReader& at) {
+    order_.reject_last(reason, Place{at});
+  }
 
   /// Counts a row that cannot be read; the first with what is wrong.
   void reject_row(const BadRow& bad, const TextReader& at) {

@@ -9,9 +9,14 @@
 #include <vector>
 
 #include "viwo/api/status.hpp"
+#include "viwo/log/text.hpp"
 #include "viwo/log/text_reader.hpp"
 
 namespace viwo::log {
+
+/// The table `name` of a folder, plain or gzipped (NAME.gz); InputError when both are there.
+/// Neither: the plain one, which cannot be opened then.
+std::filesystem::path table_in(const std::filesystem::path& folder, const std::string& name);
 
 /// "file:line  what": of a row that is no row of the table, while others may be.
 class BadRow : public InputError {
@@ -25,11 +30,20 @@ class BadRow : public InputError {
   std::string text_;
 };
 
+/// How a table is laid out that is not one of viwo's own. Its columns may be unnamed or have one
+/// name twice, and are also found by their number, from 1; texts may be in double quotes.
+struct TableLayout {
+  char separator = 0;      ///< ' ': any blanks; 0: of ';' ',' tab blanks the first that occurs
+  int skip_lines = 0;      ///< lines before the header, or the first row
+  bool has_header = true;  ///< without one, numbers are the names of the columns
+};
+
 /// Reads row by row. The header may begin with '#' as in EuRoC files; the separator is ';' if the
 /// header has one and ',' otherwise; empty lines are skipped. Wrong rows are a BadRow.
 class TableReader {
  public:
   explicit TableReader(const std::filesystem::path& file);
+  TableReader(const std::filesystem::path& file, const TableLayout& layout);
 
   const std::vector<std::string>& columns() const { return columns_; }  ///< "name" or "name [unit]"
   bool has_column(std::string_view name) const { return find(name).has_value(); }
@@ -38,6 +52,8 @@ class TableReader {
   std::size_t column(std::string_view name) const;
   /// Column "name [unit]", or "name" where the file gives no unit; InputError for another unit.
   std::size_t column(std::string_view name, std::string_view unit) const;
+  /// The same whatever unit stands behind the name.
+  std::size_t column_in_any_unit(std::string_view name) const;
 
   /// Calls `row` at each row to the end; `reject` with the BadRow for those that cannot be read.
   template <class Row, class Reject>
@@ -67,6 +83,8 @@ class TableReader {
 
   /// Decimal seconds as nanoseconds, exact (parse_seconds_ns).
   std::int64_t seconds_ns(std::size_t column) const;
+  /// The same in any unit (parse_time_ns).
+  std::int64_t time_ns(std::size_t column, TimeUnit unit) const;
 
   const TextReader& reader() const { return reader_; }
   /// Throws BadRow "file:line  column 'name': text".
@@ -76,8 +94,13 @@ class TableReader {
   [[noreturn]] void refuse(const std::string& text) const;
   std::optional<std::size_t> find(std::string_view name) const;
 
+  /// The line behind `skip` others; without the '#' before a header.
+  std::string_view first_line(int skip);
+
   TextReader reader_;
   char separator_ = ',';
+  bool is_own_ = true;    ///< not of any layout
+  bool has_row_ = false;  ///< the first row has been read where the header is looked for
   std::vector<std::string> columns_;
   std::vector<std::string_view> fields_;
 };

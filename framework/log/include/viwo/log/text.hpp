@@ -16,9 +16,20 @@ std::string_view trim(std::string_view text);
 std::optional<double> parse_number(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
 
-/// Decimal seconds, with or without exponent, as nanoseconds: exact, not through a double; digits
+/// By how many powers of ten a unit of time is longer than a nanosecond.
+enum class TimeUnit : std::uint8_t {
+  kNanosecond = 0,
+  kMicrosecond = 3,
+  kMillisecond = 6,
+  kSecond = 9
+};
+
+/// A decimal time, with or without exponent, as nanoseconds: exact, not through a double; digits
 /// below the nanosecond are rounded. Nothing when it is not a number or beyond +-4e18 ns.
-std::optional<std::int64_t> parse_seconds_ns(std::string_view text);
+std::optional<std::int64_t> parse_time_ns(std::string_view text, TimeUnit unit);
+inline std::optional<std::int64_t> parse_seconds_ns(std::string_view text) {
+  return parse_time_ns(text, TimeUnit::kSecond);
+}
 
 /// Shortest text that reads back to the same bits.
 void append_number(std::string& out, double value);

@@ -3,10 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "viwo/log/byte_reader.hpp"
 
 namespace viwo::log {
 
@@ -16,7 +17,6 @@ class TextReader {
  public:
   /// Opens a plain or gzipped file; InputError when it cannot be read or is a folder.
   explicit TextReader(const std::filesystem::path& file);
-  ~TextReader();
   TextReader(const TextReader&) = delete;
   TextReader& operator=(const TextReader&) = delete;
 
@@ -40,15 +40,11 @@ class TextReader {
   [[noreturn]] void fail(const std::string& text) const;
 
  private:
-  struct Closer {
-    void operator()(void* handle) const;
-  };
-
   /// Reads more into the buffer, behind what is not consumed yet; false at the end of the file.
   bool fill();
 
   std::filesystem::path file_;
-  std::unique_ptr<void, Closer> handle_;  ///< zlib's gzFile, which also reads plain text
+  ByteReader bytes_;
   std::vector<char> buffer_;
   std::size_t begin_ = 0;  ///< first byte not consumed
   std::size_t end_ = 0;    ///< behind the last byte read

@@ -1,0 +1,56 @@
+// Units of what a log that is of no fixed format says: parameters of the sensors that read one.
+#pragma once
+
+#include <cstdint>
+
+#include "viwo/api/params.hpp"
+
+namespace viwo::log {
+
+enum class AngleUnit : std::uint8_t { kRadian, kDegree, kTurn };
+
+/// Radians in one of them.
+double radians_in(AngleUnit unit);
+
+struct EncoderUnitParams {
+  enum class DriveUnit : std::uint8_t { kRadian, kDegree, kTurn, kTurnPerMinute, kMetre, kCount };
+  DriveUnit drive_unit = DriveUnit::kRadian;
+  double wheel_radius_m = 0.;
+  double drive_counts_per_turn = 0.;
+  enum class SteerUnit : std::uint8_t { kRadian, kDegree, kTurn, kCount };
+  SteerUnit steer_unit = SteerUnit::kRadian;
+  double steer_counts_per_turn = 0.;
+
+  void bind(ParamBinder& b);
+
+  /// What makes rad/s of a rate, or radians of an angle. ParamError for a unit that the reading
+  /// cannot have, for metres without a radius, and for counts without those of a turn.
+  double drive_factor(bool is_angle) const;
+  double steer_factor() const;
+};
+
+struct ImuUnitParams {
+  AngleUnit gyro_unit = AngleUnit::kRadian;
+  double gyro_scale = 1.;
+  enum class AccelUnit : std::uint8_t { kMetrePerS2, kGravity };
+  AccelUnit accel_unit = AccelUnit::kMetrePerS2;
+  double accel_scale = 1.;
+
+  void bind(ParamBinder& b);
+
+  double gyro_factor() const { return gyro_scale * radians_in(gyro_unit); }
+  double accel_factor() const;
+};
+
+struct PoseUnitParams {
+  enum class LengthUnit : std::uint8_t { kMetre, kCentimetre, kMillimetre };
+  LengthUnit position_unit = LengthUnit::kMetre;
+  AngleUnit yaw_unit = AngleUnit::kRadian;
+
+  void bind(ParamBinder& b);
+
+  double position_factor() const;
+  double yaw_factor() const { return radians_in(yaw_unit); }
+};
+
+}  // namespace viwo::log

@@ -1,0 +1,58 @@
+#include "viwo/log/byte_reader.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+#include <system_error>
+
+#include <zlib.h>
+
+#include "viwo/api/status.hpp"
+
+namespace viwo::log {
+namespace {
+
+gzFile as_gz(void* handle) { return static_cast<gzFile>(handle); }
+
+}  // namespace
+
+void ByteReader::Closer::operator()(void* handle) const { gzclose_r(as_gz(handle)); }
+
+ByteReader::ByteReader(const std::filesystem::path& file) : file_(file.string()) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
+    throw InputError(file_ + "  is a folder, not a file");
+  }
+  errno = 0;
+  handle_.reset(gzopen(file.c_str(), "rb"));
+  if (handle_ == nullptr) {
+    const int error = errno;
+    throw InputError(file_ +
+                     "  cannot be read: " + (error != 0 ? std::strerror(error) : "out of memory"));
+  }
+}
+
+std::size_t ByteReader::read(char* into, std::size_t size) {
+  constexpr std::size_t kMost = std::size_t{1} << 30;
+  const int n = gzread(as_gz(handle_.get()), into, static_cast<unsigned>(std::min(size, kMost)));
+  if (n > 0) return static_cast<std::size_t>(n);
+  // zlib reports a stream that stops in the middle as "nothing more to read" with this error.
+  int error = Z_OK;
+  const char* text = gzerror(as_gz(handle_.get()), &error);
+  truncated_ = error == Z_BUF_ERROR;
+  if (error == Z_OK) return 0;
+  if (truncated_) {
+    fault_ = "the gzip data end early: the file is truncated";
+  } else if (error == Z_ERRNO) {
+    fault_ = std::string("cannot be read: ") + std::strerror(errno);
+  } else {
+    // zlib puts the name of the file before its text; it is said already.
+    std::string_view reason = text;
+    if (reason.starts_with(file_ + ": ")) reason.remove_prefix(file_.size() + 2);
+    fault_ = "the gzip data are corrupt: " + std::string(reason);
+  }
+  return 0;
+}
+
+}  // namespace viwo::log

@@ -1,0 +1,130 @@
+#include "viwo/log/channel_units.hpp"
+
+#include <cmath>
+#include <initializer_list>
+#include <string>
+#include <utility>
+
+#include "viwo/api/status.hpp"
+
+namespace viwo::log {
+namespace {
+
+constexpr double kStandardGravity_m_per_s2 = 9.80665;
+
+constexpr std::initializer_list<std::pair<const char*, AngleUnit>> kAngleUnits = {
+    {"rad", AngleUnit::kRadian}, {"deg", AngleUnit::kDegree}, {"turn", AngleUnit::kTurn}};
+
+double radians_in_count(const char* key, double counts_per_turn) {
+  if (counts_per_turn > 0.) return radians_in(AngleUnit::kTurn) / counts_per_turn;
+  throw ParamError(key, std::string("counts need ") + key);
+}
+
+}  // namespace
+
+double radians_in(AngleUnit unit) {
+  switch (unit) {
+    case AngleUnit::kRadian:
+      return 1.;
+    case AngleUnit::kDegree:
+      return M_PI / 180.;
+    case AngleUnit::kTurn:
+      return 2. * M_PI;
+  }
+  return 1.;
+}
+
+void EncoderUnitParams::bind(ParamBinder& b) {
+  b(VIWO_PARAM(drive_unit),
+    {{"rad", DriveUnit::kRadian},
+     {"deg", DriveUnit::kDegree},
+     {"turn", DriveUnit::kTurn},
+     {"rpm", DriveUnit::kTurnPerMinute},
+     {"m", DriveUnit::kMetre},
+     {"count", DriveUnit::kCount}},
+    {.help = "of drive angles; rates are in this per second (but rpm: turns per minute). Metres at "
+             "the rim need wheel_radius_m, counts drive_counts_per_turn"});
+  b(VIWO_PARAM(wheel_radius_m),
+    {.unit = "m",
+     .min = 0.,
+     .help = "with drive_unit: m, the radius that whoever wrote the log made metres with: not what "
+             "the model believes"});
+  b(VIWO_PARAM(drive_counts_per_turn),
+    {.min = 0., .help = "with drive_unit: count, those of a turn of the wheel"});
+  b(VIWO_PARAM(steer_unit),
+    {{"rad", SteerUnit::kRadian},
+     {"deg", SteerUnit::kDegree},
+     {"turn", SteerUnit::kTurn},
+     {"count", SteerUnit::kCount}},
+    {.help = "of steering angles"});
+  b(VIWO_PARAM(steer_counts_per_turn),
+    {.min = 0., .help = "with steer_unit: count, those of a turn of the steering"});
+}
+
+double EncoderUnitParams::drive_factor(bool is_angle) const {
+  switch (drive_unit) {
+    case DriveUnit::kRadian:
+      return 1.;
+    case DriveUnit::kDegree:
+      return radians_in(AngleUnit::kDegree);
+    case DriveUnit::kTurn:
+      return radians_in(AngleUnit::kTurn);
+    case DriveUnit::kTurnPerMinute:
+      if (!is_angle) return radians_in(AngleUnit::kTurn) / 60.;
+      throw ParamError("drive_unit", "rpm is no unit of angles: rad, deg, turn, m or count");
+    case DriveUnit::kMetre:
+      if (wheel_radius_m > 0.) return 1. / wheel_radius_m;
+      throw ParamError("wheel_radius_m",
+                       "drive_unit: m needs wheel_radius_m, the radius that metres were made with");
+    case DriveUnit::kCount:
+      return radians_in_count("drive_counts_per_turn", drive_counts_per_turn);
+  }
+  return 1.;
+}
+
+double EncoderUnitParams::steer_factor() const {
+  switch (steer_unit) {
+    case SteerUnit::kRadian:
+      return 1.;
+    case SteerUnit::kDegree:
+      return radians_in(AngleUnit::kDegree);
+    case SteerUnit::kTurn:
+      return radians_in(AngleUnit::kTurn);
+    case SteerUnit::kCount:
+      return radians_in_count("steer_counts_per_turn", steer_counts_per_turn);
+  }
+  return 1.;
+}
+
+void ImuUnitParams::bind(ParamBinder& b) {
+  b(VIWO_PARAM(gyro_unit), kAngleUnits, {.help = "of angular rates, per second"});
+  b(VIWO_PARAM(gyro_scale), {.above = 0., .help = "makes gyro_unit of a reading"});
+  b(VIWO_PARAM(accel_unit), {{"m_per_s2", AccelUnit::kMetrePerS2}, {"g", AccelUnit::kGravity}},
+    {.help = "of specific forces; g is 9.80665 m/s^2"});
+  b(VIWO_PARAM(accel_scale), {.above = 0., .help = "makes accel_unit of a reading"});
+}
+
+double ImuUnitParams::accel_factor() const {
+  return accel_scale * (accel_unit == AccelUnit::kGravity ? kStandardGravity_m_per_s2 : 1.);
+}
+
+void PoseUnitParams::bind(ParamBinder& b) {
+  b(VIWO_PARAM(position_unit),
+    {{"m", LengthUnit::kMetre}, {"cm", LengthUnit::kCentimetre}, {"mm", LengthUnit::kMillimetre}},
+    {.help = "of positions"});
+  b(VIWO_PARAM(yaw_unit), kAngleUnits, {.help = "of a yaw"});
+}
+
+double PoseUnitParams::position_factor() const {
+  switch (position_unit) {
+    case LengthUnit::kMetre:
+      return 1.;
+    case LengthUnit::kCentimetre:
+      return 0.01;
+    case LengthUnit::kMillimetre:
+      return 0.001;
+  }
+  return 1.;
+}
+
+}  // namespace viwo::log
