@@ -119,7 +119,8 @@ TEST_F(ConfigurationTest, RefusesMissingPlugins) {
                  kSearched);
   refuse_run("kinematics: *robot", "kinematics: {type: planar_simulator}",
              "run.yaml:13:20  kinematics.type: no kinematics plugin 'planar_simulator' - known: "
-             "ackermann, differential, four_wis_wid, four_wis_wid_drive_only, mecanum, skid_steer" +
+             "ackermann, body_twist, differential, four_wis_wid, four_wis_wid_drive_only, mecanum, "
+             "skid_steer" +
                  kSearched);
   refuse_run("kinematics: *robot\n", "",
              "run.yaml:1:1  'kinematics' is missing: the section of the kinematic model");
@@ -210,7 +211,7 @@ TEST_F(ConfigurationTest, RefusesPlaceholdersThatNoVariantUses) {
 
 TEST_F(ConfigurationTest, RefusesACalibrationThatDoesNotFit) {
   write("run.yaml", kRun);
-  write("c.yaml", "calibration: c\nbase: run.yaml\nsegment_s: 1\n");
+  write("c.yaml", "calibration: c\nbase: run.yaml\nsegment_s: 0.5\n");
   expect_done({"calibrate", "c.yaml", "--out", "cal"});
   const std::string model =
       ", x_m: [0.1, -0.1, -0.1, 0.1], y_m: [0.1, 0.1, -0.1, -0.1], "

@@ -6,6 +6,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "filter_reference.hpp"
 #include "joint_search.hpp"
 #include "judgement.hpp"
 #include "motion_reference.hpp"
@@ -47,13 +48,36 @@ void require_one_kind(const std::vector<CalibrationRecording>& recordings) {
                    "': one has reference poses and one has a gyro only; say reference: gyro");
 }
 
+CalibrationRecording read_recording(const Recording& label, const Node& base, ReferenceKind kind,
+                                    PluginRegistry& plugins, WorkProgress& progress) {
+  const Node run = resolve_placeholders(base, label.labels);
+  Node wheels_alone = run;
+  if (run.find("updates") != nullptr) {
+    config::set_path(wheels_alone, "estimator.type", Node::scalar_of("dead_reckoning"));
+  }
+  RunSetup setup = read_run(wheels_alone, plugins);
+  RunData data = collect(setup);
+  const bool by_filter = kind == ReferenceKind::kFilter;
+  MotionReference motion =
+      motion_reference(label, setup, data, by_filter ? ReferenceKind::kNone : kind);
+  if (by_filter) {
+    progress.note("recording '" + label.name + "': the filter without wheels");
+    motion.kind = ReferenceKind::kPoses;
+    motion.poses = poses_of_filter(run, "recording '" + label.name + "'", plugins);
+    motion.offset_s = setup.t_OtoI_s;
+    motion.max_gap_s = setup.reference_max_gap_s;
+    setup.extrinsics = setup.O_in_I.value_or(PlanarExtrinsics::Zero());
+  }
+  return {label, std::move(setup), std::move(data), std::move(motion)};
+}
+
 }  // namespace
 
 std::vector<ParamSpec> calibration_params() { return param_specs<CalibrationParams>(); }
 
 CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
                                         const std::vector<std::string>& assignments,
-                                        PluginRegistry& plugins) {
+                                        PluginRegistry& plugins, WorkProgress& progress) {
   const Node file = config::load_file(path);
   config::Errors errors;
   constexpr std::string_view kSections[] = {"recordings", "motions", "set"};
@@ -75,11 +99,7 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   setup.leave_out_by = params.leave_out_by;
   setup.report_by = params.report_by;
   const std::vector<Recording> recordings = read_recordings(file);
-  Node base = load_base(file, assignments);
-  // Of a filter's configuration the wheels alone are wanted.
-  if (base.find("updates") != nullptr) {
-    config::set_path(base, "estimator.type", Node::scalar_of("dead_reckoning"));
-  }
+  const Node base = load_base(file, assignments);
   require_labels(setup.report_by, recordings, file, "report_by");
   for (const Recording& recording : recordings) {
     for (const std::string& label : setup.leave_out_by) {
@@ -88,11 +108,12 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
                                                           "' has no label '" + label +
                                                           "', by which leave_out_by divides them");
     }
-    RunSetup run = read_run(resolve_placeholders(base, recording.labels), plugins);
-    RunData data = collect(run);
-    MotionReference motion = motion_reference(recording, run, data, params.reference);
-    setup.recordings.push_back({recording, std::move(run), std::move(data), std::move(motion)});
+    setup.recordings.push_back(
+        read_recording(recording, base, params.reference, plugins, progress));
     require_one_kind(setup.recordings);
+  }
+  if (file.find("extrinsics_x_m_y_m_yaw_rad") == nullptr) {
+    setup.options.extrinsics_x_m_y_m_yaw_rad = setup.recordings.front().setup.extrinsics;
   }
   return setup;
 }
@@ -212,7 +233,9 @@ CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress) {
   result.sigma_of_fit = result.all.sigma;
   for (const std::string& label : setup.leave_out_by) {
     result.left_out.push_back({label, spread_of(label, fits, estimates), {}});
-    result.all.sigma = result.all.sigma.cwiseMax(result.left_out.back().spread);
+    // What is held has no sigma, whatever is left out.
+    result.all.sigma = (result.all.sigma.array() > 0.)
+                           .select(result.all.sigma.cwiseMax(result.left_out.back().spread), 0.);
   }
   for (std::size_t i = 0; i < setup.recordings.size(); ++i) {
     result.fitted.push_back(validate(setup, i, estimates[0]));

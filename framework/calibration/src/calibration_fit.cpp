@@ -196,13 +196,15 @@ class Fit {
     estimate_.cost = summary.final_cost;
   }
 
+  /// Not at the bounds themselves, where a model may break down: a radius of zero.
   void set_bounds(ceres::Problem& problem) {
+    constexpr double kInside = 0.005;  // prior sigmas; the judgement calls twice this at the bound
     for (int i = 0; i < prior_.sigma.size(); ++i) {
       const double sigma = prior_.sigma[i];
       const IntrinsicSpec& spec = spec_of(i);
       if (!(sigma > 0.)) continue;
-      const double lowest = (spec.lowest - prior_.x_WI[i]) / sigma;
-      const double highest = (spec.highest - prior_.x_WI[i]) / sigma;
+      const double lowest = (spec.lowest - prior_.x_WI[i]) / sigma + kInside;
+      const double highest = (spec.highest - prior_.x_WI[i]) / sigma - kInside;
       if (std::isfinite(lowest)) problem.SetParameterLowerBound(shared_.data(), i, lowest);
       if (std::isfinite(highest)) problem.SetParameterUpperBound(shared_.data(), i, highest);
     }

@@ -7,9 +7,11 @@ void CalibrationOptions::bind(ParamBinder& b) {
     {{"auto", ReferenceKind::kAuto},
      {"poses", ReferenceKind::kPoses},
      {"gyro", ReferenceKind::kGyro},
+     {"filter", ReferenceKind::kFilter},
      {"none", ReferenceKind::kNone}},
-    {.help = "what the wheels are compared with: reference poses, the turn by the gyro, or nothing "
-             "but each other; auto: poses where there are any, else the gyro. A label distance_m "
+    {.help = "what the wheels are compared with: reference poses, the turn by the gyro, the poses "
+             "that the filter of the base finds without its updates of wheels, or nothing but each "
+             "other; auto: poses where there are any, else the gyro. A label distance_m "
              "of a recording says how far it was driven, along the path of O"});
   b(VIWO_PARAM(segments),
     {{"auto", Segments::kAuto},

@@ -101,6 +101,7 @@ MotionReference motion_reference(const Recording& label, const RunSetup& setup, 
   } else if (out.kind == ReferenceKind::kGyro) {
     if (!has_gyro) throw InputError(where + " has no gyro to calibrate against");
     out.poses = data.imu().empty() ? yaw_of_headings(data.headings()) : yaw_of_gyro(data.imu());
+    out.offset_s = setup.t_OtoI_s;
     // Headings are often logged where they change only.
     out.max_gap_s = data.imu().empty() ? 0.5 : 0.1;
   }

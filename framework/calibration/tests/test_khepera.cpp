@@ -69,7 +69,7 @@ TEST_P(Khepera, IsCalibratedAsPublished) {
       << "calibration: khepera\nbase: run.yaml\nestimate_extrinsics: true\n"
          "prior_sigma_extrinsics_m: 0.05\nprior_sigma_extrinsics_rad: 0.5\n"
          "extrinsics_x_m_y_m_yaw_rad: [0, 0, "
-      << mounted << "]\nrecordings: [tuples]\n";
+      << mounted << "]\n\n";
   auto setup = read_calibration_setup(folder / "calibration.yaml", {}, testing::registry());
   const CalibrationResult result = calibrate(setup);
   EXPECT_TRUE(result.is_trusted()) << ::testing::PrintToString(result.doubts);
@@ -87,8 +87,8 @@ TEST_P(Khepera, IsCalibratedAsPublished) {
   EXPECT_NEAR(laser[1], published["l_x"].get<double>(), 3. * sigma(3));
   EXPECT_NEAR(laser[2], published["l_y"].get<double>(), 3. * sigma(4));
   EXPECT_NEAR(wrap_angle(laser[0] - published["l_theta"].get<double>()), 0., 3. * sigma(5));
-  // What a fit without (CAL-15) takes for noise is 7 to 13 mm.
-  EXPECT_LT(found.noise.position_m, 0.001);
+  // A third of what a fit without (CAL-15) takes for noise, which is 7 to 13 mm.
+  EXPECT_LT(found.noise.position_m, 0.007 / 3.);
   EXPECT_GT(found.weighed_down, 0);
 }
 

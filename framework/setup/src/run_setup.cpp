@@ -217,7 +217,11 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
     // Read also when the wheels run alone: what is wrong in it is wrong.
     FilterSetup filter =
         read_filter(run, setup.model, setup.x_WI, setup.sigma, context, setup.resolved, errors);
-    if (!filter.wheels.empty()) setup.O_in_I = planar_mount(filter.wheels.front().prior.wheels);
+    if (!filter.wheels.empty()) {
+      const WheelsView& wheels = filter.wheels.front().prior.wheels;
+      setup.O_in_I = planar_mount(wheels);
+      setup.t_OtoI_s = wheels.t_OtoI_s;
+    }
     measuring = filter.measuring;
     if (wants_filter(run)) setup.filter = std::move(filter);
   }

@@ -78,8 +78,9 @@ template <Sample T>
 std::vector<std::string> takers_of(const Routes& routes, const std::string& sensor) {
   std::vector<std::string> takers;
   routes.dispatch(sensor, sample_type<T>(), [&](const Route& route) {
-    constexpr const char* kNames[] = {"imu",    "heading",          "stream",   "wheels", "reference poses",
-                                      "states", "true calibration", "pictures"};
+    constexpr const char* kNames[] = {
+        "imu",    "heading",          "stream",  "wheels", "reference poses",
+        "states", "true calibration", "pictures"};
     std::string taker = kNames[static_cast<int>(route.consumer)];
     if (route.consumer == Consumer::kStream) taker += " " + std::to_string(route.stream);
     takers.push_back(taker);
@@ -210,7 +211,9 @@ TEST(Routes, OfDeadReckoningNeedWheelsAlone) {
   EXPECT_EQ(errors, "");
   EXPECT_THAT(takers_of<EncoderSample>(routes, "wheels0"), ElementsAre("wheels"));
   EXPECT_THAT(takers_of<PoseSample>(routes, "mocap"), ElementsAre("reference poses"));
-  EXPECT_THAT(takers_of<ImuSample>(routes, "imu0"), ElementsAre());
+  // For who compares the wheels with a gyro; a run without one does as well.
+  EXPECT_THAT(takers_of<ImuSample>(routes, "imu0"), ElementsAre("imu"));
+  EXPECT_EQ(resolve({kWheels, kMocap}, {}, with_wheels()).errors, "");
   EXPECT_EQ(resolve({kImu}, {}, with_wheels()).errors,
             "run.yaml:3:5  no sensor of this run gives encoders, which the kinematic model needs");
   EXPECT_EQ(resolve({kWheels, wheels1}, {}, with_wheels()).errors,

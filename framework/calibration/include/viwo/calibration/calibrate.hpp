@@ -17,10 +17,11 @@ namespace viwo::calibration {
 
 /// What the motion of the wheels is compared with.
 enum class ReferenceKind {
-  kAuto,   ///< poses where there are any, else the gyro
-  kPoses,  ///< relative poses of the reference body
-  kGyro,   ///< the turn by the gyro, about the mean direction of what the accelerometer feels
-  kNone,   ///< nothing: the wheels among themselves, and distances
+  kAuto,    ///< poses where there are any, else the gyro
+  kPoses,   ///< relative poses of the reference body
+  kGyro,    ///< the turn by the gyro, about the mean direction of what the accelerometer feels
+  kFilter,  ///< relative poses that the filter of the base finds without its wheels
+  kNone,    ///< nothing: the wheels among themselves, and distances
 };
 
 /// What is compared with the reference (docs/math/batch_calibration.md).
@@ -60,7 +61,7 @@ struct CalibrationNoise {
 
 /// What the wheels of a recording are compared with.
 struct MotionReference {
-  ReferenceKind kind = ReferenceKind::kNone;  ///< never kAuto
+  ReferenceKind kind = ReferenceKind::kNone;  ///< kPoses, kGyro or kNone
   Trajectory poses;                           ///< of B; of the gyro the yaw alone, positions zero
   double offset_s = 0.;              ///< stamp of the reference = stamp of the wheels + offset
   double max_gap_s = 0.5;            ///< not interpolated over more
@@ -178,7 +179,8 @@ std::vector<ParamSpec> calibration_params();
 /// Throws InputError for what is wrong in the configuration or in a recording.
 CalibrationSetup read_calibration_setup(const std::filesystem::path& file,
                                         const std::vector<std::string>& assignments,
-                                        PluginRegistry& plugins);
+                                        PluginRegistry& plugins,
+                                        WorkProgress& progress = no_progress());
 
 /// Nominal values and their sigmas; zeros where they have been found, to be refined.
 FitStart start_of(const CalibrationSetup& setup, const JointSearch& search);

@@ -36,6 +36,7 @@ struct RunSetup {
   Intrinsics sigma;  ///< how well they are known; 0 where the gauge holds an entry
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
   std::optional<PlanarExtrinsics> O_in_I;  ///< of the section `wheels`: where states are reference
+  double t_OtoI_s = 0.;                    ///< of the section `wheels`: t_imu = t_wheel + t_OtoI
   std::vector<SensorEntry> sensors;        ///< those that take an input behind their input
   PreintegrationOptions preintegration;
   double epoch_s = 0.1;
