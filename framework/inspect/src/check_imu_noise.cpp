@@ -80,7 +80,8 @@ void check_part(const Part& part, const Density& density, double rest_s, const s
                  {"found by configured", ratio, ""},
                  {"rest", rest_s, "s"}}};
   if (ratio > kMostRatio) {
-    white.severity = Severity::kFault;
+    // Of a rest that is too short it is a guess.
+    white.severity = rest_s < kWhiteRest_s ? Severity::kNote : Severity::kFault;
     if (density.per_sample > kMostRatio * density.over_epoch ||
         density.over_epoch > kMostRatio * density.per_sample) {
       white.what += ", more " +

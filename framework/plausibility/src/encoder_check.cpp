@@ -14,6 +14,7 @@ EncoderCheck::EncoderCheck(std::string name, std::string sensor,
     : name_(std::move(name)),
       sensor_(std::move(sensor)),
       solver_(model, {}),
+      sigma_WI_(prior.sigma_intrinsics),
       n_steer_(model->description().n_steer) {
   solver_.set_intrinsics(prior.wheels.x_WI);
   for (const ChannelChange& change : channel_changes(model->description())) {

@@ -23,6 +23,10 @@ class EncoderCheck {
 
   /// Samples in time order; the twist that they say, if they say one.
   std::optional<Twist> add(const EncoderSample& sample);
+  /// By what a prior sigma of each intrinsic changes the yaw rate of the sample last added.
+  Intrinsics rate_by_prior() const {
+    return solution_.J_xi_WI.row(2).transpose().cwiseProduct(sigma_WI_);
+  }
   void findings(Findings& out) const;
 
  private:
@@ -44,6 +48,7 @@ class EncoderCheck {
   std::string name_, sensor_;
   TwistSolver solver_;
   TwistSolution solution_;
+  Intrinsics sigma_WI_;  ///< of the prior
   int n_steer_;
   std::vector<Tried> changes_;  ///< the first is none
   std::int64_t samples_ = 0;

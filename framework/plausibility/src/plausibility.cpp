@@ -61,7 +61,10 @@ struct Plausibility::Checks {
       const std::optional<Twist> xi = check.encoders.add(sample);
       constexpr double kLeast = 0.05;  // m/s, rad/s
       moves = xi && xi->norm() > kLeast;
-      if (xi) check.twist.add_wheels({sample.t_ns, sample.begin_ns, sample.end_ns}, *xi);
+      if (xi) {
+        check.twist.add_wheels({sample.t_ns, sample.begin_ns, sample.end_ns}, *xi,
+                               check.encoders.rate_by_prior());
+      }
     } catch (const std::exception&) {
       check.has_failed = true;
     }

@@ -118,9 +118,13 @@ void TwistCheck::add_imu(const ImuSample& sample) {
   advance();
 }
 
-void TwistCheck::add_wheels(const SampleExtent& extent, const Twist& xi) {
+void TwistCheck::add_wheels(const SampleExtent& extent, const Twist& xi,
+                            const Intrinsics& rate_by_prior) {
   const auto offset_ns = static_cast<std::int64_t>(std::llround(1e9 * t_OtoI_s_));
   if (extent.begin_ns + offset_ns < 0 || !xi.allFinite()) return;
+  rate_squares_ += xi[2] * xi[2];
+  if (rate_products_.size() == 0) rate_products_.setZero(rate_by_prior.size());
+  rate_products_ += xi[2] * rate_by_prior;
   twist_means_.add(extent.begin_ns + offset_ns, extent.end_ns + offset_ns, xi);
   advance();
 }
@@ -225,7 +229,7 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
                    {drives_times(2. * std::numbers::pi)}});
   } else if (is_about(slope, -1.)) {
     find_reversed(C, out);
-  } else if (!is_about(slope, 1.) && std::abs(r) > kVeryAlike) {
+  } else if (std::abs(slope - 1.) > factor_tolerance() && std::abs(r) > kVeryAlike) {
     out.push_back({key, imu_ + ": the gyro turns " + significant(slope, 3) +
                             " times as fast as the wheels (correlation " + significant(r, 3) +
                             "): unit or scale of the drives, radii and track of the kinematics, "
@@ -234,6 +238,13 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
     find_axes(C, out);
     find_lag(C(kGyro, kGyro), out);
   }
+}
+
+/// By what part the two rates may differ: by more where the intrinsics are to be found first, such
+/// as those of a base that skids.
+double TwistCheck::factor_tolerance() const {
+  const double sigma = rate_squares_ > 0. ? rate_products_.norm() / rate_squares_ : 0.;
+  return std::max(kFactorTolerance, 3. * sigma);
 }
 
 Remedy TwistCheck::drives_times(double scale) const {

@@ -48,8 +48,9 @@ class TwistCheck {
              const WheelsPrior& prior);
 
   void add_imu(const ImuSample& sample);
-  /// `xi`: twist of O over the time of a sample of the wheels.
-  void add_wheels(const SampleExtent& extent, const Twist& xi);
+  /// `xi`: twist of O over the time of a sample of the wheels; `rate_by_prior`: by what a
+  /// prior sigma of each intrinsic changes its yaw rate.
+  void add_wheels(const SampleExtent& extent, const Twist& xi, const Intrinsics& rate_by_prior);
   /// `up`: direction of the specific force in I (ImuCheck).
   void findings(const Eigen::Vector3d& up, Findings& out) const;
 
@@ -75,6 +76,7 @@ class TwistCheck {
   void add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi);
   void add_to_lags(double gyro, const Twist& xi);
   void end_window();
+  double factor_tolerance() const;
   Remedy drives_times(double scale) const;
   Remedy turned_by(const Eigen::Matrix3d& R) const;
   bool finds_gravity(const Eigen::Vector3d& up, double slope, Findings& out) const;
@@ -93,6 +95,9 @@ class TwistCheck {
   CellMeans<3> twist_means_;
   std::optional<ImuSample> last_;
   std::int64_t next_ = 0;  ///< cell
+
+  double rate_squares_ = 0.;  ///< of the wheels, sum over samples
+  Intrinsics rate_products_;  ///< likewise, of the rate with what a prior sigma changes it by
 
   Window window_, before_;
   std::int64_t windows_ = 0;

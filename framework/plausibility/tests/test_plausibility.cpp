@@ -232,6 +232,10 @@ TEST(Plausibility, NamesAScaleThatIsOffWithoutACause) {
               ElementsAre("imu0: the gyro turns 0.5 times as fast as the wheels (correlation "
                           "1): unit or scale of the drives, radii and track of the kinematics, "
                           "or scale of the gyro"));
+  // Where radii are hardly known that is no contradiction.
+  const RunSetup hardly_known = robot("viwo_swerve", {"kinematics.prior_sigma_radius_m=0.01"});
+  EXPECT_THAT(found(hardly_known, {.wheels = [](EncoderSample& s) { scale_drives(s, 2.); }}),
+              IsEmpty());
 }
 
 TEST(Plausibility, NamesOneDriveThatIsReversed) {
