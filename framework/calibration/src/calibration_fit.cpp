@@ -239,7 +239,7 @@ class Fit {
         group.information.noalias() += J * J.transpose();
         group.squares += at.r[i] * at.r[i];
         ++group.residuals;
-        if (kind == ResidualKind::kParity || kind == ResidualKind::kDistance) continue;
+        if (kind != ResidualKind::kYaw && kind != ResidualKind::kPosition) continue;
         group.batches[first_batch + batch(k, i / problems_[k]->rows_per_segment())] += at.r[i] * J;
       }
       const double parity = std::pow(estimate_.noise.parity_scale, -2);
@@ -335,8 +335,8 @@ class Fit {
 
   /// How much there was to fit, and what moved.
   void count(const Linearisation& at) {
-    for (const ResidualKind kind :
-         {ResidualKind::kYaw, ResidualKind::kPosition, ResidualKind::kDistance}) {
+    for (const ResidualKind kind : {ResidualKind::kYaw, ResidualKind::kPosition,
+                                    ResidualKind::kDistance, ResidualKind::kTurn}) {
       estimate_.residuals += at[static_cast<std::size_t>(kind)].residuals;
     }
     int segments = 0;

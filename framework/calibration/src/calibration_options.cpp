@@ -12,7 +12,8 @@ void CalibrationOptions::bind(ParamBinder& b) {
     {.help = "what the wheels are compared with: reference poses, the turn by the gyro, the poses "
              "that the filter of the base finds without its updates of wheels, or nothing but each "
              "other; auto: poses where there are any, else the gyro. A label distance_m "
-             "of a recording says how far it was driven, along the path of O"});
+             "of a recording says how far it was driven, along the path of O, a label turn_deg by "
+             "how much it has turned from start to end, whole turns with it"});
   b(VIWO_PARAM(segments),
     {{"auto", Segments::kAuto},
      {"whole", Segments::kWhole},
@@ -49,6 +50,8 @@ void CalibrationOptions::bind(ParamBinder& b) {
     {.unit = "rad/s", .above = 0., .help = "prior of the gyro's bias, one per recording"});
   b(VIWO_PARAM(sigma_distance_m),
     {.unit = "m", .above = 0., .help = "how well the label distance_m is measured"});
+  b(VIWO_PARAM(sigma_turn_deg),
+    {.unit = "deg", .above = 0., .help = "how well the label turn_deg is measured"});
 }
 
 }  // namespace viwo::calibration

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <tuple>
 
 #include <Eigen/Dense>
 
@@ -86,6 +88,7 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
   if (options.parity)
     kinds_.insert(kinds_.end(), static_cast<std::size_t>(n_), ResidualKind::kParity);
   if (recording.motion.distance_m) kinds_.push_back(ResidualKind::kDistance);
+  if (recording.motion.turn_rad) kinds_.push_back(ResidualKind::kTurn);
 }
 
 /// Where the segments end.
@@ -200,7 +203,7 @@ void RecordingProblem::evaluate(const CalibrationPoint& point, bool jacobian,
     add_parity(row, out);
     row += n_;
   }
-  if (recording_.motion.distance_m) add_distance(row, point, out);
+  add_measured_by_hand(row, point, out);
 }
 
 void RecordingProblem::add_segment(int row, std::size_t k, const CalibrationPoint& point,
@@ -256,27 +259,38 @@ void RecordingProblem::add_parity(int row, RecordingResiduals& out) const {
   }
 }
 
-/// The path of O, of straight pieces that are short (CAL-13).
-void RecordingProblem::add_distance(int row, const CalibrationPoint& point,
-                                    RecordingResiduals& out) {
+/// The path of O, of straight pieces that are short (CAL-13), and its turn (CAL-16).
+void RecordingProblem::add_measured_by_hand(int row, const CalibrationPoint& point,
+                                            RecordingResiduals& out) {
+  const auto& [distance_m, turn_rad] =
+      std::tie(recording_.motion.distance_m, recording_.motion.turn_rad);
+  if (!distance_m && !turn_rad) return;
   const auto wheels = recording_.data.wheels();
   const std::int64_t step_ns = to_ns(kPathPiece_s);
   preintegrator_.set_intrinsics(point.x_WI);
-  double path_m = 0.;
+  double path_m = 0., yaw_rad = 0.;
+  Eigen::RowVectorXd J_path = Eigen::RowVectorXd::Zero(n_), J_yaw = J_path;
   guarded(recording_.setup.kinematics.info, "preintegration", [&] {
     for (std::int64_t t_ns = wheels.front().begin_ns; t_ns < wheels.back().end_ns;
          t_ns += step_ns) {
       preintegrator_.integrate(wheels, t_ns, std::min(t_ns + step_ns, wheels.back().end_ns),
                                piece_);
+      yaw_rad += piece_.g[0];
+      J_yaw += piece_.J_g_WI.row(0);
       const double length_m = piece_.g.tail<2>().norm();
       if (!(length_m > 0.)) continue;
       path_m += length_m;
-      out.J.row(row).head(n_) +=
-          piece_.g.tail<2>().transpose() / length_m * piece_.J_g_WI.bottomRows<2>();
+      J_path += piece_.g.tail<2>().transpose() / length_m * piece_.J_g_WI.bottomRows<2>();
     }
   });
-  out.r[row] = (path_m - *recording_.motion.distance_m) / options_.sigma_distance_m;
-  out.J.row(row) /= options_.sigma_distance_m;
+  const auto add = [&](double error, const Eigen::RowVectorXd& J, double sigma) {
+    out.r[row] = error / sigma;
+    out.J.row(row++).head(n_) = J / sigma;
+  };
+  if (distance_m) add(path_m - *distance_m, J_path, options_.sigma_distance_m);
+  if (turn_rad) {
+    add(yaw_rad - *turn_rad, J_yaw, options_.sigma_turn_deg * std::numbers::pi / 180.);
+  }
 }
 
 }  // namespace viwo::calibration

@@ -22,9 +22,10 @@ struct CalibrationPoint {
   bool operator==(const CalibrationPoint&) const = default;
 };
 
-/// What a residual is of; those of one kind have one noise (CAL-5), that of distances is known.
-enum class ResidualKind { kYaw, kPosition, kParity, kDistance };
-inline constexpr std::size_t kResidualKinds = 4;
+/// What a residual is of; those of one kind have one noise (CAL-5), that of what was measured by
+/// hand is known.
+enum class ResidualKind { kYaw, kPosition, kParity, kDistance, kTurn };
+inline constexpr std::size_t kResidualKinds = 5;
 
 /// Residuals of one recording, whitened, with their derivatives by [x_WI, extrinsics, clock
 /// offset, gyro bias].
@@ -80,7 +81,7 @@ class RecordingProblem {
   void add_segment(int row, std::size_t k, const CalibrationPoint& point, bool jacobian,
                    RecordingResiduals& out);
   void add_parity(int row, RecordingResiduals& out) const;
-  void add_distance(int row, const CalibrationPoint& point, RecordingResiduals& out);
+  void add_measured_by_hand(int row, const CalibrationPoint& point, RecordingResiduals& out);
 
   const CalibrationRecording& recording_;
   CalibrationOptions options_;

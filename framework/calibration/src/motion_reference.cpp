@@ -1,6 +1,8 @@
 #include "motion_reference.hpp"
 
 #include <charconv>
+#include <cmath>
+#include <numbers>
 
 #include <Eigen/Dense>
 
@@ -12,15 +14,21 @@ namespace {
 /// By how much the scatter about the axis of turning exceeds that about any other, at least.
 constexpr double kStandsOut = 30.;
 
-double distance_of(const std::string& name, const std::string& text) {
-  double distance_m = 0.;
+/// A label that is a number, if there is one of that name.
+std::optional<double> number_of(const Recording& recording, const char* label, const char* what,
+                                bool may_be_any) {
+  const auto found = recording.labels.find(label);
+  if (found == recording.labels.end()) return {};
+  const std::string& text = found->second;
+  double number = 0.;
   const char* const end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, distance_m);
-  if (error != std::errc() || stop != end || !(distance_m > 0.)) {
-    throw InputError("recording '" + name + "': distance_m is '" + text +
-                     "', not a distance in metres above 0");
+  const auto [stop, error] = std::from_chars(text.data(), end, number);
+  if (error != std::errc() || stop != end || !std::isfinite(number) ||
+      !(may_be_any || number > 0.)) {
+    throw InputError("recording '" + recording.name + "': " + label + " is '" + text + "', not " +
+                     what);
   }
-  return distance_m;
+  return number;
 }
 
 StampedPose turned(std::int64_t t_ns, double yaw_rad) {
@@ -85,9 +93,10 @@ MotionReference motion_reference(const Recording& label, const RunSetup& setup, 
   const bool has_gyro = !data.imu().empty() || !data.headings().empty();
   if (kind == ReferenceKind::kAuto) {
     if (data.reference.empty() && !has_gyro) {
-      throw InputError(where +
-                       " has neither a reference nor a gyro to calibrate against; wheels alone, "
-                       "with distance_m as labels of the recordings, are reference: none");
+      throw InputError(
+          where +
+          " has neither a reference nor a gyro to calibrate against; wheels alone, "
+          "with distance_m or turn_deg as labels of the recordings, are reference: none");
     }
     out.kind = data.reference.empty() ? ReferenceKind::kGyro : ReferenceKind::kPoses;
   }
@@ -105,8 +114,9 @@ MotionReference motion_reference(const Recording& label, const RunSetup& setup, 
     // Headings are often logged where they change only.
     out.max_gap_s = data.imu().empty() ? 0.5 : 0.1;
   }
-  const auto distance = label.labels.find("distance_m");
-  if (distance != label.labels.end()) out.distance_m = distance_of(label.name, distance->second);
+  out.distance_m = number_of(label, "distance_m", "a distance in metres above 0", false);
+  out.turn_rad = number_of(label, "turn_deg", "an angle in degrees", true);
+  if (out.turn_rad) *out.turn_rad *= std::numbers::pi / 180.;
   return out;
 }
 

@@ -19,7 +19,7 @@ Trajectory yaw_of_gyro(std::span<const ImuSample> imu);
 Trajectory yaw_of_headings(std::span<const HeadingSample> headings);
 
 /// The reference of a recording. Throws InputError when there is none of the kind, or when the
-/// label distance_m is no distance.
+/// labels distance_m or turn_deg are no such numbers.
 MotionReference motion_reference(const Recording& label, const RunSetup& setup, const RunData& data,
                                  ReferenceKind kind);
 

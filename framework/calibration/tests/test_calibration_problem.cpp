@@ -31,8 +31,8 @@ CalibrationRecording with_gyro() {
   recording.setup =
       read_run(config::parse(testing::swerve_with_camera(0), "run.yaml"), testing::registry());
   recording.data = collect(recording.setup);
-  recording.motion = motion_reference({"gyro", {{"distance_m", "3"}}}, recording.setup,
-                                      recording.data, ReferenceKind::kGyro);
+  recording.motion = motion_reference({"gyro", {{"distance_m", "3"}, {"turn_deg", "-450"}}},
+                                      recording.setup, recording.data, ReferenceKind::kGyro);
   return recording;
 }
 
@@ -111,6 +111,7 @@ TEST(RecordingProblem, HasTheJacobianOfTurnAndDistanceOfCentralDifferences) {
     options.segments = segments;
     RecordingProblem problem(recording, options);
     EXPECT_EQ(rows_of(problem, ResidualKind::kDistance).size(), 1u);
+    EXPECT_EQ(rows_of(problem, ResidualKind::kTurn).size(), 1u);
     EXPECT_GT(rows_of(problem, ResidualKind::kYaw).size(), 5u);
     expect_central_differences(problem, recording, 2e-3);
   }

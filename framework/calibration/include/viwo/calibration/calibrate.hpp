@@ -21,7 +21,7 @@ enum class ReferenceKind {
   kPoses,   ///< relative poses of the reference body
   kGyro,    ///< the turn by the gyro, about the mean direction of what the accelerometer feels
   kFilter,  ///< relative poses that the filter of the base finds without its wheels
-  kNone,    ///< nothing: the wheels among themselves, and distances
+  kNone,    ///< nothing: the wheels among themselves, and what was measured by hand
 };
 
 /// What is compared with the reference (docs/math/batch_calibration.md).
@@ -47,6 +47,7 @@ struct CalibrationOptions {
   double prior_sigma_clock_offset_s = 0.;  ///< of one offset per recording; 0: not estimated
   double prior_sigma_gyro_bias_rad_per_s = 0.02;
   double sigma_distance_m = 0.005;
+  double sigma_turn_deg = 0.5;
 
   void bind(ParamBinder& b);
 };
@@ -65,7 +66,8 @@ struct MotionReference {
   Trajectory poses;                           ///< of B; of the gyro the yaw alone, positions zero
   double offset_s = 0.;              ///< stamp of the reference = stamp of the wheels + offset
   double max_gap_s = 0.5;            ///< not interpolated over more
-  std::optional<double> distance_m;  ///< how far O was driven, along its path
+  std::optional<double> distance_m;  ///< how far O was driven, along its path, by hand
+  std::optional<double> turn_rad;    ///< by how much it has turned from start to end, by hand
 };
 
 /// A recording read into memory.
@@ -111,7 +113,7 @@ struct CalibrationEstimate {
   CalibrationNoise noise;  ///< found in the data (CAL-5)
   Segments segments = Segments::kWhole;
   double segment_s = 0.;      ///< 0: whole recordings
-  int residuals = 0;          ///< of turns, positions and distances
+  int residuals = 0;          ///< of turns, positions and what was measured by hand
   int weighed_down = 0;       ///< segments that fit no normal noise (CAL-15)
   int unknowns = 0;           ///< that were estimated, those of the recordings with them
   int parity_directions = 0;  ///< about which the wheels alone tell more than the prior
