@@ -1,13 +1,16 @@
 // The figures of the recorded robot: nominal dead reckoning, calibration with one repetition left
 // out.
+#include <cmath>
 #include <filesystem>
 #include <map>
 
 #include <gtest/gtest.h>
 
+#include "motion_reference.hpp"
 #include "simulated.hpp"
 #include "viwo/calibration/calibrate.hpp"
 #include "viwo/experiment/experiment.hpp"
+#include "viwo/math/se2.hpp"
 
 namespace viwo {
 namespace {
@@ -60,6 +63,45 @@ TEST_F(Recordings, CalibrationPredictsTheRepetitionThatIsLeftOutAndHalfwaysTheMo
   expect_below(result.left_out[0], 0.010, 0.012);
   // Without gains of the steering 65 mm, 0.040 rad; nominal 75 mm, 0.072 rad.
   expect_below(result.left_out[1], 0.040, 0.035);
+}
+
+/// By how much a recording has turned at its end [deg], as marks on the floor tell it.
+double marked_deg(const Trajectory& poses) {
+  double turn_rad = 0.;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    turn_rad += wrap_angle(yaw(poses[i]) - yaw(poses[i - 1]));
+  }
+  return 0.5 * std::round(2. * turn_rad * 180. / M_PI);
+}
+
+// Nothing of the motion capture but what a tape measure and chalk tell.
+TEST_F(Recordings, AreCalibratedByATapeMeasureAndMarksOnTheFloor) {
+  const auto calibrated_by = [](bool marks) {
+    auto setup =
+        read_calibration_setup(kConfigs / "calibrations" / "recordings.yaml", {}, registry());
+    setup.leave_out_by.clear();
+    setup.options.reference = ReferenceKind::kNone;
+    for (CalibrationRecording& recording : setup.recordings) {
+      Recording label = recording.label;
+      const std::string& motion = label.labels.at("motion");
+      if (motion == "forward") label.labels["distance_m"] = "4.07";
+      if (motion == "crab") label.labels["distance_m"] = "4.06";
+      if (marks) label.labels["turn_deg"] = std::to_string(marked_deg(recording.motion.poses));
+      recording.motion =
+          motion_reference(label, recording.setup, recording.data, ReferenceKind::kNone);
+    }
+    const CalibrationResult result = calibrate(setup);
+    double end_m = 0.;
+    for (const ValidationRun& run : result.fitted) end_m += run.calibrated.accuracy->end_m / 18.;
+    return std::pair{result.is_trusted(), end_m};
+  };
+  const auto [trusts_marks, by_marks_m] = calibrated_by(true);
+  EXPECT_TRUE(trusts_marks);
+  EXPECT_LT(by_marks_m, 0.025);
+  // The heading is in no distance: it says so.
+  const auto [trusts_ruler, by_ruler_m] = calibrated_by(false);
+  EXPECT_FALSE(trusts_ruler);
+  EXPECT_GT(by_ruler_m, 0.05);
 }
 
 TEST_F(Recordings, ThreeModelsRunSideBySide) {
