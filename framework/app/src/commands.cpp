@@ -91,6 +91,21 @@ RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
   return read_run(configuration, plugins, arguments.seed);
 }
 
+/// The calibration that a run starts from must not be lost when the run diverges.
+void refuse_to_overwrite(const RunSetup& setup, const std::filesystem::path& folder) {
+  const auto written = folder / "calibration.yaml";
+  for (const char* key : {"calibration", "kinematics.calibration"}) {
+    const config::Node* const file = setup.resolved.at_path(key);
+    std::error_code not_there;
+    if (!setup.filter || file == nullptr || !file->is_scalar() ||
+        !std::filesystem::equivalent(written, file->scalar(), not_there)) {
+      continue;
+    }
+    throw InputError("the run starts from " + file->scalar() +
+                     ", which its results would overwrite - choose another --out");
+  }
+}
+
 /// The results of a shard wait for those of the others.
 int shard_is_done(const ExperimentResult& result, const Shard& shard, const std::string& file,
                   const std::filesystem::path& folder) {
@@ -113,6 +128,7 @@ int shard_is_done(const ExperimentResult& result, const Shard& shard, const std:
 int run_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
+  refuse_to_overwrite(setup, out_folder(arguments));
   view::PictureSinks sinks = view::open_sinks(setup, arguments.show, arguments.video);
   const RunData data = collect(setup, LiveSensors::kAllowed);
   view::RunPictures pictures(setup, data, std::move(sinks));

@@ -314,6 +314,8 @@ class Fit {
     const Eigen::MatrixXd P = covariance(at);
     const auto n = static_cast<int>(prior_.sigma.size());
     estimate_.sigma = prior_.sigma.cwiseProduct(P.diagonal().head(n).cwiseSqrt());
+    const Eigen::VectorXd inverse = P.diagonal().head(n).cwiseSqrt().cwiseInverse();
+    estimate_.correlations = inverse.asDiagonal() * P.topLeftCorner(n, n) * inverse.asDiagonal();
     estimate_.extrinsics_sigma =
         prior_.extrinsics_sigma.cwiseProduct(P.diagonal().segment<3>(n).cwiseSqrt());
     for (std::size_t k = 0; k < own_.size(); ++k) {

@@ -1,10 +1,13 @@
 // What a calibration leaves behind: calibration.yaml, summary.json, terminal tables.
 #include <algorithm>
+#include <cmath>
+#include <optional>
 #include <sstream>
 
 #include "calibration_text.hpp"
 #include "segment_choice.hpp"
 #include "viwo/eval/json.hpp"
+#include "viwo/eval/statistics.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/setup/calibration_file.hpp"
@@ -162,6 +165,74 @@ json summary_of(const CalibrationResult& result) {
       {"left_out_by", by_label}};
 }
 
+/// The wheels' clock over all recordings: as uncertain as they differ, where that is more.
+std::optional<CalibrationEntry> clock_of(const CalibrationResult& result) {
+  const CalibrationEstimate& estimate = result.all;
+  double weights = 0., sum = 0.;
+  std::vector<double> offsets_s;
+  for (std::size_t i = 0; i < estimate.clock_offset_s.size(); ++i) {
+    const double sigma = estimate.clock_offset_sigma_s[i];
+    if (!(sigma > 0.)) continue;
+    weights += 1. / (sigma * sigma);
+    sum += estimate.clock_offset_s[i] / (sigma * sigma);
+    offsets_s.push_back(estimate.clock_offset_s[i]);
+  }
+  if (offsets_s.empty()) return std::nullopt;
+  double sigma = std::sqrt(1. / weights);
+  if (offsets_s.size() > 1) {
+    sigma = std::max(sigma, eval::sample_standard_deviation(offsets_s));
+  }
+  const double nominal = result.setup->recordings.front().motion.offset_s;
+  return CalibrationEntry{"", nominal + sum / weights, sigma, nominal, "s"};
+}
+
+/// Where O is in the reference body, and the clock of that, which is the IMU's where the gyro is
+/// the reference.
+void add_reference(const CalibrationResult& result, CalibrationFile& file) {
+  const CalibrationRecording& first = result.setup->recordings.front();
+  const bool has_poses = first.motion.kind == ReferenceKind::kPoses;
+  if (has_poses) {
+    constexpr const char* kNames[] = {"x_OinB", "y_OinB", "yaw_OinB"};
+    for (int i = 0; i < 3; ++i) {
+      file.reference.push_back({kNames[i], result.all.extrinsics[i],
+                                result.all.extrinsics_sigma[i],
+                                result.setup->options.extrinsics_x_m_y_m_yaw_rad[i],
+                                i < 2 ? "m" : "rad"});
+    }
+  }
+  std::optional<CalibrationEntry> clock = clock_of(result);
+  if (!clock) return;
+  clock->name = has_poses ? "t_OtoB" : "t_OtoI";
+  // The clock of headings is that of no IMU.
+  if (has_poses || !first.data.imu().empty()) {
+    (has_poses ? file.reference : file.clock).push_back(*clock);
+  }
+}
+
+CalibrationFile calibration_file_of(const CalibrationResult& result) {
+  using Status = CalibrationFile::Status;
+  const RunSetup& setup = result.setup->recordings.front().setup;
+  CalibrationFile file;
+  file.status = result.is_trusted() ? Status::kOk : Status::kDoubtful;
+  if (!result.all.converged) file.status = Status::kFailed;
+  file.reasons = result.doubts;
+  file.model = setup.kinematics.info.name;
+  file.twist = setup.preintegration.twist.noise_weighted ? "noise_weighted" : "plain";
+  const auto& specs = setup.model->description().intrinsics;
+  std::vector<Eigen::Index> known;
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    file.intrinsics.push_back({specs[i].name, result.all.x_WI[k], result.all.sigma[k],
+                               specs[i].nominal, specs[i].unit});
+    if (!(result.all.sigma[k] > 0.)) continue;
+    known.push_back(k);
+    file.correlations.entries.push_back(specs[i].name);
+  }
+  file.correlations.matrix = result.all.correlations(known, known);
+  add_reference(result, file);
+  return file;
+}
+
 }  // namespace
 
 std::string describe(const CalibrationResult& result) {
@@ -192,16 +263,8 @@ std::string describe(const CalibrationResult& result) {
 
 void write_calibration(const std::filesystem::path& folder, const CalibrationResult& result) {
   log::make_folder(folder);
-  const CalibrationEstimate& estimate = result.all;
-  const RunSetup& setup = result.setup->recordings.front().setup;
-  const CalibrationFile file{
-      estimate.x_WI, estimate.sigma, estimate.extrinsics,
-      setup.preintegration.twist.noise_weighted ? "noise_weighted" : "plain"};
-  std::string text =
-      "# Written by viwo calibrate; include it with kinematics.calibration in a run.\n";
-  for (const std::string& doubt : result.doubts) text += "# Not to be trusted: " + doubt + "\n";
   log::write_text(folder / "calibration.yaml",
-                  text + calibration_text(file, *setup.model, setup.kinematics.info.name));
+                  calibration_text(calibration_file_of(result), "viwo calibrate"));
   log::write_text(folder / "summary.json", summary_of(result).dump(2) + "\n");
   log::write_text(folder / "report.html", report::to_html(page_of(result)));
 }

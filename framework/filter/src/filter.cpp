@@ -59,7 +59,7 @@ Filter::Filter(const FilterOptions& options, std::vector<BlockSpec> blocks,
       dx_(Eigen::VectorXd::Zero(covariance_.size())) {
   clones_.reserve(slots_.size());
   new_columns_.reserve(static_cast<std::size_t>(room_columns(blocks_)));
-  blocks_.set_prior(covariance_);
+  blocks_.set_prior(covariance_, options_.correlations);
 }
 
 void Filter::initialize(const ImuPrior& prior) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/LU>
 
@@ -143,16 +144,28 @@ void StateBlocks::place(std::size_t block, int& next) {
   views_[block] = {column, size, spec.rotations, &value_[offset_[block]], &first_[offset_[block]]};
 }
 
-void StateBlocks::set_prior(Covariance& covariance) const {
+void StateBlocks::set_prior(Covariance& covariance, const PriorCorrelations& correlations) const {
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(columns_);
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> correlated;  // column, index in `correlations`
+  const auto& names = correlations.entries;
   for (std::size_t i = 0; i < specs_.size(); ++i) {
     if (views_[i].column() < 0) continue;
-    Eigen::VectorXd variance(views_[i].size());
-    for (Eigen::Index k = 0; k < variance.size(); ++k) {
-      const double sigma = specs_[i].entries[static_cast<std::size_t>(k)].sigma;
-      variance[k] = sigma * sigma;
+    for (std::size_t k = 0; k < specs_[i].entries.size(); ++k) {
+      const BlockEntry& entry = specs_[i].entries[k];
+      const Eigen::Index column =
+          views_[i].column() - first_column_ + static_cast<Eigen::Index>(k);
+      sigma[column] = entry.sigma;
+      const auto known = std::find(names.begin(), names.end(), entry.name);
+      if (known != names.end()) correlated.emplace_back(column, known - names.begin());
     }
-    covariance.set_block(views_[i].column(), variance.asDiagonal());
   }
+  Eigen::MatrixXd P = sigma.cwiseAbs2().asDiagonal();
+  for (const auto& [row, i] : correlated) {
+    for (const auto& [column, j] : correlated) {
+      if (row != column) P(row, column) = sigma[row] * correlations.matrix(i, j) * sigma[column];
+    }
+  }
+  if (columns_ > 0) covariance.set_block(first_column_, P);
 }
 
 void StateBlocks::estimates(BlockId id, const Covariance& covariance,

@@ -14,6 +14,7 @@
 #include "viwo/report/html.hpp"
 #include "viwo/results/metrics.hpp"
 #include "viwo/results/run_stream.hpp"
+#include "viwo/setup/calibration_file.hpp"
 
 namespace viwo {
 
@@ -43,6 +44,23 @@ void write_timing(const std::filesystem::path& file, const RunResult& result) {
   write_timing_head(out);
   for (std::size_t k = 0; k < result.epoch_ms.size(); ++k) write_timing_row(out, result, k);
   out.close();
+}
+
+/// What a next run starts from; of a run that did not end well it says so, and is refused.
+void write_start_of_next(const std::filesystem::path& file, const RunSetup& setup,
+                         const RunResult& result) {
+  if (!result.final_calibration) return;
+  using Status = CalibrationFile::Status;
+  CalibrationFile calibration = *result.final_calibration;
+  describe_rig(setup, calibration);
+  const bool has_estimates = !calibration.intrinsics.empty() || !calibration.cameras.empty();
+  if (!has_estimates) return;
+  if (result.status != RunStatus::kOk) {
+    const bool diverged = result.status == RunStatus::kDiverged;
+    calibration.status = diverged ? Status::kDiverged : Status::kFailed;
+    calibration.reasons = {result.cause};
+  }
+  log::write_text(file, calibration_text(calibration, "viwo run"));
 }
 
 /// The trajectory of each piece of a run that has several.
@@ -186,6 +204,7 @@ void write_run(const std::filesystem::path& folder, const RunSetup& setup,
     write_timing(folder / "timing.csv", result);
   }
   if (!result.reference.empty()) log::write_tum(folder / "reference.tum", result.reference);
+  write_start_of_next(folder / "calibration.yaml", setup, result);
   log::write_text(folder / "summary.json", summary_of(setup, result).dump(2) + "\n");
   log::write_text(folder / "report.html", report::to_html(report_of(setup, result)));
 }

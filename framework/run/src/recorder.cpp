@@ -113,6 +113,7 @@ void Recorder::finish(const Estimator& estimator) {
     result_.rejections.emplace_back("estimator", rejection);
   }
   result_.noises = estimator.noises();
+  result_.final_calibration = calibration_file_of(estimator.filter());
   if (loosened_ > 0) {
     std::string updates;
     for (const UpdateTrack& update : result_.updates) {

@@ -1,13 +1,12 @@
 #include "restart.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <memory>
-#include <string_view>
 #include <utility>
 
 #include "viwo/math/so3.hpp"
+#include "viwo/setup/calibration_file.hpp"
 
 namespace viwo {
 namespace {
@@ -18,14 +17,6 @@ constexpr double kLostForS = 10.;
 /// Contact is found to be lost so long afterwards at most.
 constexpr std::int64_t kFoundLateNs = 5'000'000'000;
 constexpr double kMostSigmas = 4.;
-
-/// Of what the configuration says of cameras and wheel sets (viwo/api/rig.hpp). Other blocks may be
-/// tied to a world that the filter has lost.
-bool is_of_the_rig(std::string_view block) {
-  const bool is_camera = block.size() > 3 && block.substr(0, 3) == "cam" &&
-                         std::isdigit(static_cast<unsigned char>(block[3])) != 0;
-  return is_camera || block.substr(0, 7) == "wheels.";
-}
 
 }  // namespace
 
@@ -68,7 +59,8 @@ void HealthyState::epoch(const Estimator& estimator) {
 
 bool HealthyState::is_kept(std::size_t block, const std::vector<double>& value) const {
   const BlockSpec& spec = declared_[block];
-  // Where it settles is what was declared.
+  // Other blocks may be tied to a world that the filter has lost. Where this settles is what was
+  // declared.
   if (!is_of_the_rig(spec.name) || spec.process == Process::kGaussMarkov) return false;
   constexpr double kRounding = 1e-9;
   const auto is_near = [&](std::size_t entry, double off) {

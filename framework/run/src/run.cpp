@@ -97,6 +97,7 @@ StageTime stage_time(std::vector<double> ms) {
 RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   RunResult result;
   result.rejections = data.rejections;
+  result.warnings = setup.warnings;
   result.reference = data.reference;
   const auto offset_ns =
       static_cast<std::int64_t>(std::llround(setup.reference_time_offset_s * 1e9));

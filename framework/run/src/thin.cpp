@@ -84,6 +84,7 @@ void keep_ends(RunResult& run) {
   auto nees = std::move(run.nees.series);
   thin(run, 2);
   run.nees.series = std::move(nees);
+  run.final_calibration.reset();
 }
 
 void drop_last_point(RunResult& run) {

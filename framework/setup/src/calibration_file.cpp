@@ -1,33 +1,44 @@
+// Reading and writing calibration.yaml.
 #include "viwo/setup/calibration_file.hpp"
 
-#include <array>
-#include <charconv>
-#include <vector>
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
 
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
+#include "viwo/log/text.hpp"
 
 namespace viwo {
 namespace {
 
+using config::Errors;
 using config::Node;
+using Entries = CalibrationFile::Entries;
+using Trust = CalibrationFile::Status;
 
 struct TopParams {
   std::string model;
   std::string twist;
-  Eigen::Vector3d extrinsics_x_m_y_m_yaw_rad{0., 0., 0.};
+  Trust status = Trust::kOk;
+  std::vector<std::string> reasons;
 
   void bind(ParamBinder& b) {
-    b(VIWO_PARAM(model), {.required = true, .help = "type of the kinematic model"});
-    b(VIWO_PARAM(twist), {.choices = "plain|noise_weighted",
-                          .required = true,
-                          .help = "odometry.twist of the fit: the estimates belong to it"});
-    b(VIWO_PARAM(extrinsics_x_m_y_m_yaw_rad), {.help = "pose of O in the reference body"});
+    b(VIWO_PARAM(model), {.help = "type of the kinematic model; none: nothing of wheels"});
+    b(VIWO_PARAM(twist), {.choices = "plain|noise_weighted", .help = "odometry.twist that the estimates belong to"});
+    b(VIWO_PARAM(status),
+      {{"ok", Trust::kOk},
+       {"doubtful", Trust::kDoubtful},
+       {"diverged", Trust::kDiverged},
+       {"failed", Trust::kFailed}},
+      {.help = "how it was come by; what has diverged or failed is refused"});
+    b(VIWO_PARAM(reasons), {.help = "why it is not ok"});
   }
 };
 
-struct IntrinsicParams {
+struct EntryParams {
   double estimate = 0.;
   double sigma = 0.;
   double nominal = 0.;
@@ -37,85 +48,318 @@ struct IntrinsicParams {
     b(VIWO_PARAM(estimate), {.required = true, .help = "value to run with"});
     b(VIWO_PARAM(sigma), {.min = 0., .required = true, .help = "standard deviation; 0: held"});
     b(VIWO_PARAM(nominal), {.help = "for the reader; not used"});
-    b(VIWO_PARAM(unit), {.help = "for the reader; not used"});
+    b(VIWO_PARAM(unit), {.help = "must be that of the parameter; may be left out"});
   }
 };
 
-/// Shortest text that reads back to the same number.
-Node number(double value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  return Node::scalar_of(std::string(text.data(), end));
+struct CameraParams {
+  CameraDistortion distortion_model = CameraDistortion::kRadtan;
+  Eigen::Vector2d resolution{0., 0.};
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(distortion_model),
+      {{"radtan", CameraDistortion::kRadtan}, {"equidistant", CameraDistortion::kEquidistant}},
+      {.required = true, .help = "as Kalibr calls it"});
+    b(VIWO_PARAM(resolution),
+      {.unit = "px", .min = 1., .max = 100'000., .required = true, .help = "width, height"});
+  }
+};
+
+/// The sections of entries, with the names in them; those of cameras are behind `camN.`.
+struct Section {
+  const char* key;
+  Entries CalibrationFile::*entries;
+  std::vector<std::string> names;  ///< none: those of any kinematic model
+};
+
+const std::vector<Section>& sections() {
+  static const std::vector<Section> all{
+      {"intrinsics", &CalibrationFile::intrinsics, {}},
+      {"mount",
+       &CalibrationFile::mount,
+       {"theta_ItoO_x", "theta_ItoO_y", "theta_ItoO_z", "p_IinO_x", "p_IinO_y", "p_IinO_z"}},
+      {"clock", &CalibrationFile::clock, {"t_OtoI"}},
+      {"reference", &CalibrationFile::reference, {"x_OinB", "y_OinB", "yaw_OinB", "t_OtoB"}},
+      {"cameras",
+       &CalibrationFile::cameras,
+       {"theta_ItoC_x", "theta_ItoC_y", "theta_ItoC_z", "p_IinC_x", "p_IinC_y", "p_IinC_z", "fx",
+        "fy", "cx", "cy", "d1", "d2", "d3", "d4", "t_CtoI"}}};
+  return all;
+}
+
+/// Behind the name of a wheel set or camera in front of it.
+std::string without_owner(const std::string& name) {
+  const std::size_t dot = name.rfind('.');
+  return dot == std::string::npos ? name : name.substr(dot + 1);
+}
+
+void check_name(const Section& section, const Node::Entry& entry, Errors& errors) {
+  if (section.names.empty()) return;
+  const std::string name = without_owner(entry.key);
+  if (std::find(section.names.begin(), section.names.end(), name) != section.names.end()) return;
+  errors.add(entry.key_mark, std::string(section.key) + ": unknown parameter '" + entry.key + "'" +
+                                 config::did_you_mean(name, section.names));
+}
+
+void read_entries(const Node& root, const Section& section, Entries& out, Errors& errors) {
+  const Node* const node = root.find(section.key);
+  if (node == nullptr) return;
+  const std::string path = section.key;
+  if (!node->is_map()) {
+    errors.add(node->mark(), "'" + path + "' must be a section with one entry per parameter");
+    return;
+  }
+  for (const Node::Entry& entry : node->entries()) {
+    check_name(section, entry, errors);
+    const std::size_t before = errors.size();
+    const auto values = config::read_section<EntryParams>(entry.value, entry.key_mark,
+                                                          path + "." + entry.key, errors);
+    if (errors.size() > before) continue;
+    const Node* const at = entry.value.find("estimate");
+    out.push_back({entry.key, values.estimate, values.sigma, values.nominal, values.unit,
+                   at->mark(), entry.key_mark});
+  }
+}
+
+void read_wheel_sets(const Node& root, CalibrationFile& file, Errors& errors) {
+  const Node* const sets = root.find("wheel_sets");
+  if (sets == nullptr) return;
+  for (const Node::Entry& entry : sets->entries()) {
+    if (entry.value.is_scalar()) file.wheel_sets[entry.key] = entry.value.scalar();
+  }
+  if (!sets->is_map() || file.wheel_sets.size() != sets->entries().size()) {
+    errors.add(sets->mark(), "'wheel_sets' is a section NAME: type of its kinematic model");
+  }
+}
+
+void read_camera_models(const Node& root, CalibrationFile& file, Errors& errors) {
+  const Node* const cameras = root.find("camera_models");
+  if (cameras == nullptr) return;
+  if (!cameras->is_map()) {
+    errors.add(cameras->mark(), "'camera_models' is a section cam0: {...}, cam1: {...}, ...");
+    return;
+  }
+  for (const Node::Entry& entry : cameras->entries()) {
+    const std::string name = "cam" + std::to_string(file.camera_models.size());
+    if (entry.key != name) {
+      errors.add(entry.key_mark, "camera_models: '" + entry.key + "' stands where " + name +
+                                     " should; cameras are counted from cam0 without gaps");
+      return;
+    }
+    const auto values = config::read_section<CameraParams>(entry.value, entry.key_mark,
+                                                           "camera_models." + name, errors);
+    file.camera_models.push_back({values.distortion_model,
+                                  static_cast<int>(std::lround(values.resolution[0])),
+                                  static_cast<int>(std::lround(values.resolution[1])),
+                                  entry.key_mark});
+  }
+}
+
+/// The row of a correlations matrix: as many numbers as there are rows before it.
+bool read_row(const Node::Entry& row, Eigen::Index k, Eigen::MatrixXd& matrix, Errors& errors) {
+  if (!row.value.is_list() || static_cast<Eigen::Index>(row.value.items().size()) != k) {
+    errors.add(row.value.mark(), "correlations." + row.key + ": expected a list of " +
+                                     std::to_string(k) +
+                                     " numbers, one for each of the rows before it");
+    return false;
+  }
+  for (Eigen::Index i = 0; i < k; ++i) {
+    const Node& item = row.value.items()[static_cast<std::size_t>(i)];
+    const auto value = item.is_scalar() ? log::parse_number(item.scalar()) : std::nullopt;
+    if (!value || !(std::abs(*value) <= 1.)) {
+      errors.add(item.mark(),
+                 "correlations." + row.key + ": a correlation is a number from -1 to 1");
+      return false;
+    }
+    matrix(k, i) = matrix(i, k) = *value;
+  }
+  return true;
+}
+
+void read_correlations(const Node& root, CalibrationFile& file, Errors& errors) {
+  const Node* const rows = root.find("correlations");
+  if (rows == nullptr) return;
+  if (!rows->is_map()) {
+    errors.add(rows->mark(), "'correlations' is a section with one row per parameter");
+    return;
+  }
+  PriorCorrelations& out = file.correlations;
+  const auto n = static_cast<Eigen::Index>(rows->entries().size());
+  out.matrix = Eigen::MatrixXd::Identity(n, n);
+  for (const Node::Entry& row : rows->entries()) {
+    const auto has = [&](const Section& section) {
+      const CalibrationEntry* const entry = find(file.*section.entries, row.key);
+      return entry != nullptr && entry->sigma > 0.;
+    };
+    if (std::none_of(sections().begin(), sections().end(), has)) {
+      errors.add(row.key_mark,
+                 "correlations: '" + row.key + "' is none of the parameters that have a sigma");
+      return;
+    }
+    if (!read_row(row, static_cast<Eigen::Index>(out.entries.size()), out.matrix, errors)) return;
+    out.entries.push_back(row.key);
+  }
+  if (n == 0) return;
+  // What rounding leaves of directions that are known exactly.
+  constexpr double kRounding = 1e-9;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(out.matrix, Eigen::EigenvaluesOnly);
+  if (eigen.eigenvalues()[0] < -kRounding) {
+    errors.add(rows->mark(), "correlations: no such correlations exist (the matrix has a negative "
+                             "eigenvalue): a number in it is wrong");
+  }
+}
+
+std::string joined(const std::vector<std::string>& reasons) {
+  std::string text;
+  for (const std::string& reason : reasons) text += (text.empty() ? "" : "; ") + reason;
+  return text;
+}
+
+void check_status(const CalibrationFile& file, const config::Mark& mark, Errors& errors) {
+  if (file.status != Trust::kDiverged && file.status != Trust::kFailed) return;
+  const std::string why = joined(file.reasons);
+  const std::string how = file.status == Trust::kDiverged ? "diverged" : "failed";
+  errors.add(mark, "this calibration is not to be used: what it is from has " + how +
+                       (why.empty() ? "" : " (" + why + ")") +
+                       " - calibrate again, or, if you know it to be right, write status: "
+                       "doubtful");
+}
+
+const char* text_of(Trust status) {
+  switch (status) {
+    case Trust::kDoubtful:
+      return "doubtful";
+    case Trust::kDiverged:
+      return "diverged";
+    case Trust::kFailed:
+      return "failed";
+    default:
+      return "ok";
+  }
+}
+
+Node number(double value) { return Node::scalar_of(log::number_text(value)); }
+
+Node entries_node(const Entries& entries) {
+  Node section = Node::empty_map();
+  for (const CalibrationEntry& entry : entries) {
+    Node node = Node::empty_map();
+    node.set("estimate", number(entry.estimate));
+    node.set("sigma", number(entry.sigma));
+    node.set("nominal", number(entry.nominal));
+    node.set("unit", Node::scalar_of(entry.unit));
+    section.set(entry.name, node);
+  }
+  return section;
+}
+
+Node cameras_node(const std::vector<CalibratedCamera>& cameras) {
+  Node section = Node::empty_map();
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    Node node = Node::empty_map();
+    const bool is_radtan = cameras[i].distortion == CameraDistortion::kRadtan;
+    node.set("distortion_model", Node::scalar_of(is_radtan ? "radtan" : "equidistant"));
+    node.set("resolution",
+             Node::list_of({number(cameras[i].width_px), number(cameras[i].height_px)}));
+    section.set("cam" + std::to_string(i), node);
+  }
+  return section;
+}
+
+Node correlations_node(const PriorCorrelations& correlations) {
+  Node section = Node::empty_map();
+  for (std::size_t k = 0; k < correlations.entries.size(); ++k) {
+    Node row = Node::list_of();
+    for (std::size_t i = 0; i < k; ++i) {
+      row.items().push_back(number(
+          correlations.matrix(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(i))));
+    }
+    section.set(correlations.entries[k], row);
+  }
+  return section;
 }
 
 }  // namespace
 
-CalibrationFile read_calibration(const std::filesystem::path& file, const WheelModel& model,
-                                 const std::string& model_name) {
-  const Node root = config::load_file(file);
-  config::Errors errors;
-  constexpr std::string_view kSections[] = {"intrinsics"};
-  const auto top =
-      config::read_section<TopParams>(root, root.mark(), "calibration", errors, kSections);
-  const Node* intrinsics = root.find("intrinsics");
-  if (intrinsics == nullptr || !intrinsics->is_map()) {
-    errors.add(root.mark(), "'intrinsics' must be a section with one entry per intrinsic");
-  }
-  errors.throw_if_any();
-  if (top.model != model_name) {
-    config::fail(root.find("model")->mark(), "this calibration is for the model '" + top.model +
-                                                 "', the run has '" + model_name + "'");
-  }
-  CalibrationFile calibration;
-  calibration.x_WI = model.nominal();
-  calibration.sigma = model.prior_sigma();
-  calibration.twist = top.twist;
-  calibration.extrinsics = top.extrinsics_x_m_y_m_yaw_rad;
-  std::vector<std::string> names;
-  for (const auto& spec : model.description().intrinsics) names.push_back(spec.name);
-  for (const auto& entry : intrinsics->entries()) {
-    const int index = model.find(entry.key);
-    if (index < 0) {
-      errors.add(entry.key_mark, "the model '" + model_name + "' has no intrinsic '" + entry.key +
-                                     "'" + config::did_you_mean(entry.key, names));
-      continue;
-    }
-    const std::size_t before = errors.size();
-    const auto values = config::read_section<IntrinsicParams>(entry.value, entry.key_mark,
-                                                              "intrinsics." + entry.key, errors);
-    if (errors.size() > before) continue;
-    calibration.x_WI[index] = values.estimate;
-    calibration.sigma[index] = values.sigma;
-  }
-  for (const std::string& name : names) {
-    if (intrinsics->find(name) == nullptr) {
-      errors.add(intrinsics->mark(), "intrinsic '" + name + "' is missing");
-    }
-  }
-  errors.throw_if_any();
-  return calibration;
+const CalibrationEntry* find(const Entries& entries, std::string_view name) {
+  const auto found = std::find_if(entries.begin(), entries.end(),
+                                  [&](const auto& entry) { return entry.name == name; });
+  return found != entries.end() ? &*found : nullptr;
 }
 
-std::string calibration_text(const CalibrationFile& calibration, const WheelModel& model,
-                             const std::string& model_name) {
-  Node root = Node::empty_map();
-  root.set("model", Node::scalar_of(model_name));
-  root.set("twist", Node::scalar_of(calibration.twist));
-  Node intrinsics = Node::empty_map();
-  for (int i = 0; i < model.n_intrinsics(); ++i) {
-    const IntrinsicSpec& spec = model.description().intrinsics[static_cast<std::size_t>(i)];
-    Node entry = Node::empty_map();
-    entry.set("estimate", number(calibration.x_WI[i]));
-    entry.set("sigma", number(calibration.sigma[i]));
-    entry.set("nominal", number(spec.nominal));
-    entry.set("unit", Node::scalar_of(spec.unit));
-    intrinsics.set(spec.name, entry);
+CalibrationFile read_calibration(const std::filesystem::path& path) {
+  const Node root = config::load_file(path);
+  Errors errors;
+  std::vector<std::string_view> keys{"wheel_sets", "camera_models", "correlations"};
+  for (const Section& section : sections()) keys.emplace_back(section.key);
+  const auto top = config::read_section<TopParams>(root, root.mark(), "calibration", errors, keys);
+  errors.throw_if_any();
+  CalibrationFile file;
+  file.path = path;
+  file.model = top.model;
+  file.twist = top.twist;
+  file.status = top.status;
+  file.reasons = top.reasons;
+  const Node* const model = root.find("model");
+  file.model_mark = model != nullptr ? model->mark() : root.mark();
+  if (const Node* const section = root.find("intrinsics")) file.intrinsics_mark = section->mark();
+  const Node* const status = root.find("status");
+  check_status(file, status != nullptr ? status->mark() : root.mark(), errors);
+  errors.throw_if_any();
+  for (const char* key : {"model", "twist", "intrinsics"}) {
+    const bool has_wheels = model != nullptr || root.find("intrinsics") != nullptr;
+    if (!has_wheels || root.find(key) != nullptr) continue;
+    errors.add(root.mark(), std::string("'") + key +
+                                "' is missing: model, twist and intrinsics belong together");
   }
-  root.set("intrinsics", intrinsics);
-  Node extrinsics = Node::list_of();
-  for (const double value : calibration.extrinsics) extrinsics.items().push_back(number(value));
-  root.set("extrinsics_x_m_y_m_yaw_rad", extrinsics);
-  return config::to_yaml(root);
+  for (const Section& section : sections()) {
+    read_entries(root, section, file.*section.entries, errors);
+  }
+  read_wheel_sets(root, file, errors);
+  read_camera_models(root, file, errors);
+  if (errors.empty()) read_correlations(root, file, errors);
+  errors.throw_if_any();
+  return file;
+}
+
+std::string doubts_of(const CalibrationFile& calibration) {
+  if (calibration.status == Trust::kOk) return "";
+  const std::string why = joined(calibration.reasons);
+  return calibration.path.string() + " is " + text_of(calibration.status) +
+         (why.empty() ? "" : ": " + why);
+}
+
+std::string calibration_text(const CalibrationFile& calibration, const std::string& written_by) {
+  Node root = Node::empty_map();
+  if (!calibration.model.empty()) {
+    root.set("model", Node::scalar_of(calibration.model));
+    root.set("twist", Node::scalar_of(calibration.twist));
+  }
+  root.set("status", Node::scalar_of(text_of(calibration.status)));
+  if (!calibration.reasons.empty()) {
+    Node reasons = Node::list_of();
+    for (const std::string& reason : calibration.reasons) {
+      reasons.items().push_back(Node::scalar_of(reason, {}, true));
+    }
+    root.set("reasons", reasons);
+  }
+  for (const auto& [name, model] : calibration.wheel_sets) {
+    root.set("wheel_sets", root.find("wheel_sets") != nullptr ? *root.find("wheel_sets")
+                                                              : Node::empty_map())
+        .set(name, Node::scalar_of(model));
+  }
+  for (const Section& section : sections()) {
+    const Entries& entries = calibration.*section.entries;
+    if (!entries.empty()) root.set(section.key, entries_node(entries));
+  }
+  if (!calibration.camera_models.empty()) {
+    root.set("camera_models", cameras_node(calibration.camera_models));
+  }
+  if (!calibration.correlations.entries.empty()) {
+    root.set("correlations", correlations_node(calibration.correlations));
+  }
+  return "# Written by " + written_by + "; a run starts from it with calibration: FILE.\n" +
+         config::to_yaml(root);
 }
 
 }  // namespace viwo

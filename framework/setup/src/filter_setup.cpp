@@ -6,6 +6,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "calibration_start.hpp"
 #include "section.hpp"
 #include "section_params.hpp"
 #include "update_setup.hpp"
@@ -154,7 +155,7 @@ void make_wrong(CameraPrior& prior, std::size_t index, WrongStart& wrong,
 }
 
 void read_cameras(const CamerasParams& p, const Node& section, CalibrationError error,
-                  std::uint64_t seed, FilterSetup& setup, Errors& errors) {
+                  const ReadContext& context, FilterSetup& setup, Errors& errors) {
   auto cameras = from_kalibr(p.kalibr, section, "cameras", log::read_kalibr_cameras, errors);
   if (!cameras) return;
   const auto use = static_cast<std::size_t>(p.use);
@@ -167,8 +168,8 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
   if (use > 0) cameras->resize(use);
   const bool calibrates = p.calibrate;
   if (!calibrates) error.scale = 0.;
-  WrongStart clock(error, seed, kFirstCameraDraw);
-  const double later_s = clock.draw(p.sigma_t_CtoI_s);
+  WrongStart clock(error, context.seed, kFirstCameraDraw);
+  std::optional<double> later_s;  // of all that share one clock
   for (const CameraView& camera : *cameras) {
     const std::size_t index = setup.cameras.size();
     CameraPrior prior;
@@ -179,10 +180,12 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
     prior.sigma_intrinsics.head<4>().setConstant(p.sigma_focal_px);
     prior.sigma_intrinsics.tail<4>().setConstant(p.sigma_distortion);
     prior.sigma_clock_s = p.sigma_t_CtoI_s;
-    WrongStart wrong(error, seed, kFirstCameraDraw + 1 + index);
+    if (context.start != nullptr) context.start->take_camera(index, prior, errors);
+    if (!later_s) later_s = clock.draw(prior.sigma_clock_s);
+    WrongStart wrong(error, context.seed, kFirstCameraDraw + 1 + index);
     make_wrong(prior, index, wrong, setup.drawn_from);
     const double own_s = wrong.draw(prior.sigma_clock_s);
-    if (wrong.is_wrong()) prior.camera.t_CtoI_s += prior.shares_clock ? later_s : own_s;
+    if (wrong.is_wrong()) prior.camera.t_CtoI_s += prior.shares_clock ? *later_s : own_s;
     if (!calibrates || !p.calibrate_extrinsics) prior.sigma_extrinsics.setZero();
     if (!calibrates || !p.calibrate_intrinsics) prior.sigma_intrinsics.setZero();
     if (!calibrates || !p.calibrate_time_offset) prior.sigma_clock_s = 0.;
@@ -192,7 +195,7 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
 
 /// A wheel set from its section `wheels`; the intrinsics and their sigmas are those of its model.
 void read_wheels(const WheelsParams& p, WheelSet set, CalibrationError error,
-                 const ReadContext& context, FilterSetup& setup) {
+                 const ReadContext& context, FilterSetup& setup, Errors& errors) {
   const Vector3d& rpy = p.rpy_ItoO_rad;
   WheelsPrior& prior = set.prior;
   prior.sensor = p.sensor;
@@ -202,11 +205,14 @@ void read_wheels(const WheelsParams& p, WheelSet set, CalibrationError error,
   prior.wheels.t_OtoI_s = p.t_OtoI_s;
   prior.sigma_extrinsics << p.sigma_R_ItoO_rad, p.sigma_p_IinO_m;
   prior.sigma_time_offset_s = p.sigma_t_OtoI_s;
-  if (!p.hold_gauge) {
-    for (Eigen::Index i = 0; i < prior.sigma_intrinsics.size(); ++i) {
-      const IntrinsicSpec& spec = set.model->description().intrinsics[static_cast<std::size_t>(i)];
-      if (spec.gauge_fixed) prior.sigma_intrinsics[i] = spec.prior_sigma;
-    }
+  if (context.start != nullptr) context.start->take_mount_and_clock(prior, errors);
+  for (Eigen::Index i = 0; i < prior.sigma_intrinsics.size(); ++i) {
+    const IntrinsicSpec& spec = set.model->description().intrinsics[static_cast<std::size_t>(i)];
+    double& sigma = prior.sigma_intrinsics[i];
+    if (!spec.gauge_fixed) continue;
+    // A calibration.yaml has a sigma where O was placed by something else than the gauge.
+    if (p.hold_gauge) sigma = 0.;
+    if (!p.hold_gauge && sigma == 0.) sigma = spec.prior_sigma;
   }
 
   WrongStart wrong(error, context.seed, setup.wheels.size());
@@ -272,7 +278,12 @@ void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext&
                         [&] { return std::make_shared<const WheelModel>(model.object); });
     set.prior.wheels.x_WI = set.model->nominal();
     set.prior.sigma_intrinsics = set.model->prior_sigma();
-    read_wheels(*params, std::move(set), error, context, setup);
+    set.model_name = model.info.name;
+    if (context.start != nullptr && context.start->has_wheels(entry.key, set.model_name)) {
+      context.start->take_intrinsics(entry.key, *set.model, set.model_name, set.prior.wheels.x_WI,
+                                     set.prior.sigma_intrinsics, errors);
+    }
+    read_wheels(*params, std::move(set), error, context, setup, errors);
     Node resolved_set = Node::empty_map();
     resolved_set.set("kinematics", model.resolved);
     resolved_set.set("wheels", resolved_wheels);
@@ -342,7 +353,7 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
   }
   if (run.find("cameras") != nullptr) {
     if (const auto params = read("cameras", std::type_identity<CamerasParams>())) {
-      read_cameras(*params, *run.find("cameras"), error, context.seed, setup, errors);
+      read_cameras(*params, *run.find("cameras"), error, context, setup, errors);
     }
   }
   if (model != nullptr) {
@@ -351,11 +362,15 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
       set.model = model;
       set.prior.wheels.x_WI = x_WI;
       set.prior.sigma_intrinsics = sigma;
-      read_wheels(*params, std::move(set), error, context, setup);
+      read_wheels(*params, std::move(set), error, context, setup, errors);
     }
   }
   read_wheel_sets(run, error, context, setup, resolved, errors);
   check_wheel_sensors(run, setup, errors);
+  // Starts that are made wrong are drawn entry by entry.
+  if (context.start != nullptr && error.scale == 0.) {
+    setup.options.filter.correlations = context.start->correlations();
+  }
   read_updates(run, context, setup, resolved, errors);
   return setup;
 }

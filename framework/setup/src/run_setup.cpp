@@ -7,11 +7,11 @@
 #include <utility>
 #include <vector>
 
+#include "calibration_start.hpp"
 #include "camera_check.hpp"
 #include "section.hpp"
 #include "section_params.hpp"
 #include "viwo/config/params.hpp"
-#include "viwo/setup/calibration_file.hpp"
 
 namespace viwo {
 namespace {
@@ -93,8 +93,22 @@ void read_sensors(const Node& run, const ReadContext& context, RunSetup& setup,
   place_behind_inputs(std::move(unplaced), *sensors, setup, errors);
 }
 
-void read_kinematics(const Node& run, PluginRegistry& plugins, RunSetup& setup,
-                     config::Errors& errors) {
+/// What a calibration.yaml says of the wheels by themselves, and of the reference.
+void take_wheels(CalibrationStart& start, RunSetup& setup, config::Errors& errors) {
+  const std::string& model = setup.kinematics.info.name;
+  if (!start.has_wheels("", model)) return;
+  const CalibrationFile& file = start.file();
+  start.take_intrinsics("", *setup.model, model, setup.x_WI, setup.sigma, errors);
+  setup.preintegration.twist.noise_weighted = file.twist == "noise_weighted";
+  constexpr const char* kPose[] = {"x_OinB", "y_OinB", "yaw_OinB"};
+  for (int i = 0; i < 3; ++i) {
+    const CalibrationEntry* const entry = find(file.reference, kPose[i]);
+    if (entry != nullptr) setup.extrinsics[i] = entry->estimate;
+  }
+}
+
+void read_kinematics(const Node& run, PluginRegistry& plugins, CalibrationStart* start,
+                     RunSetup& setup, config::Errors& errors) {
   const Node* section = run.find("kinematics");
   if (section == nullptr) {
     if (!wants_filter(run)) {
@@ -113,31 +127,19 @@ void read_kinematics(const Node& run, PluginRegistry& plugins, RunSetup& setup,
   setup.x_WI = setup.model->nominal();
   setup.sigma = setup.model->prior_sigma();
   Node resolved = setup.kinematics.resolved;
-  if (const Node* file = section->find("calibration")) {
-    if (!file->is_scalar()) {
-      errors.add(file->mark(), "kinematics.calibration must be the path of a calibration.yaml");
-      return;
-    }
-    const auto path = std::filesystem::absolute(
-        std::filesystem::path(file->mark().line > 0 ? file->mark().file : "").parent_path() /
-        file->scalar());
-    const CalibrationFile calibration =
-        read_calibration(path, *setup.model, setup.kinematics.info.name);
-    setup.x_WI = calibration.x_WI;
-    setup.sigma = calibration.sigma;
-    setup.extrinsics = calibration.extrinsics;
-    setup.preintegration.twist.noise_weighted = calibration.twist == "noise_weighted";
-    resolved.set("calibration", Node::scalar_of(path.lexically_normal().string()));
+  if (start != nullptr) take_wheels(*start, setup, errors);
+  if (const auto file = kinematics_calibration(*section); !file.empty()) {
+    resolved.set("calibration", Node::scalar_of(file.string()));
   }
   setup.resolved.set("kinematics", resolved);
 }
 
-void read_options(const Node& run, RunSetup& setup, config::Errors& errors) {
+void read_options(const Node& run, const CalibrationStart* start, RunSetup& setup,
+                  config::Errors& errors) {
   const Node odometry = section_or_empty(run, "odometry");
   const Node evaluation = section_or_empty(run, "evaluation");
   const std::size_t before = errors.size();
-  const auto o =
-      config::read_section<OdometryParams>(odometry, odometry.mark(), "odometry", errors);
+  auto o = config::read_section<OdometryParams>(odometry, odometry.mark(), "odometry", errors);
   const auto e =
       config::read_section<EvaluationParams>(evaluation, evaluation.mark(), "evaluation", errors);
   if (errors.size() > before) return;
@@ -149,6 +151,11 @@ void read_options(const Node& run, RunSetup& setup, config::Errors& errors) {
   setup.preintegration.parity_gate_probability = o.parity_gate_probability;
   setup.preintegration.parity = false;
   setup.epoch_s = o.epoch_s;
+  const CalibrationEntry* const clock =
+      start != nullptr ? find(start->file().reference, "t_OtoB") : nullptr;
+  if (clock != nullptr && odometry.find("reference_time_offset_s") == nullptr) {
+    o.reference_time_offset_s = clock->estimate;
+  }
   setup.reference_time_offset_s = o.reference_time_offset_s;
   setup.evaluation.alignment = e.alignment;
   setup.evaluation.segment_lengths_m = e.segment_lengths_m;
@@ -191,6 +198,19 @@ PlanarExtrinsics planar_mount(const WheelsView& wheels) {
   return {p_OinI.x(), p_OinI.y(), std::atan2(R_OtoI(1, 0), R_OtoI(0, 0))};
 }
 
+/// What the user of a calibration.yaml should know.
+void warn_of(const CalibrationStart& start, RunSetup& setup) {
+  if (const std::string doubts = doubts_of(start.file()); !doubts.empty()) {
+    setup.warnings.push_back("calibration " + doubts);
+  }
+  if (!setup.filter || start.correlations().entries.empty()) return;
+  if (setup.filter->options.filter.correlations.entries.empty()) {
+    setup.warnings.push_back(
+        "estimator.calibration_error_scale draws each parameter by itself: the correlations of " +
+        start.file().path.string() + " are not used");
+  }
+}
+
 }  // namespace
 
 RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed,
@@ -209,9 +229,11 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
   } else {
     setup.resolved = Node::empty_map();
   }
-  read_kinematics(run, plugins, setup, errors);
-  read_options(run, setup, errors);
-  const ReadContext context{plugins, setup.seed, exact};
+  auto start = read_calibration_start(run, top.calibration, errors);
+  CalibrationStart* const from = start ? &*start : nullptr;
+  read_kinematics(run, plugins, from, setup, errors);
+  read_options(run, from, setup, errors);
+  const ReadContext context{plugins, setup.seed, exact, from};
   std::vector<std::string> measuring;
   if (has_filter_sections(run)) {
     // Read also when the wheels run alone: what is wrong in it is wrong.
@@ -223,12 +245,21 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
       setup.t_OtoI_s = wheels.t_OtoI_s;
     }
     measuring = filter.measuring;
+    if (setup.model != nullptr) filter.wheels.front().model_name = setup.kinematics.info.name;
     if (wants_filter(run)) setup.filter = std::move(filter);
   }
   read_sensors(run, context, setup, errors);
   if (errors.empty()) setup.routes = read_routes(run, setup, std::move(measuring), errors);
   errors.throw_if_any();
-  setup.warnings = compare_cameras(setup);
+  if (start) {
+    if (!start->took_anything()) {
+      config::fail(start->file().model_mark, "this calibration has nothing that the run has");
+    }
+    warn_of(*start, setup);
+  }
+  if (!start || !start->took_cameras()) {
+    for (std::string& line : compare_cameras(setup)) setup.warnings.push_back(std::move(line));
+  }
   return setup;
 }
 

@@ -17,10 +17,14 @@ namespace viwo {
 struct RunParams {
   std::string name = "run";
   std::uint64_t seed = 1;
+  std::filesystem::path calibration;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(name), {.help = "what tables and pages call this run"});
     b(VIWO_PARAM(seed), {.min = 0., .help = "seed of everything random"});
+    b(VIWO_PARAM(calibration),
+      {.help = "calibration.yaml of a run or of viwo calibrate to start from: values, sigmas and "
+               "correlations of wheels and cameras"});
   }
 };
 

@@ -107,6 +107,7 @@ struct CalibrationEstimate {
   Intrinsics sigma;  ///< 0 where an entry was held
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
   PlanarExtrinsics extrinsics_sigma = PlanarExtrinsics::Zero();
+  Eigen::MatrixXd correlations;  ///< of x_WI
   // One per recording used; sigma 0 where it was not estimated.
   std::vector<double> clock_offset_s, clock_offset_sigma_s;
   std::vector<double> gyro_bias_rad_per_s, gyro_bias_sigma_rad_per_s;

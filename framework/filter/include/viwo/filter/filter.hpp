@@ -24,6 +24,7 @@ struct FilterOptions {
   bool first_estimates = true;
   ImuNoise imu_noise;
   double gravity_m_per_s2 = 9.81;
+  PriorCorrelations correlations = {};  ///< of the entries of blocks
 };
 
 /// An inertial state to start from.

@@ -20,6 +20,12 @@ struct BlockEstimate {
   double sigma = 0.;  ///< 0 for what is held
 };
 
+/// How entries of declared blocks hang together at the start.
+struct PriorCorrelations {
+  std::vector<std::string> entries;  ///< names; those that no block has do not matter
+  Eigen::MatrixXd matrix = {};       ///< symmetric, of ones on its diagonal
+};
+
 /// Blocks that the monitor of excitation watches together.
 struct BlockGroup {
   std::string name;
@@ -55,8 +61,8 @@ class StateBlocks {
   /// Where the groups begin; all columns from there on are watched.
   int first_watched() const { return first_watched_; }
 
-  /// The prior of all declared blocks.
-  void set_prior(Covariance& covariance) const;
+  /// The prior of all declared blocks: their sigmas, with these correlations.
+  void set_prior(Covariance& covariance, const PriorCorrelations& correlations = {}) const;
   /// Estimates of the entries of a declared block, in their order.
   void estimates(BlockId id, const Covariance& covariance, std::vector<BlockEstimate>& out) const;
 

@@ -23,8 +23,8 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result);
 /// report.html of a run, as a document.
 report::Document report_of(const RunSetup& setup, const RunResult& result);
 
-/// Writes config.resolved.yaml, trajectory.tum, reference.tum, calibration.csv, timing.csv,
-/// summary.json and report.html.
+/// Writes config.resolved.yaml, trajectory.tum, reference.tum, calibration.csv, calibration.yaml,
+/// timing.csv, summary.json and report.html.
 void write_run(const std::filesystem::path& folder, const RunSetup& setup, const RunResult& result);
 
 /// A few lines for the terminal.

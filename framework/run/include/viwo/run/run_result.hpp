@@ -11,6 +11,7 @@
 #include "viwo/estimator/estimator.hpp"
 #include "viwo/eval/accuracy.hpp"
 #include "viwo/math/trajectory.hpp"
+#include "viwo/setup/calibration_file.hpp"
 #include "viwo/wheel/preintegration.hpp"
 
 namespace viwo {
@@ -121,6 +122,7 @@ struct RunResult {
   std::vector<PoseError> errors;  ///< where the reference is in the frame of the estimate
   std::vector<double> epoch_t_s;
   std::vector<CalibrationTrack> calibration;
+  std::optional<CalibrationFile> final_calibration;  ///< of wheels and cameras
   std::vector<UpdateTrack> updates;
   MonitorTrack monitor;
   /// More than one: it diverged and was started again. Those without an epoch are not here.

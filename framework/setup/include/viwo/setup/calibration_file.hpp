@@ -1,26 +1,78 @@
-// calibration.yaml: what `viwo calibrate` writes and a run configuration includes.
+// calibration.yaml: what `viwo calibrate` and runs of the filter leave, and a run starts from.
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
+#include <string_view>
+#include <vector>
 
-#include "viwo/setup/run_setup.hpp"
+#include "viwo/api/rig.hpp"
+#include "viwo/config/errors.hpp"
+#include "viwo/filter/filter.hpp"
 
 namespace viwo {
 
-struct CalibrationFile {
-  Intrinsics x_WI;
-  Intrinsics sigma;  ///< 0 where the gauge holds an entry
-  PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
-  std::string twist;  ///< odometry.twist of the fit: the estimates belong to it
+struct RunSetup;
+
+/// One number of a calibration.
+struct CalibrationEntry {
+  std::string name;  ///< of docs/conventions.md: "r_1", "theta_ItoO_x", "back.r_1", "cam0.fx"
+  double estimate = 0.;
+  double sigma = 0.;    ///< 0: it was held
+  double nominal = 0.;  ///< where its estimate began
+  std::string unit = {};
+  config::Mark mark = {}, key_mark = {};  ///< where estimate and name are written
 };
 
-/// Throws InputError when the file is for another model or does not name all of its intrinsics.
-CalibrationFile read_calibration(const std::filesystem::path& file, const WheelModel& model,
-                                 const std::string& model_name);
+/// What of a camera is not estimated.
+struct CalibratedCamera {
+  CameraDistortion distortion = CameraDistortion::kRadtan;
+  int width_px = 0;
+  int height_px = 0;
+  config::Mark mark = {};  ///< where it is written
+};
 
-/// YAML text with units and nominal values beside the estimates.
-std::string calibration_text(const CalibrationFile& calibration, const WheelModel& model,
-                             const std::string& model_name);
+struct CalibrationFile {
+  enum class Status { kOk, kDoubtful, kDiverged, kFailed };
+  using Entries = std::vector<CalibrationEntry>;
+
+  Status status = Status::kOk;
+  std::vector<std::string> reasons;               ///< why it is not ok
+  std::string model;                              ///< type of the kinematic model; "": no wheels
+  std::string twist;                              ///< odometry.twist that the estimates belong to
+  std::map<std::string, std::string> wheel_sets;  ///< further ones: name, type of the model
+  Entries intrinsics;                             ///< of the wheels
+  Entries mount;                                  ///< R_ItoO, p_IinO
+  Entries clock;                                  ///< t_OtoI
+  Entries reference;                              ///< pose of O and the wheels' clock, in B's
+  Entries cameras;
+  std::vector<CalibratedCamera> camera_models;
+  PriorCorrelations correlations;  ///< of entries with a sigma
+  std::filesystem::path path = {};
+  config::Mark model_mark = {}, intrinsics_mark = {};
+};
+
+/// The entry of that name; nullptr if there is none.
+const CalibrationEntry* find(const CalibrationFile::Entries& entries, std::string_view name);
+
+/// Throws InputError with all that is wrong in the file, and for one that is not to be used: of a
+/// run that has diverged, of a calibration that has failed.
+CalibrationFile read_calibration(const std::filesystem::path& file);
+
+/// Its YAML text; `written_by` is for the first line.
+std::string calibration_text(const CalibrationFile& calibration, const std::string& written_by);
+
+/// "calibration.yaml is doubtful: reasons"; "" for one that is not.
+std::string doubts_of(const CalibrationFile& calibration);
+
+/// What a filter knows of the wheels and cameras of the configuration, with the covariance across
+/// blocks. What wanders is not in it.
+CalibrationFile calibration_file_of(const Filter& filter);
+/// Adds what a run with that filter says of models and cameras.
+void describe_rig(const RunSetup& setup, CalibrationFile& file);
+
+/// Whether a block is of what the configuration says of cameras and wheel sets (viwo/api/rig.hpp).
+bool is_of_the_rig(std::string_view block);
 
 }  // namespace viwo

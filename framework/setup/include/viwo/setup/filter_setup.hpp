@@ -15,6 +15,8 @@
 
 namespace viwo {
 
+class CalibrationStart;
+
 enum class StartMode {
   kReference,   ///< the first state that the reference gives
   kStandstill,  ///< gravity and gyro bias from a rest
@@ -40,6 +42,7 @@ enum class Restart { kNever, kLive, kAlways };
 struct WheelSet {
   std::shared_ptr<const WheelModel> model;
   WheelsPrior prior;  ///< name "" for the first: its parameters have no prefix
+  std::string model_name = {};
 };
 
 struct FilterSetup {
@@ -82,6 +85,7 @@ struct ReadContext {
   PluginRegistry& plugins;
   std::uint64_t seed = 1;
   bool exact = false;  ///< HostServices::exact: no noise, no wrong start
+  CalibrationStart* start = nullptr;  ///< a calibration.yaml that the run starts from
 };
 
 /// Reads the sections `estimator`, `imu`, `cameras`, `wheels`, `wheel_sets` and `updates` of a run

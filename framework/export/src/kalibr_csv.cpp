@@ -1,0 +1,77 @@
+// The cameras as a camera chain of Kalibr; everything as a table.
+#include "formats.hpp"
+#include "viwo/config/yaml.hpp"
+#include "viwo/log/text.hpp"
+
+namespace viwo::exports {
+namespace {
+
+using config::Node;
+
+template <class Numbers>
+Node list(const Numbers& values) {
+  Node out = Node::list_of();
+  for (const double value : values) {
+    out.items().push_back(Node::scalar_of(log::number_text(value)));
+  }
+  return out;
+}
+
+Node camera_node(const CameraView& camera, std::size_t index) {
+  Eigen::Matrix4d T_cam_imu = Eigen::Matrix4d::Identity();
+  T_cam_imu.topLeftCorner<3, 3>() = camera.R_ItoC;
+  T_cam_imu.topRightCorner<3, 1>() = camera.p_IinC;
+  Node rows = Node::list_of();
+  for (int i = 0; i < 4; ++i) rows.items().push_back(list(T_cam_imu.row(i)));
+  const bool is_radtan = camera.distortion == CameraDistortion::kRadtan;
+  Node node = Node::empty_map();
+  node.set("T_cam_imu", rows);
+  node.set("cam_overlaps", Node::list_of());
+  node.set("camera_model", Node::scalar_of("pinhole"));
+  node.set("distortion_coeffs", list(camera.intrinsics.tail<4>()));
+  node.set("distortion_model", Node::scalar_of(is_radtan ? "radtan" : "equidistant"));
+  node.set("intrinsics", list(camera.intrinsics.head<4>()));
+  node.set("resolution", list(Eigen::Vector2d(camera.width_px, camera.height_px)));
+  node.set("rostopic", Node::scalar_of("/cam" + std::to_string(index) + "/image_raw"));
+  node.set("timeshift_cam_imu", list(Eigen::Matrix<double, 1, 1>(camera.t_CtoI_s)).items()[0]);
+  return node;
+}
+
+/// A text that may have separators.
+std::string field(const std::string& text) {
+  return text.find_first_of(",\"") == std::string::npos ? text : '"' + text + '"';
+}
+
+}  // namespace
+
+Exported to_kalibr(const Robot& robot) {
+  Lost lost(robot);
+  lost.sigmas();
+  const CalibrationFile& file = *robot.file;
+  if (!file.intrinsics.empty()) lost.add("the wheels, their mount and clock");
+  lost.add("names of topics and overlaps of the cameras, which nothing tells: those here are made "
+           "up");
+  Node root = Node::empty_map();
+  for (std::size_t i = 0; i < robot.cameras.size(); ++i) {
+    root.set("cam" + std::to_string(i), camera_node(robot.cameras[i], i));
+  }
+  return {head(robot, lost.texts(), "# ") + config::to_yaml(root), lost.texts()};
+}
+
+Exported to_csv(const Robot& robot) {
+  Lost lost(robot);
+  lost.add("correlations");
+  if (!robot.cameras.empty()) lost.add("distortion models and resolutions of the cameras");
+  std::string text = head(robot, lost.texts(), "# ") + "name,value,sigma,unit\n";
+  const CalibrationFile& file = *robot.file;
+  for (const auto* entries :
+       {&file.intrinsics, &file.mount, &file.clock, &file.reference, &file.cameras}) {
+    for (const CalibrationEntry& entry : *entries) {
+      text += field(entry.name) + "," + log::number_text(entry.estimate) + "," +
+              log::number_text(entry.sigma) + "," + field(entry.unit) + "\n";
+    }
+  }
+  return {text, lost.texts()};
+}
+
+}  // namespace viwo::exports
