@@ -222,7 +222,7 @@ TEST_F(ConfigurationTest, RefusesACalibrationThatDoesNotFit) {
   refuse_run("kinematics: *robot", "kinematics: {type: four_wis_wid_drive_only" + model,
              "TMP/cal/calibration.yaml:2:8  this calibration is for the model 'four_wis_wid', the "
              "run has 'four_wis_wid_drive_only'");
-  write("cal/calibration.yaml", replaced(read("cal/calibration.yaml"), "  r_2:", "  r_5:"));
+  write("cal/calibration.yaml", replaced(read("cal/calibration.yaml"), "  r_2:\n", "  r_5:\n"));
   refuse_run(
       "kinematics: *robot", "kinematics: {type: four_wis_wid" + model,
       "TMP/cal/calibration.yaml:5:3  intrinsic 'r_2' is missing\n"

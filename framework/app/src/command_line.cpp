@@ -20,6 +20,12 @@ void add_option(const std::string& name, po::options_description& options) {
     add("out,o", po::value<std::string>()->value_name("DIR"), "folder for the results");
   } else if (name == "out!") {
     add("out,o", po::value<std::string>()->value_name("DIR")->required(), "folder for the log");
+  } else if (name == "out-file") {
+    add("out,o", po::value<std::string>()->value_name("FILE"),
+        "the file to write (default: the terminal)");
+  } else if (name == "to!") {
+    add("to", po::value<std::string>()->value_name("FORMAT")->required(),
+        "urdf, ros2_control, wpilib (Java), kalibr (cameras) or csv");
   } else if (name == "seed") {
     add("seed", po::value<std::int64_t>()->value_name("N"), "overrules the configured seed");
   } else if (name == "seeds") {
@@ -112,7 +118,8 @@ void check_ranges(const Command& command, const po::variables_map& values) {
     refuse(command, "--shard and --collect need --out, the folder that all shards share");
   }
   if (values.contains("out") && values["out"].as<std::string>().empty()) {
-    refuse(command, "--out needs the name of a folder");
+    refuse(command, std::string("--out needs the name of a ") +
+                        (values.contains("to") ? "file" : "folder"));
   }
   if (values.contains("fix") && values["fix"].as<std::string>().empty()) {
     refuse(command, "--fix needs the name of a file");
@@ -167,6 +174,7 @@ Arguments arguments_of(const po::variables_map& values) {
   arguments.reference = text("reference");
   arguments.estimate = text("estimate");
   arguments.align = text("align");
+  arguments.to = text("to");
   return arguments;
 }
 

@@ -30,6 +30,7 @@ struct Arguments {
   std::string figures;          ///< "svg", "pdf" or none
   std::filesystem::path fix;    ///< none if empty
   std::string reference, estimate, align;
+  std::string to;  ///< a format of export
 };
 
 /// One command: what it is called, what it takes, what it does.
@@ -55,6 +56,7 @@ int evaluate_command(const Arguments& arguments);
 int inspect_command(const Arguments& arguments);
 int simulate_command(const Arguments& arguments);
 int calibrate_command(const Arguments& arguments);
+int export_command(const Arguments& arguments);
 int plugins_command(const Arguments& arguments);
 
 }  // namespace viwo::app

@@ -12,6 +12,7 @@
 #include "viwo/eval/accuracy.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/experiment/folder_lock.hpp"
+#include "viwo/export/export_calibration.hpp"
 #include "viwo/inspect/inspection.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/log/tum.hpp"
@@ -230,6 +231,22 @@ int calibrate_command(const Arguments& arguments) {
   std::cout << describe(result) << "\ncalibration: " << (folder / "calibration.yaml").string()
             << "\nreport: " << (folder / "report.html").string() << "\n";
   return result.is_trusted() ? 0 : 1;
+}
+
+int export_command(const Arguments& arguments) {
+  const CalibrationFile calibration = read_calibration(arguments.positional[0]);
+  const exports::Exported exported = exports::export_calibration(calibration, arguments.to);
+  if (arguments.out) {
+    write_text(*arguments.out, exported.text);
+  } else {
+    std::cout << exported.text;
+  }
+  const std::string doubts = doubts_of(calibration);
+  if (!doubts.empty()) std::cerr << "warning: " << doubts << "\n";
+  for (const std::string& line : exported.lost) {
+    std::cerr << "not in " << arguments.to << ": " << line << "\n";
+  }
+  return 0;
 }
 
 int inspect_command(const Arguments& arguments) {

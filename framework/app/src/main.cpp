@@ -40,6 +40,10 @@ constexpr Command kCommands[] = {
      "distance; says when they are not to be trusted (exit code 1). Keys of CONFIG: viwo plugins "
      "describe calibration.",
      "out set", 1, calibrate_command},
+    {"export", "export FILE --to urdf|ros2_control|wpilib|kalibr|csv [--out FILE]",
+     "Writes a calibration.yaml, of calibrate or of a run, as other programs take it; says what "
+     "the format cannot hold (docs/export.md).",
+     "to! out-file", 1, export_command},
     {"simulate", "simulate CONFIG --out DIR [--seed N] [--set KEY=VALUE]...",
      "Writes what the sensors of a configuration yield (IMU, images' tracks, encoders, truth) as a "
      "log folder.",

@@ -40,9 +40,10 @@ std::string swerve(const Robot& robot) {
     zeros.push_back(std::remainder(wheel.zero_rad, 2. * M_PI) / (2. * M_PI));
   }
   return "  // In the order of the modules in viwo's configuration.\n" + radii(robot.wheels) +
-         "  /** What the steering encoders read where the wheels point forward, from -0.5 to 0.5. "
-         "To be taken\n   * off the reading: for a CANcoder, off the MagnetOffset that was set "
-         "while recording. */\n" +
+         "  /** What the steering encoders read where the wheels point forward, from -0.5 to 0.5, "
+         "as turned by\n   * steer_scale and steer_shift_rad of the configuration. To be taken off "
+         "the reading: for a CANcoder,\n   * off the MagnetOffset that was set while recording. */"
+         "\n" +
          constant("double[]", "kEncoderOffsetsRotations", "{" + numbers(zeros) + "}") +
          constant("Translation2d[]", "kModuleLocations", "{" + places + "}") +
          kinematics("SwerveDriveKinematics", "kModuleLocations");
