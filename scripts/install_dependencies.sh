@@ -65,7 +65,8 @@ if [ "${1:-}" = --tests ] || [ "${1:-}" = --engines ]; then
   if ! grep -qsx 'ID=ubuntu' /etc/os-release; then
     need_command chromium chromium chromium-browser google-chrome
   fi
-  for package in python3-rosmaster python3-rosbag librosbag-dev python3-jsonschema python3-yaml xvfb; do
+  for package in python3-rosmaster python3-rosbag librosbag-dev python3-jsonschema python3-yaml xvfb \
+    liburdfdom-dev pkg-config; do
     need_package "$package"
   done
 fi

@@ -61,10 +61,9 @@ class CalibrationStartTest : public ::testing::Test {
 
   /// A short run of the swerve robot with two cameras, all of it calibrated.
   static RunSetup setup(const std::vector<std::string>& more = {}, const char* scale = "0") {
-    std::vector<std::string> assignments{"placeholders.motion=icr_sweep",
-                                         "sensors.simulator0.duration_s=8",
-                                         "cameras.calibrate=true",
-                                         std::string("estimator.calibration_error_scale=") + scale};
+    std::vector<std::string> assignments{
+        "placeholders.motion=icr_sweep", "sensors.simulator0.duration_s=8",
+        "cameras.calibrate=true", std::string("estimator.calibration_error_scale=") + scale};
     assignments.insert(assignments.end(), more.begin(), more.end());
     return testing::run_setup("runs/viwo_swerve.yaml", assignments);
   }
@@ -105,8 +104,9 @@ TEST_F(CalibrationStartTest, ARunBeginsWhereTheOneBeforeHasEndedInValueAndCovari
   EXPECT_THAT(second.warnings, IsEmpty());
   // It has been learned something, or nothing would be tested.
   const auto prior = differences(end_, start_of(setup()));
-  for (const char* what : {"sigma of r_2", "estimate of r_2", "sigma of t_OtoI", "sigma of p_IinO_x",
-                           "sigma of cam0.fx", "sigma of cam1.p_IinC_x", "correlations"}) {
+  for (const char* what :
+       {"sigma of r_2", "estimate of r_2", "sigma of t_OtoI", "sigma of p_IinO_x",
+        "sigma of cam0.fx", "sigma of cam1.p_IinC_x", "correlations"}) {
     EXPECT_THAT(prior, ::testing::Contains(what));
   }
   // The wheels' part of the file by the key of the wheels.

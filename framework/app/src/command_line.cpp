@@ -118,8 +118,8 @@ void check_ranges(const Command& command, const po::variables_map& values) {
     refuse(command, "--shard and --collect need --out, the folder that all shards share");
   }
   if (values.contains("out") && values["out"].as<std::string>().empty()) {
-    refuse(command, std::string("--out needs the name of a ") +
-                        (values.contains("to") ? "file" : "folder"));
+    refuse(command,
+           std::string("--out needs the name of a ") + (values.contains("to") ? "file" : "folder"));
   }
   if (values.contains("fix") && values["fix"].as<std::string>().empty()) {
     refuse(command, "--fix needs the name of a file");

@@ -194,8 +194,7 @@ void add_reference(const CalibrationResult& result, CalibrationFile& file) {
   if (has_poses) {
     constexpr const char* kNames[] = {"x_OinB", "y_OinB", "yaw_OinB"};
     for (int i = 0; i < 3; ++i) {
-      file.reference.push_back({kNames[i], result.all.extrinsics[i],
-                                result.all.extrinsics_sigma[i],
+      file.reference.push_back({kNames[i], result.all.extrinsics[i], result.all.extrinsics_sigma[i],
                                 result.setup->options.extrinsics_x_m_y_m_yaw_rad[i],
                                 i < 2 ? "m" : "rad"});
     }
@@ -222,8 +221,8 @@ CalibrationFile calibration_file_of(const CalibrationResult& result) {
   std::vector<Eigen::Index> known;
   for (std::size_t i = 0; i < specs.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    file.intrinsics.push_back({specs[i].name, result.all.x_WI[k], result.all.sigma[k],
-                               specs[i].nominal, specs[i].unit});
+    file.intrinsics.push_back(
+        {specs[i].name, result.all.x_WI[k], result.all.sigma[k], specs[i].nominal, specs[i].unit});
     if (!(result.all.sigma[k] > 0.)) continue;
     known.push_back(k);
     file.correlations.entries.push_back(specs[i].name);

@@ -63,7 +63,8 @@ bool can_hold(const Format& format, const Robot& robot) {
   const CalibrationFile& file = *robot.file;
   const std::string model = file.model.empty() ? "no wheels" : "a base '" + file.model + "'";
   const std::string names = names_of(file.intrinsics);
-  throw InputError(file.path.string() + " has " + model + (names.empty() ? "" : " (" + names + ")") +
+  throw InputError(file.path.string() + " has " + model +
+                   (names.empty() ? "" : " (" + names + ")") +
                    (robot.cameras.empty() ? " and no cameras" : "") + "; " + format.name +
                    " holds " + format.holds_what + " - formats that hold this one: " + can);
 }
@@ -111,8 +112,7 @@ void Lost::radii_but_the_mean(const std::vector<Wheel>& wheels) {
 
 std::string head(const Robot& robot, const std::vector<std::string>& lost,
                  const std::string& mark) {
-  std::string text = mark + "Written by viwo export from " +
-                     robot.file->path.filename().string() +
+  std::string text = mark + "Written by viwo export from " + robot.file->path.filename().string() +
                      (robot.file->model.empty() ? "" : " (" + robot.file->model + ")") + ".\n";
   std::istringstream doubts(doubts_of(*robot.file));
   for (std::string line; std::getline(doubts, line);) text += mark + line + "\n";

@@ -49,8 +49,9 @@ Exported to_kalibr(const Robot& robot) {
   lost.sigmas();
   const CalibrationFile& file = *robot.file;
   if (!file.intrinsics.empty()) lost.add("the wheels, their mount and clock");
-  lost.add("names of topics and overlaps of the cameras, which nothing tells: those here are made "
-           "up");
+  lost.add(
+      "names of topics and overlaps of the cameras, which nothing tells: those here are made "
+      "up");
   Node root = Node::empty_map();
   for (std::size_t i = 0; i < robot.cameras.size(); ++i) {
     root.set("cam" + std::to_string(i), camera_node(robot.cameras[i], i));

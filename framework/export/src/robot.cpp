@@ -89,7 +89,8 @@ void add_axles(Intrinsics& intrinsics, Robot& robot) {
       const std::string name = (front ? "front_" : "rear_") + side;
       Wheel wheel{.name = name, .steers = front};
       // Without encoders of their own the front wheels are taken to be like those behind them.
-      wheel.radius_m = intrinsics.take((intrinsics.has("r_" + name) ? "r_" + name : "r_rear_" + side));
+      wheel.radius_m =
+          intrinsics.take((intrinsics.has("r_" + name) ? "r_" + name : "r_rear_" + side));
       wheel.x_m = front ? robot.wheel_base_m : 0.;
       wheel.y_m = (side == "left" ? 0.5 : -0.5) * robot.track_m;
       if (front) wheel.zero_rad = intrinsics.take("delta_o_" + side);
@@ -134,9 +135,8 @@ CameraView camera_of(const CalibrationFile& file, std::size_t index) {
   const CalibratedCamera& model = file.camera_models[index];
   const std::string cam = "cam" + std::to_string(index) + ".";
   std::vector<std::string> names;
-  for (const char* name :
-       {"theta_ItoC_x", "theta_ItoC_y", "theta_ItoC_z", "p_IinC_x", "p_IinC_y", "p_IinC_z", "fx",
-        "fy", "cx", "cy", "d1", "d2", "d3", "d4", "t_CtoI"}) {
+  for (const char* name : {"theta_ItoC_x", "theta_ItoC_y", "theta_ItoC_z", "p_IinC_x", "p_IinC_y",
+                           "p_IinC_z", "fx", "fy", "cx", "cy", "d1", "d2", "d3", "d4", "t_CtoI"}) {
     names.push_back(cam + name);
   }
   const Eigen::VectorXd values = values_of(file, file.cameras, names);
@@ -170,10 +170,9 @@ Robot robot_of(const CalibrationFile& file) {
   robot.file = &file;
   recognise(file, robot);
   if (find(file.mount, "p_IinO_x") != nullptr) {
-    const Eigen::VectorXd values =
-        values_of(file, file.mount,
-                  {"theta_ItoO_x", "theta_ItoO_y", "theta_ItoO_z", "p_IinO_x", "p_IinO_y",
-                   "p_IinO_z"});
+    const Eigen::VectorXd values = values_of(
+        file, file.mount,
+        {"theta_ItoO_x", "theta_ItoO_y", "theta_ItoO_z", "p_IinO_x", "p_IinO_y", "p_IinO_z"});
     robot.mount = {exp_so3(Eigen::Vector3d(values.head<3>())), values.tail<3>()};
   }
   for (std::size_t i = 0; i < file.camera_models.size(); ++i) {

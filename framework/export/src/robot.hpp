@@ -26,8 +26,8 @@ struct Wheel {
   double radius_m = 0.;
   double x_m = 0., y_m = 0.;  ///< in O; of a mecanum wheel not known
   bool steers = false;
-  double zero_rad = 0.;              ///< what the steering encoder reads straight ahead
-  double tan_gamma = 0., k_m = 0.;   ///< of a mecanum wheel: row [1, tan_gamma, k]
+  double zero_rad = 0.;             ///< what the steering encoder reads straight ahead
+  double tan_gamma = 0., k_m = 0.;  ///< of a mecanum wheel: row [1, tan_gamma, k]
 };
 
 struct Mount {

@@ -34,10 +34,10 @@ std::string empty_link(const std::string& name) { return "  <link name=\"" + nam
 
 std::string wheel_link(const std::string& name, double radius_m) {
   // A cylinder stands along z.
-  const std::string shape =
-      "      <origin xyz=\"0 0 0\" rpy=\"" + log::number_text(M_PI_2) +
-      " 0 0\"/>\n      <geometry><cylinder radius=\"" + log::number_text(radius_m) +
-      "\" length=\"" + log::number_text(0.5 * radius_m) + "\"/></geometry>\n";
+  const std::string shape = "      <origin xyz=\"0 0 0\" rpy=\"" + log::number_text(M_PI_2) +
+                            " 0 0\"/>\n      <geometry><cylinder radius=\"" +
+                            log::number_text(radius_m) + "\" length=\"" +
+                            log::number_text(0.5 * radius_m) + "\"/></geometry>\n";
   return "  <link name=\"" + name + "\">\n    <visual>\n" + shape +
          "    </visual>\n    <collision>\n" + shape + "    </collision>\n  </link>\n";
 }

@@ -88,19 +88,23 @@ Exported to_wpilib(const Robot& robot) {
     imports += import_of("kinematics.MecanumDriveKinematics");
     body = mecanum(robot);
     lost.add("angles of the rollers: WPILib takes 45 deg");
-    lost.add("where the wheels are: their lever arms k tell the sum of x and y alone, half of "
-             "which is written for each");
+    lost.add(
+        "where the wheels are: their lever arms k tell the sum of x and y alone, half of "
+        "which is written for each");
   } else {
     imports = import_of("kinematics.DifferentialDriveKinematics");
     body = differential(robot);
     if (robot.base == Base::kSkidSteer) {
-      lost.add("x_icr, and the middle of y_icr_left and y_icr_right; the track is the distance "
-               "of the two");
+      lost.add(
+          "x_icr, and the middle of y_icr_left and y_icr_right; the track is the distance "
+          "of the two");
     }
   }
-  lost.add("radii in the kinematics, which are for speeds of wheels in m/s: take kWheelRadiiMeters "
-           "where rotations become metres");
-  return {head(robot, lost.texts(), "// ") + "\n" + imports + "\npublic final class ViwoConstants {\n" +
+  lost.add(
+      "radii in the kinematics, which are for speeds of wheels in m/s: take kWheelRadiiMeters "
+      "where rotations become metres");
+  return {head(robot, lost.texts(), "// ") + "\n" + imports +
+              "\npublic final class ViwoConstants {\n" +
               constant("double", "kWheelRadiusMeters", log::number_text(robot.mean_radius_m())) +
               body + "\n  private ViwoConstants() {}\n}\n",
           lost.texts()};

@@ -47,11 +47,22 @@ CalibrationFile file_of(const std::string& model,
 }
 
 CalibrationFile swerve() {
-  return file_of("four_wis_wid",
-                 {{"r_1", 0.0501}, {"r_2", 0.0502}, {"r_3", 0.0503}, {"r_4", 0.0504},
-                  {"x_1", 0.21}, {"x_2", -0.22}, {"x_3", -0.23}, {"x_4", 0.24},
-                  {"y_1", 0.31}, {"y_2", 0.32}, {"y_3", -0.33}, {"y_4", -0.34},
-                  {"delta_o1", 0.1}, {"delta_o2", -2.5}, {"delta_o3", 3.5}, {"delta_o4", -0.4}});
+  return file_of("four_wis_wid", {{"r_1", 0.0501},
+                                  {"r_2", 0.0502},
+                                  {"r_3", 0.0503},
+                                  {"r_4", 0.0504},
+                                  {"x_1", 0.21},
+                                  {"x_2", -0.22},
+                                  {"x_3", -0.23},
+                                  {"x_4", 0.24},
+                                  {"y_1", 0.31},
+                                  {"y_2", 0.32},
+                                  {"y_3", -0.33},
+                                  {"y_4", -0.34},
+                                  {"delta_o1", 0.1},
+                                  {"delta_o2", -2.5},
+                                  {"delta_o3", 3.5},
+                                  {"delta_o4", -0.4}});
 }
 
 CalibrationFile differential() {
@@ -59,21 +70,36 @@ CalibrationFile differential() {
 }
 
 CalibrationFile skid_steer() {
-  return file_of("skid_steer", {{"r_left", 0.101}, {"r_right", 0.099}, {"y_icr_left", 0.41},
-                                {"y_icr_right", -0.39}, {"x_icr", -0.02}});
+  return file_of("skid_steer", {{"r_left", 0.101},
+                                {"r_right", 0.099},
+                                {"y_icr_left", 0.41},
+                                {"y_icr_right", -0.39},
+                                {"x_icr", -0.02}});
 }
 
 CalibrationFile ackermann() {
-  return file_of("ackermann",
-                 {{"r_rear_left", 0.31}, {"r_rear_right", 0.30}, {"r_front_left", 0.32},
-                  {"r_front_right", 0.33}, {"wheel_base", 2.7}, {"track", 1.5},
-                  {"delta_o_left", 0.01}, {"delta_o_right", -0.02}});
+  return file_of("ackermann", {{"r_rear_left", 0.31},
+                               {"r_rear_right", 0.30},
+                               {"r_front_left", 0.32},
+                               {"r_front_right", 0.33},
+                               {"wheel_base", 2.7},
+                               {"track", 1.5},
+                               {"delta_o_left", 0.01},
+                               {"delta_o_right", -0.02}});
 }
 
 CalibrationFile mecanum() {
-  return file_of("mecanum", {{"r_1", 0.051}, {"r_2", 0.052}, {"r_3", 0.053}, {"r_4", 0.054},
-                             {"gamma_1", -0.78}, {"gamma_2", 0.79}, {"gamma_3", -0.80},
-                             {"gamma_4", 0.77}, {"k_1", -0.51}, {"k_2", -0.52}, {"k_3", 0.53},
+  return file_of("mecanum", {{"r_1", 0.051},
+                             {"r_2", 0.052},
+                             {"r_3", 0.053},
+                             {"r_4", 0.054},
+                             {"gamma_1", -0.78},
+                             {"gamma_2", 0.79},
+                             {"gamma_3", -0.80},
+                             {"gamma_4", 0.77},
+                             {"k_1", -0.51},
+                             {"k_2", -0.52},
+                             {"k_3", 0.53},
                              {"k_4", 0.54}});
 }
 
@@ -88,11 +114,10 @@ CalibrationFile with_rig(CalibrationFile file) {
   for (const char* cam : {"cam0.", "cam1."}) {
     const double one = cam[3] == '0' ? 1. : 1.01;
     const std::pair<const char*, double> entries[] = {
-        {"theta_ItoC_x", 1.2},  {"theta_ItoC_y", -1.21}, {"theta_ItoC_z", 1.22},
-        {"p_IinC_x", 0.05},     {"p_IinC_y", 0.06},      {"p_IinC_z", -0.07},
-        {"fx", 285.1},          {"fy", 286.2},           {"cx", 421.3},
-        {"cy", 399.4},          {"d1", -0.01},           {"d2", 0.04},
-        {"d3", -0.003},         {"d4", 0.002},           {"t_CtoI", -0.0011}};
+        {"theta_ItoC_x", 1.2}, {"theta_ItoC_y", -1.21}, {"theta_ItoC_z", 1.22}, {"p_IinC_x", 0.05},
+        {"p_IinC_y", 0.06},    {"p_IinC_z", -0.07},     {"fx", 285.1},          {"fy", 286.2},
+        {"cx", 421.3},         {"cy", 399.4},           {"d1", -0.01},          {"d2", 0.04},
+        {"d3", -0.003},        {"d4", 0.002},           {"t_CtoI", -0.0011}};
     for (const auto& [name, value] : entries) {
       file.cameras.push_back({std::string(cam) + name, one * value, 1e-3, 0., ""});
     }
@@ -296,10 +321,8 @@ TEST(Export, AsRos2ControlIsWhatTheControllersComputeWith) {
   EXPECT_NEAR(number_at(root, path + "kinematics.sum_of_robot_center_projection_on_X_Y_axis"),
               0.525, kRounding);
   // Of the rows [1, tan gamma, k] of docs: 1 front left, 2 rear left, 3 rear right, 4 front right.
-  const std::map<std::string, std::string> joints{{"front_left", "1"},
-                                                  {"rear_left", "2"},
-                                                  {"rear_right", "3"},
-                                                  {"front_right", "4"}};
+  const std::map<std::string, std::string> joints{
+      {"front_left", "1"}, {"rear_left", "2"}, {"rear_right", "3"}, {"front_right", "4"}};
   for (const auto& [corner, wheel] : joints) {
     EXPECT_EQ(root.at_path(path + corner + "_wheel_command_joint_name")->scalar(),
               "drive_" + wheel + "_joint");
@@ -323,9 +346,8 @@ TEST(Export, AsJavaForWpilibHasPlacesRadiiAndOffsetsInTurns) {
   EXPECT_EQ(numbers_in(between_texts(sides, "kTrackWidthMeters = ", ";")),
             (std::vector<double>{0.55}));
   const std::string rollers = export_calibration(mecanum(), "wpilib").text;
-  const auto corners = numbers_in(
-      std::regex_replace(between_texts(rollers, "MecanumDriveKinematics(", ");\n"),
-                         std::regex("Translation2d"), ""));
+  const auto corners = numbers_in(std::regex_replace(
+      between_texts(rollers, "MecanumDriveKinematics(", ");\n"), std::regex("Translation2d"), ""));
   // Front left, front right, rear left, rear right: x + y is the lever arm.
   const double levers[] = {0.51, 0.54, 0.52, 0.53};
   ASSERT_EQ(corners.size(), 8u);

@@ -152,8 +152,7 @@ void StateBlocks::set_prior(Covariance& covariance, const PriorCorrelations& cor
     if (views_[i].column() < 0) continue;
     for (std::size_t k = 0; k < specs_[i].entries.size(); ++k) {
       const BlockEntry& entry = specs_[i].entries[k];
-      const Eigen::Index column =
-          views_[i].column() - first_column_ + static_cast<Eigen::Index>(k);
+      const Eigen::Index column = views_[i].column() - first_column_ + static_cast<Eigen::Index>(k);
       sigma[column] = entry.sigma;
       const auto known = std::find(names.begin(), names.end(), entry.name);
       if (known != names.end()) correlated.emplace_back(column, known - names.begin());

@@ -27,7 +27,8 @@ struct TopParams {
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(model), {.help = "type of the kinematic model; none: nothing of wheels"});
-    b(VIWO_PARAM(twist), {.choices = "plain|noise_weighted", .help = "odometry.twist that the estimates belong to"});
+    b(VIWO_PARAM(twist),
+      {.choices = "plain|noise_weighted", .help = "odometry.twist that the estimates belong to"});
     b(VIWO_PARAM(status),
       {{"ok", Trust::kOk},
        {"doubtful", Trust::kDoubtful},
@@ -148,10 +149,9 @@ void read_camera_models(const Node& root, CalibrationFile& file, Errors& errors)
     }
     const auto values = config::read_section<CameraParams>(entry.value, entry.key_mark,
                                                            "camera_models." + name, errors);
-    file.camera_models.push_back({values.distortion_model,
-                                  static_cast<int>(std::lround(values.resolution[0])),
-                                  static_cast<int>(std::lround(values.resolution[1])),
-                                  entry.key_mark});
+    file.camera_models.push_back(
+        {values.distortion_model, static_cast<int>(std::lround(values.resolution[0])),
+         static_cast<int>(std::lround(values.resolution[1])), entry.key_mark});
   }
 }
 
@@ -204,8 +204,9 @@ void read_correlations(const Node& root, CalibrationFile& file, Errors& errors) 
   constexpr double kRounding = 1e-9;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(out.matrix, Eigen::EigenvaluesOnly);
   if (eigen.eigenvalues()[0] < -kRounding) {
-    errors.add(rows->mark(), "correlations: no such correlations exist (the matrix has a negative "
-                             "eigenvalue): a number in it is wrong");
+    errors.add(rows->mark(),
+               "correlations: no such correlations exist (the matrix has a negative "
+               "eigenvalue): a number in it is wrong");
   }
 }
 
@@ -271,8 +272,8 @@ Node correlations_node(const PriorCorrelations& correlations) {
   for (std::size_t k = 0; k < correlations.entries.size(); ++k) {
     Node row = Node::list_of();
     for (std::size_t i = 0; i < k; ++i) {
-      row.items().push_back(number(
-          correlations.matrix(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(i))));
+      row.items().push_back(
+          number(correlations.matrix(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(i))));
     }
     section.set(correlations.entries[k], row);
   }
@@ -344,8 +345,8 @@ std::string calibration_text(const CalibrationFile& calibration, const std::stri
     root.set("reasons", reasons);
   }
   for (const auto& [name, model] : calibration.wheel_sets) {
-    root.set("wheel_sets", root.find("wheel_sets") != nullptr ? *root.find("wheel_sets")
-                                                              : Node::empty_map())
+    root.set("wheel_sets",
+             root.find("wheel_sets") != nullptr ? *root.find("wheel_sets") : Node::empty_map())
         .set(name, Node::scalar_of(model));
   }
   for (const Section& section : sections()) {

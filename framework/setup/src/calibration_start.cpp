@@ -45,8 +45,8 @@ bool CalibrationStart::take(const CalibrationFile::Entries& section, const Block
     }
     known = entry;
     if (!entry->unit.empty() && entry->unit != wanted.unit) {
-      errors.add(entry->mark, entry->name + ": its unit is '" + entry->unit + "', not '" +
-                                  wanted.unit + "'");
+      errors.add(entry->mark,
+                 entry->name + ": its unit is '" + entry->unit + "', not '" + wanted.unit + "'");
     }
     const auto k = static_cast<Eigen::Index>(i);
     value[k] = entry->estimate;
@@ -70,11 +70,11 @@ bool CalibrationStart::has_wheels(const std::string& set, const std::string& mod
   }
   if (model.empty() && !only_wheels_) return false;
   if (model == model_name) return true;
-  config::fail(file_.model_mark,
-               model.empty() ? "this calibration has nothing of wheels"
-                             : "this calibration is for the model '" + model + "', " +
-                                   (set.empty() ? "the run" : "wheel set '" + set + "'") +
-                                   " has '" + model_name + "'");
+  config::fail(file_.model_mark, model.empty()
+                                     ? "this calibration has nothing of wheels"
+                                     : "this calibration is for the model '" + model + "', " +
+                                           (set.empty() ? "the run" : "wheel set '" + set + "'") +
+                                           " has '" + model_name + "'");
 }
 
 void CalibrationStart::take_intrinsics(const std::string& set, const WheelModel& model,

@@ -84,8 +84,8 @@ CalibrationFile calibration_file_of(const Filter& filter) {
     for (std::size_t i = 0; i < spec.entries.size(); ++i) {
       const BlockEntry& entry = spec.entries[i];
       section_of(spec.name, file)
-          .push_back({entry.name, estimates[i].value, estimates[i].sigma, declared(spec, i),
-                      entry.unit});
+          .push_back(
+              {entry.name, estimates[i].value, estimates[i].sigma, declared(spec, i), entry.unit});
       if (!(estimates[i].sigma > 0.)) continue;
       file.correlations.entries.push_back(entry.name);
       columns.push_back(filter.blocks().view(id).column() + static_cast<int>(i));

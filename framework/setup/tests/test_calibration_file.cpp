@@ -12,8 +12,8 @@
 namespace viwo {
 namespace {
 
-using ::testing::HasSubstr;
 using testing::error_of;
+using ::testing::HasSubstr;
 using testing::registry;
 
 class CalibrationFileTest : public ::testing::Test {
@@ -54,21 +54,21 @@ class CalibrationFileTest : public ::testing::Test {
   std::filesystem::path file_;
 };
 
-const std::string kHead = "model: differential\ntwist: plain\nintrinsics:\n";
-const std::string kWheels =
-    kHead + "  r_left: {estimate: 0.051, sigma: 0.001, unit: m}\n"
-            "  r_right: {estimate: 0.049, sigma: 0.001}\n"
-            "  baseline: {estimate: 0.41, sigma: 0.01}\n";
+const std::string kTwoSidesHead = "model: differential\ntwist: plain\nintrinsics:\n";
+const std::string kTwoSides = kTwoSidesHead +
+                              "  r_left: {estimate: 0.051, sigma: 0.001, unit: m}\n"
+                              "  r_right: {estimate: 0.049, sigma: 0.001}\n"
+                              "  baseline: {estimate: 0.41, sigma: 0.01}\n";
 
 TEST_F(CalibrationFileTest, ComesBackToTheBit) {
-  CalibrationFile file = read(
-      kWheels +
-      "status: doubtful\nreasons: ['a: b']\nwheel_sets: {back: differential}\n"
-      "mount: {theta_ItoO_x: {estimate: 0.1, sigma: 0.3, nominal: 0.2, unit: rad}}\n"
-      "clock: {t_OtoI: {estimate: 0.3333333333333333, sigma: 0}}\n"
-      "cameras: {cam0.fx: {estimate: 300, sigma: 1}}\n"
-      "camera_models: {cam0: {distortion_model: equidistant, resolution: [640, 480]}}\n"
-      "correlations: {r_left: [], baseline: [-0.1], theta_ItoO_x: [0.3, 0.7]}\n");
+  CalibrationFile file =
+      read(kTwoSides +
+           "status: doubtful\nreasons: ['a: b']\nwheel_sets: {back: differential}\n"
+           "mount: {theta_ItoO_x: {estimate: 0.1, sigma: 0.3, nominal: 0.2, unit: rad}}\n"
+           "clock: {t_OtoI: {estimate: 0.3333333333333333, sigma: 0}}\n"
+           "cameras: {cam0.fx: {estimate: 300, sigma: 1}}\n"
+           "camera_models: {cam0: {distortion_model: equidistant, resolution: [640, 480]}}\n"
+           "correlations: {r_left: [], baseline: [-0.1], theta_ItoO_x: [0.3, 0.7]}\n");
   EXPECT_EQ(file.correlations.matrix(1, 2), 0.7);
   EXPECT_EQ(file.correlations.matrix(1, 0), -0.1);
   const std::string text = calibration_text(file, "a test");
@@ -80,16 +80,16 @@ TEST_F(CalibrationFileTest, ComesBackToTheBit) {
 TEST_F(CalibrationFileTest, RefusesWhatIsWrongWithItsPlace) {
   EXPECT_EQ(error_of_file("model: differential\nintrinsics: {}\n"),
             "F:1:1  'twist' is missing: model, twist and intrinsics belong together");
-  EXPECT_EQ(error_of_file(kWheels + "mount: {p_IinO_w: {estimate: 0, sigma: 0}}\n"),
+  EXPECT_EQ(error_of_file(kTwoSides + "mount: {p_IinO_w: {estimate: 0, sigma: 0}}\n"),
             "F:7:9  mount: unknown parameter 'p_IinO_w' - did you mean 'p_IinO_x'?");
-  EXPECT_EQ(error_of_file(kWheels + "mounts: {}\n"),
+  EXPECT_EQ(error_of_file(kTwoSides + "mounts: {}\n"),
             "F:7:1  calibration: unknown key 'mounts' - did you mean 'mount'?");
-  EXPECT_THAT(error_of_file(kHead + "  r_left: {estimate: 0.05, sigma: -1}\n"),
+  EXPECT_THAT(error_of_file(kTwoSidesHead + "  r_left: {estimate: 0.05, sigma: -1}\n"),
               HasSubstr("F:4:35  intrinsics.r_left.sigma: -1 violates sigma >= 0"));
-  EXPECT_EQ(error_of_file(kWheels + "camera_models: {cam1: {}}\n"),
+  EXPECT_EQ(error_of_file(kTwoSides + "camera_models: {cam1: {}}\n"),
             "F:7:17  camera_models: 'cam1' stands where cam0 should; cameras are counted from cam0 "
             "without gaps");
-  const std::string rows = kWheels + "correlations:\n  r_left: []\n";
+  const std::string rows = kTwoSides + "correlations:\n  r_left: []\n";
   EXPECT_EQ(error_of_file(rows + "  r_right: [0.1, 0.2]\n"),
             "F:9:12  correlations.r_right: expected a list of 1 numbers, one for each of the rows "
             "before it");
@@ -102,28 +102,29 @@ TEST_F(CalibrationFileTest, RefusesWhatIsWrongWithItsPlace) {
 }
 
 TEST_F(CalibrationFileTest, MustFitTheRunThatTakesIt) {
-  EXPECT_EQ(error_of_run(kWheels), "(no error)");
-  EXPECT_EQ(error_of_run(kWheels, "kinematics.calibration"), "(no error)");
+  EXPECT_EQ(error_of_run(kTwoSides), "(no error)");
+  EXPECT_EQ(error_of_run(kTwoSides, "kinematics.calibration"), "(no error)");
   EXPECT_EQ(error_of_run("model: skid_steer\ntwist: plain\nintrinsics: {}\n"),
             "F:1:8  this calibration is for the model 'skid_steer', the run has 'differential'");
-  EXPECT_EQ(error_of_run(kHead + "  r_left: {estimate: -0.05, sigma: 0.001, unit: m}\n"
-                                 "  r_rihgt: {estimate: 0.05, sigma: 0.001}\n"
-                                 "  baseline: {estimate: 410, sigma: 1, unit: mm}\n"),
+  EXPECT_EQ(error_of_run(kTwoSidesHead + "  r_left: {estimate: -0.05, sigma: 0.001, unit: m}\n"
+                                         "  r_rihgt: {estimate: 0.05, sigma: 0.001}\n"
+                                         "  baseline: {estimate: 410, sigma: 1, unit: mm}\n"),
             "F:4:3  intrinsic 'r_right' is missing\n"
             "F:4:22  r_left: -0.05 is beyond what the model 'differential' takes, 0 to inf m\n"
             "F:5:3  the model 'differential' has no intrinsic 'r_rihgt' - did you mean 'r_right'?\n"
             "F:6:24  baseline: its unit is 'mm', not 'm'");
   EXPECT_EQ(error_of_run("cameras: {cam0.fx: {estimate: 300, sigma: 1}}\n"),
             "F:1:1  this calibration has nothing that the run has");
-  EXPECT_EQ(error_of_run("cameras: {cam0.fx: {estimate: 300, sigma: 1}}\n", "kinematics.calibration"),
-            "F:1:1  this calibration has nothing of wheels");
+  EXPECT_EQ(
+      error_of_run("cameras: {cam0.fx: {estimate: 300, sigma: 1}}\n", "kinematics.calibration"),
+      "F:1:1  this calibration has nothing of wheels");
   EXPECT_EQ(error_of_run("status: failed\nreasons: [no turns]\n"),
             "F:1:9  this calibration is not to be used: what it is from has failed (no turns) - "
             "calibrate again, or, if you know it to be right, write status: doubtful");
 }
 
 TEST_F(CalibrationFileTest, IsNamedOnce) {
-  std::ofstream(file_) << kWheels;
+  std::ofstream(file_) << kTwoSides;
   auto run = config::parse(kRun, "run.yaml");
   const auto path = config::Node::scalar_of(file_.string());
   config::set_path(run, "calibration", path);
@@ -133,7 +134,7 @@ TEST_F(CalibrationFileTest, IsNamedOnce) {
 }
 
 TEST_F(CalibrationFileTest, GivesTheReferenceItsPlaceAndClock) {
-  std::ofstream(file_) << kWheels
+  std::ofstream(file_) << kTwoSides
                        << "reference:\n  x_OinB: {estimate: 0.1, sigma: 0.01}\n"
                           "  y_OinB: {estimate: 0.2, sigma: 0.01}\n"
                           "  yaw_OinB: {estimate: 0.3, sigma: 0.01}\n"

@@ -84,7 +84,7 @@ std::vector<BlockEstimate> calibration_of(const Filter& filter);
 struct ReadContext {
   PluginRegistry& plugins;
   std::uint64_t seed = 1;
-  bool exact = false;  ///< HostServices::exact: no noise, no wrong start
+  bool exact = false;                 ///< HostServices::exact: no noise, no wrong start
   CalibrationStart* start = nullptr;  ///< a calibration.yaml that the run starts from
 };
 
