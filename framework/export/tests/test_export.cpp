@@ -389,7 +389,7 @@ TEST(Export, AsTableHasEveryNumberWithSigmaAndUnit) {
   }
   ASSERT_EQ(rows.size(), 1u + 16u + 6u + 1u + 30u);
   EXPECT_EQ(rows[0], "name,value,sigma,unit");
-  EXPECT_EQ(rows[1], "r_1,0.0501,0.0001,m");
+  EXPECT_EQ(rows[1], "r_1,0.0501,1e-04,m");
   EXPECT_THAT(rows, Contains("t_OtoI,0.004,0.001,s"));
   EXPECT_THAT(rows, Contains("cam0.fx,285.1,0.001,"));
 }
