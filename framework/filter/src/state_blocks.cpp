@@ -145,26 +145,30 @@ void StateBlocks::place(std::size_t block, int& next) {
 }
 
 void StateBlocks::set_prior(Covariance& covariance, const PriorCorrelations& correlations) const {
-  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(columns_);
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> correlated;  // column, index in `correlations`
   const auto& names = correlations.entries;
+  std::vector<std::pair<int, Eigen::Index>> correlated;  // column, index in `correlations`
   for (std::size_t i = 0; i < specs_.size(); ++i) {
     if (views_[i].column() < 0) continue;
-    for (std::size_t k = 0; k < specs_[i].entries.size(); ++k) {
-      const BlockEntry& entry = specs_[i].entries[k];
-      const Eigen::Index column = views_[i].column() - first_column_ + static_cast<Eigen::Index>(k);
-      sigma[column] = entry.sigma;
+    Eigen::VectorXd variance(views_[i].size());
+    for (Eigen::Index k = 0; k < variance.size(); ++k) {
+      const BlockEntry& entry = specs_[i].entries[static_cast<std::size_t>(k)];
+      variance[k] = entry.sigma * entry.sigma;
       const auto known = std::find(names.begin(), names.end(), entry.name);
-      if (known != names.end()) correlated.emplace_back(column, known - names.begin());
+      if (known == names.end()) continue;
+      correlated.emplace_back(views_[i].column() + static_cast<int>(k), known - names.begin());
     }
+    covariance.set_block(views_[i].column(), variance.asDiagonal());
   }
-  Eigen::MatrixXd P = sigma.cwiseAbs2().asDiagonal();
+  if (correlated.empty()) return;
+  Eigen::MatrixXd P = covariance.matrix().block(first_column_, first_column_, columns_, columns_);
+  const Eigen::VectorXd sigma = P.diagonal().cwiseSqrt();
   for (const auto& [row, i] : correlated) {
     for (const auto& [column, j] : correlated) {
-      if (row != column) P(row, column) = sigma[row] * correlations.matrix(i, j) * sigma[column];
+      const Eigen::Index k = row - first_column_, l = column - first_column_;
+      if (k != l) P(k, l) = sigma[k] * correlations.matrix(i, j) * sigma[l];
     }
   }
-  if (columns_ > 0) covariance.set_block(first_column_, P);
+  covariance.set_block(first_column_, P);
 }
 
 void StateBlocks::estimates(BlockId id, const Covariance& covariance,

@@ -245,7 +245,8 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
       setup.t_OtoI_s = wheels.t_OtoI_s;
     }
     measuring = filter.measuring;
-    if (setup.model != nullptr) filter.wheels.front().model_name = setup.kinematics.info.name;
+    const bool has_base = setup.model != nullptr && !filter.wheels.empty();
+    if (has_base) filter.wheels.front().model_name = setup.kinematics.info.name;
     if (wants_filter(run)) setup.filter = std::move(filter);
   }
   read_sensors(run, context, setup, errors);
