@@ -222,11 +222,11 @@ TEST_F(ConfigurationTest, RefusesACalibrationThatDoesNotFit) {
   refuse_run("kinematics: *robot", "kinematics: {type: four_wis_wid_drive_only" + model,
              "TMP/cal/calibration.yaml:2:8  this calibration is for the model 'four_wis_wid', the "
              "run has 'four_wis_wid_drive_only'");
-  write("cal/calibration.yaml", replaced(read("cal/calibration.yaml"), "  r_2:\n", "  r_5:\n"));
+  write("cal/calibration.yaml", replaced(read("cal/calibration.yaml"), "  r_2:", "  r_5:"));
   refuse_run(
       "kinematics: *robot", "kinematics: {type: four_wis_wid" + model,
-      "TMP/cal/calibration.yaml:5:3  intrinsic 'r_2' is missing\n"
-      "TMP/cal/calibration.yaml:10:3  the model 'four_wis_wid' has no intrinsic 'r_5' - known: "
+      "TMP/cal/calibration.yaml:6:3  intrinsic 'r_2' is missing\n"
+      "TMP/cal/calibration.yaml:11:3  the model 'four_wis_wid' has no intrinsic 'r_5' - known: "
       "r_1, r_2, r_3, r_4, x_1, x_2, x_3, x_4, y_1, y_2, y_3, y_4, delta_o1, delta_o2, "
       "delta_o3, delta_o4");
 }

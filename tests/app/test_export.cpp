@@ -61,7 +61,8 @@ TEST_F(ExportTest, RefusesWhatItCannotDo) {
                  "c.yaml has a base 'differential' (r_left, r_right, baseline) and no cameras; "
                  "kalibr holds cameras - formats that hold this one: urdf, ros2_control, wpilib, "
                  "csv");
-  expect_refused({"export", "c.yaml", "--to", "sdf"}, "no format 'sdf' - did you mean 'csv'?");
+  expect_refused({"export", "c.yaml", "--to", "sdf"},
+                 "no format 'sdf' - known: urdf, ros2_control, wpilib, kalibr, csv");
   expect_refused({"export", "none.yaml", "--to", "csv"}, "none.yaml  no such file");
   expect_refused({"export", "c.yaml"},
                  "viwo export: the option '--to' is required but missing (see viwo export --help)");

@@ -50,7 +50,7 @@ std::string wheel_text(const Wheel& wheel) {
   if (wheel.steers) {
     // At the reading zero_rad the wheel points straight ahead.
     text += empty_link(fork) + joint(steer_joint(wheel), "continuous", "base_link", fork, hub,
-                                     {0., 0., -wheel.zero_rad}, "0 0 1");
+                                     {0., 0., 0. - wheel.zero_rad}, "0 0 1");
   }
   return text + wheel_link(rim, wheel.radius_m) +
          joint(drive_joint(wheel), "continuous", wheel.steers ? fork : "base_link", rim,
