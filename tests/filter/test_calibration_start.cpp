@@ -120,6 +120,52 @@ TEST_F(CalibrationStartTest, ARunBeginsWhereTheOneBeforeHasEndedInValueAndCovari
   }
 }
 
+TEST_F(CalibrationStartTest, OfSeveralWheelSetsTakesEachByItsName) {
+  // Without updates of wheels: those would need a sensor of their own for the second set.
+  const std::string back =
+      "wheel_sets={back: {kinematics: {type: differential, radius_left_m: 0.0255, radius_right_m: "
+      "0.0255, baseline_m: 0.3}, wheels: {p_IinO_m: [0.05, 0.02, 0.15]}}}";
+  const std::string updates = "updates={visual_features: {}}";
+  const RunSetup two = setup({back, updates});
+  CalibrationFile file = start_of(setup());
+  describe_rig(two, file);
+  EXPECT_EQ(file.wheel_sets.at("back"), "differential");
+  for (auto* section : {&file.intrinsics, &file.mount, &file.clock}) section->clear();
+  file.correlations = {};
+  int i = 0;
+  for (const WheelSet& set : two.filter->wheels) {
+    for (const BlockSpec& block : wheels_blocks(set.prior)) {
+      auto& section = block.name.ends_with(".extrinsics") ? file.mount
+                      : block.name.ends_with(".clock")    ? file.clock
+                                                          : file.intrinsics;
+      for (const BlockEntry& entry : block.entries) {
+        section.push_back({entry.name, 0.05 + 1e-4 * ++i, 1e-3 * i, 0., entry.unit});
+      }
+    }
+  }
+  const auto changed = write(calibration_text(file, "a test"));
+  const RunSetup start = setup({back, updates, "calibration=" + changed.string()});
+  const auto [mount, clock, intrinsics] = wheels_blocks(start.filter->wheels[1].prior);
+  for (const auto& [block, section] :
+       {std::pair{&mount, &file.mount}, {&clock, &file.clock}, {&intrinsics, &file.intrinsics}}) {
+    for (const BlockEntry& entry : block->entries) {
+      ASSERT_TRUE(entry.name.starts_with("back.")) << entry.name;
+      EXPECT_EQ(entry.sigma, find(*section, entry.name)->sigma) << entry.name;
+    }
+  }
+  EXPECT_EQ(start.filter->wheels[1].prior.wheels.x_WI[2],
+            find(file.intrinsics, "back.baseline")->estimate);
+  // Another model of that name.
+  file.wheel_sets["back"] = "skid_steer";
+  write(calibration_text(file, "a test"));
+  EXPECT_THAT(
+      [&] {
+        setup({back, updates, "calibration=" + changed.string()});
+      },
+      ::testing::ThrowsMessage<InputError>(
+          HasSubstr("for the model 'skid_steer', wheel set 'back' has 'differential'")));
+}
+
 TEST_F(CalibrationStartTest, ShowsWhereSigmasOrCorrelationsAreNotRead) {
   const auto file = first_run();
   const std::string text = text_of(file);

@@ -178,6 +178,38 @@ TEST(Calibrate, ReadsItsFileLeavesOutAndWritesACalibrationThatARunIncludes) {
   EXPECT_LT(included.accuracy->end_m, 0.1 * nominal.accuracy->end_m);
 }
 
+TEST(Calibrate, LeavesSigmasCorrelationsAndTheReferencesPlaceAndClockToRuns) {
+  const auto folder = std::filesystem::path(::testing::TempDir()) / "viwo_calibrated_reference";
+  std::filesystem::remove_all(folder);
+  CalibrationSetup setup = setup_of({"icr_sweep", "figure_eight"}, 1);
+  setup.options.estimate_extrinsics = true;
+  setup.options.extrinsics_x_m_y_m_yaw_rad = {0.001, 0., 0.};
+  setup.options.prior_sigma_clock_offset_s = 0.01;
+  const CalibrationResult result = calibrate(setup);
+  write_calibration(folder, result);
+  const CalibrationFile file = read_calibration(folder / "calibration.yaml");
+  const CalibrationEntry& x = *find(file.reference, "x_OinB");
+  EXPECT_EQ(x.estimate, result.all.extrinsics[0]);
+  EXPECT_EQ(x.sigma, result.all.extrinsics_sigma[0]);
+  EXPECT_EQ(x.nominal, 0.001);
+  const CalibrationEntry& clock = *find(file.reference, "t_OtoB");
+  const auto& offsets = result.all.clock_offset_s;
+  EXPECT_GE(clock.estimate, std::min(offsets[0], offsets[1]));
+  EXPECT_LE(clock.estimate, std::max(offsets[0], offsets[1]));
+  EXPECT_GE(clock.sigma, std::abs(offsets[0] - offsets[1]) / std::sqrt(2.) - 1e-12);
+  // All but the three that the gauge holds.
+  EXPECT_EQ(file.correlations.entries.size(), 13u);
+  EXPECT_GT((file.correlations.matrix - Eigen::MatrixXd::Identity(13, 13)).norm(), 0.1);
+  for (const CalibrationEntry& entry : file.intrinsics) {
+    const int i = setup.recordings.front().setup.model->find(entry.name);
+    EXPECT_EQ(entry.sigma, result.all.sigma[i]) << entry.name;
+  }
+  const auto run = simulated("circle", {"calibration=" + (folder / "calibration.yaml").string()});
+  const RunSetup taken = read_run(run, registry());
+  EXPECT_EQ(taken.extrinsics, result.all.extrinsics);
+  EXPECT_EQ(taken.reference_time_offset_s, clock.estimate);
+}
+
 TEST(Calibrate, KnowsNoMoreThanRecordingsThatAreLeftOutTell) {
   CalibrationSetup setup = setup_of({"icr_sweep", "figure_eight", "circle"}, 1);
   setup.leave_out_by = {"motion"};
