@@ -201,11 +201,12 @@ void add_reference(const CalibrationResult& result, CalibrationFile& file) {
   }
   std::optional<CalibrationEntry> clock = clock_of(result);
   if (!clock) return;
-  clock->name = has_poses ? "t_OtoB" : "t_OtoI";
-  // The clock of headings is that of no IMU.
-  if (has_poses || !first.data.imu().empty()) {
-    (has_poses ? file.reference : file.clock).push_back(*clock);
-  }
+  // Of the filter's poses, too, it is the IMU's; that of headings is of no IMU.
+  const bool is_of_imu = result.setup->options.reference == ReferenceKind::kFilter ||
+                         (!has_poses && !first.data.imu().empty());
+  clock->name = is_of_imu ? "t_OtoI" : "t_OtoB";
+  if (is_of_imu) file.clock.push_back(*clock);
+  if (has_poses && !is_of_imu) file.reference.push_back(*clock);
 }
 
 CalibrationFile calibration_file_of(const CalibrationResult& result) {
@@ -216,6 +217,9 @@ CalibrationFile calibration_file_of(const CalibrationResult& result) {
   if (!result.all.converged) file.status = Status::kFailed;
   file.reasons = result.doubts;
   file.model = setup.kinematics.info.name;
+  file.drive_signs = result.search.drive_signs;
+  const std::vector<int> configured = drive_signs(setup);
+  for (std::size_t i = 0; i < file.drive_signs.size(); ++i) file.drive_signs[i] *= configured[i];
   file.twist = setup.preintegration.twist.noise_weighted ? "noise_weighted" : "plain";
   const auto& specs = setup.model->description().intrinsics;
   std::vector<Eigen::Index> known;

@@ -105,8 +105,8 @@ std::vector<std::string> search_text(const CalibrationResult& result) {
   for (std::size_t i = 0; i < search.drive_signs.size(); ++i) {
     if (search.drive_signs[i] > 0) continue;
     out.push_back("drive " + std::to_string(i + 1) +
-                  " turns backwards: the calibration is for readings of the other sign "
-                  "(drive_scale of the sensor)");
+                  " turns backwards: the calibration is for readings of the other sign, by "
+                  "drive_scale of the sensor, without which no run takes it");
   }
   return out;
 }

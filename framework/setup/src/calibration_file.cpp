@@ -24,6 +24,7 @@ struct TopParams {
   std::string twist;
   Trust status = Trust::kOk;
   std::vector<std::string> reasons;
+  std::vector<int> drive_signs;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(model), {.help = "type of the kinematic model; none: nothing of wheels"});
@@ -36,6 +37,8 @@ struct TopParams {
        {"failed", Trust::kFailed}},
       {.help = "how it was come by; what has diverged or failed is refused"});
     b(VIWO_PARAM(reasons), {.help = "why it is not ok"});
+    b(VIWO_PARAM(drive_signs),
+      {.min = -1., .max = 1., .help = "signs of the drives that the estimates belong to"});
   }
 };
 
@@ -299,6 +302,7 @@ CalibrationFile read_calibration(const std::filesystem::path& path) {
   file.path = path;
   file.model = top.model;
   file.twist = top.twist;
+  file.drive_signs = top.drive_signs;
   file.status = top.status;
   file.reasons = top.reasons;
   const Node* const model = root.find("model");
@@ -343,6 +347,13 @@ std::string calibration_text(const CalibrationFile& calibration, const std::stri
       reasons.items().push_back(Node::scalar_of(reason, {}, true));
     }
     root.set("reasons", reasons);
+  }
+  if (!calibration.drive_signs.empty()) {
+    Node signs = Node::list_of();
+    for (const int sign : calibration.drive_signs) {
+      signs.items().push_back(Node::scalar_of(std::to_string(sign)));
+    }
+    root.set("drive_signs", signs);
   }
   for (const auto& [name, model] : calibration.wheel_sets) {
     root.set("wheel_sets",

@@ -198,6 +198,20 @@ PlanarExtrinsics planar_mount(const WheelsView& wheels) {
   return {p_OinI.x(), p_OinI.y(), std::atan2(R_OtoI(1, 0), R_OtoI(0, 0))};
 }
 
+/// Wheels that turn the other way are not those that were calibrated.
+void require_drive_signs(const CalibrationFile& file, const RunSetup& setup) {
+  if (file.drive_signs.empty() || !setup.model || file.drive_signs == drive_signs(setup)) return;
+  std::string scale;
+  for (const int sign : file.drive_signs) {
+    scale += (scale.empty() ? "[" : ", ") + std::to_string(sign);
+  }
+  throw InputError(file.path.string() +
+                   "  this calibration is for drives that turn otherwise than configured: write "
+                   "sensors." +
+                   setup.routes.sensor_of(Consumer::kWheels) + ".drive_scale: " + scale +
+                   "], with the sizes that are there");
+}
+
 /// What the user of a calibration.yaml should know.
 void warn_of(const CalibrationStart& start, RunSetup& setup) {
   if (const std::string doubts = doubts_of(start.file()); !doubts.empty()) {
@@ -212,6 +226,17 @@ void warn_of(const CalibrationStart& start, RunSetup& setup) {
 }
 
 }  // namespace
+
+std::vector<int> drive_signs(const RunSetup& setup) {
+  std::vector<int> signs(static_cast<std::size_t>(setup.model->description().n_drive), 1);
+  const std::string sensor = setup.routes.sensor_of(Consumer::kWheels);
+  const Node* const scale = setup.resolved.at_path("sensors." + sensor + ".drive_scale");
+  if (scale == nullptr) return signs;
+  for (std::size_t i = 0; i < std::min(signs.size(), scale->items().size()); ++i) {
+    if (scale->items()[i].scalar().starts_with('-')) signs[i] = -1;
+  }
+  return signs;
+}
 
 RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed,
                   bool exact) {
@@ -256,6 +281,7 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
     if (!start->took_anything()) {
       config::fail(start->file().model_mark, "this calibration has nothing that the run has");
     }
+    require_drive_signs(start->file(), setup);
     warn_of(*start, setup);
   }
   if (!start || !start->took_cameras()) {

@@ -41,6 +41,8 @@ struct CalibrationFile {
   std::vector<std::string> reasons;               ///< why it is not ok
   std::string model;                              ///< type of the kinematic model; "": no wheels
   std::string twist;                              ///< odometry.twist that the estimates belong to
+  /// Of `drive_scale`, where they were searched: 1 or -1 for each drive. Empty: they were not.
+  std::vector<int> drive_signs;
   std::map<std::string, std::string> wheel_sets;  ///< further ones: name, type of the model
   Entries intrinsics;                             ///< of the wheels
   Entries mount;                                  ///< R_ItoO, p_IinO

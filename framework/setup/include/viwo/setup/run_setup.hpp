@@ -50,6 +50,9 @@ struct RunSetup {
   std::vector<std::string> warnings;  ///< what is suspicious in it, for those of the result
 };
 
+/// Signs of the drives, 1 or -1, by `drive_scale` of the sensor that gives the wheels.
+std::vector<int> drive_signs(const RunSetup& setup);
+
 /// Reads a run configuration without placeholders. `seed` overrules the configured one; `exact`:
 /// without noise and wrong starts (HostServices::exact). Throws InputError with everything that is
 /// wrong in it.
