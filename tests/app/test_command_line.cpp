@@ -15,8 +15,8 @@ TEST_F(CommandLineTest, WithoutArgumentsPrintsTheHelpAndFails) {
   EXPECT_EQ(nothing.out, help.out);
   EXPECT_EQ(help.err, "");
   for (const char* command :
-       {"run CONFIG", "experiment EXPERIMENT", "calibrate CONFIG", "simulate CONFIG --out DIR",
-        "evaluate --reference A.tum --estimate B.tum",
+       {"run CONFIG", "experiment EXPERIMENT", "calibrate CONFIG", "plan CONFIG",
+        "simulate CONFIG --out DIR", "evaluate --reference A.tum --estimate B.tum",
         "plugins list | describe NAME | schema | check FILE | new KIND NAME [--out DIR]"}) {
     EXPECT_NE(help.out.find("\n  viwo " + std::string(command)), std::string::npos) << command;
   }
@@ -43,6 +43,7 @@ TEST_F(CommandLineTest, EveryCommandExplainsItself) {
       {"experiment", {"--out", "--jobs", "--seeds", "--set", "--keep-runs"}},
       {"inspect", {"--out", "--set", "--fix"}},
       {"calibrate", {"--out", "--set"}},
+      {"plan", {"--out", "--set"}},
       {"simulate", {"--out", "--seed", "--set"}},
       {"evaluate", {"--reference", "--estimate", "--align", "--out"}},
       {"plugins", {"--out"}}};

@@ -381,6 +381,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
                 "observability/ackermann.yaml", "observability/mecanum.yaml",
                 "observability/skid_steer.yaml", "observability/swerve.yaml",
                 "observability/degenerate_motions.yaml", "observability/differential.yaml",
+                "plans/swerve.yaml", "plans/swerve_calibration.yaml", "plans/swerve_drive.yaml",
                 "runs/comma2k19_car.yaml", "runs/euroc.yaml", "runs/euroc_board.yaml",
                 "runs/husky_gnss.yaml", "runs/frc_swerve.yaml", "runs/hybrid.yaml",
                 "runs/kaist_urban.yaml", "runs/openvins_sim.yaml", "runs/recording.yaml",

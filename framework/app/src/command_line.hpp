@@ -57,6 +57,7 @@ int inspect_command(const Arguments& arguments);
 int simulate_command(const Arguments& arguments);
 int calibrate_command(const Arguments& arguments);
 int export_command(const Arguments& arguments);
+int plan_command(const Arguments& arguments);
 int plugins_command(const Arguments& arguments);
 
 }  // namespace viwo::app

@@ -18,6 +18,7 @@
 #include "viwo/log/tum.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/observability/observability.hpp"
+#include "viwo/plan/plan.hpp"
 #include "viwo/report/figures.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/results/run_stream.hpp"
@@ -247,6 +248,18 @@ int export_command(const Arguments& arguments) {
     std::cerr << "not in " << arguments.to << ": " << line << "\n";
   }
   return 0;
+}
+
+int plan_command(const Arguments& arguments) {
+  PluginRegistry plugins = make_registry(arguments);
+  const plan::PlanSetup setup =
+      plan::read_plan_setup(arguments.positional[0], arguments.assignments, plugins);
+  const plan::Plan found = plan::make_plan(setup);
+  const auto folder = out_folder(arguments);
+  write_plan(folder, setup, found);
+  std::cout << describe(setup, found) << "motion: " << (folder / "plan.csv").string()
+            << "\nreport: " << (folder / "report.html").string() << "\n";
+  return found.reached ? 0 : 1;
 }
 
 int inspect_command(const Arguments& arguments) {

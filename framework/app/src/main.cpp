@@ -44,6 +44,12 @@ constexpr Command kCommands[] = {
      "Writes a calibration.yaml, of calibrate or of a run, as other programs take it; says what "
      "the format cannot hold (docs/export.md).",
      "to! out-file", 1, export_command},
+    {"plan", "plan CONFIG [--out DIR] [--set KEY=VALUE]...",
+     "Tells how to drive so that a calibration will know the intrinsics as well as goals ask, on "
+     "the "
+     "shortest path on a floor of given size; writes plan.csv, report.html and summary.json. Exit "
+     "code 1: it takes too long (docs/plan.md). Keys of CONFIG: viwo plugins describe plan.",
+     "out set", 1, plan_command},
     {"simulate", "simulate CONFIG --out DIR [--seed N] [--set KEY=VALUE]...",
      "Writes what the sensors of a configuration yield (IMU, images' tracks, encoders, truth) as a "
      "log folder.",
@@ -53,7 +59,8 @@ constexpr Command kCommands[] = {
      evaluate_command},
     {"plugins", "plugins list | describe NAME | schema | check FILE | new KIND NAME [--out DIR]",
      "Lists the plugins that are found (kinematics, sensors, updates), the parameters of one or of "
-     "a section (estimator, imu, cameras, wheels, odometry, evaluation, run, calibration), or why "
+     "a section (estimator, imu, cameras, wheels, odometry, evaluation, run, calibration, plan), "
+     "or why "
      "a file is "
      "refused; schema gives a JSON Schema of run configurations, for editors; new writes the "
      "source "

@@ -7,6 +7,7 @@
 #include "viwo/calibration/calibrate.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/plan/plan.hpp"
 #include "viwo/setup/schema.hpp"
 
 namespace viwo::app {
@@ -38,6 +39,8 @@ int describe(PluginRegistry& plugins, const std::string& name) {
   sections.push_back({"calibration",
                       "a file of viwo calibrate, beside recordings or motions, and set",
                       calibration::calibration_params()});
+  sections.push_back({"plan", "a file of viwo plan, beside kinematics and goals",
+                      param_specs<plan::PlanParams>()});
   for (const HostSection& section : sections) {
     names.push_back(section.name);
     if (section.name != name) continue;

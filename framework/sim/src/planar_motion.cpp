@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "viwo/api/status.hpp"
 #include "viwo/math/se2.hpp"
@@ -24,12 +25,6 @@ double wave(double hz, double t) { return std::sin(2. * M_PI * hz * t); }
 
 Twist along(double speed, double direction, double omega) {
   return {speed * std::cos(direction), speed * std::sin(direction), omega};
-}
-
-/// From 0 to 1 within [0, 1], twice continuously differentiable.
-double smooth_step(double u) {
-  u = std::clamp(u, 0., 1.);
-  return u * u * u * (10. + u * (6. * u - 15.));
 }
 
 /// The swings of an ICR sweep, each times `amplitude`.
@@ -53,6 +48,16 @@ Twist mixed(double t, const MotionOptions& o) {
 }
 
 }  // namespace
+
+double smooth_step(double u) {
+  u = std::clamp(u, 0., 1.);
+  return u * u * u * (10. + u * (6. * u - 15.));
+}
+
+double smooth_step_integral(double u) {
+  const double within = std::clamp(u, 0., 1.);
+  return within * within * within * within * (2.5 + within * (within - 3.)) + std::max(u - 1., 0.);
+}
 
 struct PlanarMotion::Entry {
   const char* name;
@@ -118,15 +123,18 @@ PlanarMotion::PlanarMotion(std::string_view name, const MotionOptions& options)
   throw InputError(text);
 }
 
+PlanarMotion::PlanarMotion(std::string name, std::function<Twist(double t_s)> twist)
+    : name_(std::move(name)), given_(std::move(twist)) {
+  options_.ramp_s = 0.;
+}
+
 double PlanarMotion::progress(double t) const {
   if (options_.ramp_s <= 0.) return t;
-  const double u = std::clamp(t / options_.ramp_s, 0., 1.);
-  // Integral of the ramp u^3 (10 - 15 u + 6 u^2) of twist().
-  const double within = u * u * u * u * (2.5 + u * (u - 3.));
-  return options_.ramp_s * within + std::max(t - options_.ramp_s, 0.);
+  return options_.ramp_s * smooth_step_integral(t / options_.ramp_s);
 }
 
 Twist PlanarMotion::twist(double t) const {
+  if (given_) return given_(t);
   double ramp = 1.;
   if (options_.ramp_s > 0.) {
     ramp = smooth_step(t / options_.ramp_s);

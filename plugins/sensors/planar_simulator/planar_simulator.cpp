@@ -1,6 +1,7 @@
 // Sensor planar_simulator: encoders and reference poses of a base on a plane (model.md).
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ namespace {
 struct Params : sim::EncoderParams, log::JointParams {
   NestedKinematics robot;
   std::string motion = "icr_sweep";
+  std::filesystem::path motion_file;
   double duration_s = 60.;
   double speed_m_per_s = 0.5;
   double yaw_rate_rad_per_s = 0.6;
@@ -32,6 +34,7 @@ struct Params : sim::EncoderParams, log::JointParams {
     b(VIWO_PARAM(robot),
       {.required = true, .help = "the base: its nominal intrinsics and its noise"});
     b(VIWO_PARAM(motion), {.choices = sim::kMotionChoices, .help = "how the base moves"});
+    b(VIWO_PARAM(motion_file), {.help = sim::kMotionFileHelp});
     b(VIWO_PARAM(duration_s), {.unit = "s", .above = 0., .max = 86400., .help = "how long"});
     b(VIWO_PARAM(speed_m_per_s), {.unit = "m/s", .help = "speed of the motion"});
     b(VIWO_PARAM(yaw_rate_rad_per_s),
@@ -92,8 +95,9 @@ std::vector<PoseSample> poses(const Params& params, const sim::PlanarMotion& mot
 }
 
 log::Recording<Measurement> simulate(const Params& params, const HostServices& services) {
-  const sim::PlanarMotion motion(params.motion, {params.speed_m_per_s, params.yaw_rate_rad_per_s,
-                                                 params.ramp_s, params.pivot_m});
+  const sim::PlanarMotion motion = sim::motion_from(
+      params.motion, params.motion_file,
+      {params.speed_m_per_s, params.yaw_rate_rad_per_s, params.ramp_s, params.pivot_m});
   log::Recording<Measurement> out;
   auto from_wheels = encoders(params, motion, services);
   log::mount_joints(params, from_wheels, out.rejections);

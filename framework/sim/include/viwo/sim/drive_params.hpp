@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 
 #include "viwo/api/params.hpp"
@@ -9,14 +10,18 @@
 
 namespace viwo::sim {
 
-/// Names of PlanarMotion.
+/// Names of PlanarMotion, and a motion from a file.
 inline constexpr const char* kMotionChoices =
     "icr_sweep|straight|lateral|circle|stationary|figure_eight|crab_varying|"
-    "spin|constant_steering|pivot|sweep_then_straight|mixed";
+    "spin|constant_steering|pivot|sweep_then_straight|mixed|file";
+inline constexpr const char* kMotionFileHelp =
+    "of motion: file, a table with the columns time_s, v_x_m_per_s, v_y_m_per_s, omega_rad_per_s "
+    "(plan.csv of viwo plan); the base stands before and after it";
 
 /// How PlanarMotion and Ground go.
 struct DriveParams {
   std::string motion = "icr_sweep";
+  std::filesystem::path motion_file;
   double duration_s = 60.;
   double speed_m_per_s = 0.5;
   double yaw_rate_rad_per_s = 0.6;
@@ -29,6 +34,7 @@ struct DriveParams {
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(motion), {.choices = kMotionChoices, .help = "how the base moves"});
+    b(VIWO_PARAM(motion_file), {.help = kMotionFileHelp});
     b(VIWO_PARAM(duration_s), {.unit = "s", .above = 0., .max = 7200., .help = "how long"});
     b(VIWO_PARAM(speed_m_per_s),
       {.unit = "m/s", .min = -20., .max = 20., .help = "speed of the motion"});
@@ -52,6 +58,11 @@ struct DriveParams {
       {.unit = "ns", .min = 0., .max = 4e18, .help = "stamp at which the motion starts"});
   }
 };
+
+/// One of the motions by name, or that of a file. ParamError for a file that is missing, wrong or
+/// not asked for.
+PlanarMotion motion_from(const std::string& name, const std::filesystem::path& file,
+                         const MotionOptions& options);
 
 /// The trajectory of DriveParams from before time 0 to behind `end_s`, with `margin_s` more at
 /// both ends, and half a second in which the ends of its spline do not matter; `sideways` as for

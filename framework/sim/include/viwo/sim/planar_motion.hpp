@@ -1,6 +1,7 @@
 // Motions of a base in the plane, as the twist of O in O over time, and the poses they lead to.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,8 @@ class PlanarMotion {
  public:
   /// InputError for an unknown name (with the known ones).
   explicit PlanarMotion(std::string_view name, const MotionOptions& options = {});
+  /// Any other motion: `twist` at t seconds, twice continuously differentiable; driven as it is.
+  PlanarMotion(std::string name, std::function<Twist(double t_s)> twist);
 
   static const std::vector<std::string>& names();
   const std::string& name() const { return name_; }
@@ -58,7 +61,12 @@ class PlanarMotion {
   std::string name_;
   MotionOptions options_;
   Profile profile_ = nullptr;
+  std::function<Twist(double)> given_;  ///< instead of a profile
 };
+
+/// 0 for u <= 0, 1 for u >= 1, twice continuously differentiable; and its integral.
+double smooth_step(double u);
+double smooth_step_integral(double u);
 
 /// Period of figure_eight, s: the eight closes when the heading swings by +-j0 (the first zero of
 /// the Bessel function J0), hence 2 pi j0 / w.

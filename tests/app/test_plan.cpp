@@ -1,0 +1,53 @@
+// viwo plan as a user meets it: exit codes, files, and the drive in a simulator and a calibration.
+#include "support.hpp"
+
+namespace viwo {
+namespace {
+
+using PlanTest = CommandLineTest;
+
+const std::string kPlans = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/plans/";
+
+TEST_F(PlanTest, WritesADriveThatASimulatorFollowsAndACalibrationTakes) {
+  const Outcome outcome = expect_done({"plan", kPlans + "swerve.yaml", "--out", "out"});
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_NE(outcome.out.find("\nall goals are reached after "), std::string::npos) << outcome.out;
+  const nlohmann::json plan = summary();
+  EXPECT_EQ(plan.at("status"), "ok");
+  for (const auto& goal : plan.at("goals")) {
+    EXPECT_LE(goal.at("sigma").get<double>(), goal.at("goal").get<double>());
+  }
+  EXPECT_NE(read("out/report.html").find("Seen from above"), std::string::npos);
+  const std::string drive = "placeholders.plan=" + at("out/plan.csv").string();
+  expect_done({"simulate", kPlans + "swerve_drive.yaml", "--out", "log", "--set", drive});
+  const Outcome calibrated = expect_done(
+      {"calibrate", kPlans + "swerve_calibration.yaml", "--out", "calibrated", "--set", drive});
+  EXPECT_NE(calibrated.out.find("delta_o4"), std::string::npos) << calibrated.out;
+}
+
+TEST_F(PlanTest, ThatTakesTooLongIsAFailure) {
+  const Outcome outcome =
+      viwo({"plan", kPlans + "swerve.yaml", "--out", "out", "--set", "max_path_m=2"});
+  EXPECT_EQ(outcome.code, 1) << outcome.err;
+  EXPECT_NE(outcome.out.find("the goals are not reached: it would take more than max_path_m"),
+            std::string::npos)
+      << outcome.out;
+  EXPECT_EQ(summary().at("status"), "failed");
+}
+
+TEST_F(PlanTest, RefusesWhatIsWrongAndWritesNothing) {
+  const std::string file = kPlans + "swerve.yaml";
+  expect_refused({"plan", file, "--out", "out", "--set", "floor_x_m=0.3"},
+                 "--set floor_x_m  floor_x_m: a floor of 0.3 m has no room for a base of "
+                 "base_radius_m 0.2");
+  expect_refused({"plan", file, "--out", "out", "--set", "flor_x_m=3"},
+                 "--set flor_x_m  plan: unknown key 'flor_x_m' - did you mean 'floor_x_m'?");
+  const Outcome unreachable =
+      viwo({"plan", file, "--out", "out", "--set", "kinematics.prior_sigma_position_m=0.05"});
+  EXPECT_EQ(unreachable.code, 2) << unreachable.out;
+  EXPECT_NE(unreachable.err.find("goals: r_"), std::string::npos) << unreachable.err;
+  EXPECT_FALSE(std::filesystem::exists(at("out")));
+}
+
+}  // namespace
+}  // namespace viwo
