@@ -219,6 +219,12 @@ TEST_F(ConfigurationTest, RefusesACalibrationThatDoesNotFit) {
   write("run.yaml",
         replaced(kRun, "kinematics: *robot", "kinematics: {type: four_wis_wid" + model));
   expect_done({"run", "run.yaml", "--out", "fits"});
+  write("turned.yaml", read("cal/calibration.yaml") + "drive_signs: [1, 1, -1, 1]\n");
+  refuse_run(
+      "kinematics: *robot",
+      "kinematics: {type: four_wis_wid" + replaced(model, "cal/calibration.yaml", "turned.yaml"),
+      "TMP/turned.yaml  this calibration is for drives that turn otherwise than configured: "
+      "write sensors.sim.drive_scale: [1, 1, -1, 1], with the sizes that are there");
   refuse_run("kinematics: *robot", "kinematics: {type: four_wis_wid_drive_only" + model,
              "TMP/cal/calibration.yaml:2:8  this calibration is for the model 'four_wis_wid', the "
              "run has 'four_wis_wid_drive_only'");
@@ -229,6 +235,24 @@ TEST_F(ConfigurationTest, RefusesACalibrationThatDoesNotFit) {
       "TMP/cal/calibration.yaml:11:3  the model 'four_wis_wid' has no intrinsic 'r_5' - known: "
       "r_1, r_2, r_3, r_4, x_1, x_2, x_3, x_4, y_1, y_2, y_3, y_4, delta_o1, delta_o2, "
       "delta_o3, delta_o4");
+}
+
+TEST_F(ConfigurationTest, RefusesLabelsAndSegmentsOfACalibrationThatAreMeantOtherwise) {
+  write("run.yaml", kRun);
+  const auto refuse = [&](const std::string& more, const std::string& message) {
+    write("c.yaml", "calibration: c\nbase: run.yaml\n" + more);
+    expect_refused({"calibrate", "c.yaml", "--out", "out"}, message);
+  };
+  refuse("recordings: [{recording: a, distance: 4}]\n",
+         "recording 'a': label 'distance' - did you mean 'distance_m'?");
+  refuse("segment_s: 1e-6\n",
+         "c.yaml:3:12  segment_s is shorter than the interval between readings of the wheels, "
+         "0.01 s");
+  // Keys of the calibration itself can be set as those of its base can.
+  write("c.yaml", "calibration: c\nbase: run.yaml\n");
+  const Outcome none = viwo({"calibrate", "c.yaml", "--set", "reference=gyro", "--out", "out"});
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.err.find("has no gyro to calibrate against"), std::string::npos) << none.err;
 }
 
 TEST_F(ConfigurationTest, RefusesAMissingCalibrationFile) {

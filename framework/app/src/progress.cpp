@@ -34,6 +34,7 @@ void Progress::begin(const std::string& what, int total) {
   const std::lock_guard lock(mutex_);
   what_ = what;
   total_ = total;
+  count_ = skipped_ = 0;
   start_ = std::chrono::steady_clock::now();
   if (terminal_) draw();
 }

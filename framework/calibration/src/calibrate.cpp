@@ -13,7 +13,9 @@
 #include "segment_choice.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/params.hpp"
+#include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
+#include "viwo/math/significant.hpp"
 #include "wheel_wander.hpp"
 
 namespace viwo::calibration {
@@ -36,6 +38,52 @@ struct CalibrationParams : CalibrationOptions {
     CalibrationOptions::bind(b);
   }
 };
+
+/// Assignments to keys of the calibration file itself; the others are for its base.
+std::vector<std::string> assign(const std::vector<std::string>& assignments, Node& file) {
+  std::vector<std::string> others;
+  for (const std::string& text : assignments) {
+    const config::Assignment assignment = config::parse_assignment(text);
+    const auto& specs = param_specs<CalibrationOptions>();
+    const bool is_own = std::any_of(specs.begin(), specs.end(), [&](const ParamSpec& spec) {
+      return spec.name == assignment.path;
+    });
+    if (is_own) {
+      config::set_path(file, assignment.path, assignment.value);
+    } else {
+      others.push_back(text);
+    }
+  }
+  return others;
+}
+
+/// What is nearly the name of a label with a meaning is meant to be it.
+void refuse_misspelt_labels(const Recording& recording) {
+  for (const auto& [label, value] : recording.labels) {
+    for (const char* known : {"distance_m", "turn_deg"}) {
+      const std::string_view stem(known, std::string_view(known).find('_'));
+      const bool is_near = label.starts_with(stem) ||
+                           !config::nearest(label, std::vector<std::string>{known}).empty();
+      if (label == known || !is_near) continue;
+      throw InputError("recording '" + recording.name + "': label '" + label +
+                       "' - did you mean '" + known + "'?");
+    }
+  }
+}
+
+/// Shorter than the interval between two readings there is nothing to compare.
+void require_readings_in_segments(const CalibrationSetup& setup, const Node& file) {
+  const double segment_s = setup.options.segment_s;
+  for (const CalibrationRecording& recording : setup.recordings) {
+    const auto wheels = recording.data.wheels();
+    const double interval_s = seconds_between(wheels.front().begin_ns, wheels.back().end_ns) /
+                              static_cast<double>(wheels.size());
+    if (!(segment_s > 0.) || segment_s >= interval_s) continue;
+    config::fail(file.find("segment_s")->mark(),
+                 "segment_s is shorter than the interval between readings of the wheels, " +
+                     significant(interval_s, 2) + " s");
+  }
+}
 
 /// A fit has one noise for all turns, and one gauge.
 void require_one_kind(const std::vector<CalibrationRecording>& recordings) {
@@ -78,7 +126,8 @@ std::vector<ParamSpec> calibration_params() { return param_specs<CalibrationPara
 CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
                                         const std::vector<std::string>& assignments,
                                         PluginRegistry& plugins, WorkProgress& progress) {
-  const Node file = config::load_file(path);
+  Node file = config::load_file(path);
+  const std::vector<std::string> of_base = assign(assignments, file);
   config::Errors errors;
   constexpr std::string_view kSections[] = {"recordings", "motions", "set"};
   const auto params =
@@ -99,9 +148,10 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   setup.leave_out_by = params.leave_out_by;
   setup.report_by = params.report_by;
   const std::vector<Recording> recordings = read_recordings(file);
-  const Node base = load_base(file, assignments);
+  const Node base = load_base(file, of_base);
   require_labels(setup.report_by, recordings, file, "report_by");
   for (const Recording& recording : recordings) {
+    refuse_misspelt_labels(recording);
     for (const std::string& label : setup.leave_out_by) {
       if (recording.labels.contains(label)) continue;
       config::fail(file.find("leave_out_by")->mark(), "recording '" + recording.name +
@@ -112,6 +162,7 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
         read_recording(recording, base, params.reference, plugins, progress));
     require_one_kind(setup.recordings);
   }
+  require_readings_in_segments(setup, file);
   if (file.find("extrinsics_x_m_y_m_yaw_rad") == nullptr) {
     setup.options.extrinsics_x_m_y_m_yaw_rad = setup.recordings.front().setup.extrinsics;
   }
@@ -214,7 +265,7 @@ CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress) {
   CalibrationResult result;
   result.search = find_joints(setup, progress);
   const FitStart start = start_of(setup, result.search);
-  const CalibrationOptions options = choose_segments(setup, start, result.lengths, progress);
+  const CalibrationOptions options = choose_segments(setup, start, result, progress);
   progress.begin("fits", static_cast<int>(fits.size()));
   std::vector<CalibrationEstimate> estimates(fits.size());
   tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t f) {

@@ -251,6 +251,7 @@ std::string describe(const CalibrationResult& result) {
   for (const std::string& text : search_text(result)) out << text << "\n";
   out << left_over_text(result) << "\n" << wander_text(result.wander) << "\n";
   if (const std::string text = clock_text(result); !text.empty()) out << text << "\n";
+  if (const std::string text = bias_text(result); !text.empty()) out << text << "\n";
   describe_undetermined(result.all, out);
   describe_errors("End error of dead reckoning, recordings used in the fit", *result.setup,
                   result.fitted, out);

@@ -9,6 +9,7 @@
 
 #include "viwo/math/chi2.hpp"
 #include "viwo/math/se2.hpp"
+#include "viwo/math/significant.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -139,7 +140,9 @@ void RecordingProblem::compare_with_reference() {
   }
   if (ends.size() < 2) {
     throw InputError("recording '" + recording_.label.name +
-                     "': the reference has gaps at all segment ends");
+                     "': at all ends of segments the reference has gaps of more than " +
+                     significant(recording_.motion.max_gap_s, 3) +
+                     " s (evaluation.reference_max_gap_s, of poses)");
   }
   stamps_ns_ = std::move(known_ns);
   const bool from_start = options_.segments == calibration::Segments::kTrajectory;

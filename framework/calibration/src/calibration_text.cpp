@@ -81,6 +81,13 @@ std::string wander_text(const WheelWander& wander) {
   }
   if (!(wander.sigma > 0.)) return "the wheels contradict each other as noise does: none wanders";
   const std::string sigma = significant(wander.sigma, 2), time_s = significant(wander.time_s, 2);
+  // Priors say how far wheels are from nominal at most: what comes and goes by more is none of it.
+  constexpr double kMostWander = 3.;
+  if (wander.sigma > kMostWander) {
+    return "how the wheels contradict each other comes and goes by " + sigma +
+           " prior sigmas of the intrinsics, for " + time_s +
+           " s: slip, or a model that is not of this base, and nothing that a filter can follow";
+  }
   return "the intrinsics wander by " + sigma + " prior sigmas, for " + time_s +
          " s: wheels.intrinsics_wander=" + sigma + ", wheels.intrinsics_wander_time_s=" + time_s +
          " in a filter";
@@ -144,6 +151,16 @@ std::string clock_text(const CalibrationResult& result) {
             significant(1e3 * eval::sample_standard_deviation(estimate.clock_offset_s), 3) + " ms";
   }
   return text;
+}
+
+std::string bias_text(const CalibrationResult& result) {
+  const auto& biases = result.all.gyro_bias_rad_per_s;
+  const auto& sigmas = result.all.gyro_bias_sigma_rad_per_s;
+  if (biases.empty() || !(sigmas.front() > 0.)) return "";
+  const auto [least, most] = std::minmax_element(biases.begin(), biases.end());
+  std::string text = "bias of the gyro: " + significant(*least, 3);
+  if (biases.size() > 1) text += " .. " + significant(*most, 3);
+  return text + " rad/s";
 }
 
 std::string status_of(const CalibrationResult& result) {

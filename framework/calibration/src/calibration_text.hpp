@@ -37,6 +37,7 @@ std::vector<std::string> search_text(const CalibrationResult& result);
 /// What the fit cannot explain.
 std::string left_over_text(const CalibrationResult& result);
 /// Offsets of the clocks over the recordings; empty where none were estimated.
+std::string bias_text(const CalibrationResult& result);
 std::string clock_text(const CalibrationResult& result);
 /// "ok", "doubtful" or, without an estimate, "failed".
 std::string status_of(const CalibrationResult& result);

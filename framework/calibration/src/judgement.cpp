@@ -1,9 +1,11 @@
 #include "judgement.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "segment_choice.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -19,6 +21,127 @@ constexpr double kQuiet = 3.;
 
 const std::vector<IntrinsicSpec>& specs_of(const CalibrationResult& result) {
   return result.setup->recordings.front().setup.model->description().intrinsics;
+}
+
+std::string name_of(const CalibrationResult& result, std::size_t recording) {
+  const std::string& name = result.setup->recordings[recording].label.name;
+  return name.empty() ? "the recording" : "recording '" + name + "'";
+}
+
+/// Strange is a warning, unbelievable a doubt.
+void add_by_size(double sigmas, const std::string& text, CalibrationResult& result) {
+  if (std::abs(sigmas) < kStrange) return;
+  auto& list = std::abs(sigmas) < kUnbelievable ? result.warnings : result.doubts;
+  list.push_back(text);
+}
+
+/// What nothing was learned of.
+void judge_knowledge(CalibrationResult& result) {
+  const CalibrationEstimate& all = result.all;
+  const auto free = (all.sigma.array() > 0.).count();
+  if (free > 0 && static_cast<Eigen::Index>(all.undetermined.size()) >= free) {
+    result.doubts.push_back(
+        "the recordings tell less than the priors of all intrinsics: drive more, and so that the "
+        "base turns while it moves");
+    return;
+  }
+  constexpr double kUnknownZero_rad = 0.05;  // half of what the fit is given
+  for (const int zero : result.search.zeros) {
+    if (all.sigma[zero] < kUnknownZero_rad) continue;
+    result.doubts.push_back("the motion does not tell " +
+                            specs_of(result)[static_cast<std::size_t>(zero)].name +
+                            ", which was searched: turn while moving, to both sides");
+  }
+}
+
+/// Measurements by hand that the wheels contradict, and a gyro that would have to be very wrong.
+void judge_what_was_given(CalibrationResult& result) {
+  for (const ByHand& one : result.all.by_hand) {
+    add_by_size(one.sigmas,
+                name_of(result, one.recording) + ": the wheels miss its " + one.label + " by " +
+                    significant(std::abs(one.sigmas), 2) +
+                    " sigmas: a measurement of another drive, its unit, or sigma_distance_m, "
+                    "sigma_turn_deg",
+                result);
+  }
+  const double prior = result.setup->options.prior_sigma_gyro_bias_rad_per_s;
+  for (std::size_t i = 0; i < result.all.gyro_bias_rad_per_s.size(); ++i) {
+    const double bias = result.all.gyro_bias_rad_per_s[i];
+    if (!(result.all.gyro_bias_sigma_rad_per_s[i] > 0.)) continue;
+    add_by_size(bias / prior,
+                name_of(result, i) + ": the gyro would need a bias of " + significant(bias, 2) +
+                    " rad/s: it turns where the wheels do not, or "
+                    "prior_sigma_gyro_bias_rad_per_s is too narrow",
+                result);
+  }
+}
+
+/// How much of their motion the wheels contradict each other by, at the estimate.
+double contradiction(const CalibrationResult& result) {
+  double left = 0., moved = 0.;
+  TwistSolution solution;
+  for (const CalibrationRecording& recording : result.setup->recordings) {
+    TwistSolver solver(recording.setup.model, {});
+    solver.set_intrinsics(result.all.x_WI);
+    for (const EncoderSample& sample : recording.data.wheels()) {
+      if (solver.solve(sample, solution) != Status::kOk) continue;
+      // As if a metre from O: of a spin it is too much, so that no doubt is raised without reason.
+      moved += solution.xi.squaredNorm();
+      left += solution.e.squaredNorm() /
+              static_cast<double>(std::max<Eigen::Index>(1, solution.e.size()));
+    }
+  }
+  return moved > 0. ? std::sqrt(left / moved) : 0.;
+}
+
+void judge_wheels(CalibrationResult& result) {
+  constexpr double kPart = 0.3;
+  const double part = contradiction(result);
+  if (part > kPart) {
+    result.doubts.push_back(
+        "calibrated, the wheels still contradict each other by " + significant(100. * part, 2) +
+        " % of their speed: drives or steerings that are exchanged or reversed, units, gears, or "
+        "wheels that are elsewhere");
+    return;
+  }
+  if (result.all.noise.parity_scale > kQuiet) {
+    result.warnings.push_back("the wheels contradict each other by " +
+                              significant(result.all.noise.parity_scale, 2) +
+                              " times what the model's sigmas say: slip, play, or sigmas that are "
+                              "too small for this base");
+  }
+}
+
+/// Dead reckoning by the wheels that were calibrated ought to end nearer than by the nominal ones.
+void judge_ends(CalibrationResult& result) {
+  constexpr double kWorse = 1.2;
+  double nominal_m = 0., calibrated_m = 0., nominal_deg = 0., calibrated_deg = 0.;
+  for (const ValidationRun& run : result.fitted) {
+    if (!run.nominal.accuracy || !run.calibrated.accuracy) return;
+    nominal_m += run.nominal.accuracy->end_m;
+    calibrated_m += run.calibrated.accuracy->end_m;
+    nominal_deg += std::abs(run.nominal.accuracy->end_yaw_deg);
+    calibrated_deg += std::abs(run.calibrated.accuracy->end_yaw_deg);
+  }
+  if (calibrated_m > kWorse * nominal_m) {
+    result.doubts.push_back(
+        "calibrated, dead reckoning ends further off than nominal: see the "
+        "table of end errors");
+  } else if (calibrated_deg > kWorse * nominal_deg) {
+    result.warnings.push_back("calibrated, dead reckoning ends further off in yaw than nominal");
+  }
+}
+
+/// A gyro tells no scale.
+void judge_scale(CalibrationResult& result) {
+  const auto& recordings = result.setup->recordings;
+  const bool has_scale = std::any_of(recordings.begin(), recordings.end(), [](const auto& one) {
+    return one.motion.kind == ReferenceKind::kPoses || one.motion.distance_m.has_value();
+  });
+  if (has_scale) return;
+  result.warnings.push_back(
+      "nothing tells the scale: radii and lengths are as right as the nominal lengths of the base; "
+      "a distance measured with a tape (distance_m) would tell");
 }
 
 void judge_search(CalibrationResult& result) {
@@ -47,11 +170,11 @@ void judge_change(CalibrationResult& result) {
           ": a base that is mirrored, or joints that are exchanged or reversed");
     }
     const double change = (result.all.x_WI[k] - specs[i].nominal) / specs[i].prior_sigma;
-    if (std::abs(change) < kStrange) continue;
-    auto& list = std::abs(change) < kUnbelievable ? result.warnings : result.doubts;
-    list.push_back(specs[i].name + " is " + significant(std::abs(change), 2) +
-                   " prior sigmas from its nominal value: a wrong nominal value, a prior that is "
-                   "too narrow, or joints, units or clocks that are wrong");
+    add_by_size(change,
+                specs[i].name + " is " + significant(std::abs(change), 2) +
+                    " prior sigmas from its nominal value: a wrong nominal value, a prior that is "
+                    "too narrow, or joints, units or clocks that are wrong",
+                result);
   }
 }
 
@@ -76,6 +199,9 @@ void judge_left_over(CalibrationResult& result) {
 }
 
 void judge_lengths(CalibrationResult& result) {
+  for (const std::string& text : result.failed_lengths) {
+    result.warnings.push_back("segments that could not be compared: " + text);
+  }
   const auto& specs = specs_of(result);
   for (const CalibrationEstimate& other : result.lengths) {
     double most = 0.;
@@ -108,16 +234,15 @@ void judge(CalibrationResult& result) {
                             " unknowns that the wheels among themselves do not tell: more or "
                             "longer recordings, or segments: auto");
   }
+  judge_knowledge(result);
+  judge_what_was_given(result);
   judge_search(result);
   judge_left_over(result);
+  judge_wheels(result);
   judge_change(result);
+  judge_ends(result);
   judge_lengths(result);
-  if (all.noise.parity_scale > kQuiet) {
-    result.warnings.push_back("the wheels contradict each other by " +
-                              significant(all.noise.parity_scale, 2) +
-                              " times what the model's sigmas say: slip, play, or sigmas that are "
-                              "too small for this base");
-  }
+  judge_scale(result);
 }
 
 }  // namespace viwo::calibration

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <tuple>
 
@@ -89,8 +90,7 @@ std::string segments_text(const CalibrationEstimate& estimate) {
 }
 
 CalibrationOptions choose_segments(const CalibrationSetup& setup, const FitStart& start,
-                                   std::vector<CalibrationEstimate>& tried,
-                                   WorkProgress& progress) {
+                                   CalibrationResult& result, WorkProgress& progress) {
   if (setup.options.segments != Segments::kAuto) return setup.options;
   if (setup.recordings.front().motion.kind == ReferenceKind::kNone) {
     CalibrationOptions options = setup.options;
@@ -99,22 +99,42 @@ CalibrationOptions choose_segments(const CalibrationSetup& setup, const FitStart
     return options;
   }
   const std::vector<CalibrationOptions> all = candidates(setup);
-  tried.resize(all.size());
+  std::vector<CalibrationEstimate> estimates(all.size());
+  std::vector<std::string> failures(all.size());
   const bool predicts = setup.recordings.size() >= kFolds &&
                         setup.recordings.front().motion.kind == ReferenceKind::kPoses;
   progress.begin("segment lengths", static_cast<int>(all.size()));
   tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
-    tried[i] = fit(setup, all_of(setup), all[i], start);
-    if (predicts) tried[i].prediction_m = predict(setup, all[i], start);
-    progress.done("segments: " + segments_text(tried[i]));
+    estimates[i].segments = all[i].segments;
+    estimates[i].segment_s = all[i].segment_s;
+    const std::string text = "segments: " + segments_text(estimates[i]);
+    try {
+      estimates[i] = fit(setup, all_of(setup), all[i], start);
+      if (predicts) estimates[i].prediction_m = predict(setup, all[i], start);
+      progress.done(text);
+    } catch (const std::exception& error) {
+      failures[i] = error.what();
+      progress.done(text + ": " + error.what());
+    }
   });
+  std::vector<CalibrationOptions> fitted;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (failures[i].empty()) {
+      fitted.push_back(all[i]);
+      result.lengths.push_back(estimates[i]);
+    } else {
+      result.failed_lengths.push_back(segments_text(estimates[i]) + ": " + failures[i]);
+    }
+  }
+  if (fitted.empty()) throw InputError(failures.front());
+  const std::vector<CalibrationEstimate>& tried = result.lengths;
   const auto rank = [](const CalibrationEstimate& estimate) {
     return std::tuple(!estimate.converged, !estimate.has_enough_residuals(),
                       estimate.prediction_m.value_or(0.), estimate.log_volume);
   };
   const auto best = std::min_element(
       tried.begin(), tried.end(), [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
-  return all[static_cast<std::size_t>(best - tried.begin())];
+  return fitted[static_cast<std::size_t>(best - tried.begin())];
 }
 
 }  // namespace viwo::calibration

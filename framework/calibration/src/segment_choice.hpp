@@ -9,9 +9,10 @@
 namespace viwo::calibration {
 
 /// The options of a fit, segments chosen: those of the configuration, or, of several lengths, that
-/// with the smallest log_volume (CAL-11). `tried` gets the estimates of all lengths.
+/// with the smallest log_volume (CAL-11). `result` gets the estimates of all
+/// lengths, and those that could not be fitted. Throws InputError when none could.
 CalibrationOptions choose_segments(const CalibrationSetup& setup, const FitStart& start,
-                                   std::vector<CalibrationEstimate>& tried, WorkProgress& progress);
+                                   CalibrationResult& result, WorkProgress& progress);
 
 /// "2 s", "whole recordings", ...
 std::string segments_text(const CalibrationEstimate& estimate);

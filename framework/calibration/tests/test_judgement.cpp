@@ -10,6 +10,7 @@ namespace {
 
 using namespace calibration;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -26,7 +27,7 @@ TEST(Judgement, TrustsWhatIsRight) {
   CalibrationSetup setup = differential(kRight);
   const CalibrationResult result = calibrate(setup);
   EXPECT_THAT(result.doubts, IsEmpty());
-  EXPECT_THAT(result.warnings, IsEmpty());
+  EXPECT_THAT(result.warnings, ElementsAre(HasSubstr("nothing tells the scale")));
   EXPECT_FALSE(result.lengths.empty());
 }
 
@@ -52,6 +53,38 @@ TEST(Judgement, DoubtsAMirroredBaseWhichBoundsExclude) {
     EXPECT_GE(result.all.x_WI[model.find(name)], 0.) << name;
   }
   EXPECT_FALSE(result.is_trusted());
+}
+
+TEST(Judgement, DoubtsWhatNothingWasLearnedOf) {
+  CalibrationSetup setup = differential(kRight);
+  testing::scale_drives(setup, 0.);
+  EXPECT_THAT(calibrate(setup).doubts, Contains(HasSubstr("tell less than the priors of all")));
+  // Driven straight on, no zero of a steering shows.
+  CalibrationSetup straight = testing::unknown_swerve(1, "straight");
+  straight.options.find_steering_zeros = true;
+  EXPECT_FALSE(calibrate(straight).is_trusted());
+}
+
+TEST(Judgement, DoubtsADistanceThatTheWheelsContradict) {
+  CalibrationSetup setup =
+      differential(kRight + ", prior_sigma_radius_m: 1e-4, prior_sigma_baseline_m: 1e-4");
+  MotionReference& motion = setup.recordings[0].motion;
+  motion.distance_m = 100.;
+  EXPECT_THAT(calibrate(setup).doubts, Contains(HasSubstr("the wheels miss its distance_m")));
+  motion.distance_m = {};
+  motion.turn_rad = 3.;
+  EXPECT_FALSE(calibrate(setup).is_trusted());
+}
+
+TEST(Judgement, DoubtsAGyroThatWouldNeedAGreatBias) {
+  CalibrationSetup setup = differential(kRight);
+  constexpr double kBias_rad_per_s = 0.2;
+  Trajectory& poses = setup.recordings[0].motion.poses;
+  for (StampedPose& pose : poses) {
+    const double turned = kBias_rad_per_s * seconds_between(poses.front().t_ns, pose.t_ns);
+    pose.q_BtoW = Eigen::AngleAxisd(turned, Eigen::Vector3d::UnitZ()) * pose.q_BtoW;
+  }
+  EXPECT_THAT(calibrate(setup).doubts, Contains(HasSubstr("the gyro would need a bias of")));
 }
 
 }  // namespace

@@ -2,8 +2,10 @@
 // out.
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "motion_reference.hpp"
@@ -102,6 +104,21 @@ TEST_F(Recordings, AreCalibratedByATapeMeasureAndMarksOnTheFloor) {
   const auto [trusts_ruler, by_ruler_m] = calibrated_by(false);
   EXPECT_FALSE(trusts_ruler);
   EXPECT_GT(by_ruler_m, 0.05);
+}
+
+// Of a match: it slips, but one of two drives the wrong way round is something else.
+TEST(FrcRecording, IsTrustedUnlessADriveIsReversed) {
+  const auto data = std::filesystem::path(VIWO_TEST_SHARED_DIR) / "data" / "real" / "frc_swerve";
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "no recordings at " << data;
+  const auto file = std::filesystem::path(::testing::TempDir()) / "viwo_frc_calibration.yaml";
+  std::ofstream(file) << "calibration: frc\nbase: " << (kConfigs / "runs/frc_swerve.yaml").string()
+                      << "\n";
+  auto setup = read_calibration_setup(file, {}, registry());
+  const CalibrationResult result = calibrate(setup);
+  EXPECT_TRUE(result.is_trusted()) << ::testing::PrintToString(result.doubts);
+  auto reversed = read_calibration_setup(file, {"sensors.wheels0.drive_scale=[1, -1]"}, registry());
+  EXPECT_THAT(calibrate(reversed).doubts,
+              ::testing::Contains(::testing::HasSubstr("still contradict each other by")));
 }
 
 TEST_F(Recordings, ThreeModelsRunSideBySide) {

@@ -220,8 +220,8 @@ void feed(const Measurement& measurement, Estimator& estimator) {
 }  // namespace
 
 Drive simulate_drive(const char* motion, double duration_s) {
-  const sim::BodyTrajectory trajectory = sim::BodyTrajectory::drive(
-      sim::PlanarMotion(motion, {}), sim::Ground(), -1., duration_s + 1.);
+  const sim::BodyTrajectory trajectory =
+      sim::BodyTrajectory::drive(sim::PlanarMotion(motion), sim::Ground(), -1., duration_s + 1.);
   constexpr std::uint64_t kSeed = 5;
   Drive drive;
   add_rig(trajectory, duration_s, kSeed, drive);

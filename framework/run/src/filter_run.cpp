@@ -98,6 +98,7 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
   }
   if (result.status == RunStatus::kOk && !result.reference.empty()) {
     result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);
+    warn_of_gaps(result);
   }
 }
 

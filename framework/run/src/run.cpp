@@ -13,7 +13,9 @@
 
 #include "viwo/eval/consistency.hpp"
 #include "viwo/math/se2.hpp"
+#include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/run/warnings.hpp"
 
 namespace viwo {
 
@@ -50,9 +52,19 @@ std::vector<std::int64_t> epoch_stamps(const RunSetup& setup, const RunData& dat
     throw InputError("the encoder samples of '" + data.wheels_name +
                      "' and the reference have no time in common");
   }
-  const auto period_ns = static_cast<std::int64_t>(std::llround(setup.epoch_s * 1e9));
+  const auto period_ns = std::max<std::int64_t>(1, std::llround(setup.epoch_s * 1e9));
+  // Many more epochs than samples, and more than memory is for: two clocks.
+  constexpr std::int64_t kMost = 100'000, kMostPerSample = 100;
+  const auto samples = static_cast<std::int64_t>(data.wheels().size());
+  if (const std::int64_t n = (end_ns - begin_ns) / period_ns;
+      n > kMost && n / samples > kMostPerSample) {
+    throw InputError("the encoder samples of '" + data.wheels_name + "' are " +
+                     std::to_string(samples) + " in " +
+                     significant(seconds_between(begin_ns, end_ns), 3) +
+                     " s: their stamps are of two clocks, or of another unit");
+  }
   std::vector<std::int64_t> stamps;
-  for (std::int64_t t_ns = begin_ns; t_ns < end_ns; t_ns += std::max<std::int64_t>(period_ns, 1)) {
+  for (std::int64_t t_ns = begin_ns; t_ns < end_ns; t_ns += period_ns) {
     stamps.push_back(t_ns);
   }
   stamps.push_back(end_ns);
@@ -177,6 +189,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   if (result.status == RunStatus::kOk && !data.reference.empty()) {
     result.accuracy = eval::evaluate(data.reference, result.estimate, setup.evaluation);
     result.nees_planar = nees.mean();
+    warn_of_gaps(result);
   }
   return result;
 }

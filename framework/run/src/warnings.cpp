@@ -90,4 +90,12 @@ std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& cal
   return lines;
 }
 
+void warn_of_gaps(RunResult& result) {
+  if (!result.accuracy || result.accuracy->n_in_gap <= result.accuracy->n_poses) return;
+  result.warnings.push_back("accuracy is of " + std::to_string(result.accuracy->n_poses) + " of " +
+                            std::to_string(result.accuracy->n_poses + result.accuracy->n_in_gap) +
+                            " poses alone: the others lie in gaps of the reference of more than "
+                            "evaluation.reference_max_gap_s");
+}
+
 }  // namespace viwo

@@ -24,7 +24,7 @@ struct TopParams {
   std::string twist;
   Trust status = Trust::kOk;
   std::vector<std::string> reasons;
-  std::vector<int> drive_signs;
+  std::vector<double> drive_signs;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(model), {.help = "type of the kinematic model; none: nothing of wheels"});
@@ -302,7 +302,7 @@ CalibrationFile read_calibration(const std::filesystem::path& path) {
   file.path = path;
   file.model = top.model;
   file.twist = top.twist;
-  file.drive_signs = top.drive_signs;
+  for (const double sign : top.drive_signs) file.drive_signs.push_back(sign < 0. ? -1 : 1);
   file.status = top.status;
   file.reasons = top.reasons;
   const Node* const model = root.find("model");

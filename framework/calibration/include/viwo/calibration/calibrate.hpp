@@ -101,6 +101,13 @@ struct WheelWander {
   std::vector<double> lag_s, covariance, weight;  ///< what it was fitted to (CAL-6)
 };
 
+/// A measurement by hand, and what the fit leaves of it.
+struct ByHand {
+  std::size_t recording = 0;  ///< of the setup
+  std::string label;          ///< "distance_m", "turn_deg"
+  double sigmas = 0.;         ///< by which the wheels miss it
+};
+
 /// What one fit found.
 struct CalibrationEstimate {
   Intrinsics x_WI;
@@ -113,8 +120,9 @@ struct CalibrationEstimate {
   std::vector<double> gyro_bias_rad_per_s, gyro_bias_sigma_rad_per_s;
   CalibrationNoise noise;  ///< found in the data (CAL-5)
   Segments segments = Segments::kWhole;
-  double segment_s = 0.;      ///< 0: whole recordings
-  int residuals = 0;          ///< of turns, positions and what was measured by hand
+  double segment_s = 0.;  ///< 0: whole recordings
+  int residuals = 0;      ///< of turns, positions and what was measured by hand
+  std::vector<ByHand> by_hand;
   int weighed_down = 0;       ///< segments that fit no normal noise (CAL-15)
   int unknowns = 0;           ///< that were estimated, those of the recordings with them
   int parity_directions = 0;  ///< about which the wheels alone tell more than the prior
@@ -165,6 +173,7 @@ struct CalibrationResult {
   const CalibrationSetup* setup = nullptr;
   JointSearch search;
   std::vector<CalibrationEstimate> lengths;  ///< with segments of several lengths, if one is chosen
+  std::vector<std::string> failed_lengths;   ///< those that could not be fitted, and why
   CalibrationEstimate all;        ///< from all recordings; its sigmas are not below any `spread`
   Intrinsics sigma_of_fit;        ///< those that the fit itself believes
   std::vector<LeftOut> left_out;  ///< of each of leave_out_by

@@ -21,4 +21,7 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
 /// Warnings of calibration that has gone where its prior does not reach.
 std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration);
 
+/// An accuracy that most of the estimate has no part in, because the reference has gaps there.
+void warn_of_gaps(RunResult& result);
+
 }  // namespace viwo
