@@ -38,9 +38,9 @@ struct CalibrationFile {
   using Entries = std::vector<CalibrationEntry>;
 
   Status status = Status::kOk;
-  std::vector<std::string> reasons;               ///< why it is not ok
-  std::string model;                              ///< type of the kinematic model; "": no wheels
-  std::string twist;                              ///< odometry.twist that the estimates belong to
+  std::vector<std::string> reasons;  ///< why it is not ok
+  std::string model;                 ///< type of the kinematic model; "": no wheels
+  std::string twist;                 ///< odometry.twist that the estimates belong to
   /// Of `drive_scale`, where they were searched: 1 or -1 for each drive. Empty: they were not.
   std::vector<int> drive_signs;
   std::map<std::string, std::string> wheel_sets;  ///< further ones: name, type of the model
