@@ -79,7 +79,8 @@ std::string wander_text(const WheelWander& wander) {
     return "whether the intrinsics wander cannot be told: only wheels that could contradict each "
            "other, for longer than a second, tell it";
   }
-  if (!(wander.sigma > 0.)) return "the wheels contradict each other as noise does: none wanders";
+  constexpr double kLeastWander = 0.01;  // nothing that anybody would notice
+  if (!(wander.sigma > kLeastWander)) return "the wheels contradict each other as noise does: none wanders";
   const std::string sigma = significant(wander.sigma, 2), time_s = significant(wander.time_s, 2);
   // Priors say how far wheels are from nominal at most: what comes and goes by more is none of it.
   constexpr double kMostWander = 3.;
