@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/stamp_filter.hpp"
@@ -26,6 +27,13 @@ constexpr const char* kTurnsLost =
     "reading of a steering whose turns have been lost count of (steer_turn)";
 constexpr const char* kSteeringUnknown =
     "reading that leaves open how fast wheels were steered (drive_per_steer)";
+
+/// No drive turns so fast: at the rim of a wheel of 5 cm it is 500 m/s, and motors before their
+/// gears reach some thousand rad/s. A reading beyond is none, whatever became of its bytes.
+constexpr double kFastest_rad_per_s = 1e4;
+/// Stamps may bunch: angles are not taken to be nearer to each other than this.
+constexpr double kLeastSpacing_s = 1e-3;
+constexpr const char* kTooFast = "drive faster than 1e4 rad/s";
 
 std::string channels_text(int n, const std::string& kind) {
   return std::to_string(n) + " " + kind + (n == 1 ? " channel" : " channels") + " of the log";
@@ -226,11 +234,18 @@ void JointMap::restart() {
     for (Joint& joint : *joints) joint.turns.restart();
   }
   for (TurnCounter& steering : steering_) steering.restart();
+  before_.reset();
 }
 
 const char* JointMap::convert(EncoderReading& reading) {
-  if (is_identity_) return nullptr;
   reading.is_start = false;
+  if (!is_identity_) {
+    if (const char* const why = to_model(reading)) return why;
+  }
+  return check_rates(reading);
+}
+
+const char* JointMap::to_model(EncoderReading& reading) {
   // All of them: who has been followed so far is not lost for what is wrong with another one.
   const char* const drive =
       to_rad(drives_, drive_members_, reading.t_ns, reading.drive, reading.is_start);
@@ -298,6 +313,27 @@ const char* JointMap::take_off_steering(EncoderReading& reading) {
         drive_per_steer_[j] * (drive_is_angle_ ? steering.total() : steering.rate());  // (J-4)
   }
   return why;
+}
+
+/// Of angles that jump nobody knows which are right: where they go on they start anew.
+const char* JointMap::check_rates(EncoderReading& reading) {
+  std::array<double, kMaxDrives> moved = reading.drive;
+  double during_s = 1.;
+  if (drive_is_angle_) {
+    reading.is_start = std::exchange(was_too_fast_, false) || reading.is_start;
+    const auto before = std::exchange(before_, reading);
+    if (!before || reading.is_start) return nullptr;
+    const double dt_s = seconds_between(before->t_ns, reading.t_ns);
+    if (dt_s > max_gap_s_) return nullptr;
+    during_s = std::max(dt_s, kLeastSpacing_s);
+    for (std::size_t i = 0; i < moved.size(); ++i) moved[i] -= before->drive[i];
+  }
+  for (const double way : moved) {
+    if (std::abs(way) <= kFastest_rad_per_s * during_s) continue;
+    was_too_fast_ = true;
+    return kTooFast;
+  }
+  return nullptr;
 }
 
 void mount_joints(const JointParams& params, std::vector<EncoderSample>& samples,

@@ -49,7 +49,7 @@ double wrapped(double value, double turn) { return value - turn * std::floor(val
 
 TEST(Joints, LeaveEveryBitWhereNothingIsSaid) {
   JointMap map({}, 8, 8, false, 0.2);
-  EncoderReading reading = reading_of(1., {-0., 0.1, 5e-324, -3., 1e300, 7., 1e-9, 2.},
+  EncoderReading reading = reading_of(1., {-0., 0.1, 5e-324, -3., 9e3, 7., 1e-9, 2.},
                                       {-0., 4., -9., 1e-17, 0.3, 0.7, 2.2, 1.1});
   const EncoderReading before = reading;
   EXPECT_EQ(map.convert(reading), nullptr);
@@ -374,6 +374,47 @@ TEST(Joints, ThatScaleAReadingBeyondAllNumbersAreRejected) {
   JointMap map(params, 1, 0, false, 0.2);
   EncoderReading reading = reading_of(0., {1e300});
   EXPECT_STREQ(map.convert(reading), "value that is not finite");
+}
+
+TEST(Joints, ThatTurnFasterThanAnyDriveAreRejected) {
+  for (const double scale : {1., -2.}) {  // 1 leaves the lists out
+    JointParams params;
+    if (scale != 1.) params.drive_scale = {1., scale};
+    JointMap map(params, 2, 0, false, 0.2);
+    for (const double rate : {1e100, -2e4, 1.001e4}) {
+      EncoderReading reading = reading_of(0., {0., rate});
+      EXPECT_STREQ(map.convert(reading), "drive faster than 1e4 rad/s") << scale << " " << rate;
+    }
+    converted(map, reading_of(1., {9999., 4999.}));
+  }
+}
+
+TEST(Joints, WhoseAnglesJumpAreRejectedAndStartAnewAfterIt) {
+  JointMap map({}, 1, 0, true, 0.2);
+  std::vector<EncoderReading> used;
+  int rejected = 0;
+  for (int k = 0; k < 40; ++k) {
+    // One reading is broken, and the counter is set back.
+    const double angle = k == 10 ? 1e100 : k < 20 ? 5e4 + 0.2 * k : 0.2 * k;
+    EncoderReading reading = reading_of(0.02 * k, {angle});
+    const char* const why = map.convert(reading);
+    if (why == nullptr) {
+      used.push_back(reading);
+      continue;
+    }
+    EXPECT_STREQ(why, "drive faster than 1e4 rad/s");
+    ++rejected;
+  }
+  EXPECT_EQ(rejected, 2);
+  const auto cells = samples_from(used, true, 0.2, 1);
+  EXPECT_EQ(cells.size(), 35U);
+  for (const EncoderSample& cell : cells) EXPECT_NEAR(cell.drive_rad_per_s[0], 10., 1e-6);
+}
+
+TEST(Joints, MayHaveAnglesWhoseStampsBunch) {
+  JointMap map({}, 1, 0, true, 0.2);
+  converted(map, reading_of(0., {0.}));
+  EXPECT_FALSE(converted(map, reading_of(1e-6, {0.2})).is_start);
 }
 
 TEST(Joints, AllocateNothing) {

@@ -63,7 +63,8 @@ class JointMap {
            double max_gap_s);
 
   /// Makes a reading of the log, whose values are finite and whose stamp is after those before, one
-  /// of the model. nullptr, or why it cannot be used. Allocates nothing.
+  /// of the model. nullptr, or why it cannot be used: also where a drive turns faster than any
+  /// does. Allocates nothing.
   const char* convert(EncoderReading& reading);
   /// Forgets what came before, as behind a gap.
   void restart();
@@ -81,7 +82,9 @@ class JointMap {
   const char* to_rad(std::vector<Joint>& joints, const std::vector<double>& members,
                      std::int64_t t_ns, std::array<double, kSize>& values, bool& is_start) const;
   const char* count(Joint& joint, std::int64_t t_ns, double& value, bool& is_start) const;
+  const char* to_model(EncoderReading& reading);
   const char* take_off_steering(EncoderReading& reading);
+  const char* check_rates(EncoderReading& reading);
 
   bool is_identity_, drive_is_angle_;
   double max_gap_s_;
@@ -89,6 +92,8 @@ class JointMap {
   std::vector<double> drive_members_, steer_members_;  ///< channels of the log in each of the model
   std::vector<double> drive_per_steer_;
   std::array<TurnCounter, kMaxSteers> steering_;  ///< of the model, for drive_per_steer
+  std::optional<EncoderReading> before_;          ///< angles, whether or not they could be used
+  bool was_too_fast_ = false;                     ///< from those before to them
 };
 
 /// Samples of rates that become what a log has whose joints are mounted so: the way out of a
