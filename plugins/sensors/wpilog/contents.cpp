@@ -11,6 +11,8 @@ namespace {
 
 constexpr std::size_t kMostEntries = 65536;
 constexpr std::size_t kLongestName = 1024;
+/// Of all that is named: an hour of four modules at 250 Hz has 200 MB.
+constexpr std::size_t kMostKept = std::size_t{512} << 20;
 constexpr std::string_view kSchema = ".schema/struct:";
 
 enum Control : char { kStart = 0, kFinish = 1, kSetMetadata = 2 };
@@ -46,6 +48,21 @@ Contents::Contents(const std::filesystem::path& file, const std::vector<std::str
   rejections_.add(file_.fault(), [this] { return where(file_.offset()); });
 }
 
+std::string Contents::damage() const {
+  const auto& counts = rejections_.counts();
+  if (counts.empty()) return {};
+  return "; the log is damaged: " + counts.back().reason + " (first at " + counts.back().first +
+         ")";
+}
+
+void Contents::keep(std::size_t bytes, const Record& record) {
+  kept_ += bytes;
+  if (kept_ <= kMostKept) return;
+  throw InputError(file() + "  has more than " + std::to_string(kMostKept >> 20) +
+                   " MiB of records of the entries that are named, up to byte " +
+                   std::to_string(record.offset) + ": too much for a log of a robot");
+}
+
 void Contents::reject(const char* reason, const Record& record) {
   rejections_.add(reason, [&] { return where(record.offset); });
 }
@@ -58,11 +75,13 @@ void Contents::take(const Record& record, const std::vector<std::string>& wanted
   const bool is_schema =
       entry.type == "structschema" && entry.name.find(kSchema) != entry.name.npos;
   if (!is_schema && !is_wanted(entry.name, wanted)) return;
-  if (record.size > kMaxPayload) return reject("record of more than 1 MiB", record);
+  keep(record.payload.size() + sizeof(Datum), record);
   if (is_schema) {
-    const std::size_t at = entry.name.find(kSchema) + kSchema.size();
-    return schemas_.add(entry.name.substr(at), record.payload);
+    const std::string of = entry.name.substr(entry.name.find(kSchema) + kSchema.size());
+    if (record.size > kMaxPayload) return schemas_.add_too_long(of);
+    return schemas_.add(of, record.payload);
   }
+  if (record.size > kMaxPayload) return reject("record of more than 1 MiB", record);
   entry.data.push_back({record.t_us, record.offset, entry.bytes.size(), record.size});
   entry.bytes += record.payload;
 }
@@ -74,10 +93,10 @@ void Contents::take_control(const Record& record) {
     const auto id = static_cast<std::uint32_t>(little_endian(&payload[1], 4));
     switch (payload[0]) {
       case kStart:
-        can_be_read = start(payload);
+        can_be_read = start(record);
         break;
       case kFinish:
-        can_be_read = by_id_.erase(id) > 0;
+        can_be_read = finish(id, record);
         break;
       case kSetMetadata:
         break;  // of no use here
@@ -88,7 +107,20 @@ void Contents::take_control(const Record& record) {
   if (!can_be_read) reject("control record that cannot be read", record);
 }
 
-bool Contents::start(std::string_view payload) {
+/// What was written last holds no longer.
+bool Contents::finish(std::uint32_t id, const Record& record) {
+  const auto known = by_id_.find(id);
+  if (known == by_id_.end()) return false;
+  Entry& entry = entries_[known->second];
+  by_id_.erase(known);
+  if (entry.data.empty()) return true;
+  keep(sizeof(Datum), record);
+  entry.data.push_back({std::max(record.t_us, entry.data.back().t_us), record.offset, 0, 0, true});
+  return true;
+}
+
+bool Contents::start(const Record& record) {
+  std::string_view payload = record.payload;
   const auto id = static_cast<std::uint32_t>(little_endian(&payload[1], 4));
   payload.remove_prefix(5);
   const auto name = take_text(payload);
@@ -100,7 +132,16 @@ bool Contents::start(std::string_view payload) {
     if (entries_.size() == kMostEntries) {
       throw InputError(file() + "  has more than " + std::to_string(kMostEntries) + " entries");
     }
+    keep(sizeof(Entry) + name->size() + type->size(), record);
     entries_.push_back({std::string(*name), std::string(*type), 0, {}, {}});
+  }
+  const auto before = by_id_.find(id);
+  if (before != by_id_.end() && before->second != known->second) {
+    const std::string old = entries_[before->second].name;
+    rejections_.add("entry started by the number of another one, which was not finished", [&] {
+      return where(record.offset) + ", " + log::quoted(*name) + " in place of " + log::quoted(old);
+    });
+    finish(id, record);
   }
   by_id_[id] = known->second;
   return true;

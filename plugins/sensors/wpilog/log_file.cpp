@@ -67,8 +67,12 @@ void LogFile::read_header() {
                    std::to_string(head[6]) + ": what is read is version 1");
 }
 
+/// Whether gzip data are corrupt may show at their end only.
 bool LogFile::stop(const char* fault) {
   fault_ = fault;
+  payload_.resize(kMaxPayload);
+  while (take(payload_.data(), payload_.size()) > 0) {
+  }
   return false;
 }
 

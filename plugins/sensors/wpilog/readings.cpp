@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
+#include <utility>
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
@@ -10,6 +12,9 @@ namespace viwo::wpilog {
 namespace {
 
 constexpr std::int64_t kMaxStamp_us = 4'000'000'000'000'000;
+/// Records of one entry may be out of order, but by less than this.
+constexpr std::int64_t kFarBack_us = 1'000'000;
+constexpr const char* kWentBack = "stamp a second or more before one of the same entry";
 
 /// When, and at which byte of the file.
 struct Instant {
@@ -31,7 +36,10 @@ class Track {
     for (const Datum& datum : entry_.data) {
       const auto where = [&] { return contents.where(datum.offset); };
       const std::size_t begin = numbers_.size();
-      if (!has_stamp(datum)) {
+      if (datum.is_end) {
+        if (width_ > 0 && has_stamp(datum))
+          events_.push_back({{datum.t_us, datum.offset}, begin - width_, true});
+      } else if (!has_stamp(datum)) {
         order.reject("stamp that is none", where);
       } else if (!source.pick.decode(entry_.payload(datum), numbers_)) {
         order.reject("record that does not fit its type", where);
@@ -42,7 +50,7 @@ class Track {
         order.reject("record of another number of values than the first", where);
       } else {
         width_ = numbers_.size() - begin;
-        events_.push_back({{datum.t_us, datum.offset}, begin});
+        add({{datum.t_us, datum.offset}, begin}, order);
       }
     }
     // The file need not be in the order of time.
@@ -54,7 +62,9 @@ class Track {
   std::size_t width() const { return width_; }
 
   void append_instants(std::vector<Instant>& out) const {
-    for (const Event& event : events_) out.push_back(event.instant);
+    for (const Event& event : events_) {
+      if (!event.is_end) out.push_back(event.instant);
+    }
   }
 
   /// Two values within a cycle are of two things.
@@ -62,7 +72,7 @@ class Track {
     std::int64_t count = 0, first = 0;
     for (std::size_t i = 1; i < events_.size(); ++i) {
       const Event &a = events_[i - 1], &b = events_[i];
-      if (b.instant.t_us - a.instant.t_us > options.spread_us || same(a, b)) continue;
+      if (b.instant.t_us - a.instant.t_us > options.spread_us || same(a, b) || a.is_end) continue;
       if (count++ == 0) first = b.instant.offset;
       order.leave_out("'" + entry_.name + "': two values within a cycle, the first not used",
                       [&] { return contents_.where(b.instant.offset); });
@@ -79,10 +89,12 @@ class Track {
                      "if its cycle is shorter, so must cycle_spread_s be");
   }
 
-  /// Goes to the last value that is no later; false before the first.
-  bool advance(std::int64_t t_us) {
-    while (next_ < events_.size() && events_[next_].instant.t_us <= t_us) ++next_;
-    return next_ > 0;
+  /// Goes to the last value of the cycle at `t_us` or before. nullptr, or why there is none.
+  const char* advance(std::int64_t t_us, std::int64_t spread_us) {
+    while (next_ < events_.size() && events_[next_].instant.t_us <= t_us + spread_us) ++next_;
+    if (next_ == 0) return "cycle before the first value of each entry";
+    const Event& last = events_[next_ - 1];
+    return last.is_end && last.instant.t_us < t_us ? "cycle after the end of an entry" : nullptr;
   }
   std::span<const double> numbers() const { return numbers(events_[next_ - 1]); }
 
@@ -90,7 +102,32 @@ class Track {
   struct Event {
     Instant instant;
     std::size_t begin = 0;  ///< of its numbers
+    bool is_end = false;    ///< they hold up to here
   };
+
+  /// In the order of the file. Of two stamps that contradict each other the one is wrong that
+  /// stands alone.
+  void add(const Event& event, StampOrder& order) {
+    const auto reject = [&](const Event& one) {
+      order.reject(kWentBack, [&] { return contents_.where(one.instant.offset); });
+    };
+    const std::int64_t t_us = event.instant.t_us;
+    const bool is_back = latest_us_ && t_us <= *latest_us_ - (is_behind_ ? 0 : kFarBack_us);
+    if (is_back && !is_behind_ && events_.back().instant.t_us == *latest_us_ &&
+        !events_.back().is_end && (!before_us_ || t_us > *before_us_ - kFarBack_us)) {
+      reject(events_.back());
+      events_.pop_back();
+      latest_us_ = before_us_;
+    } else if (is_back) {
+      is_behind_ = true;
+      numbers_.resize(event.begin);
+      return reject(event);
+    }
+    is_behind_ = false;
+    events_.push_back(event);
+    if (latest_us_ && t_us <= *latest_us_) return;
+    before_us_ = std::exchange(latest_us_, t_us);
+  }
 
   std::span<const double> numbers(const Event& event) const {
     return std::span(numbers_).subspan(event.begin, width_);
@@ -105,6 +142,8 @@ class Track {
   std::vector<Event> events_;
   std::vector<double> numbers_;
   std::size_t width_ = 0;
+  std::optional<std::int64_t> latest_us_, before_us_;  ///< the last stamps, each after all others
+  bool is_behind_ = false;                             ///< until stamps are after the last again
   std::size_t next_ = 0;
 };
 
@@ -138,19 +177,19 @@ void for_each_reading(const Contents& contents, const std::vector<Source>& sourc
   for (const Instant& cycle : cycles_of(tracks, options)) {
     const auto where = [&] { return contents.where(cycle.offset); };
     numbers.clear();
-    bool is_whole = true;
+    const char* missing = nullptr;
     for (Track& track : tracks) {
-      if (!track.advance(cycle.t_us + options.spread_us)) {
-        is_whole = false;
+      if (const char* const why = track.advance(cycle.t_us, options.spread_us)) {
+        missing = why;
         continue;
       }
       const auto more = track.numbers();
       numbers.insert(numbers.end(), more.begin(), more.end());
     }
-    if (is_whole) {
+    if (missing == nullptr) {
       visit(1000 * cycle.t_us, numbers, where);
     } else {
-      order.leave_out("cycle before the first value of each entry", where);
+      order.leave_out(missing, where);
     }
   }
 }

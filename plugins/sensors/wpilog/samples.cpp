@@ -16,16 +16,6 @@
 namespace viwo::wpilog {
 namespace {
 
-/// " - did you mean ...", not too long.
-std::string suggestion(const std::string& name, const std::vector<std::string>& names) {
-  constexpr std::size_t kLongest = 2000;
-  if (names.empty()) return " - the log has none that fits";
-  std::string text = log::did_you_mean(name, names);
-  if (text.size() <= kLongest) return text;
-  return text.substr(0, text.rfind(", ", kLongest)) + ", ... (" + std::to_string(names.size()) +
-         " in all)";
-}
-
 /// Finds what the parameter `key` names; `pick` says of an entry, and of a path within it, which
 /// numbers it has.
 template <class PickOf>
@@ -52,21 +42,24 @@ class Finder {
       if (auto found = pick_(*entry, path)) return {entry, std::move(*found)};
     } catch (const InputError& error) {
       throw ParamError(key_, "the entry '" + entry->name + "' in " + contents_.file() +
-                                 " cannot be read: " + error.what());
+                                 " cannot be read: " + error.what() + contents_.damage());
     }
     fail("'" + name + "' in " + contents_.file() + " is no " + what_ + ", but of type " +
-             log::quoted(entry->type) + (path.empty() ? "" : " without " + log::quoted(path)),
+             log::quoted(entry->type) +
+             (path.empty() ? "" : std::string(" without a ") + what_ + " " + log::quoted(path)),
          name);
   }
 
  private:
   [[noreturn]] void fail(const std::string& text, const std::string& name) const {
-    constexpr std::size_t kMost = 2000;
+    constexpr std::size_t kMost = 10'000;
     std::vector<std::string> fitting;
     for (const Entry& entry : contents_.entries()) {
       if (entry.records > 0 && fits(entry) && fitting.size() < kMost) fitting.push_back(entry.name);
     }
-    throw ParamError(key_, text + suggestion(name, fitting));
+    throw ParamError(key_, text + contents_.damage() +
+                               (fitting.empty() ? " - the log has none that fits"
+                                                : log::did_you_mean(name, fitting)));
   }
   bool fits(const Entry& entry) const {
     try {
@@ -150,7 +143,10 @@ const Entry* cycle_entry(const Contents& contents, const std::string& name) {
 template <class Sample>
 log::Recording<Sample> finish(const Contents& contents, const StampOrder& order,
                               std::vector<Sample> samples) {
-  if (order.empty()) throw InputError(contents.file() + "  has no time at which all entries are");
+  if (order.empty()) {
+    throw InputError(contents.file() + "  has no time at which all entries are" +
+                     contents.damage());
+  }
   order.require_enough(contents.file(), "readings");
   return {std::move(samples), order.counts()};
 }
@@ -164,6 +160,7 @@ log::EncoderRecording read_wheels(const Contents& contents, const Params& params
   params.check_stride(wheels.is_angle, "angle");
   const double drive_factor = params.drive_factor(wheels.is_angle);
   const double steer_factor = params.steer_factor();
+  params.check_turns(wheels.is_angle, params.drive_turn, params.steer_turn);
   StampOrder order(params.limits());
   std::vector<log::EncoderReading> readings;
   std::optional<log::JointMap> joints;
@@ -260,6 +257,19 @@ std::size_t usual_size(const Entry& entry) {
   return some == entry.data.end() ? 0 : some->size;
 }
 
+std::optional<Pick> pick_robot_pose(const Entry& entry, const Schemas& schemas) {
+  const std::size_t size = usual_size(entry);
+  auto pick = pick_pose(entry.type, size, schemas);
+  const std::size_t number = entry.type == "double[]" ? 8 : entry.type == "float[]" ? 4 : 0;
+  if (pick || number == 0 || size < 6 * number) return pick;
+  const std::string name = "\"" + entry.name + "/";
+  throw InputError("it has " + std::to_string(size / number) +
+                   " numbers, a pose has 3 (x, y, yaw) or 7 (x, y, z, qw, qx, qy, qz). Where they "
+                   "are x, y, z, roll, pitch, yaw in degrees, as a Limelight writes them, give "
+                   "pose_entries: [" +
+                   name + "0\", " + name + "1\", " + name + "5\"] and yaw_unit: deg");
+}
+
 log::PoseRecording read_poses(const Contents& contents, const Params& params) {
   std::vector<Source> sources;
   if (params.pose_entries.size() == 3) {
@@ -268,7 +278,7 @@ log::PoseRecording read_poses(const Contents& contents, const Params& params) {
     const Finder find(contents, "pose_entries", "pose",
                       [&](const Entry& entry, std::string_view path) -> std::optional<Pick> {
                         if (!path.empty()) return std::nullopt;
-                        return pick_pose(entry.type, usual_size(entry), contents.schemas());
+                        return pick_robot_pose(entry, contents.schemas());
                       });
     auto [entry, pick] = find(params.pose_entries[0]);
     sources.push_back({entry, std::move(pick)});

@@ -104,7 +104,7 @@ class LayoutBuilder {
     member.number = {type.type, layout_.size, type.size, 0, 0};
     if (declaration.bits) {
       place_bits(declaration, type, *declaration.bits, member.number);
-      layout_.members.push_back(std::move(member));
+      push(declaration, std::move(member));
     } else {
       add(declaration, std::move(member), type.size);
     }
@@ -134,8 +134,16 @@ class LayoutBuilder {
     member.count = declaration.count.value_or(1);
     member.is_array = declaration.count.has_value();
     grow(declaration, size * member.count);  // both at most kMaxPayload
-    layout_.members.push_back(std::move(member));
+    push(declaration, std::move(member));
     unit_size_ = 0;
+  }
+
+  void push(const Declaration& declaration, Member member) {
+    const auto same = [&](const Member& other) { return other.name == member.name; };
+    if (std::any_of(layout_.members.begin(), layout_.members.end(), same)) {
+      refuse(declaration.whole, "a member of that name is there already");
+    }
+    layout_.members.push_back(std::move(member));
   }
 
   void place_bits(const Declaration& declaration, const TypeName& type, std::size_t bits,
@@ -191,6 +199,10 @@ void Schemas::add(const std::string& name, std::string_view text) {
   if (known->second.text != text) known->second.state = Schema::State::kTwice;
 }
 
+void Schemas::add_too_long(const std::string& name) {
+  schemas_[name].state = Schema::State::kTooLong;
+}
+
 Layout Schemas::read(const std::string& text) const {
   LayoutBuilder builder;
   for (std::string_view rest = text; !rest.empty();) {
@@ -219,6 +231,9 @@ const Layout& Schemas::layout(const std::string& name) const {
   const auto found = schemas_.find(name);
   if (found == schemas_.end()) fail("the log has no schema of it");
   Schema& schema = found->second;
+  if (schema.state == State::kTooLong) {
+    fail("its schema has more than 1 MiB and was passed over");
+  }
   if (schema.state == State::kTwice) fail("the log has two schemas of it");
   if (schema.state == State::kBeingRead) fail("it contains itself");
   if (schema.state == State::kNew) {
@@ -255,13 +270,18 @@ std::optional<Field> Schemas::find(const std::string& name, std::string_view pat
       offset += static_cast<std::size_t>(*index) * member->stride;
       path.remove_prefix(std::min(end + 1, path.size()));
     }
-    if (member->struct_name.empty() != path.empty()) return std::nullopt;
-    if (path.empty()) {
+    if (member->struct_name.empty()) {
+      if (!path.empty()) return std::nullopt;
       Field field = member->number;
       field.offset += offset;
       return field;
     }
     offset += member->number.offset;
+    if (path.empty()) {
+      auto field = only_number(member->struct_name);
+      if (field) field->offset += offset;
+      return field;
+    }
     inner = &layout(member->struct_name);
   }
 }

@@ -45,13 +45,15 @@ struct Layout {
 class Schemas {
  public:
   void add(const std::string& name, std::string_view text);
+  /// A schema that was passed over.
+  void add_too_long(const std::string& name);
 
   /// InputError "struct 'X': what" for a schema that is not there, is wrong, contains itself, or is
   /// there in two versions.
   const Layout& layout(const std::string& name) const;
 
-  /// The number at a path of members and indices, "angle/value" or "modules/2/speed"; nothing when
-  /// there is none. InputError as layout().
+  /// The number at a path of members and indices, "angle/value" or "modules/2/speed", or that of a
+  /// struct there that has no other ("angle"); nothing when there is none. InputError as layout().
   std::optional<Field> find(const std::string& name, std::string_view path) const;
   /// The number of a struct that has one member, which is a number or such a struct.
   std::optional<Field> only_number(const std::string& name) const;
@@ -59,7 +61,13 @@ class Schemas {
  private:
   struct Schema {
     std::string text;
-    enum class State : std::uint8_t { kNew, kBeingRead, kRead, kTwice } state = State::kNew;
+    enum class State : std::uint8_t {
+      kNew,
+      kBeingRead,
+      kRead,
+      kTwice,
+      kTooLong
+    } state = State::kNew;
     Layout layout;
     std::string error;  ///< of a schema that was read; empty: none
   };

@@ -49,7 +49,7 @@ TEST_F(WpiLog, AGzippedLogThatIsCutIsReadUpToThereAndACorruptOneIsNot) {
   std::mt19937_64 random(3);
   Writer out;
   for (int k = 0; k < 5000; ++k) {
-    out.add("/d", "double", 20 * k * kMs, number(1e-15 * static_cast<double>(random())));
+    out.add("/d", "double", 20 * k * kMs, number(1e-16 * static_cast<double>(random())));
   }
   const std::string file = gzipped(out.bytes);
   std::ifstream in(file, std::ios::binary);
@@ -145,8 +145,9 @@ TEST_F(WpiLog, AnEntryThatIsNotThereIsAnsweredWithThoseThatFit) {
               HasSubstr("the entry '/empty' in " + file + " has no records"));
   EXPECT_THAT(error("drive_entries: [/Drive/Mode], drive_unit: rad"),
               HasSubstr("'/Drive/Mode' in " + file + " is no number, but of type 'string'"));
-  EXPECT_THAT(error("drive_entries: [/Pose/translation/q], drive_unit: rad"),
-              HasSubstr("is no number, but of type 'struct:Pose2d' without 'translation/q'"));
+  EXPECT_THAT(
+      error("drive_entries: [/Pose/translation/q], drive_unit: rad"),
+      HasSubstr("is no number, but of type 'struct:Pose2d' without a number 'translation/q'"));
   EXPECT_THAT(error("drive_entries: [/odd], drive_unit: rad"),
               HasSubstr("the entry '/odd' in " + file +
                         " cannot be read: struct 'Unknown': the log has no schema of it"));
