@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "viwo/api/status.hpp"
+#include "viwo/log/text.hpp"
 
 namespace viwo::log {
 namespace {
@@ -18,6 +19,19 @@ constexpr std::initializer_list<std::pair<const char*, AngleUnit>> kAngleUnits =
 double radians_in_count(const char* key, double counts_per_turn) {
   if (counts_per_turn > 0.) return radians_in(AngleUnit::kTurn) / counts_per_turn;
   throw ParamError(key, std::string("counts need ") + key);
+}
+
+/// ParamError for numbers that are whole turns in the unit of the log, and none in radians.
+void check_in_radians(const char* key, const char* unit_key, const std::vector<double>& turns,
+                      double factor) {
+  const auto is_whole_turn = [](double rad) {
+    return std::abs(std::remainder(rad, radians_in(AngleUnit::kTurn))) < 1e-3;
+  };
+  for (const double turn : turns) {
+    if (turn == 0. || is_whole_turn(turn) || !is_whole_turn(factor * turn)) continue;
+    throw ParamError(key, number_text(turn) + " is in the unit of the log: here it is in rad, as " +
+                              unit_key + " makes the readings: " + number_text(factor * turn));
+  }
 }
 
 }  // namespace
@@ -62,6 +76,12 @@ void EncoderUnitParams::bind(ParamBinder& b) {
 }
 
 double EncoderUnitParams::drive_factor(bool is_angle) const {
+  if (wheel_radius_m > 0. && drive_unit != DriveUnit::kMetre) {
+    throw ParamError("wheel_radius_m", "needs drive_unit: m");
+  }
+  if (drive_counts_per_turn > 0. && drive_unit != DriveUnit::kCount) {
+    throw ParamError("drive_counts_per_turn", "needs drive_unit: count");
+  }
   switch (drive_unit) {
     case DriveUnit::kRadian:
       return 1.;
@@ -83,6 +103,9 @@ double EncoderUnitParams::drive_factor(bool is_angle) const {
 }
 
 double EncoderUnitParams::steer_factor() const {
+  if (steer_counts_per_turn > 0. && steer_unit != SteerUnit::kCount) {
+    throw ParamError("steer_counts_per_turn", "needs steer_unit: count");
+  }
   switch (steer_unit) {
     case SteerUnit::kRadian:
       return 1.;
@@ -94,6 +117,12 @@ double EncoderUnitParams::steer_factor() const {
       return radians_in_count("steer_counts_per_turn", steer_counts_per_turn);
   }
   return 1.;
+}
+
+void EncoderUnitParams::check_turns(bool is_angle, const std::vector<double>& drive_turn,
+                                    const std::vector<double>& steer_turn) const {
+  check_in_radians("drive_turn", "drive_unit", drive_turn, drive_factor(is_angle));
+  check_in_radians("steer_turn", "steer_unit", steer_turn, steer_factor());
 }
 
 void ImuUnitParams::bind(ParamBinder& b) {

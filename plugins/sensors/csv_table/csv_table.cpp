@@ -1,4 +1,5 @@
 // Sensor csv_table: wheels, IMU and poses from the columns of any table (model.md).
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -10,6 +11,7 @@
 #include "csv_table_params.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
+#include "viwo/log/text.hpp"
 
 namespace viwo {
 namespace {
@@ -20,18 +22,20 @@ using csv_table::Params;
 class Table {
  public:
   explicit Table(const Params& params)
-      : reader_(params.path, params.layout()), unit_(params.time_unit) {
+      : reader_(params.path, params.layout()), unit_(params.time_unit), has_header_(params.header) {
     time_ = column("time_column", params.time_column);
   }
 
-  std::size_t column(const char* key, const std::string& name) const {
+  /// ParamError for a column that is not there.
+  std::size_t column(const char* key, const std::string& name) {
     try {
-      return reader_.column(name);
+      named_.push_back({key, name, reader_.column(name)});
     } catch (const InputError& error) {
       throw ParamError(key, error.what());
     }
+    return named_.back().column;
   }
-  std::vector<std::size_t> columns(const char* key, const std::vector<std::string>& names) const {
+  std::vector<std::size_t> columns(const char* key, const std::vector<std::string>& names) {
     std::vector<std::size_t> out;
     for (const std::string& name : names) out.push_back(column(key, name));
     return out;
@@ -40,6 +44,7 @@ class Table {
   /// Calls `row` with the stamp of each row that has something in `columns`, if only in one.
   template <class Collector, class Row>
   void read(const std::vector<std::size_t>& columns, Collector& collector, Row&& row) {
+    check();
     reader_.for_each_row(
         [&] {
           for (const std::size_t i : columns) {
@@ -54,10 +59,36 @@ class Table {
 
  private:
   using BadRow = log::BadRow;
+  struct Named {
+    const char* key;
+    std::string name;
+    std::size_t column;
+  };
+
+  /// ParamError for a first row that is taken for a header, and for a column that is two things.
+  void check() const {
+    const auto has_number = [this](const Named& one) {
+      return log::parse_number(reader_.columns()[one.column]).has_value();
+    };
+    if (has_header_ && std::all_of(named_.begin(), named_.end(), has_number)) {
+      throw ParamError("header",
+                       "the first line has numbers in all columns that are read: header: false "
+                       "reads it as a row (with skip_lines, where these numbers are names)");
+    }
+    for (auto one = named_.begin(); one != named_.end(); ++one) {
+      const auto same = [&](const Named& other) { return other.column == one->column; };
+      const auto before = std::find_if(named_.begin(), one, same);
+      if (before == one) continue;
+      throw ParamError(one->key, "'" + one->name + "' is the column '" + before->name +
+                                     "', which is given already");
+    }
+  }
 
   log::TableReader reader_;
   log::TimeUnit unit_;
+  bool has_header_;
   std::size_t time_ = 0;
+  std::vector<Named> named_;  ///< by the parameters
 };
 
 log::EncoderRecording read_wheels(const Params& params) {
@@ -66,6 +97,7 @@ log::EncoderRecording read_wheels(const Params& params) {
   const auto steers = table.columns("steer_columns", params.steer_columns);
   const double drive_factor = params.drive_factor(params.is_angle());
   const double steer_factor = params.steer_factor();
+  params.check_turns(params.is_angle(), params.drive_turn, params.steer_turn);
   log::EncoderCollector collector(
       {params.limits(), params.is_angle(), params.stride, params.joints()}, drives.size(),
       steers.size());

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 #include <zlib.h>
 
 #include "support.hpp"
@@ -214,6 +215,64 @@ TEST_F(CsvTable, SaysWhatIsWrongWithItsParameters) {
               HasSubstr("9 names, at most 8 are possible"));
   EXPECT_THAT(error(time + "drive_columns: [d, d]"),
               HasSubstr("sensor.drive_columns: 'd' is there twice"));
+}
+
+TEST_F(CsvTable, RefusesParametersThatOthersLeaveWithoutUse) {
+  const auto error = [&](const std::string& rest) {
+    return error_of(table("t,d,s\n0,1,2\n0.1,1,2\n",
+                          "time_column: t, time_unit: s, drive_columns: [d], " + rest));
+  };
+  EXPECT_THAT(error("wheel_radius_m: 0.05"),
+              HasSubstr("sensor.wheel_radius_m: needs drive_unit: m"));
+  EXPECT_THAT(error("drive_counts_per_turn: 4096"),
+              HasSubstr("sensor.drive_counts_per_turn: needs drive_unit: count"));
+  EXPECT_THAT(error("steer_columns: [s], steer_counts_per_turn: 4096"),
+              HasSubstr("sensor.steer_counts_per_turn: needs steer_unit: count"));
+}
+
+TEST_F(CsvTable, TurnsOfJointsAreInRadiansAndSaySo) {
+  const auto error = [&](const std::string& rest) {
+    return error_of(
+        table("t,d,s\n0,1,2\n0.1,1,2\n",
+              "time_column: t, time_unit: s, drive_columns: [d], drive_input: angle, " + rest));
+  };
+  EXPECT_THAT(error("drive_unit: deg, drive_turn: [360]"),
+              HasSubstr("sensor.drive_turn: 360 is in the unit of the log: here it is in rad, as "
+                        "drive_unit makes the readings: 6.28318530717958"));
+  EXPECT_THAT(error("drive_unit: count, drive_counts_per_turn: 4096, drive_turn: [65536]"),
+              HasSubstr("65536 is in the unit of the log"));
+  EXPECT_THAT(error("steer_columns: [s], steer_unit: turn, steer_turn: [1]"),
+              HasSubstr("sensor.steer_turn: 1 is in the unit of the log"));
+  EXPECT_THAT(error("drive_unit: deg, drive_turn: [6.2831853]"), IsEmpty());
+}
+
+TEST_F(CsvTable, AColumnIsOneThingHoweverItIsNamed) {
+  const auto error = [&](const std::string& rest) {
+    return error_of(table("t,d,s\n0,1,2\n0.1,1,2\n", "time_column: t, time_unit: s, " + rest));
+  };
+  EXPECT_THAT(error("drive_columns: [d, \"2\"]"),
+              HasSubstr("sensor.drive_columns: '2' is the column 'd', which is given already"));
+  EXPECT_THAT(error("drive_columns: [d], steer_columns: [\"1\"]"),
+              HasSubstr("sensor.steer_columns: '1' is the column 't', which is given already"));
+}
+
+TEST_F(CsvTable, AFirstRowOfNumbersIsNoHeader) {
+  const std::string rest = "time_column: 1, time_unit: s, drive_columns: [2]";
+  EXPECT_THAT(error_of(table("0,1,x\n0.1,2,x\n", rest)),
+              HasSubstr("sensor.header: the first line has numbers in all columns that are read: "
+                        "header: false reads it as a row"));
+  EXPECT_EQ(play_only<EncoderSample>(table("0,1,x\n0.1,2,x\n", rest + ", header: false")).size(),
+            2U);
+}
+
+TEST_F(CsvTable, WhatIsNoFileIsRefused) {
+  const std::string pipe = (folder_ / "pipe").string();
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::string rest = ", time_column: t, time_unit: s, drive_columns: [d]}";
+  EXPECT_THAT(error_of("{type: csv_table, path: " + pipe + rest),
+              HasSubstr("pipe  is a pipe, not a file"));
+  EXPECT_THAT(error_of("{type: csv_table, path: /dev/zero" + rest),
+              HasSubstr("/dev/zero  is a device, not a file"));
 }
 
 TEST_F(CsvTable, SaysWhatIsWrongWithTheTable) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "viwo/api/params.hpp"
 
@@ -27,6 +28,10 @@ struct EncoderUnitParams {
   /// cannot have, for metres without a radius, and for counts without those of a turn.
   double drive_factor(bool is_angle) const;
   double steer_factor() const;
+  /// ParamError for turns of joints (JointParams) that are in the unit of the log: they see
+  /// radians.
+  void check_turns(bool is_angle, const std::vector<double>& drive_turn,
+                   const std::vector<double>& steer_turn) const;
 };
 
 struct ImuUnitParams {
