@@ -19,6 +19,8 @@ class BagFile {
   virtual const std::vector<Topic>& topics() const = 0;
   virtual bool is_empty() const = 0;
   virtual std::int64_t begin_ns() const = 0;  ///< of the first message
+  /// As Bag::damage().
+  virtual std::string damage() const { return {}; }
   /// As Bag::read(); the messages of topics that this file does not have are none.
   virtual void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
                     const std::function<void(const Message&)>& visit, Rejections& damage) const = 0;

@@ -21,9 +21,11 @@ struct Chunk {
   std::uint64_t whole_bytes = 0;  ///< when they are not
   std::uint32_t crc = 0;          ///< of them; 0: none
   Compression compression = Compression::kNone;
-  std::int64_t begin_ns = 0;  ///< no message was received before
-  bool has_record = true;     ///< false: messages outside of chunks
-  bool is_cut = false;        ///< the file ends within it
+  std::int64_t begin_ns = 0;     ///< no message was received before
+  std::int64_t end_ns = 0;       ///< nor after, as the chunk says
+  std::uint64_t n_messages = 0;  ///< in the indexes behind it; 0: it has none
+  bool has_record = true;        ///< false: messages outside of chunks
+  bool is_cut = false;           ///< the file ends within it
 };
 
 struct Content {

@@ -9,6 +9,7 @@
 
 #include "mcap_records.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/log/text.hpp"
 
 namespace viwo::bag {
 
@@ -33,7 +34,13 @@ void McapFile::find_channels() {
   for (std::size_t i = 0; i < structure_.chunks.size(); ++i) {
     if (!structure_.chunks[i].has_record) continue;
     const mcap::Content content = mcap::read_chunk(file_, structure_.chunks[i]);
-    if (!content.fault.empty()) continue;  // told when its messages are read
+    if (!content.fault.empty()) {
+      if (damage_.empty()) {
+        damage_ = file_.name() + ": the chunk at byte " +
+                  std::to_string(structure_.chunks[i].place) + " " + content.fault;
+      }
+      continue;
+    }
     try {
       mcap::for_each_record(content.records, structure_.chunks[i].is_cut,
                             [this](std::uint8_t op, std::span<const std::uint8_t> fields, auto) {
@@ -139,7 +146,7 @@ class McapFile::Reading {
     const Records content = file_.load(i);
     const Chunk& chunk = file_.structure_.chunks[i];
     const bool is_good = content->fault.empty();
-    std::int64_t n = 0;
+    std::uint64_t n = 0;
     try {
       mcap::for_each_record(
           content->records, chunk.is_cut || !is_good,
@@ -152,9 +159,13 @@ class McapFile::Reading {
       file_.fail(i, broken.what());
     }
     if (is_good) return;
-    damage_.add(
-        "message of a chunk that " + content->fault, [&] { return place(chunk.place); },
-        std::max<std::int64_t>(n, 1));
+    const auto where = [&] {
+      if (chunk.n_messages > 0) return place(chunk.place);
+      return place(chunk.place) + ", which has " +
+             log::number_text(1e-9 * static_cast<double>(chunk.end_ns - chunk.begin_ns)) + " s";
+    };
+    damage_.add("message of a chunk that " + content->fault, where,
+                static_cast<std::int64_t>(std::max<std::uint64_t>({n, chunk.n_messages, 1})));
   }
 
   void take(std::size_t chunk, std::span<const std::uint8_t> fields, std::size_t at) {

@@ -29,6 +29,7 @@ class McapFile final : public BagFile {
   const std::vector<Topic>& topics() const override { return topics_; }
   bool is_empty() const override { return structure_.chunks.empty(); }
   std::int64_t begin_ns() const override;
+  std::string damage() const override { return damage_; }
   /// Chunk after chunk, each of them once; what was received before the next chunk begins is
   /// visited then.
   void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
@@ -49,7 +50,8 @@ class McapFile final : public BagFile {
   mcap::Structure structure_;
   std::map<std::uint16_t, mcap::Channel> channels_;
   std::vector<Topic> topics_;
-  mutable std::mutex mutex_;                                 ///< of what is kept
+  std::string damage_;        ///< of a chunk that may describe channels
+  mutable std::mutex mutex_;  ///< of what is kept
   mutable std::list<std::pair<std::size_t, Records>> kept_;  ///< the last one first
 };
 

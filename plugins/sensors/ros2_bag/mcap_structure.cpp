@@ -128,7 +128,9 @@ class Follower {
         return add_message(at, record);
       case kChunk:
         return add_chunk(at, record, false);
-      default:  // indexes, attachments, and what is yet to come
+      case kMessageIndex:
+        return add_index(record);
+      default:  // other indexes, attachments, and what is yet to come
         return;
     }
   }
@@ -168,7 +170,7 @@ class Follower {
     try {
       Fields in(head);
       chunk.begin_ns = stamp_of(in.u64());
-      in.u64();  // the end
+      chunk.end_ns = stamp_of(in.u64());
       chunk.whole_bytes = in.u64();
       chunk.crc = in.u32();
       chunk.compression = compression(in.text());
@@ -187,6 +189,15 @@ class Follower {
       throw BrokenRecord("a chunk has more bytes than its record");
     }
     out_.chunks.push_back(chunk);
+  }
+
+  /// For how much a chunk has that cannot be read.
+  void add_index(const Head& record) {
+    constexpr std::uint64_t kUsed = 2 + 4, kEntry = 8 + 8;
+    if (out_.chunks.empty() || record.length < kUsed) return;
+    Fields in(window_.at(record.content, kUsed));
+    in.u16();  // the channel
+    out_.chunks.back().n_messages += in.u32() / kEntry;
   }
 
   static Compression compression(std::string_view name) {

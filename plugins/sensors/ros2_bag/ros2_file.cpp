@@ -96,6 +96,12 @@ class Ros2Recording final : public Bag {
   const std::string& name() const override { return name_; }
   const std::vector<Topic>& topics() const override { return topics_; }
   std::int64_t begin_ns() const override { return begin_ns_; }
+  std::string damage() const override {
+    for (const auto& file : files_) {
+      if (!file->damage().empty()) return file->damage();
+    }
+    return {};
+  }
   void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
             const std::function<void(const Message&)>& visit, Rejections& damage) const override {
     for (const auto& file : files_) file->read(wanted, from_ns, to_ns, visit, damage);

@@ -186,6 +186,51 @@ TEST_F(Mcap, CountsTheMessagesOfAChunkThatIsDamaged) {
   }
 }
 
+TEST_F(Mcap, CountsTheMessagesOfAChunkThatCannotBeDecompressed) {
+  bag::Ros2Writer out(file("one.mcap"), bag::mcap::Compression::kZstd, 20'000);
+  for (int k = 0; k < 400; ++k) {
+    out.write_imu("/imu0", {kStart + k * kMs, kStart + k * kMs}, {0.1 * k, 1. / (k + 1), 0.}, {});
+  }
+  out.close();
+  std::string content = bytes_of(file("one.mcap"));
+  const std::size_t at = third_chunk(content);
+  std::fill_n(&content[at + 53], 16, '\xff');  // where the compressed bytes begin
+  const auto sensor = make_sensor(section_of(store(content), "imu_topic: /imu0"));
+  const auto n = static_cast<std::int64_t>(play(*sensor).size());
+  const auto rejections = rejections_of(*sensor);
+  ASSERT_EQ(rejections.size(), 1U);
+  EXPECT_EQ(rejections[0].reason, "message of a chunk that cannot be decompressed");
+  EXPECT_EQ(rejections[0].count, 400 - n);
+  EXPECT_GT(rejections[0].count, 20);
+}
+
+TEST_F(Mcap, NamesTheDamageOfChunksThatDescribeTheChannels) {
+  std::string content = bytes_of(data("plain.mcap"));
+  content[content.size() - 60] = static_cast<char>(content[content.size() - 60] ^ 1);  // summary
+  for (std::size_t at = content.find("/imu0"); at != std::string::npos;
+       at = content.find("/imu0", at + 1)) {
+    content[at + 1] = 'j';
+  }
+  const std::string error = error_of(section_of(store(content), "imu_topic: /imu0"));
+  EXPECT_THAT(error, HasSubstr("no topic '/imu0'"));
+  EXPECT_THAT(error, HasSubstr("; the bag is damaged, what is missing may have been there: "));
+  EXPECT_THAT(error, HasSubstr("a.mcap: the chunk at byte "));
+}
+
+TEST_F(Mcap, NamesTheDamageWhereNoMessageIsLeft) {
+  std::string content = bytes_of(data("plain.mcap"));
+  for (std::size_t at = 8; content[at] != '\x0f';) {  // up to the end of the data
+    std::uint64_t length = 0;
+    std::memcpy(&length, &content[at + 1], sizeof(length));
+    if (content[at] == '\x06') content[at + 200] = static_cast<char>(content[at + 200] ^ 0x10);
+    at += 9 + length;
+  }
+  EXPECT_THAT(
+      error_of(section_of(store(content), "imu_topic: /imu0")),
+      HasSubstr("topic '/imu0' has no messages in the time that is read; the bag is damaged: "
+                "message of a chunk that has another check sum than it says ("));
+}
+
 TEST_F(Mcap, ReadsWithoutASummaryThatIsDamaged) {
   std::string content = bytes_of(data("lz4.mcap"));
   content[content.size() - 60] = static_cast<char>(content[content.size() - 60] ^ 1);

@@ -55,6 +55,8 @@ class Bag {
   virtual const std::vector<Topic>& topics() const = 0;
   /// When the first message of any topic was received; 0 of an empty bag.
   virtual std::int64_t begin_ns() const = 0;
+  /// Why topics may be missing, with the place; empty: they are not.
+  virtual std::string damage() const { return {}; }
   /// Visits the messages that were received in [from_ns, to_ns], file after file in the order in
   /// which they were received. What a damaged file has lost is counted in `damage`.
   virtual void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,

@@ -44,6 +44,9 @@ std::string types_text(std::initializer_list<Kind> kinds) {
   const std::string same_type = topics_of(bag, kinds);
   text += same_type.empty() ? " - there is no topic of type " + types_text(kinds)
                             : " - of type " + types_text(kinds) + " there are: " + same_type;
+  if (const std::string damage = bag.damage(); !damage.empty()) {
+    text += "; the bag is damaged, what is missing may have been there: " + damage;
+  }
   throw ParamError(key, text);
 }
 
@@ -130,7 +133,13 @@ BagSamples read_samples(const std::shared_ptr<const Bag>& bag, const BagOptions&
   bag->read(all.wanted, from_ns, to_ns, take, damage);
   BagSamples out;
   damage.append_to(out.rejections);
-  for (const auto& reader : all.readers) reader->finish(bag->name(), out);
+  std::string lost;
+  if (!damage.counts().empty()) {
+    const RejectionCount& first = damage.counts().front();
+    lost = "; the bag is damaged: " + first.reason + " (" + std::to_string(first.count) +
+           ", first at " + first.first + ")";
+  }
+  for (const auto& reader : all.readers) reader->finish(bag->name(), lost, out);
   // Cameras of one time stay in their order.
   std::stable_sort(out.images.begin(), out.images.end(),
                    [](const ImageSample& a, const ImageSample& b) { return a.t_ns < b.t_ns; });

@@ -11,9 +11,10 @@ std::string TopicFilter::Place::operator()() const {
          std::to_string(at.number);
 }
 
-void TopicFilter::finish(const std::string& bag) const {
+void TopicFilter::finish(const std::string& bag, const std::string& lost) const {
   if (order_.empty()) {
-    throw InputError(bag + "  topic '" + topic_ + "' has no messages in the time that is read");
+    throw InputError(bag + "  topic '" + topic_ + "' has no messages in the time that is read" +
+                     lost);
   }
   order_.require_enough(bag, "messages");
 }

@@ -29,8 +29,9 @@ class TopicFilter {
   void leave_out(std::string_view reason, const Message& at) {
     order_.leave_out(reason, Place{at});
   }
-  /// At the end of the bag: InputError when nothing was accepted or too much was rejected.
-  void finish(const std::string& bag) const;
+  /// At the end of the bag: InputError when nothing was accepted or too much was rejected; `lost`
+  /// is said where there is nothing.
+  void finish(const std::string& bag, const std::string& lost) const;
 
   const std::vector<RejectionCount>& counts() const { return order_.counts(); }
   const std::string& topic() const { return topic_; }

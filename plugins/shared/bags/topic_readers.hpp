@@ -23,8 +23,8 @@ class TopicReader {
   void reject(const std::string& reason, const Message& message) {
     filter_.reject(reason, message);
   }
-  /// Appends what was read; InputError when it is too little.
-  void finish(const std::string& bag, BagSamples& out);
+  /// Appends what was read; InputError when it is too little, with what the bag has `lost`.
+  void finish(const std::string& bag, const std::string& lost, BagSamples& out);
 
  protected:
   TopicReader(const BagOptions& options, const std::string& topic, const LogLimits& limits)
