@@ -163,7 +163,9 @@ void Intake::take_joints(std::size_t topic, const bag::Joints& joints) {
   if (const auto missing = bag::joint_reading(joints, options_, reading)) {
     return reject(topic, reason_of(*missing, joints), joints.t_ns);
   }
-  if (const char* const why = log::why_rejected(reading)) return reject(topic, why, joints.t_ns);
+  if (log::why_rejected(reading) != nullptr) {
+    return reject(topic, bag::not_finite(reading, options_), joints.t_ns);
+  }
   if (!accept(topic, reading.t_ns)) return;
   if (const char* const why = joints_.convert(reading)) return reject(topic, why, reading.t_ns);
   if (const auto cell = cells_.add(reading)) queue_.push(*cell);

@@ -318,7 +318,8 @@ TEST_F(IntakeTest, NamesTheJointThatIsNotThere) {
       ElementsAre(
           "/joint_states: no joint 'drive_1' - did you mean 'drve_1'? | 1 | stamp 1000000000 ns",
           "/joint_states: no velocity of joint 'drive_1' | 1 | stamp 1000000000 ns",
-          "/joint_states: value that is not finite | 1 | stamp 1000000000 ns"));
+          "/joint_states: velocity of joint 'drive_1' that is not finite | 1 | stamp 1000000000 "
+          "ns"));
 }
 
 TEST_F(IntakeTest, TakesPosesOfEitherMessage) {

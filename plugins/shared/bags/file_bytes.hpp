@@ -24,7 +24,7 @@ class FileBytes {
   [[noreturn]] void fail(const std::string& why) const;
 
   std::string name_;
-  int fd_;
+  int fd_ = -1;
   std::uint64_t size_ = 0;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -46,6 +47,20 @@ std::optional<MissingJoint> joint_reading(const Joints& joints, const TopicOptio
   auto missing = pick(joints, options.drive_joints, drive, out.drive);
   if (!missing) missing = pick(joints, options.steer_joints, What::kPosition, out.steer_rad);
   return missing;
+}
+
+std::string not_finite(const log::EncoderReading& reading, const TopicOptions& options) {
+  const auto& drives = options.drive_joints;
+  const std::string drive = options.drive_is_angle() ? "position" : "velocity";
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    if (std::isfinite(reading.drive[i])) continue;
+    return drive + " of joint '" + drives[i] + "' that is not finite";
+  }
+  for (std::size_t i = 0; i < options.steer_joints.size(); ++i) {
+    if (std::isfinite(reading.steer_rad[i])) continue;
+    return "position of joint '" + options.steer_joints[i] + "' that is not finite";
+  }
+  return {};
 }
 
 }  // namespace viwo::bag

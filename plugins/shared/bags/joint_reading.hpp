@@ -23,4 +23,7 @@ struct MissingJoint {
 std::optional<MissingJoint> joint_reading(const Joints& joints, const TopicOptions& options,
                                           log::EncoderReading& out);
 
+/// "velocity of joint 'left' that is not finite": the first of a reading that has one.
+std::string not_finite(const log::EncoderReading& reading, const TopicOptions& options);
+
 }  // namespace viwo::bag

@@ -132,7 +132,9 @@ class JointReader final : public TopicReader {
       }
     }
     if (missing) return filter_.reject(reason_of(missing->what), message);
-    if (const char* const why = log::why_rejected(reading)) return filter_.reject(why, message);
+    if (log::why_rejected(reading) != nullptr) {
+      return filter_.reject(not_finite(reading, options_), message);
+    }
     reading.t_ns = stamp(joints.t_ns, message);
     if (!filter_.accept(reading.t_ns, message)) return;
     if (const char* const why = joints_.convert(reading)) return filter_.reject_last(why, message);
@@ -208,9 +210,9 @@ class FixReader final : public TopicReader {
 
 }  // namespace
 
-void TopicReader::finish(const std::string& bag, BagSamples& out) {
+void TopicReader::finish(const std::string& bag, const std::string& lost, BagSamples& out) {
   check(bag);
-  filter_.finish(bag);
+  filter_.finish(bag, lost);
   move_samples(out);
   out.rejections.insert(out.rejections.end(), filter_.counts().begin(), filter_.counts().end());
 }
