@@ -4,11 +4,11 @@
 #include <cerrno>
 #include <cstring>
 #include <string_view>
-#include <system_error>
 
 #include <zlib.h>
 
 #include "viwo/api/status.hpp"
+#include "viwo/log/files.hpp"
 
 namespace viwo::log {
 namespace {
@@ -20,10 +20,7 @@ gzFile as_gz(void* handle) { return static_cast<gzFile>(handle); }
 void ByteReader::Closer::operator()(void* handle) const { gzclose_r(as_gz(handle)); }
 
 ByteReader::ByteReader(const std::filesystem::path& file) : file_(file.string()) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    throw InputError(file_ + "  is a folder, not a file");
-  }
+  require_regular_file(file);
   errno = 0;
   handle_.reset(gzopen(file.c_str(), "rb"));
   if (handle_ == nullptr) {

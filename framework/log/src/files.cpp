@@ -9,6 +9,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "viwo/api/status.hpp"
+
 namespace viwo::log {
 namespace {
 
@@ -26,6 +28,23 @@ bool sync_folder(const std::filesystem::path& folder) {
 }
 
 }  // namespace
+
+void require_regular_file(const std::filesystem::path& file) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  switch (fs::status(file, ignored).type()) {
+    case fs::file_type::directory:
+      throw InputError(file.string() + "  is a folder, not a file");
+    case fs::file_type::fifo:
+    case fs::file_type::socket:
+      throw InputError(file.string() + "  is a pipe, not a file");
+    case fs::file_type::character:
+    case fs::file_type::block:
+      throw InputError(file.string() + "  is a device, not a file");
+    default:  // whether it is there shows when it is opened
+      return;
+  }
+}
 
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error;

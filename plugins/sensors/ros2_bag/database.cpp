@@ -5,12 +5,14 @@
 #include <system_error>
 
 #include "viwo/api/status.hpp"
+#include "viwo/log/files.hpp"
 
 namespace viwo::bag {
 
 namespace fs = std::filesystem;
 
 Database::Database(const fs::path& file) : name_(file.string()) {
+  log::require_regular_file(file);
   std::error_code error;
   const auto size = fs::file_size(file, error);
   if (error) throw InputError(name_ + "  cannot be read: " + error.message());

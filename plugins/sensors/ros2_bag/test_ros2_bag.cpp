@@ -1,5 +1,8 @@
 // The sensor ros2_bag as the host loads it, on bags that SQLite and fastcdr have written.
+#include <cmath>
 #include <random>
+
+#include <sys/stat.h>
 
 #include "test_fixture.hpp"
 
@@ -212,6 +215,27 @@ TEST_F(Ros2Bag, ABrokenImageIsAnErrorWhenItIsRead) {
     EXPECT_EQ(error.what(), file() +
                                 ": /cam0 message 1: an image of 3 x 2 mono8 in rows of 3 "
                                 "bytes has 5 bytes of pixels");
+  }
+}
+
+TEST_F(Ros2Bag, NamesTheJointThatIsNotFinite) {
+  {
+    Writer out(file());
+    out.topic(2, "/joints", "sensor_msgs/msg/JointState");
+    out.message(2, 5, joints(kStart, std::nan("")));
+  }
+  const std::string rest =
+      "joint_topic: /joints, drive_joints: [drive], steer_joints: [steer], drive_input: ";
+  EXPECT_THAT(error_of(section(rest + "velocity")),
+              HasSubstr("/joints: velocity of joint 'drive' that is not finite (1, first at "));
+  EXPECT_THAT(error_of(section(rest + "position")),
+              HasSubstr("/joints: position of joint 'steer' that is not finite (1, first at "));
+}
+
+TEST_F(Ros2Bag, WhatIsNoFileIsRefused) {
+  for (const char* name : {"a.mcap", "a.db3"}) {
+    ASSERT_EQ(::mkfifo(file(name).c_str(), 0600), 0);
+    EXPECT_THAT(error_of(section("imu_topic: /imu0", name)), HasSubstr("is a pipe, not a file"));
   }
 }
 

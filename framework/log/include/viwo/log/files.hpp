@@ -10,6 +10,10 @@ namespace viwo::log {
 
 void make_folder(const std::filesystem::path& folder);
 
+/// InputError "file  is a pipe, not a file" for what is there and cannot be read as one: folders,
+/// pipes, whose reader waits for ever, and devices.
+void require_regular_file(const std::filesystem::path& file);
+
 /// When what is written is under the name of the file.
 enum class Appears {
   kWhole,   ///< all of it, once it is on the disk; what is no file (a device, a pipe) at once
