@@ -15,6 +15,8 @@
 namespace viwo::log {
 namespace {
 
+constexpr const char* kPosesAlone = " (the poses alone are read by asl_pose)";
+
 std::filesystem::path table_file(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::is_directory(path, ignored) ? table_in(path, "data.csv") : path;
@@ -61,6 +63,27 @@ void read_numbers(const TableReader& table, const std::array<std::size_t, N>& co
   for (std::size_t i = 0; i < N; ++i) out[i] = table.number(columns[i]);
 }
 
+/// What is not finite is a BadRow that names its column; `advice` stands behind it.
+template <std::size_t N>
+void read_finite(const TableReader& table, const std::array<std::size_t, N>& columns,
+                 const char* advice, std::array<double, N>& out) {
+  read_numbers(table, columns, out);
+  for (std::size_t i = 0; i < N; ++i) {
+    if (std::isfinite(out[i])) continue;
+    table.fail(columns[i], quoted(table.text(columns[i])) + " is not finite" + advice);
+  }
+}
+
+/// InputError for drives in the unit of the other kind of reading.
+void check_drive_input(const TableReader& table, bool is_angle) {
+  const std::string rate = "drive_1 [rad/s]", angle = "drive_1 [rad]";
+  const auto& wanted = is_angle ? angle : rate;
+  const auto& other = is_angle ? rate : angle;
+  if (table.has_column(wanted) || !table.has_column(other)) return;
+  table.reader().fail("column '" + other + "' has another unit than '" + wanted +
+                      "': it is read with drive_input: " + (is_angle ? "rate" : "angle"));
+}
+
 }  // namespace
 
 EncoderRecording read_asl_encoders(const std::filesystem::path& path,
@@ -68,6 +91,7 @@ EncoderRecording read_asl_encoders(const std::filesystem::path& path,
   TableReader table(table_file(path));
   const std::size_t stamp = stamp_column(table);
   const JointParams& joints = options.joints;
+  if (joints.drive_scale.empty()) check_drive_input(table, options.drive_is_angle);
   const auto drives = channel_columns(table, "drive_", options.drive_is_angle ? "rad" : "rad/s",
                                       joints.drive_scale, 1, kMaxDrives);
   const auto steers = channel_columns(table, "steer_", "rad", joints.steer_scale, 0, kMaxSteers);
@@ -112,11 +136,11 @@ StateRecording read_asl_states(const std::filesystem::path& path, const LogLimit
   read_rows(table, collector, [&] {
     StateSample state;
     state.t_ns = table.stamp_ns(stamp);
-    read_numbers(table, q, state.q_ItoG_xyzw);
-    read_numbers(table, p, state.p_IinG_m);
-    read_numbers(table, v, state.v_IinG_m_per_s);
-    read_numbers(table, gyro_bias, state.gyro_bias_rad_per_s);
-    read_numbers(table, accel_bias, state.accel_bias_m_per_s2);
+    read_finite(table, q, "", state.q_ItoG_xyzw);
+    read_finite(table, p, "", state.p_IinG_m);
+    read_finite(table, v, kPosesAlone, state.v_IinG_m_per_s);
+    read_finite(table, gyro_bias, kPosesAlone, state.gyro_bias_rad_per_s);
+    read_finite(table, accel_bias, kPosesAlone, state.accel_bias_m_per_s2);
     collector.add(state, table.reader());
   });
   return collector.finish(table.reader());

@@ -21,6 +21,8 @@ constexpr double kMostOff = 0.25;
 /// No spacing is longer than so many usual ones, and while no rate is known.
 constexpr double kLongest = 3.5, kLongestFirst = 2.;
 
+constexpr const char* kScaledTooFar =
+    "reading that is not finite any more where it is scaled (drive_scale, steer_scale)";
 constexpr const char* kTurnsUnknown =
     "reading that leaves open how many turns a joint has gone (drive_turn, steer_turn)";
 constexpr const char* kTurnsLost =
@@ -256,7 +258,7 @@ const char* JointMap::to_model(EncoderReading& reading) {
   reading.n_drive = static_cast<int>(drive_members_.size());
   reading.n_steer = static_cast<int>(steer_members_.size());
   if (const char* const why = take_off_steering(reading)) return why;
-  return all_finite(reading.drive) && all_finite(reading.steer_rad) ? nullptr : kNotFinite;
+  return all_finite(reading.drive) && all_finite(reading.steer_rad) ? nullptr : kScaledTooFar;
 }
 
 template <std::size_t kSize>

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <numeric>
+#include <utility>
 
 namespace viwo::log {
 namespace {
@@ -90,6 +91,47 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return last[b.size()];
 }
 
+/// How many bytes the first character has; 0 where it is none.
+std::size_t utf8_size(std::string_view text) {
+  const auto first = static_cast<unsigned char>(text[0]);
+  const std::size_t size = first < 0x80   ? 1
+                           : first < 0xc2 ? 0
+                           : first < 0xe0 ? 2
+                           : first < 0xf0 ? 3
+                           : first < 0xf5 ? 4
+                                          : 0;
+  if (size > text.size()) return 0;
+  for (std::size_t i = 1; i < size; ++i) {
+    if ((static_cast<unsigned char>(text[i]) & 0xc0U) != 0x80U) return 0;
+  }
+  return size;
+}
+
+/// "a, b, c"; of a long list the nearest to `name`, and how many more there are.
+std::string list_of(const std::vector<std::string>& candidates, std::string_view name) {
+  constexpr std::size_t kLongest = 500;  // an error of a plugin has room for 1000
+  std::size_t size = 0;
+  for (const std::string& candidate : candidates) size += candidate.size() + 2;
+  std::vector<std::pair<double, std::string_view>> ranked;
+  for (const std::string& candidate : candidates) {
+    const double longer =
+        static_cast<double>(std::max({candidate.size(), name.size(), std::size_t{1}}));
+    const auto off = size > kLongest ? static_cast<double>(edit_distance(name, candidate)) : 0.;
+    ranked.emplace_back(off / longer, candidate);
+  }
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::string list;
+  for (std::size_t i = 0; i < ranked.size(); ++i) {
+    const std::string next = (i == 0 ? "" : ", ") + printable(ranked[i].second);
+    if (i > 0 && list.size() + next.size() > kLongest) {
+      return list + ", ... (" + std::to_string(ranked.size() - i) + " more)";
+    }
+    list += next;
+  }
+  return list;
+}
+
 }  // namespace
 
 std::string_view trim(std::string_view text) {
@@ -133,11 +175,25 @@ std::string number_text(double value) {
 
 std::string quoted(std::string_view text) {
   constexpr std::size_t kLongest = 40;
-  std::string out = "'";
-  for (const char c : text.substr(0, kLongest)) {
-    out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
+  return "'" + printable(text.substr(0, kLongest)) + (text.size() > kLongest ? "...'" : "'");
+}
+
+std::string printable(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string out;
+  while (!text.empty()) {
+    const auto c = static_cast<unsigned char>(text[0]);
+    const std::size_t size = utf8_size(text);
+    if (c < 0x20 || c == 0x7f) {
+      out += '?';
+    } else if (size > 0) {
+      out += text.substr(0, size);
+    } else {
+      out += {'\\', 'x', kDigits[c >> 4U], kDigits[c & 15U]};
+    }
+    text.remove_prefix(std::max<std::size_t>(size, 1));
   }
-  return out + (text.size() > kLongest ? "...'" : "'");
+  return out;
 }
 
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates) {
@@ -150,13 +206,8 @@ std::string did_you_mean(std::string_view name, const std::vector<std::string>& 
       nearest_distance = distance;
     }
   }
-  if (nearest != nullptr) return " - did you mean '" + *nearest + "'?";
-  std::string list = " - there are: ";
-  for (const std::string& candidate : candidates) {
-    if (&candidate != &candidates.front()) list += ", ";
-    list += candidate;
-  }
-  return list;
+  if (nearest != nullptr) return " - did you mean '" + printable(*nearest) + "'?";
+  return " - there are: " + list_of(candidates, name);
 }
 
 }  // namespace viwo::log

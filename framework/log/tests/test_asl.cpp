@@ -77,7 +77,9 @@ TEST_F(AslTest, ReadsAnglesAndTheEurocStampColumn) {
   EXPECT_EQ(read.samples[1].t_ns, 750'000'000);
   EXPECT_EQ(read.samples[1].drive_rad_per_s[0], 6.);
   EXPECT_EQ(message_of([&] { read_asl_encoders(file, {}); }),
-            file.string() + ":1  column 'drive_1 [rad]' has another unit than 'drive_1 [rad/s]'");
+            file.string() +
+                ":1  column 'drive_1 [rad]' has another unit than 'drive_1 [rad/s]': it is read "
+                "with drive_input: angle");
 }
 
 TEST_F(AslTest, CountsWhatItDropsWithReasonAndFirstPlace) {

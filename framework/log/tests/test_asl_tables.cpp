@@ -1,5 +1,6 @@
 // IMU, feature, state and calibration tables of log folders: round trip, refusals.
 #include <cmath>
+#include <fstream>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -11,6 +12,7 @@ namespace viwo::log {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 constexpr std::int64_t kStart = 1'700'000'000'000'000'001;
 
@@ -201,7 +203,7 @@ TEST_F(AslTables, CellsAtMidPointsReadBackAlsoAroundAGapAndWithUnevenStamps) {
     sample.n_drive = 4;
     sample.n_steer = 4;
     for (std::size_t i = 0; i < 4; ++i) {
-      sample.drive_rad_per_s[i] = any();
+      sample.drive_rad_per_s[i] = std::remainder(any(), 1e4);  // faster is no drive
       sample.steer_rad[i] = any();
     }
     cells.push_back(sample);
@@ -235,6 +237,24 @@ TEST_F(AslTables, WritesTheDocumentedTables) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "log/features0"));
 }
 
+TEST_F(AslTables, NameTheColumnOfAStateThatIsNotFinite) {
+  const std::string header =
+      "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+      "q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], b_w_RS_S_x [rad s^-1], "
+      "b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1], b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], "
+      "b_a_RS_S_z [m s^-2]\n";
+  const auto message = [&](const std::string& row) {
+    const auto file = folder_ / "states.csv";
+    std::ofstream(file) << header << row;
+    return message_of([&] { read_asl_states(file, {}); });
+  };
+  EXPECT_THAT(message("5,1,2,3,1,0,0,0,1,nan,nan,0,0,0,0,0,0\n"),
+              HasSubstr("column 'v_RS_R_y [m s^-1]': 'nan' is not finite (the poses alone are read "
+                        "by asl_pose)"));
+  EXPECT_THAT(message("5,1,inf,3,1,0,0,0,1,nan,nan,0,0,0,0,0,0\n"),
+              HasSubstr("column 'p_RS_R_y [m]': 'inf' is not finite)"));
+}
+
 TEST_F(AslTables, RefusesToWriteWhatWouldNotReadBack) {
   EXPECT_EQ(message_of([&] {
               write_log({PoseSample{}, StateSample{}});
@@ -254,10 +274,12 @@ TEST_F(AslTables, ALogOfPosesIsNoLogOfStates) {
   write_log({PoseSample{7, {1., 2., 3.}, {0., 0., 0.6, 0.8}}});
   const auto table = folder_ / "log/state_groundtruth_estimate0";
   EXPECT_EQ(read_asl_poses(table, {}).samples.size(), 1U);
-  EXPECT_EQ(message_of([&] { read_asl_states(table, {}); }),
-            (table / "data.csv").string() +
-                "  1 of 1 data rejected, allowed is a fraction of 0.1: value that is not finite "
-                "(1, first at data.csv:2)");
+  EXPECT_EQ(
+      message_of([&] { read_asl_states(table, {}); }),
+      (table / "data.csv").string() +
+          "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read "
+          "(1, first at data.csv:2  column 'v_RS_R_x [m s^-1]': 'nan' is not finite (the poses "
+          "alone are read by asl_pose))");
 }
 
 constexpr const char* kImuHeader =

@@ -140,6 +140,20 @@ TEST(Suggestions, NameTheNearestSpellingOrAll) {
   EXPECT_EQ(did_you_mean("wheel", names), " - there are: drive_1, drive_2, steer");
 }
 
+TEST(Suggestions, OfManyNamesBeginWithTheNearestAndEndAtAWholeName) {
+  std::vector<std::string> names;
+  for (int i = 0; i < 100; ++i) names.push_back("joystick_axis_" + std::to_string(i));
+  names.emplace_back("/Robot/Drive/GyroYaw");
+  const std::string text = did_you_mean("/Drive/Gyro", names);
+  EXPECT_EQ(text.find(" - there are: /Robot/Drive/GyroYaw, joystick_axis_0, "), 0U) << text;
+  EXPECT_LT(text.size(), 550U);
+  EXPECT_EQ(text.substr(text.rfind(',')), ", ... (73 more)");
+}
+
+TEST(Texts, ShowBytesThatAreNoTextAsTheirNumbers) {
+  EXPECT_EQ(quoted("a\x01 \xc3\xb6 \xff\xc3"), "'a? \xc3\xb6 \\xff\\xc3'");
+}
+
 TEST_F(TableReaderTest, ReadsEitherSeparatorAndAHeaderBehindAHash) {
   TableReader commas(write("a.csv", "#timestamp [ns], x [m],label\n12, -1.5 ,abc\n\n13,nan,\n"));
   EXPECT_THAT(commas.columns(), ElementsAre("timestamp [ns]", "x [m]", "label"));

@@ -36,11 +36,13 @@ void append_number(std::string& out, double value);
 void append_number(std::string& out, std::int64_t value);
 std::string number_text(double value);
 
-/// For messages: in quotes, control characters replaced, cut after 40 characters.
+/// For messages: control characters are '?', bytes that are no UTF-8 "\xff".
+std::string printable(std::string_view text);
+/// The same in quotes, cut after 40 characters.
 std::string quoted(std::string_view text);
 
 /// " - did you mean 'x'?" for the candidate at an edit distance of at most 2, otherwise
-/// " - there are: a, b, c".
+/// " - there are: a, b, c": of a long list the nearest, and how many more.
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates);
 
 }  // namespace viwo::log
