@@ -1,6 +1,7 @@
 #include "mcap_file.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -136,6 +137,12 @@ class McapFile::Reading {
 
   /// When received; of one time as in the file: the chunk, and where in it.
   using Key = std::tuple<std::int64_t, std::size_t, std::size_t>;
+  struct Lost {
+    std::size_t chunk;
+    std::uint64_t n_messages;
+    bool is_counted;  ///< otherwise there may be more
+    std::string fault;
+  };
   struct Waiting {
     std::size_t topic;
     std::size_t size;  ///< of the message
@@ -158,14 +165,14 @@ class McapFile::Reading {
     } catch (const mcap::BrokenRecord& broken) {
       file_.fail(i, broken.what());
     }
-    if (is_good) return;
-    const auto where = [&] {
-      if (chunk.n_messages > 0) return place(chunk.place);
-      return place(chunk.place) + ", which has " +
-             log::number_text(1e-9 * static_cast<double>(chunk.end_ns - chunk.begin_ns)) + " s";
-    };
-    damage_.add("message of a chunk that " + content->fault, where,
-                static_cast<std::int64_t>(std::max<std::uint64_t>({n, chunk.n_messages, 1})));
+    if (is_good && span_ns(chunk) > 0.) {
+      read_messages_ += static_cast<double>(n);
+      read_ns_ += span_ns(chunk);
+    }
+    if (!is_good) {
+      const bool is_counted = chunk.n_messages > 0 || content->records.size() == chunk.whole_bytes;
+      lost_.push_back({i, std::max(n, chunk.n_messages), is_counted, content->fault});
+    }
   }
 
   void take(std::size_t chunk, std::span<const std::uint8_t> fields, std::size_t at) {
@@ -217,7 +224,29 @@ class McapFile::Reading {
     }
   }
 
+  static double span_ns(const Chunk& chunk) {
+    return std::max(0., static_cast<double>(chunk.end_ns) - static_cast<double>(chunk.begin_ns));
+  }
+
+  /// Where no index tells how many messages a chunk had, they were as dense as the others.
+  void report(const Lost& lost) {
+    const Chunk& chunk = file_.structure_.chunks[lost.chunk];
+    auto n = static_cast<double>(lost.n_messages);
+    std::string more;
+    if (!lost.is_counted && read_ns_ > 0.) {
+      const double by_time = read_messages_ * span_ns(chunk) / read_ns_;
+      const auto most = static_cast<double>(chunk.whole_bytes / mcap::kMessageHead);
+      n = std::max(n, std::min(by_time, most));
+      more = ", which has " + log::number_text(1e-9 * span_ns(chunk)) +
+             " s: their number is that of others in this time";
+    }
+    damage_.add(
+        "message of a chunk that " + lost.fault, [&] { return place(chunk.place) + more; },
+        std::max<std::int64_t>(std::llround(n), 1));
+  }
+
   void report() {
+    for (const Lost& lost : lost_) report(lost);
     const mcap::Structure& structure = file_.structure_;
     if (structure.has_wrong_summary) {
       damage_.add("summary that is damaged: the messages were found without it",
@@ -245,6 +274,8 @@ class McapFile::Reading {
   std::vector<std::int64_t> numbers_;
   std::map<Key, Waiting> waiting_;
   std::uint64_t waiting_bytes_ = 0;
+  std::vector<Lost> lost_;
+  double read_messages_ = 0., read_ns_ = 0.;  ///< of the chunks that are as they were written
 };
 
 void McapFile::read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,

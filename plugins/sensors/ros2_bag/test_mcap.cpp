@@ -202,6 +202,17 @@ TEST_F(Mcap, CountsTheMessagesOfAChunkThatCannotBeDecompressed) {
   EXPECT_EQ(rejections[0].reason, "message of a chunk that cannot be decompressed");
   EXPECT_EQ(rejections[0].count, 400 - n);
   EXPECT_GT(rejections[0].count, 20);
+  // Without indexes they are as many as others in that time.
+  for (std::size_t i = 8; content[i] != '\x0f';) {
+    std::uint64_t length = 0;
+    std::memcpy(&length, &content[i + 1], sizeof(length));
+    if (content[i] == '\x07') content[i] = '\x7f';  // a kind of record that nobody knows
+    i += 9 + length;
+  }
+  const auto by_time = rejections_of(*make_sensor(section_of(store(content), "imu_topic: /imu0")));
+  ASSERT_EQ(by_time.size(), 1U);
+  EXPECT_NEAR(static_cast<double>(by_time[0].count), static_cast<double>(400 - n), 2.);
+  EXPECT_THAT(by_time[0].first, HasSubstr(" s: their number is that of others in this time"));
 }
 
 TEST_F(Mcap, NamesTheDamageOfChunksThatDescribeTheChannels) {
