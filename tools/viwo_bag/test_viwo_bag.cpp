@@ -193,7 +193,8 @@ TEST_F(ViwoBag, WhatTheLogDoesNotHaveIsNotRead) {
     FAIL() << "positions of wheels that the log does not have were read";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("100 of 100 messages rejected"));
-    EXPECT_THAT(error.what(), HasSubstr("/joint_states: value that is not finite (100, first at"));
+    EXPECT_THAT(error.what(), HasSubstr("/joint_states: position of joint 'drive_1' that is not "
+                                        "finite (100, first at"));
   }
 }
 
