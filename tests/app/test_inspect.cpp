@@ -33,6 +33,14 @@ TEST_F(InspectTest, FindsWritesAndMends) {
   expect_done({"inspect", "fixed.yaml", "--out", "again"});
 }
 
+TEST_F(InspectTest, DoesNotWriteOverTheConfigurationItself) {
+  write("run.yaml", kRun);
+  expect_refused({"inspect", "run.yaml", "--fix", "./run.yaml"},
+                 "--fix ./run.yaml: is the configuration itself, whose comments and "
+                 "placeholders would be lost: name another file");
+  EXPECT_EQ(read("run.yaml"), kRun);
+}
+
 TEST_F(InspectTest, RefusesWhatIsNoConfiguration) {
   write("run.yaml", replaced(kRun, "motion: circle", "motion: cicle"));
   const Outcome outcome = viwo({"inspect", "run.yaml", "--out", "out"});

@@ -263,6 +263,12 @@ int plan_command(const Arguments& arguments) {
 }
 
 int inspect_command(const Arguments& arguments) {
+  std::error_code none;  // of a file that is not there
+  if (std::filesystem::equivalent(arguments.fix, arguments.positional[0], none)) {
+    throw InputError("--fix " + arguments.fix.string() +
+                     ": is the configuration itself, whose comments and placeholders would be "
+                     "lost: name another file");
+  }
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
   const auto folder = out_folder(arguments);
