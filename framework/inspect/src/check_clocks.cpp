@@ -184,45 +184,63 @@ Finding clock_finding(const std::string& label, const ClockWords& words, const L
   return finding;
 }
 
-void check_wheel_clocks(const Recording& recording, Findings& out) {
-  if (recording.imu.empty()) return;
-  const std::string imu = recording.label<ImuSample>(recording.imu_sensor);
+/// Of a wheel set against a gyro.
+void check_wheel_clock(const Recording& recording, const Wheels& wheels, const YawRates& rates,
+                       Findings& out) {
   const Span span = span_of(recording);
+  const std::string label = recording.label<EncoderSample>(wheels.sensor);
+  std::vector<Turn> of_wheels = twists_of(wheels);
+  const RateGrid a(span.begin_ns, span.end_ns, rates.turns);
+  std::optional<Lag> lag =
+      find_lag(a, RateGrid(span.begin_ns, span.end_ns, about(of_wheels, Vector3d::UnitZ())));
+  if (lag && lag->correlation > 0.) {
+    const RateGrid twists(span.begin_ns, span.end_ns, of_wheels);
+    const Vector3d row = yaw_of_twist(a, twists, lag->lag_s);
+    const RateGrid b(span.begin_ns, span.end_ns, about(of_wheels, row));
+    if (const auto better = find_lag(a, b)) lag = better;
+  }
+  // Nothing else is known of a heading.
+  const bool is_heading =
+      recording.imu.empty() || rates.label != recording.label<ImuSample>(recording.imu_sensor);
+  const bool is_compared = lag && std::abs(lag->correlation) > 0.8;
+  if (is_heading) {
+    out.push_back({rates.label, is_compared ? Severity::kFits : Severity::kNote, "turns",
+                   is_compared ? "compared with " + label
+                               : "not looked at but for its stamps: its turns and those of " +
+                                     label + " are too few, or too different"});
+  }
+  if (!lag) {
+    out.push_back({label, Severity::kNote, "clock",
+                   "too little rotation, or too little in common with " + rates.label +
+                       ", to compare its clock and sign with the gyro"});
+    return;
+  }
+  std::string key = wheels.prior.name.empty()
+                        ? "wheels.t_OtoI_s"
+                        : "wheel_sets." + wheels.prior.name + ".wheels.t_OtoI_s";
+  if (!recording.setup->filter) key = "a run of the wheels alone, which has no key for it,";
+  Finding clock = clock_finding(
+      label, {"clock", "clock", key, rates.label, wheels.prior.wheels.t_OtoI_s}, *lag,
+      wheels.prior.sigma_time_offset_s, std::max(period_of(rates.turns), period_of(of_wheels)));
+  clock.figures.push_back({"wheels by gyro", lag->slope, ""});
+  if (!recording.setup->filter) clock.remedies.clear();  // there is no such key
+  if (lag->correlation < -0.8) {
+    clock.severity = Severity::kFault;
+    clock.remedies.clear();
+    clock.what = "turns opposite to " + rates.label + " (correlation " +
+                 significant(lag->correlation, 3) +
+                 "): the gyro is upside down or reversed, all drives are reversed, or left and "
+                 "right are exchanged";
+  }
+  out.push_back(clock);
+}
+
+void check_wheel_clocks(const Recording& recording, Findings& out) {
   for (const Wheels& wheels : recording.wheels) {
     if (wheels.samples.empty()) continue;
-    const std::string label = recording.label<EncoderSample>(wheels.sensor);
-    std::vector<Turn> of_wheels = twists_of(wheels);
-    const auto gyro = about(turns_of(recording.imu), yaw_axis_of(recording, wheels.prior));
-    const RateGrid a(span.begin_ns, span.end_ns, gyro);
-    std::optional<Lag> lag =
-        find_lag(a, RateGrid(span.begin_ns, span.end_ns, about(of_wheels, Vector3d::UnitZ())));
-    if (lag && lag->correlation > 0.) {
-      const RateGrid twists(span.begin_ns, span.end_ns, of_wheels);
-      const Vector3d row = yaw_of_twist(a, twists, lag->lag_s);
-      const RateGrid b(span.begin_ns, span.end_ns, about(of_wheels, row));
-      if (const auto better = find_lag(a, b)) lag = better;
+    for (const YawRates& rates : yaw_rates_of(recording, wheels.prior)) {
+      check_wheel_clock(recording, wheels, rates, out);
     }
-    if (!lag) {
-      out.push_back({label, Severity::kNote, "clock",
-                     "too little rotation, or too little in common with " + imu +
-                         ", to compare its clock and sign with the gyro"});
-      continue;
-    }
-    const std::string key =
-        wheels.prior.name.empty() ? "wheels" : "wheel_sets." + wheels.prior.name + ".wheels";
-    Finding clock = clock_finding(
-        label, {"clock", "clock", key + ".t_OtoI_s", imu, wheels.prior.wheels.t_OtoI_s}, *lag,
-        wheels.prior.sigma_time_offset_s, std::max(period_of(gyro), period_of(of_wheels)));
-    clock.figures.push_back({"wheels by gyro", lag->slope, ""});
-    if (lag->correlation < -0.8) {
-      clock.severity = Severity::kFault;
-      clock.remedies.clear();
-      clock.what = "turns opposite to " + imu + " (correlation " +
-                   significant(lag->correlation, 3) +
-                   "): the IMU is upside down, all drives are reversed, or left and right are "
-                   "exchanged";
-    }
-    out.push_back(clock);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "checks.hpp"
+#include "rate_grid.hpp"
 #include "rests.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
@@ -17,6 +18,14 @@ using Eigen::Vector3d;
 
 /// Gravity at sea level, from the equator to a pole, less what a mountain takes.
 constexpr double kLeastGravity = 9.76, kMostGravity = 9.84;
+
+/// Of a start without a filter's configuration, as that has them by default.
+constexpr double kAccelBias_m_per_s2 = 0.05, kGyroBias_rad_per_s = 0.02;
+
+double gravity_of(const Recording& recording) {
+  const auto& filter = recording.setup->filter;
+  return (filter ? filter->options : EstimatorOptions{}).filter.gravity_m_per_s2;
+}
 
 std::string axis_of(const Vector3d& direction) {
   int i = 0;
@@ -55,10 +64,10 @@ double tilt_of(const Vector3d& up) {
 void check_rest(const Recording& recording, const Rest& rest, const std::string& label,
                 Findings& out) {
   const auto& imu = recording.imu;
-  const FilterSetup& filter = *recording.setup->filter;
+  const auto& filter = recording.setup->filter;
   const Means means = means_of(imu, rest.first, rest.last);
   const double length_s = seconds_between(imu[rest.first].t_ns, imu[rest.last - 1].t_ns);
-  const double is = means.accel.norm(), expected = filter.options.filter.gravity_m_per_s2;
+  const double is = means.accel.norm(), expected = gravity_of(recording);
   const std::string at = " (mean of " + significant(length_s, 3) + " s at rest from " +
                          time_text(imu[rest.first].t_ns - recording.begin_ns()) + ")";
   Finding gravity{label,
@@ -72,24 +81,27 @@ void check_rest(const Recording& recording, const Rest& rest, const std::string&
                    {"up, y", means.accel.y() / is, ""},
                    {"up, z", means.accel.z() / is, ""},
                    {"rest", length_s, "s"}}};
-  const double sigma = filter.start.sigma_accel_bias_m_per_s2;
+  // Without a filter its defaults, beyond which nothing is wrong with a run of the wheels alone.
+  const Severity beyond = filter ? Severity::kFault : Severity::kNote;
+  const double sigma = filter ? filter->start.sigma_accel_bias_m_per_s2 : kAccelBias_m_per_s2;
   const double off = std::abs(is - expected);
   // More than a tenth is another unit or scale: `plausibility` names it.
   if (off > 4. * sigma && off < 0.1 * expected) {
-    gravity.severity = Severity::kFault;
+    gravity.severity = beyond;
     gravity.what += ": estimator.gravity_m_per_s2 says " + significant(expected, 4) +
                     ", and the accelerometer's bias is thought to be within " +
                     significant(sigma, 2);
     if (is > kLeastGravity && is < kMostGravity) {
-      gravity.remedies = {{"estimator.gravity_m_per_s2", significant(is, 4)}};
+      if (filter) gravity.remedies = {{"estimator.gravity_m_per_s2", significant(is, 4)}};
     } else {
       gravity.what += "; no place on Earth has that gravity: it has a bias or a wrong scale";
-      gravity.remedies = {{"estimator.sigma_start_accel_bias_m_per_s2", rounded_up(0.5 * off)}};
+      if (filter)
+        gravity.remedies = {{"estimator.sigma_start_accel_bias_m_per_s2", rounded_up(0.5 * off)}};
     }
   }
   out.push_back(gravity);
   const double bias = means.gyro.cwiseAbs().maxCoeff();
-  const double sigma_gyro = filter.start.sigma_gyro_bias_rad_per_s;
+  const double sigma_gyro = filter ? filter->start.sigma_gyro_bias_rad_per_s : kGyroBias_rad_per_s;
   Finding gyro{label,
                Severity::kFits,
                "gyro bias",
@@ -99,10 +111,11 @@ void check_rest(const Recording& recording, const Rest& rest, const std::string&
                 {"gyro bias, z", means.gyro.z(), "rad/s"},
                 {"sigma, configured", sigma_gyro, "rad/s"}}};
   if (bias > 3. * sigma_gyro) {
-    gyro.severity = Severity::kFault;
+    gyro.severity = beyond;
     gyro.what += ": beyond three sigma of what the configuration expects (" +
                  significant(sigma_gyro, 2) + " rad/s)";
-    gyro.remedies = {{"estimator.sigma_start_gyro_bias_rad_per_s", rounded_up(0.5 * bias)}};
+    if (filter)
+      gyro.remedies = {{"estimator.sigma_start_gyro_bias_rad_per_s", rounded_up(0.5 * bias)}};
   }
   out.push_back(gyro);
 }
@@ -160,13 +173,22 @@ Vector3d up_of(const Recording& recording) {
   return sum.norm() > kSteady * n && n > 0. ? Vector3d(sum.normalized()) : Vector3d::Zero();
 }
 
-Vector3d yaw_axis_of(const Recording& recording, const WheelsPrior& prior) {
-  const Vector3d up = up_of(recording);
-  return up.norm() > 0. ? up : Vector3d(prior.wheels.R_ItoO.row(2));
+std::vector<YawRates> yaw_rates_of(const Recording& recording, const WheelsPrior& prior) {
+  std::vector<YawRates> all;
+  if (!recording.imu.empty()) {
+    const Vector3d up = up_of(recording);
+    const Vector3d axis = up.norm() > 0. ? up : Vector3d(prior.wheels.R_ItoO.row(2));
+    all.push_back(
+        {recording.label<ImuSample>(recording.imu_sensor), about(turns_of(recording.imu), axis)});
+  }
+  for (const Headings& other : recording.headings) {
+    all.push_back({recording.label<HeadingSample>(other.sensor), turns_of(other.samples)});
+  }
+  return all;
 }
 
 void check_imu(const Recording& recording, Findings& out) {
-  if (recording.imu.empty() || !recording.setup->filter) return;
+  if (recording.imu.empty()) return;
   const std::string label = recording.label<ImuSample>(recording.imu_sensor);
   check_channels(recording, label, out);
   const std::vector<Rest> rests = rests_of(recording);

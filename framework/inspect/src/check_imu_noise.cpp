@@ -126,8 +126,15 @@ void check_part(const Part& part, const Density& density, double rest_s, const s
 }  // namespace
 
 void check_imu_noise(const Recording& recording, Findings& out) {
-  if (recording.imu.empty() || !recording.setup->filter) return;
+  if (recording.imu.empty()) return;
   const std::string label = recording.label<ImuSample>(recording.imu_sensor);
+  if (!recording.setup->filter) {
+    out.push_back(
+        {label, Severity::kNote, "noise",
+         "noises not looked at: there is no filter, whose section imu has some to compare "
+         "them with"});
+    return;
+  }
   const std::vector<Rest> rests = rests_of(recording);
   const double rest_s = rests.empty() ? 0.
                                       : seconds_between(recording.imu[rests.front().first].t_ns,

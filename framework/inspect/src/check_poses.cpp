@@ -19,6 +19,10 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr std::size_t kFewestWindows = 5;
+/// Slip, tyres and poses that are decimetres off stay within; a wrong diameter does not.
+constexpr double kMostFactor = 0.15;
+
 /// Turns about the vertical of the world, of a pose source.
 std::vector<Turn> yaw_turns_of(const Trajectory& poses) {
   std::vector<Turn> turns = turns_of(poses);
@@ -107,13 +111,66 @@ void check_heading(const Speeds& speeds, const std::string& label, const std::st
   out.push_back(heading);
 }
 
+/// With the drives of a side reversed the base goes next to nowhere where it goes straight.
+bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& label,
+                 const std::string& other, Findings& out) {
+  for (const ChannelChange& change : side_changes(wheels.model, wheels.prior.wheels.x_WI)) {
+    Wheels changed = wheels;
+    for (EncoderSample& sample : changed.samples) change.undo(sample);
+    const Speeds speeds = speeds_of(changed, poses.poses);
+    if (speeds.ratio.size() < kFewestWindows || speeds.cosine.empty()) continue;
+    const double ratio = eval::median(speeds.ratio);
+    if (std::abs(ratio - 1.) > kMostFactor || eval::median(speeds.cosine) < 0.) continue;
+    const bool is_known = std::any_of(out.begin(), out.end(), [&](const Finding& f) {
+      return f.sensor == label && f.check == "order" && f.severity == Severity::kFault;
+    });
+    if (!is_known) {
+      out.push_back(
+          {label,
+           Severity::kFault,
+           "order",
+           change.text() + " (without that they go " + significant(ratio, 3) + " times as far as " +
+               other + ")",
+           {{"wheels by poses", ratio, ""}},
+           change.remedies(wheels.sensor,
+                           static_cast<std::size_t>(wheels.model->description().n_drive), 0)});
+    }
+    return true;
+  }
+  return false;
+}
+
+/// Positions between which nothing can go: of a source that loses its place, or has none and says
+/// zero.
+bool has_jumps(const Poses& poses, const std::string& label, Findings& out) {
+  constexpr double kMost_m_per_s = 100., kLeast_m = 0.5;
+  double jumps = 0., zeros = 0.;
+  for (std::size_t i = 1; i < poses.poses.size(); ++i) {
+    const double moved_m = (poses.poses[i].p_BinW - poses.poses[i - 1].p_BinW).norm();
+    const double dt_s = seconds_between(poses.poses[i - 1].t_ns, poses.poses[i].t_ns);
+    if (moved_m < std::max(kLeast_m, kMost_m_per_s * dt_s)) continue;
+    jumps += 1.;
+    if (poses.poses[i].p_BinW.norm() == 0.) zeros += 1.;
+  }
+  const double share = jumps / static_cast<double>(poses.poses.size());
+  constexpr double kRare = 1e-3;
+  if (jumps < 2. || share < kRare) return false;
+  out.push_back({label,
+                 Severity::kFault,
+                 "jumps",
+                 "its positions jump " + significant(jumps, 6) + " times faster than " +
+                     significant(kMost_m_per_s, 3) + " m/s, " + significant(zeros, 6) +
+                     " times to exactly zero: outliers, or records without a pose",
+                 {{"jumps", jumps, ""}, {"to zero", zeros, ""}, {"share", share, ""}}});
+  return true;
+}
+
 /// How far the wheels say that the base went, by how far the poses say.
 void check_speed(const Recording& recording, const Wheels& wheels, const Poses& poses,
                  const std::string& other, Findings& out) {
   const std::string label = recording.label<EncoderSample>(wheels.sensor);
   const Speeds speeds = speeds_of(wheels, poses.poses);
-  constexpr std::size_t kFewest = 5;
-  if (speeds.ratio.size() < kFewest) return;
+  if (speeds.ratio.size() < kFewestWindows) return;
   const double ratio = eval::median(speeds.ratio);
   Finding finding{label,
                   Severity::kFits,
@@ -125,16 +182,15 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
   const std::array<Unit, 3> units = {Unit{180. / std::numbers::pi, "deg/s"},
                                      Unit{30. / std::numbers::pi, "revolutions per minute"},
                                      Unit{0.5 / std::numbers::pi, "revolutions per second"}};
-  // Slip, tyres and poses that are decimetres off stay within; a wrong diameter does not.
-  constexpr double kMost = 0.15;
   const double spread = 1.2 *
                         (eval::quantile(speeds.ratio, 0.75) - eval::quantile(speeds.ratio, 0.25)) /
                         std::sqrt(static_cast<double>(speeds.ratio.size()));
   finding.figures.push_back({"sigma", spread, ""});
-  if (std::abs(ratio - 1.) > kMost + 3. * spread) {
+  if (std::abs(ratio - 1.) > kMostFactor + 3. * spread) {
     finding.severity = Severity::kFault;
+    if (check_sides(wheels, poses, label, other, out)) return;
     const auto unit = std::find_if(units.begin(), units.end(), [&](const Unit& u) {
-      return std::abs(ratio / u.factor - 1.) < kMost;
+      return std::abs(ratio / u.factor - 1.) < kMostFactor;
     });
     if (unit != units.end()) {
       finding.what += std::string(": drives are in ") + unit->name;
@@ -148,7 +204,7 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
     }
   }
   out.push_back(finding);
-  if (speeds.cosine.size() >= kFewest) check_heading(speeds, label, other, out);
+  if (speeds.cosine.size() >= kFewestWindows) check_heading(speeds, label, other, out);
 }
 
 /// Whether the body of reference states is the IMU, as they are taken.
@@ -242,6 +298,7 @@ void check_poses(const Recording& recording, Findings& out) {
     if (poses.poses.size() < 10) continue;
     const std::string label = poses.of_imu ? recording.label<StateSample>(poses.sensor)
                                            : recording.label<PoseSample>(poses.sensor);
+    if (has_jumps(poses, label, out)) continue;
     if (!recording.imu.empty() && poses.of_imu) {
       if (!has_axes_of_imu(recording, poses, label, out)) continue;
       check_clock(recording, turns_of(poses.poses), label, turns_of(recording.imu),

@@ -57,6 +57,41 @@ double most_gap_s(const Recording& recording, const Stamps& stamps) {
   return recording.setup->filter->options.imu.max_gap_s;
 }
 
+/// What a run makes of intervals that are longer or shorter than any that it takes, with the key
+/// that says so: stamps of another unit, or a reference that is slow. "" for nothing.
+struct Interval {
+  std::string what;
+  std::vector<Remedy> remedies;
+};
+Interval check_interval(const Recording& recording, const Stamps& stamps, double period_s) {
+  const RunSetup& setup = *recording.setup;
+  const auto is_of = [&](Consumer consumer) {
+    return setup.routes.sensor_of(consumer) == stamps.sensor;
+  };
+  const bool is_reference =
+      (*stamps.type == sample_type<PoseSample>() && is_of(Consumer::kReferencePoses)) ||
+      (*stamps.type == sample_type<StateSample>() && is_of(Consumer::kReferenceStates));
+  if (is_reference && period_s > setup.reference_max_gap_s) {
+    const std::string key = "evaluation.reference_max_gap_s";
+    return {"a run takes none of it, for " + key + " says " + ms(setup.reference_max_gap_s),
+            {{key, significant(kGapPeriods * period_s, 2)}}};
+  }
+  constexpr double kShortest_s = 25e-6;  // the fastest gyros give 32 kHz
+  if (period_s < kShortest_s) {
+    return {"no sensor of a robot gives a sample every " + ms(period_s) +
+                ": the unit of its stamps is another one (time_unit)",
+            {}};
+  }
+  const bool is_bridged =
+      *stamps.type == sample_type<EncoderSample>() || *stamps.type == sample_type<ImuSample>();
+  const std::string key = "sensors." + stamps.sensor + ".max_gap_s";
+  const config::Node* longest = setup.resolved.at_path(key);
+  if (!is_bridged || longest == nullptr || period_s <= std::stod(longest->scalar())) return {};
+  return {"a run takes each interval of " + ms(period_s) + " for a gap (" + key + ": " +
+              longest->scalar() + "): the unit of its stamps is another one (time_unit)?",
+          {}};
+}
+
 std::string label_of(const Recording& recording, const Stamps& stamps) {
   std::string label = recording.label(stamps.sensor, *stamps.type);
   const bool several =
@@ -120,7 +155,12 @@ void check_stream(const Recording& recording, const Stamps& stamps, Findings& ou
                 {"missing samples", static_cast<double>(gaps.missing), ""}}};
   rate.what = significant(rate_hz, 4) + " Hz over " + significant(span_s, 4) + " s, " +
               std::to_string(gaps.count) + (gaps.count == 1 ? " gap" : " gaps");
-  if (gaps.count > 0) {
+  if (const Interval interval = check_interval(recording, stamps, period_s);
+      !interval.what.empty()) {
+    rate.severity = Severity::kFault;
+    rate.what += "; " + interval.what;
+    rate.remedies = interval.remedies;
+  } else if (gaps.count > 0) {
     const std::string text = ": " + std::to_string(gaps.missing) +
                              " samples are missing, the longest gap has " + ms(gaps.longest_s) +
                              " at " + time_text(gaps.longest_ns - recording.begin_ns());
@@ -134,6 +174,22 @@ void check_stream(const Recording& recording, const Stamps& stamps, Findings& ou
   }
   out.push_back(rate);
   check_jitter(label, spacing_s, out);
+}
+
+/// What no run or check takes anything of.
+void check_unused(const Recording& recording, Findings& out) {
+  for (const Stamps& stamps : recording.stamps) {
+    const bool is_wheels = *stamps.type == sample_type<EncoderSample>();
+    const bool is_taken =
+        is_wheels
+            ? std::any_of(recording.wheels.begin(), recording.wheels.end(),
+                          [&](const Wheels& w) { return w.sensor == stamps.sensor; })
+            : !(*stamps.type == sample_type<ImuSample>()) || stamps.sensor == recording.imu_sensor;
+    if (is_taken) continue;
+    out.push_back({label_of(recording, stamps), Severity::kNote, "unused",
+                   std::string("not looked at but for its stamps: no ") +
+                       (is_wheels ? "wheels take it" : "filter takes it, or there are several")});
+  }
 }
 
 void check_rejections(const Recording& recording, Findings& out) {
@@ -216,6 +272,7 @@ void check_overlap(const Recording& recording, Findings& out) {
 
 void check_stamps(const Recording& recording, Findings& out) {
   for (const Stamps& stamps : recording.stamps) check_stream(recording, stamps, out);
+  check_unused(recording, out);
   check_rejections(recording, out);
   check_overlap(recording, out);
 }

@@ -186,10 +186,84 @@ std::vector<NoiseFound> noises_of(const Wheels& wheels, const Calibration& calib
   return found;
 }
 
+/// How much the wheels contradict each other, whatever the noises are.
+struct Parity {
+  double rms = 0.;              ///< of a row, m/s; NaN where no sample gives a twist
+  double drive_rad_per_s = 0.;  ///< rms
+  double speed = 0.;            ///< of what the drives say, rms, m/s
+  double refused = 0.;          ///< part of the samples
+  /// A fifth of what moves: no noise, and no slip of a base that drives all the time.
+  bool is_gross() const {
+    constexpr double kMoves_rad_per_s = 0.1;
+    if (!std::isfinite(rms) || !std::isfinite(speed) || refused > 0.5) return true;
+    return drive_rad_per_s > kMoves_rad_per_s && rms > 0.2 * speed;
+  }
+};
+
+Parity parity_of(const Wheels& wheels, const Intrinsics& x_WI) {
+  TwistSolver solver(wheels.model, {});
+  solver.set_intrinsics(x_WI);
+  TwistSolution solution;
+  RowSystem rows;
+  const ModelDescription& description = wheels.model->description();
+  rows.A.resize(description.n_rows, 3);
+  rows.b.resize(description.n_rows);
+  double squares = 0., speeds = 0., rates = 0., n = 0., n_refused = 0.;
+  for (const EncoderSample& sample : wheels.samples) {
+    if (solver.solve(sample, solution) != Status::kOk) {
+      n_refused += 1.;
+      continue;
+    }
+    if (solution.rank_deficient) continue;
+    if (wheels.model->model().rows(sample, x_WI, false, rows) != Status::kOk) continue;
+    squares += solution.e.squaredNorm();
+    speeds += rows.b.squaredNorm();
+    for (int i = 0; i < description.n_drive; ++i) {
+      const double rate = sample.drive_rad_per_s[static_cast<std::size_t>(i)];
+      rates += rate * rate;
+    }
+    n += 1.;
+  }
+  const double n_drives = n * std::max(1, description.n_drive);
+  return {n > 0. ? std::sqrt(squares / (n * description.n_rows)) : NAN,
+          n > 0. ? std::sqrt(rates / n_drives) : 0., n > 0. ? std::sqrt(speeds / n_drives) : 0.,
+          n_refused / static_cast<double>(wheels.samples.size())};
+}
+
+void check_parity(const Parity& parity, const std::string& label, Findings& out) {
+  Finding finding{label,
+                  Severity::kFits,
+                  "parity",
+                  "rows disagree by " + significant(1e3 * parity.rms, 2) + " mm/s at " +
+                      significant(parity.speed, 2) + " m/s of the wheels",
+                  {{"parity residual", parity.rms, "m/s"}, {"speed", parity.speed, "m/s"}}};
+  if (parity.is_gross()) {
+    finding.severity = Severity::kFault;
+    if (!std::isfinite(parity.rms) || parity.refused > 0.5) {
+      finding.what = "the kinematic model makes no motion of " +
+                     significant(100. * std::max(parity.refused, 0.), 3) + " % of the samples";
+    }
+    finding.what +=
+        ": the wheels contradict each other grossly - their order, or that of the wheels in "
+        "kinematics, signs, units of drives or steering, zeros of the steering, or one of these in "
+        "a part of the recording";
+  }
+  out.push_back(finding);
+}
+
+/// Of steering angles beyond 0.1 rad, or a third of what moves; or ten times what is configured
+/// where the wheels contradict each other grossly.
+bool is_no_noise(const NoiseFound& part, const Parity& parity) {
+  if (part.unit == "rad" && part.found > 0.1) return true;
+  if (part.unit == "rad/s" && part.found > parity.drive_rad_per_s / 3.) return true;
+  if (part.unit == "m/s" && part.found > parity.speed / 3.) return true;
+  return part.found > 10. * part.configured && parity.is_gross();
+}
+
 /// From sample to sample, and over a tenth of a second, which is what an epoch has: the steps of an
 /// angle that is counted cancel out in it, slip does not. The smaller one counts.
-void check_noises(const Wheels& wheels, const Calibration& calibration, const std::string& label,
-                  Findings& out) {
+void check_noises(const Wheels& wheels, const Calibration& calibration, const Parity& parity,
+                  const std::string& label, Findings& out) {
   std::vector<NoiseFound> found = noises_of(wheels, calibration, wheels.samples);
   const std::vector<EncoderSample> longer = merged(wheels.samples);
   const double times = std::sqrt(static_cast<double>(wheels.samples.size()) /
@@ -219,7 +293,10 @@ void check_noises(const Wheels& wheels, const Calibration& calibration, const st
     if (ratio > kMostFactor) {
       finding.severity = Severity::kFault;
       finding.what += ": the wheels contradict each other by more than it explains";
-      if (part.name.find(' ') == std::string::npos) {
+      if (is_no_noise(part, parity)) {
+        finding.what +=
+            ", and no noise is like that: something else is wrong (signs, order, units, zeros)";
+      } else if (part.name.find(' ') == std::string::npos) {
         finding.remedies = {{section + part.name, significant(part.found, 2)}};
       } else {
         finding.severity = Severity::kNote;  // one that is worse than the others of its kind
@@ -227,30 +304,6 @@ void check_noises(const Wheels& wheels, const Calibration& calibration, const st
     }
     out.push_back(finding);
   }
-}
-
-/// How much the wheels contradict each other, whatever the noises are.
-void check_parity(const Wheels& wheels, const Intrinsics& x_WI, const std::string& label,
-                  Findings& out) {
-  TwistSolver solver(wheels.model, {});
-  solver.set_intrinsics(x_WI);
-  TwistSolution solution;
-  double squares = 0., speeds = 0., rows = 0., samples = 0.;
-  for (const EncoderSample& sample : wheels.samples) {
-    if (solver.solve(sample, solution) != Status::kOk || solution.rank_deficient) continue;
-    squares += solution.e.squaredNorm();
-    speeds += solution.xi.head<2>().squaredNorm();
-    rows += static_cast<double>(solution.e.size());
-    samples += 1.;
-  }
-  if (rows == 0.) return;
-  const double rms = std::sqrt(squares / rows), speed = std::sqrt(speeds / samples);
-  out.push_back({label,
-                 Severity::kFits,
-                 "parity",
-                 "rows disagree by " + significant(1e3 * rms, 2) + " mm/s at " +
-                     significant(speed, 2) + " m/s",
-                 {{"parity residual", rms, "m/s"}, {"speed", speed, "m/s"}}});
 }
 
 }  // namespace
@@ -264,11 +317,16 @@ void check_wheels(const Recording& recording, Findings& out) {
     }
     if (wheels.samples.empty()) continue;
     check_channels(wheels, label, out);
+    if (wheels.model->n_rows() <= 3) continue;
     const std::optional<Calibration> calibration = calibrated(wheels);
-    if (!calibration) continue;
-    check_parity(wheels, calibration->x_WI, label, out);
+    if (!calibration) {
+      check_parity(parity_of(wheels, wheels.prior.wheels.x_WI), label, out);
+      continue;
+    }
+    const Parity parity = parity_of(wheels, calibration->x_WI);
+    check_parity(parity, label, out);
     check_liars(recording, wheels, *calibration, label, out);
-    check_noises(wheels, *calibration, label, out);
+    check_noises(wheels, *calibration, parity, label, out);
   }
 }
 

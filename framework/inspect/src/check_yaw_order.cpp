@@ -29,9 +29,18 @@ Left left_by(const RateGrid& gyro, const RateGrid& wheels) {
   return {variance > 0. ? (dd / n - d * d / (n * n)) / variance : 1., variance};
 }
 
+/// What wheels cannot say among themselves: with more than three rows, whole sides alone.
+std::vector<ChannelChange> changes_by_gyro(const Wheels& wheels) {
+  std::vector<ChannelChange> changes = {{}};
+  if (wheels.model->n_rows() <= 3) changes = channel_changes(wheels.model->description());
+  const auto sides = side_changes(wheels.model, wheels.prior.wheels.x_WI);
+  changes.insert(changes.end(), sides.begin(), sides.end());
+  return changes;
+}
+
 /// Each change undone, by what is left of the gyro's rate: as the parity residual says it of wheels
 /// that can contradict each other.
-void check_order(const Recording& recording, const Wheels& wheels, const RateGrid& gyro,
+bool check_order(const Recording& recording, const Wheels& wheels, const RateGrid& gyro,
                  const std::string& label, Findings& out) {
   const Span span = span_of(recording);
   struct Tried {
@@ -39,7 +48,7 @@ void check_order(const Recording& recording, const Wheels& wheels, const RateGri
     Left left;
   };
   std::vector<Tried> all;
-  for (const ChannelChange& change : channel_changes(wheels.model->description())) {
+  for (const ChannelChange& change : changes_by_gyro(wheels)) {
     Wheels changed = wheels;
     for (EncoderSample& sample : changed.samples) change.undo(sample);
     all.push_back({change, left_by(gyro, RateGrid(span.begin_ns, span.end_ns, turns_of(changed)))});
@@ -49,11 +58,16 @@ void check_order(const Recording& recording, const Wheels& wheels, const RateGri
   });
   const Left none = all.front().left, least = best->left;
   constexpr double kLeastRate = 0.05;
-  if (best == all.begin() || none.gyro < kLeastRate * kLeastRate) return;
+  if (best == all.begin() || none.gyro < kLeastRate * kLeastRate) return false;
   const bool is_clear = std::all_of(all.begin(), all.end(), [&](const Tried& other) {
     return &other == &*best || other.left.part > 3. * least.part;
   });
-  if (!is_clear || least.part > 0.1 * none.part || least.part > 0.1) return;
+  if (!is_clear || least.part > 0.1 * none.part || least.part > 0.1) return false;
+  // What turns the rate round may be the gyro's sign as well: that is told with all its causes.
+  const auto opposite = about(turns_of(wheels), -Eigen::Vector3d::UnitZ());
+  if (left_by(gyro, RateGrid(span.begin_ns, span.end_ns, opposite)).part < 3. * least.part) {
+    return false;
+  }
   const ModelDescription& description = wheels.model->description();
   out.push_back({label,
                  Severity::kFault,
@@ -64,19 +78,22 @@ void check_order(const Recording& recording, const Wheels& wheels, const RateGri
                  {{"left as it is", none.part, ""}, {"left without it", least.part, ""}},
                  best->change.remedies(wheels.sensor, static_cast<std::size_t>(description.n_drive),
                                        static_cast<std::size_t>(description.n_steer))});
+  return true;
 }
 
 }  // namespace
 
 void check_yaw_order(const Recording& recording, Findings& out) {
-  if (recording.imu.empty()) return;
   const Span span = span_of(recording);
   for (const Wheels& wheels : recording.wheels) {
     if (wheels.samples.empty() || !wheels.unusable.empty()) continue;
-    if (wheels.model->n_rows() > 3) continue;  // the wheels say it among themselves
-    const RateGrid gyro(span.begin_ns, span.end_ns,
-                        about(turns_of(recording.imu), yaw_axis_of(recording, wheels.prior)));
-    check_order(recording, wheels, gyro, recording.label<EncoderSample>(wheels.sensor), out);
+    for (const YawRates& rates : yaw_rates_of(recording, wheels.prior)) {
+      const RateGrid gyro(span.begin_ns, span.end_ns, rates.turns);
+      if (check_order(recording, wheels, gyro, recording.label<EncoderSample>(wheels.sensor),
+                      out)) {
+        break;
+      }
+    }
   }
 }
 

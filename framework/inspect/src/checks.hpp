@@ -2,6 +2,7 @@
 // then they say nothing, or a note why.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "recording.hpp"
@@ -36,8 +37,14 @@ void check_poses(const Recording& recording, Findings& out);
 /// direction, or there is no IMU.
 Eigen::Vector3d up_of(const Recording& recording);
 
-/// The same, as the mounting has it where the accelerometer has no direction.
-Eigen::Vector3d yaw_axis_of(const Recording& recording, const WheelsPrior& prior);
+/// What a gyro says of the turns about the vertical, as z; of an IMU whose accelerometer has no
+/// direction about what the mounting has for it.
+struct YawRates {
+  std::string label;
+  std::vector<Turn> turns;
+};
+/// Of the IMU, and of all that integrate for themselves.
+std::vector<YawRates> yaw_rates_of(const Recording& recording, const WheelsPrior& prior);
 
 /// The time that all of the IMU, wheels and poses cover, and a bit more: of grids.
 struct Span {

@@ -56,8 +56,13 @@ bool is_fault_of(const Findings& findings, std::string_view sensor, Checks check
 /// unit, sign, order or zero disagrees in all that it is compared with.
 constexpr std::array<std::string_view, 6> kWheelCauses = {"order",   "turn", "steering",
                                                           "channel", "rate", "steer offsets"};
+/// Of those what makes the wheels alone say another turn than the gyro.
+constexpr std::array<std::string_view, 6> kWheelsAlone = {"order",   "turn",          "steering",
+                                                          "channel", "steer offsets", "parity"};
 constexpr std::array<std::string_view, 2> kOrder = {"order", "steering"};
 constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
+/// What no noise is the remedy of.
+constexpr std::array<std::string_view, 4> kNoNoise = {"contradicted", "parity", "speed", "heading"};
 constexpr std::array<std::string_view, 5> kImuCauses = {"gravity", "rate", "up", "tilt", "channel"};
 bool is_one_of(const std::string& check, Checks checks) {
   return std::find(checks.begin(), checks.end(), check) != checks.end();
@@ -78,9 +83,23 @@ void demote(Finding& finding, const std::string& cause) {
 void demote_consequences(const Recording& recording, Findings& findings) {
   const std::string imu =
       recording.imu_sensor.empty() ? "" : recording.label<ImuSample>(recording.imu_sensor);
+  std::vector<std::string> gyros = {imu};
+  for (const Headings& other : recording.headings) {
+    gyros.push_back(recording.label<HeadingSample>(other.sensor));
+  }
+  std::string wheels;  // that contradict themselves
+  for (const Wheels& set : recording.wheels) {
+    const std::string label = recording.label<EncoderSample>(set.sensor);
+    if (is_fault_of(findings, label, kWheelsAlone)) wheels = label;
+  }
+  for (Finding& finding : findings) {
+    const bool is_of_gyro = std::find(gyros.begin(), gyros.end(), finding.sensor) != gyros.end();
+    if (is_of_gyro && finding.check == "rate" && !wheels.empty()) demote(finding, wheels);
+  }
   const Findings all = findings;
   const bool imu_is_wrong = std::any_of(all.begin(), all.end(), [&](const Finding& f) {
-    return f.sensor == imu && f.severity == Severity::kFault && is_one_of(f.check, kImuCauses);
+    return std::find(gyros.begin(), gyros.end(), f.sensor) != gyros.end() &&
+           f.severity == Severity::kFault && is_one_of(f.check, kImuCauses);
   });
   for (Finding& finding : findings) {
     if (finding.severity != Severity::kFault) continue;
@@ -92,8 +111,9 @@ void demote_consequences(const Recording& recording, Findings& findings) {
       demote(finding, sensor);
     } else if (sensor != imu && follows(kWheelCauses)) {
       if (!is_of_stamps(finding.check) || finding.check == "clock") demote(finding, sensor);
-    } else if (follows(kContradicted) &&
-               (finding.check.starts_with("sigma_") || finding.check == "speed")) {
+    } else if (finding.check.starts_with("sigma_") && is_fault_of(all, sensor, kNoNoise)) {
+      demote(finding, sensor);
+    } else if (follows(kContradicted) && (finding.check == "parity" || finding.check == "speed")) {
       demote(finding, sensor);
     } else if (imu_is_wrong && finding.check == "clock") {
       demote(finding, imu);
@@ -152,8 +172,11 @@ Inspection inspect(RunSetup& setup) {
       sensors.push_back(finding.sensor);
     }
   }
+  // Of each sensor what is the cause first.
   const auto place = [&](const Finding& f) {
-    return std::find(sensors.begin(), sensors.end(), f.sensor) - sensors.begin();
+    const bool is_cause = is_one_of(f.check, kWheelCauses) || is_one_of(f.check, kImuCauses);
+    return 2 * (std::find(sensors.begin(), sensors.end(), f.sensor) - sensors.begin()) +
+           (is_cause && f.severity == Severity::kFault ? 0 : 1);
   };
   std::stable_sort(findings.begin(), findings.end(),
                    [&](const Finding& a, const Finding& b) { return place(a) < place(b); });

@@ -6,6 +6,7 @@
 
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/plausibility/heading_rate.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::inspect {
@@ -52,6 +53,15 @@ std::vector<Turn> turns_of(std::span<const ImuSample> imu) {
     turns.push_back(
         {imu[i - 1].t_ns, imu[i].t_ns,
          0.5 * (to_vector(imu[i - 1].gyro_rad_per_s) + to_vector(imu[i].gyro_rad_per_s))});
+  }
+  return turns;
+}
+
+std::vector<Turn> turns_of(std::span<const HeadingSample> headings) {
+  std::vector<Turn> turns;
+  for (std::size_t i = 1; i < headings.size(); ++i) {
+    const auto rate = yaw_rate_between(headings[i - 1], headings[i]);
+    if (rate) turns.push_back({headings[i - 1].t_ns, headings[i].t_ns, {0., 0., *rate}});
   }
   return turns;
 }

@@ -33,6 +33,8 @@ class RateGrid {
 
 /// Rate of the gyro in I, between its readings.
 std::vector<Turn> turns_of(std::span<const ImuSample> imu);
+/// About the vertical, as z, between headings.
+std::vector<Turn> turns_of(std::span<const HeadingSample> headings);
 /// Of a trajectory, in the frame of its body.
 std::vector<Turn> turns_of(const Trajectory& poses);
 /// Twists [v_x, v_y, omega] of O instead of rates, shifted by what the configuration says of the

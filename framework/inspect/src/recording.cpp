@@ -8,6 +8,7 @@
 
 #include <Eigen/SVD>
 
+#include "checks.hpp"
 #include "viwo/camera/camera_model.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
@@ -128,6 +129,7 @@ class Gatherer {
     }
     plausibility_.finish();
     recording_.implausible = plausibility_.findings();
+    if (!setup_.filter) look_without_filter();
     return std::move(recording_);
   }
 
@@ -150,6 +152,29 @@ class Gatherer {
     return false;
   }
 
+  /// Only what all of it says tells how the IMU is mounted.
+  void look_without_filter() {
+    struct Sample {
+      std::int64_t t_ns;
+      const std::string* sensor;
+      SampleView view;
+    };
+    std::vector<Sample> all;
+    const auto include = [&all](const std::string& sensor, const auto& samples) {
+      for (const auto& sample : samples) all.push_back({sample.t_ns, &sensor, sample});
+    };
+    include(recording_.imu_sensor, recording_.imu);
+    for (const Wheels& wheels : recording_.wheels) include(wheels.sensor, wheels.samples);
+    for (const Headings& other : recording_.headings) include(other.sensor, other.samples);
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Sample& a, const Sample& b) { return a.t_ns < b.t_ns; });
+    Plausibility plausibility(setup_, up_of(recording_));
+    plausibility.begin_at(recording_.begin_ns());
+    for (const Sample& sample : all) plausibility.add(*sample.sensor, sample.view);
+    plausibility.finish();
+    recording_.implausible = plausibility.findings();
+  }
+
   void add(const std::string& sensor, SampleView sample) {
     if (sample.get_if<CalibrationSample>() != nullptr) return;
     add_stamp(sensor, sample);
@@ -160,6 +185,8 @@ class Gatherer {
       }
     } else if (const auto* wheels = sample.get_if<EncoderSample>()) {
       add_encoders(sensor, *wheels);
+    } else if (const auto* heading = sample.get_if<HeadingSample>()) {
+      add_heading(sensor, *heading);
     } else if (const auto* pose = sample.get_if<PoseSample>()) {
       add_pose(sensor, false, {pose->t_ns, to_vector(pose->p_BinW_m), pose->q_BtoW_xyzw});
     } else if (const auto* state = sample.get_if<StateSample>()) {
@@ -193,6 +220,14 @@ class Gatherer {
       }
       if (sample.fault() == nullptr) wheels.samples.push_back(sample);
     }
+  }
+
+  void add_heading(const std::string& sensor, const HeadingSample& heading) {
+    auto& all = recording_.headings;
+    auto known = std::find_if(all.begin(), all.end(),
+                              [&](const Headings& other) { return other.sensor == sensor; });
+    if (known == all.end()) known = all.insert(known, {sensor, {}});
+    if (heading.fault() == nullptr) known->samples.push_back(heading);
   }
 
   struct RawPose {

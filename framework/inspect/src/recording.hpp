@@ -56,12 +56,19 @@ struct Poses {
   Trajectory poses;
 };
 
+/// What a gyro that integrates for itself said.
+struct Headings {
+  std::string sensor;
+  std::vector<HeadingSample> samples;
+};
+
 struct Recording {
   const RunSetup* setup = nullptr;
   std::vector<Stamps> stamps;
   std::string imu_sensor;  ///< "" for none
   std::vector<ImuSample> imu;
   std::vector<Wheels> wheels;
+  std::vector<Headings> headings;
   std::vector<Poses> poses;
   std::vector<CameraTurns> cameras;
   std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor

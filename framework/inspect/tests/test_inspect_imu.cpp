@@ -7,6 +7,7 @@
 
 #include "allan.hpp"
 #include "inspected.hpp"
+#include "viwo/config/overrides.hpp"
 
 namespace viwo::inspect {
 namespace {
@@ -71,6 +72,46 @@ TEST(InspectStamps, TellsSensorsThatHaveLittleTimeInCommon) {
   EXPECT_THAT(faults_of(inspected(swerve(), {.states = later})), IsEmpty());
   const Inspection few = inspected(swerve(), {.images = sooner, .states = later});
   EXPECT_THAT(faults_of(few), Contains("recording overlap"));
+}
+
+TEST(InspectStamps, TellsIntervalsThatNoRunTakes) {
+  RunSetup slow = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
+  std::int64_t last_ns = -kSecond;
+  const Inspection reference = inspected(std::move(slow), {.poses = [&last_ns](PoseSample& s) {
+                                           if (s.t_ns - last_ns < 8 * kSecond / 10) return false;
+                                           last_ns = s.t_ns;
+                                           return true;
+                                         }});
+  EXPECT_THAT(faults_of(reference), ElementsAre("poses0 stamps"));
+  EXPECT_EQ(remedy_of(finding_of(reference, "poses0", "stamps"), "evaluation.reference_max_gap_s"),
+            "2");
+  const auto times = [](std::int64_t factor, std::int64_t by) {
+    RunSetup setup = simulated("viwo_skid_steer", {"sensors.simulator0.duration_s=10"});
+    config::set_path(setup.resolved, "sensors.wheels0",
+                     config::parse("{max_gap_s: 0.5}", "resolved"));
+    return inspected(std::move(setup), {.wheels = [factor, by](EncoderSample& s) {
+                       for (std::int64_t* t_ns : {&s.t_ns, &s.begin_ns, &s.end_ns}) {
+                         *t_ns = *t_ns * factor / by;
+                       }
+                       return true;
+                     }});
+  };
+  EXPECT_THAT(finding_of(times(1000, 1), "wheels0", "stamps").what,
+              HasSubstr("takes each interval of"));
+  EXPECT_THAT(finding_of(times(1, 1000), "wheels0", "stamps").what,
+              HasSubstr("no sensor of a robot gives a sample every"));
+}
+
+// What begins first may begin with a stamp that is none.
+TEST(InspectStamps, DoesNotTakeOneStampForTheTimeOfTheRecording) {
+  bool is_first = true;
+  const Inspection stray = inspected(swerve(), {.wheels = [&is_first](EncoderSample& s) {
+                                       if (is_first) s.t_ns = s.begin_ns = s.end_ns = -5 * kSecond;
+                                       is_first = false;
+                                       return true;
+                                     }});
+  EXPECT_THAT(faults_of(stray), IsEmpty());
+  EXPECT_GT(figure_of(finding_of(stray, "wheels0", "stamps"), "longest interval"), 5.);
 }
 
 /// Ends with a fault, and had some samples rejected.

@@ -89,6 +89,104 @@ TEST(InspectWheels, FindsSteeringInDegreesAndWritesTheScale) {
               HasSubstr("[0.0174532925"));
 }
 
+// Never more than a turn, so that no angle by itself is impossible.
+TEST(InspectWheels, FindsSmallSteeringAnglesInDegrees) {
+  const Inspection degrees = with_wheels(swerve(), [](EncoderSample& s) {
+    for (double& angle : s.steer_rad) {
+      angle = std::remainder(angle * 180. / std::numbers::pi, 2. * std::numbers::pi);
+    }
+  });
+  EXPECT_THAT(faults_of(degrees), ::testing::Not(IsEmpty()));
+  const Inspection car = with_wheels(simulated("viwo_ackermann"), [](EncoderSample& s) {
+    for (double& angle : s.steer_rad) angle *= 180. / std::numbers::pi;
+  });
+  EXPECT_THAT(faults_of(car), ::testing::Not(IsEmpty()));
+}
+
+TEST(InspectWheels, TellsThatTheyContradictEachOtherWhereNothingMendsIt) {
+  const Inspection swapped = with_wheels(swerve(), [](EncoderSample& s) {
+    if (s.t_ns < 20'000'000'000) return;
+    std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[2]);
+    std::swap(s.steer_rad[0], s.steer_rad[1]);
+    s.steer_rad[3] *= -1.;
+  });
+  const Finding parity = finding_of(swapped, "wheels0", "parity");
+  EXPECT_THAT(faults_of(swapped), ::testing::Not(IsEmpty()));
+  EXPECT_THAT(parity.what, HasSubstr("contradict each other grossly"));
+  for (const Finding& finding : swapped.findings) {
+    EXPECT_FALSE(finding.check.starts_with("sigma_") && !finding.remedies.empty()) << finding.what;
+  }
+  const Inspection absurd = with_wheels(swerve(), [](EncoderSample& s) {
+    for (double& rate : s.drive_rad_per_s) rate *= 1e308;
+  });
+  EXPECT_THAT(faults_of(absurd), Contains("wheels0 parity"));
+}
+
+TEST(InspectWheels, WritesNoNoiseThatIsNone) {
+  const Inspection faster = with_wheels(swerve(), [](EncoderSample& s) {
+    s.drive_rad_per_s[0] *= 5.;
+    s.drive_rad_per_s[2] *= -3.;
+  });
+  for (const Finding& finding : faster.findings) {
+    EXPECT_FALSE(finding.check.starts_with("sigma_") && !finding.remedies.empty()) << finding.what;
+  }
+  EXPECT_THAT(faults_of(faster), Contains("wheels0 parity"));
+}
+
+/// Two drives on each side, as a base that skids has them.
+RunSetup four_drives(const std::string& motion = "figure_eight") {
+  return simulated(
+      "viwo_skid_steer",
+      {"sensors.simulator0.duration_s=30", "sensors.simulator0.robot.left_drives=[1, 3]",
+       "sensors.simulator0.robot.right_drives=[2, 4]", "kinematics.left_drives=[1, 3]",
+       "kinematics.right_drives=[2, 4]"});
+}
+
+TEST(InspectWheels, NamesBothOfTwoDrivesOfWhichOneIsReversed) {
+  const Inspection reversed =
+      with_wheels(four_drives(), [](EncoderSample& s) { s.drive_rad_per_s[1] *= -1.; });
+  const Finding order = finding_of(reversed, "wheels0", "order");
+  EXPECT_THAT(faults_of(reversed), ElementsAre("wheels0 order"));
+  EXPECT_THAT(order.what, HasSubstr("drive_2 turns opposite"));
+  EXPECT_THAT(order.what, HasSubstr("drive_4 turns opposite"));
+  EXPECT_THAT(order.remedies, IsEmpty());
+}
+
+TEST(InspectWheels, FindsThatASideIsReversedByTheGyroAndByPoses) {
+  const auto right = [](EncoderSample& s) {
+    s.drive_rad_per_s[1] *= -1.;
+    s.drive_rad_per_s[3] *= -1.;
+  };
+  const Inspection by_gyro = with_wheels(four_drives(), right);
+  EXPECT_THAT(faults_of(by_gyro), ElementsAre("wheels0 order"));
+  EXPECT_EQ(remedy_of(finding_of(by_gyro, "wheels0", "order"), "sensors.wheels0.drive_scale"),
+            "[1, -1, 1, -1]");
+  RunSetup planar = four_drives("straight");
+  planar.filter.reset();
+  const Inspection by_poses = inspected(std::move(planar), {.imu = [](ImuSample&) { return false; },
+                                                            .wheels =
+                                                                [&right](EncoderSample& s) {
+                                                                  right(s);
+                                                                  return true;
+                                                                }});
+  EXPECT_THAT(faults_of(by_poses), Contains("wheels0 order"));
+  EXPECT_EQ(remedy_of(finding_of(by_poses, "wheels0", "order"), "sensors.wheels0.drive_scale"),
+            "[1, -1, 1, -1]");
+}
+
+TEST(InspectPoses, TellsThoseThatJump) {
+  std::int64_t n = 0;
+  const Inspection jumps = inspected(setup_of(testing::configuration("runs/simulated_swerve.yaml")),
+                                     {.poses = [&n](PoseSample& s) {
+                                       if (++n % 10 == 0) s.p_BinW_m = {0., 0., 0.};
+                                       if (n % 10 == 5) s.p_BinW_m[0] += 50.;
+                                       return true;
+                                     }});
+  EXPECT_THAT(faults_of(jumps), ElementsAre("poses0 jumps"));
+  EXPECT_GT(figure_of(finding_of(jumps, "poses0", "jumps"), "to zero"), 0.);
+  EXPECT_EQ(finding_of(jumps, "wheels0", "heading").what, "");
+}
+
 TEST(InspectWheels, FindsTheZeroOfASteeringAndWritesTheOffset) {
   EXPECT_EQ(
       finding_of(with_wheels(swerve(), [](EncoderSample&) {}), "wheels0", "steer offsets").severity,

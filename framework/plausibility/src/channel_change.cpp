@@ -1,8 +1,18 @@
 #include "viwo/plausibility/channel_change.hpp"
 
+#include <bit>
+#include <numbers>
 #include <utility>
 
+#include "viwo/math/significant.hpp"
+#include "viwo/wheel/twist_solver.hpp"
+
 namespace viwo {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.;
+
+}  // namespace
 
 std::vector<ChannelChange> channel_changes(const ModelDescription& description) {
   std::vector<ChannelChange> changes = {{}};
@@ -21,8 +31,29 @@ std::vector<ChannelChange> channel_changes(const ModelDescription& description) 
   add_channels(n_drive, ChannelChange::kDriveSign, ChannelChange::kDrivesExchanged);
   add_channels(n_steer, ChannelChange::kSteerSign, ChannelChange::kSteersExchanged);
   if (n_steer > 1) changes.push_back({ChannelChange::kSteerSigns});
+  if (n_steer > 0) changes.push_back({ChannelChange::kSteersInDegrees});
   if (n_steer == n_drive) add_pairs(n_drive, ChannelChange::kWheelsExchanged);
   return changes;
+}
+
+std::vector<ChannelChange> side_changes(const std::shared_ptr<const WheelModel>& model,
+                                        const Intrinsics& x_WI) {
+  const auto n = static_cast<std::size_t>(model->description().n_drive);
+  TwistSolver solver(model, {});
+  solver.set_intrinsics(x_WI);
+  TwistSolution solution;
+  std::uint32_t left = 0, right = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    EncoderSample alone;
+    alone.n_drive = model->description().n_drive;
+    alone.n_steer = model->description().n_steer;
+    alone.end_ns = 1'000'000;
+    alone.drive_rad_per_s[i] = 1.;
+    if (solver.solve(alone, solution) != Status::kOk || solution.rank_deficient) return {};
+    (solution.xi[2] > 0. ? right : left) |= 1u << i;
+  }
+  if (std::popcount(left) < 2 || std::popcount(right) < 2) return {};
+  return {{ChannelChange::kSideSign, 0, 0, left}, {ChannelChange::kSideSign, 0, 0, right}};
 }
 
 void ChannelChange::undo(EncoderSample& sample) const {
@@ -48,6 +79,17 @@ void ChannelChange::undo(EncoderSample& sample) const {
       std::swap(sample.drive_rad_per_s[a], sample.drive_rad_per_s[b]);
       std::swap(sample.steer_rad[a], sample.steer_rad[b]);
       break;
+    case kSteersInDegrees:
+      for (double& angle : sample.steer_rad) angle *= kDegree;
+      break;
+    case kSideSign:
+      for (std::size_t i = 0; i < kMaxDrives; ++i) {
+        if ((side >> i & 1u) != 0) sample.drive_rad_per_s[i] *= -1.;
+      }
+      break;
+    case kNoSteering:
+      sample.steer_rad.fill(0.);
+      break;
   }
 }
 
@@ -55,6 +97,7 @@ std::string ChannelChange::text() const {
   const std::string first = std::to_string(a + 1), second = std::to_string(b + 1);
   switch (kind) {
     case kNone:
+    case kNoSteering:
       break;
     case kDriveSign:
       return "drive_" + first + " turns opposite to what the other wheels say: its sign";
@@ -72,6 +115,16 @@ std::string ChannelChange::text() const {
     case kWheelsExchanged:
       return "wheels contradict each other, and do not with drive and steering of wheels " + first +
              " and " + second + " exchanged: their order";
+    case kSteersInDegrees:
+      return "wheels contradict each other, and do not if the steering angles are in degrees";
+    case kSideSign: {
+      std::string drives;
+      for (std::size_t i = 0; i < kMaxDrives; ++i) {
+        if ((side >> i & 1u) == 0) continue;
+        drives += (drives.empty() ? "drive_" : ", drive_") + std::to_string(i + 1);
+      }
+      return drives + ", all of one side, are reversed: their sign";
+    }
   }
   return "";
 }
@@ -79,7 +132,10 @@ std::string ChannelChange::text() const {
 std::vector<Remedy> ChannelChange::remedies(const std::string& sensor, std::size_t n_drive,
                                             std::size_t n_steer) const {
   const std::string section = "sensors." + sensor + ".";
-  const auto sign = [&](std::size_t i) { return i == a || kind == kSteerSigns ? "-1" : "1"; };
+  const auto sign = [&](std::size_t i) {
+    const bool is_reversed = kind == kSideSign ? (side >> i & 1u) != 0 : i == a;
+    return is_reversed || kind == kSteerSigns ? "-1" : "1";
+  };
   const auto order = [&](std::size_t i) {
     return std::to_string((i == a ? b : i == b ? a : i) + 1);
   };
@@ -87,8 +143,10 @@ std::vector<Remedy> ChannelChange::remedies(const std::string& sensor, std::size
   const Remedy steers{section + "steer_channel", yaml_list(n_steer, order)};
   switch (kind) {
     case kNone:
+    case kNoSteering:
       break;
     case kDriveSign:
+    case kSideSign:
       return {{section + "drive_scale", yaml_list(n_drive, sign)}};
     case kDrivesExchanged:
       return {drives};
@@ -99,6 +157,9 @@ std::vector<Remedy> ChannelChange::remedies(const std::string& sensor, std::size
       return {steers};
     case kWheelsExchanged:
       return {drives, steers};
+    case kSteersInDegrees:
+      return {{section + "steer_scale",
+               yaml_list(n_steer, [](std::size_t) { return significant(kDegree, 15); })}};
   }
   return {};
 }

@@ -20,6 +20,7 @@ EncoderCheck::EncoderCheck(std::string name, std::string sensor,
   for (const ChannelChange& change : channel_changes(model->description())) {
     changes_.push_back({change});
   }
+  if (n_steer_ > 0) changes_.push_back({{ChannelChange::kNoSteering}});
 }
 
 std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
@@ -78,8 +79,8 @@ void EncoderCheck::find_degrees(Findings& out) const {
                    yaml_list(n_steer(), [](std::size_t) { return "0.0174532925199433"; })}}});
 }
 
-/// One change, and no other, makes the contradictions of the wheels vanish: to a tenth of what they
-/// are, and a third of what is left by the next best.
+/// One change makes the contradictions of the wheels vanish: to a tenth of what they are. Others
+/// that leave less than three times as much explain it as well: then all of them are named.
 void EncoderCheck::find_change(Findings& out) const {
   if (tried_ < 50) return;
   const auto best =
@@ -90,12 +91,16 @@ void EncoderCheck::find_change(Findings& out) const {
   const double least = 1e-4 * n_rows * static_cast<double>(tried_);  // 1 cm/s each
   const Tried& none = changes_.front();
   if (none.residual < least || none.residual < 0.01 * none.signal) return;
+  const double most = 0.1 * none.residual;
+  std::string texts;
+  std::vector<Remedy> remedies = best->change.remedies(sensor_, n_drive(), n_steer());
   for (const Tried& other : changes_) {
-    if (&other != &*best && other.residual < 3. * best->residual) return;
+    if (other.residual >= 3. * best->residual && &other != &*best) continue;
+    if (other.residual >= most || other.change.kind == ChannelChange::kNoSteering) return;
+    if (!texts.empty()) remedies.clear();
+    texts += (texts.empty() ? "" : " - or, which explains it as well, ") + other.change.text();
   }
-  if (best->residual < 0.1 * none.residual)
-    out.push_back({name_ + " order", name_ + ": " + best->change.text(), false,
-                   best->change.remedies(sensor_, n_drive(), n_steer())});
+  out.push_back({name_ + " order", name_ + ": " + texts, false, std::move(remedies)});
 }
 
 }  // namespace viwo

@@ -15,14 +15,14 @@
 
 namespace viwo {
 
-/// Median of positive numbers, to one percent, from 0.001 to 1000.
+/// Median of positive numbers, to one percent, from 0.001 to 1e5.
 class LogMedian {
  public:
   void add(double value);
   double value() const;
 
  private:
-  std::vector<std::uint32_t> counts_ = std::vector<std::uint32_t>(1382);
+  std::vector<std::uint32_t> counts_ = std::vector<std::uint32_t>(1843);
   std::uint64_t total_ = 0;
 };
 

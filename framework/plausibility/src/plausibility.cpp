@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Geometry>
+
 #include "encoder_check.hpp"
 #include "imu_check.hpp"
 #include "stereo_check.hpp"
@@ -17,7 +19,7 @@ struct Plausibility::Checks {
   struct WheelsCheck {
     std::string sensor;
     EncoderCheck encoders;
-    TwistCheck twist;
+    TwistCheck twist, heading;
     bool has_failed = false;  ///< what its model throws is told by those who need it
   };
 
@@ -35,7 +37,7 @@ struct Plausibility::Checks {
     }
   };
 
-  std::string imu_name;
+  std::string imu_name, heading_name;
   ImuCheck imu;
   std::vector<WheelsCheck> wheels;
   StereoCheck stereo;
@@ -48,12 +50,17 @@ struct Plausibility::Checks {
     return std::abs(stream.ahead_s(streams.front().watch)) > kFar_s;
   }
 
-  /// `imu_text`, `wheels_text`: what texts call them.
-  void add(const std::string& sensor, const std::string& imu_text, const std::string& wheels_text,
-           const WheelSet& set) {
-    wheels.push_back({sensor, EncoderCheck(wheels_text, sensor, set.model, set.prior),
-                      TwistCheck(imu_text, wheels_text, "sensors." + sensor + ".drive_scale",
-                                 set.model->description().n_drive, set.prior)});
+  /// What texts call them.
+  struct Names {
+    std::string imu, heading, wheels;
+  };
+  void add(const std::string& sensor, const Names& names, const WheelSet& set, Gyro gyro) {
+    const ModelDescription& description = set.model->description();
+    const std::string drives = "sensors." + sensor + ".drive_scale";
+    wheels.push_back(
+        {sensor, EncoderCheck(names.wheels, sensor, set.model, set.prior),
+         TwistCheck(names.imu, names.wheels, drives, description, set.prior, gyro),
+         TwistCheck(names.heading, names.wheels, drives, description, set.prior, Gyro::kHeading)});
   }
 
   void add(WheelsCheck& check, const EncoderSample& sample) {
@@ -62,8 +69,9 @@ struct Plausibility::Checks {
       constexpr double kLeast = 0.05;  // m/s, rad/s
       moves = xi && xi->norm() > kLeast;
       if (xi) {
-        check.twist.add_wheels({sample.t_ns, sample.begin_ns, sample.end_ns}, *xi,
-                               check.encoders.rate_by_prior());
+        const SampleExtent extent{sample.t_ns, sample.begin_ns, sample.end_ns};
+        check.twist.add_wheels(extent, *xi, check.encoders.rate_by_prior());
+        check.heading.add_wheels(extent, *xi, check.encoders.rate_by_prior());
       }
     } catch (const std::exception&) {
       check.has_failed = true;
@@ -90,6 +98,19 @@ std::string source_of(const std::string& name, const std::vector<SensorEntry>& s
   return name;
 }
 
+/// As texts call what a sensor gives: by its kind, too, if it gives several.
+std::string name_of(const RunSetup& setup, const std::string& sensor, const std::string& kind) {
+  for (const SensorEntry& entry : setup.sensors) {
+    if (entry.name != sensor) continue;
+    SampleTypes kinds =
+        guarded(entry.sensor.info, "yields", [&] { return entry.sensor.object->yields(); });
+    std::erase_if(kinds,
+                  [](const SampleType* t) { return *t == sample_type<CalibrationSample>(); });
+    if (kinds.size() > 1) return kind + " of " + sensor;
+  }
+  return sensor;
+}
+
 Finding of_another_clock(const std::string& name, double ahead_s) {
   return {name + " clock",
           name + ": its stamps are " + significant(std::abs(ahead_s), 2) + " s " +
@@ -100,11 +121,12 @@ Finding of_another_clock(const std::string& name, double ahead_s) {
 
 }  // namespace
 
+Plausibility::Plausibility(const RunSetup& setup, const Eigen::Vector3d& up) : live_(false) {
+  watch_without_filter(setup, up);
+}
+
 Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
-  if (!setup.filter) {
-    watch_wheels_alone(setup);
-    return;
-  }
+  if (!setup.filter) return;
   const FilterSetup& filter = *setup.filter;
   const std::string imu = setup.routes.sensor_of(Consumer::kImu);
   // A simulator is all of them.
@@ -115,6 +137,7 @@ Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
   };
   checks_ = std::make_unique<Checks>(
       Checks{imu,
+             setup.routes.sensor_of(Consumer::kHeading),
              ImuCheck(told(imu, "imu"), filter.options.filter.gravity_m_per_s2),
              {},
              StereoCheck(filter.cameras),
@@ -125,24 +148,43 @@ Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
     if (sensor.empty()) sensor = setup.routes.sensor_of(Consumer::kWheels);
     if (sensor.empty()) continue;
     try {
-      checks_->add(sensor, told(imu, "imu"), told(sensor, "wheels"), set);
+      checks_->add(sensor, {told(imu, "imu"), checks_->heading_name, told(sensor, "wheels")}, set,
+                   Gyro::kMounted);
     } catch (const std::exception&) {
       continue;
     }
   }
 }
 
-/// Of dead reckoning, which has neither an IMU nor streams.
-void Plausibility::watch_wheels_alone(const RunSetup& setup) {
+/// Of dead reckoning, which has no streams, and does not say how the IMU is mounted.
+void Plausibility::watch_without_filter(const RunSetup& setup, const Eigen::Vector3d& up) {
   const std::string sensor = setup.routes.sensor_of(Consumer::kWheels);
+  const std::string imu = setup.routes.sensor_of(Consumer::kImu);
+  const std::string heading = setup.routes.sensor_of(Consumer::kHeading);
+  checks_ = std::make_unique<Checks>(
+      Checks{imu,
+             heading,
+             ImuCheck(name_of(setup, imu, "imu"), EstimatorOptions{}.filter.gravity_m_per_s2),
+             {},
+             StereoCheck({}),
+             {}});
   if (!setup.model || sensor.empty()) return;
-  checks_ = std::make_unique<Checks>(Checks{"", ImuCheck("", 0.), {}, StereoCheck({}), {}});
   WheelSet set{setup.model, {}};
   set.prior.wheels.x_WI = setup.x_WI;
+  set.prior.sigma_intrinsics = setup.sigma;
+  set.prior.wheels.R_ItoO = Eigen::Matrix3d::Identity();
+  set.prior.wheels.p_IinO = Eigen::Vector3d::Zero();
+  if (up.norm() > 0.) {
+    set.prior.wheels.R_ItoO =
+        Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  }
   try {
-    checks_->add(sensor, "", sensor, set);
+    checks_->add(sensor,
+                 {name_of(setup, imu, "imu"), name_of(setup, heading, "headings"),
+                  name_of(setup, sensor, "wheels")},
+                 set, Gyro::kLevel);
   } catch (const std::exception&) {
-    checks_.reset();
+    // What its model throws is told by those who need it.
   }
 }
 
@@ -176,6 +218,9 @@ void Plausibility::add(const std::string& sensor, SampleView sample) {
   if (const auto* imu = sample.get_if<ImuSample>(); imu != nullptr && sensor == checks_->imu_name) {
     checks_->imu.add(*imu, checks_->moves);
     for (auto& wheels : checks_->wheels) wheels.twist.add_imu(*imu);
+  } else if (const auto* heading = sample.get_if<HeadingSample>()) {
+    if (sensor != checks_->heading_name) return;
+    for (auto& wheels : checks_->wheels) wheels.heading.add_heading(*heading);
   } else if (const auto* encoders = sample.get_if<EncoderSample>()) {
     for (auto& wheels : checks_->wheels) {
       if (wheels.sensor == sensor && !wheels.has_failed) checks_->add(wheels, *encoders);
@@ -190,8 +235,11 @@ void Plausibility::watch(const std::string& sensor, SampleView sample) {
   for (Checks::Watched& stream : checks_->streams) {
     if (stream.sensor != sensor || !(*stream.type == sample.type())) continue;
     const std::int64_t t_ns = sample.t_ns();
-    if (!now_ns_) now_ns_ = next_look_ns_ = t_ns;
-    if (!zero_ns_) zero_ns_ = now_ns_;
+    // A single stamp is not yet the time of the run: that of the next stream may be.
+    const bool is_single = n_watched_ == 1 && !stream.watch.has_begun();
+    if (!now_ns_ || is_single) now_ns_ = next_look_ns_ = t_ns;
+    if (!zero_ns_ || (is_single && !is_begun_at_)) zero_ns_ = now_ns_;
+    ++n_watched_;
     stream.watch.add(t_ns, sample.type().channel(sample.data()), *now_ns_);
     if (stream.watch.has_begun() && !checks_->is_of_another_clock(stream)) {
       now_ns_ = std::max(*now_ns_, stream.watch.newest_ns());
@@ -222,12 +270,14 @@ void Plausibility::finish() {
 
 void Plausibility::look(bool at_end) {
   findings_.clear();
-  if (now_ns_) checks_->imu.findings(*zero_ns_, findings_);
+  if (zero_ns_) checks_->imu.findings(*zero_ns_, findings_);
   for (const auto& wheels : checks_->wheels) {
     const std::size_t before = findings_.size();
     wheels.encoders.findings(findings_);
     // Wheels that contradict themselves say nothing of the IMU.
-    if (findings_.size() == before) wheels.twist.findings(checks_->imu.up(), findings_);
+    if (findings_.size() != before) continue;
+    wheels.twist.findings(checks_->imu.up(), findings_);
+    wheels.heading.findings(Eigen::Vector3d::Zero(), findings_);
   }
   checks_->stereo.findings(findings_);
   if (!now_ns_ || checks_->streams.empty()) return;

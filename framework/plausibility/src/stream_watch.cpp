@@ -1,6 +1,7 @@
 #include "stream_watch.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "viwo/math/significant.hpp"
@@ -37,12 +38,19 @@ bool StreamWatch::is_set_back(std::int64_t t_ns) {
 void StreamWatch::add(std::int64_t stamp_ns, int number, std::int64_t now_ns) {
   constexpr std::int64_t kMostStamp = 4'000'000'000'000'000'000;
   if (stamp_ns > kMostStamp || stamp_ns < -kMostStamp) return;
+  // A first stamp that the next one contradicts says nothing of the clock.
+  if (n_samples_ == 1 && std::abs(now_ns - stamp_ns - offset_ns_) > kLongNs) {
+    has_begun_ = false;
+    offset_ns_ = 0;
+    jump_ = StampJump{1.};
+  }
   if (!has_begun_) {
     // Of another clock.
     const std::int64_t off_ns = now_ns - stamp_ns;
     if (off_ns > kSecondNs / 2 || off_ns < -kSecondNs / 2) offset_ns_ = off_ns;
     first_offset_ns_ = offset_ns_;
   }
+  ++n_samples_;
   std::int64_t t_ns = stamp_ns + offset_ns_;
   if (has_begun_ && t_ns <= newest_ns_) {
     if (!is_set_back(t_ns)) {

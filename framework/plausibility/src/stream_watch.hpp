@@ -55,6 +55,7 @@ class StreamWatch {
   std::int64_t least_gap_ns_;
   StampJump jump_{1.};
   bool has_begun_ = false;
+  std::int64_t n_samples_ = 0;
   std::int64_t offset_ns_ = 0;  ///< from its stamps to the common time
   std::int64_t first_offset_ns_ = 0;
   std::int64_t newest_ns_ = 0;

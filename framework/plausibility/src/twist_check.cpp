@@ -13,11 +13,12 @@
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/plausibility/channel_change.hpp"
+#include "viwo/plausibility/heading_rate.hpp"
 
 namespace viwo {
 namespace {
 
-constexpr std::int64_t kFewestWindows = 50;  ///< 10 s
+constexpr std::int64_t kFewestWindows = 40;  ///< 8 s
 constexpr std::int64_t kFewestUpright = 15;  ///< of them, for a verdict on gravity
 constexpr double kLeastRate = 0.05;          ///< rad/s, standard deviation about the mean
 constexpr double kLeastForce = 0.1;          ///< m/s^2, likewise
@@ -87,12 +88,14 @@ auto CellMeans<kSize>::mean(std::int64_t cell) const -> std::optional<Vector> {
   return found.sum / static_cast<double>(found.covered_ns);
 }
 
-TwistCheck::TwistCheck(std::string imu, std::string wheels, std::string drives, int n_drive,
-                       const WheelsPrior& prior)
+TwistCheck::TwistCheck(std::string imu, std::string wheels, std::string drives,
+                       const ModelDescription& description, const WheelsPrior& prior, Gyro gyro)
     : imu_(std::move(imu)),
       wheels_(std::move(wheels)),
       drives_(std::move(drives)),
-      n_drive_(n_drive),
+      gyro_is_(gyro),
+      n_drive_(description.n_drive),
+      n_steer_(description.n_steer),
       R_ItoO_(prior.wheels.R_ItoO),
       p_IinO_(prior.wheels.p_IinO.head<2>()),
       t_OtoI_s_(prior.wheels.t_OtoI_s),
@@ -106,15 +109,33 @@ void TwistCheck::add_imu(const ImuSample& sample) {
     return v;
   };
   // Behind a gap, or a step back, the clock may be another one.
-  if (last_ && std::abs(sample.t_ns - last_->t_ns) > CellMeans<6>::kLongestNs) {
-    lag_cells_ = lag_count_ = 0;
-    lags_.fill({});
-    lag_products_.setZero();
-  }
+  if (last_ && std::abs(sample.t_ns - last_->t_ns) > CellMeans<6>::kLongestNs) begin_anew();
   if (last_) {
     imu_means_.add(last_->t_ns, sample.t_ns, 0.5 * (values(*last_) + values(sample)));
   }
   last_ = sample;
+  advance();
+}
+
+void TwistCheck::begin_anew() {
+  lag_cells_ = lag_count_ = 0;
+  lags_.fill({});
+  lag_products_.setZero();
+}
+
+/// As the rate of a gyro without an accelerometer.
+void TwistCheck::add_heading(const HeadingSample& sample) {
+  if (sample.fault() != nullptr || sample.t_ns < 0) return;
+  if (last_heading_) {
+    const std::int64_t spacing_ns = sample.t_ns - last_heading_->t_ns;
+    if (std::abs(spacing_ns) > CellMeans<6>::kLongestNs) begin_anew();
+    if (const auto rate = yaw_rate_between(*last_heading_, sample)) {
+      Eigen::Matrix<double, 6, 1> v = Eigen::Matrix<double, 6, 1>::Zero();
+      v[2] = *rate;
+      imu_means_.add(last_heading_->t_ns, sample.t_ns, v);
+    }
+  }
+  last_heading_ = sample;
   advance();
 }
 
@@ -204,14 +225,32 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
   const double slope = turns && std::abs(r) > kAlike
                            ? std::copysign(std::sqrt(C(kGyro, kGyro) / C(kWheels, kWheels)), r)
                            : 0.;
-  if (finds_gravity(up, slope, out)) return;
-  if (slope == 0. || windows_ < kFewestWindows) return;
+  if (gyro_is_ == Gyro::kMounted && finds_gravity(up, slope, out)) return;
+  if (windows_ < kFewestWindows) return;
+  if (slope != 0.) return find_factor(slope, r, C, out);
+  // It turns by next to nothing of what the wheels do.
+  constexpr double kStuck = 0.1;
+  const double gyro = std::sqrt(C(kGyro, kGyro)), wheels = std::sqrt(C(kWheels, kWheels));
+  if (wheels > kLeastRate && gyro < kStuck * wheels) {
+    out.push_back({imu_ + " rate", imu_ + ": turns by " + significant(gyro, 2) +
+                                       " rad/s (standard deviation) where " + wheels_ +
+                                       " turn by " + significant(wheels, 2) +
+                                       ": it is stuck or not upright, or the wheels are wrong "
+                                       "(signs, order, zeros of the steering)"});
+  }
+}
+
+/// The rates are alike but for a factor.
+void TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
+                             Findings& out) const {
   const std::string fast = significant(std::abs(slope), 3) + " times as fast as the wheels";
   const std::string slow = significant(1. / std::abs(slope), 3) + " times as fast as the gyro";
   constexpr double kDeg = 180. / std::numbers::pi;
   const std::string key = imu_ + " rate";
   if (is_about(std::abs(slope), kDeg)) {
-    out.push_back({key, imu_ + ": the gyro turns " + fast + ": it is in deg/s"});
+    out.push_back({key, imu_ + ": the gyro turns " + fast +
+                            (gyro_is_ == Gyro::kHeading ? ": it is in degrees (yaw_unit: deg)"
+                                                        : ": it is in deg/s")});
   } else if (is_about(std::abs(slope), 1. / kDeg)) {
     out.push_back({key,
                    wheels_ + ": turn " + slow + ": drives are in deg/s",
@@ -288,6 +327,21 @@ bool TwistCheck::finds_gravity(const Eigen::Vector3d& up, double slope, Findings
   return true;
 }
 
+/// What may be wrong when the gyro turns opposite to the wheels. Both ends of a base with steered
+/// wheels look the same.
+std::string TwistCheck::opposite() const {
+  std::string text = gyro_is_ == Gyro::kHeading ? "sign of the heading (heading_scale: -1)"
+                                                : "sign of the gyro's z";
+  if (gyro_is_ == Gyro::kLevel) text += ", of the accelerometer (at rest it reads upwards)";
+  text += ", sign of all drives, or drives on the left and on the right exchanged";
+  if (n_steer_ > 0) {
+    text +=
+        "; zeros of the steering that are all off by half a turn look the same, the sign of the "
+        "gyro then says which end is the front";
+  }
+  return text;
+}
+
 /// The gyro turns opposite to the wheels: the accelerometer says which of them is right, by the
 /// sign that the change of velocity, and its turning, need to have.
 void TwistCheck::find_reversed(const Eigen::MatrixXd& C, Findings& out) const {
@@ -315,12 +369,11 @@ void TwistCheck::find_reversed(const Eigen::MatrixXd& C, Findings& out) const {
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return variances[a] < variances[b]; });
   const double all = C(kForce, kForce) + C(kForce + 1, kForce + 1);
-  const bool is_clear = all > kLeastForce * kLeastForce && variances[order[0]] < 0.7 * all &&
+  const bool is_clear = gyro_is_ == Gyro::kMounted && all > kLeastForce * kLeastForce &&
+                        variances[order[0]] < 0.7 * all &&
                         variances[order[1]] - variances[order[0]] > 0.1 * all;
   Finding finding{imu_ + " rate",
-                  imu_ + ": the gyro turns opposite to " + wheels_ +
-                      ": sign of the gyro's z, sign of all drives, or drives on the left and on "
-                      "the right exchanged"};
+                  imu_ + ": the gyro turns opposite to " + wheels_ + ": " + opposite()};
   if (is_clear) finding.text = texts[order[0]];
   if (is_clear && order[0] == 1) finding.remedies = {drives_times(-1.)};
   out.push_back(std::move(finding));
@@ -328,6 +381,7 @@ void TwistCheck::find_reversed(const Eigen::MatrixXd& C, Findings& out) const {
 
 /// The rates agree: so should the accelerometer and what the wheels' velocity takes.
 void TwistCheck::find_axes(const Eigen::MatrixXd& C, Findings& out) const {
+  if (gyro_is_ != Gyro::kMounted) return;
   static const std::array<Mounting, 8> kMountings = {{
       {matrix(1, 0, 0, 1), ""},
       {matrix(-1, 0, 0, -1),
@@ -401,6 +455,7 @@ void TwistCheck::find_lag(double rate_variance, Findings& out) const {
   constexpr double kSame = 0.5 / kCell_s;
   constexpr double kPart = 0.05;  // of the turn; rad/m of the velocity
   const double n = static_cast<double>(lag_count_);
+  if (gyro_is_ != Gyro::kMounted) return;  // there is no wheels.t_OtoI_s
   if (n * kCell_s < 10.) return;
   std::array<double, kLags> left = left_by_lag(Eigen::Vector4d::Zero());
   const double noise = *std::min_element(left.begin(), left.end());

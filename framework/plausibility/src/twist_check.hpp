@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "viwo/api/kinematic_model.hpp"
 #include "viwo/api/rig.hpp"
 #include "viwo/plausibility/finding.hpp"
 
@@ -40,14 +41,22 @@ class CellMeans {
   std::int64_t end_ = 0;
 };
 
+/// What gives the rate that the wheels are compared with.
+enum class Gyro {
+  kMounted,  ///< an IMU whose mounting is configured
+  kLevel,    ///< an IMU of which only gravity says how it is mounted
+  kHeading,  ///< a gyro that integrates for itself
+};
+
 class TwistCheck {
  public:
-  /// What texts call IMU and wheels; `drives`: the key of the scales of the drives, of which there
-  /// are `n_drive`.
-  TwistCheck(std::string imu, std::string wheels, std::string drives, int n_drive,
-             const WheelsPrior& prior);
+  /// What texts call gyro and wheels; `drives`: the key of the scales of the drives.
+  TwistCheck(std::string imu, std::string wheels, std::string drives,
+             const ModelDescription& description, const WheelsPrior& prior,
+             Gyro gyro = Gyro::kMounted);
 
   void add_imu(const ImuSample& sample);
+  void add_heading(const HeadingSample& sample);
   /// `xi`: twist of O over the time of a sample of the wheels; `rate_by_prior`: by what a
   /// prior sigma of each intrinsic changes its yaw rate.
   void add_wheels(const SampleExtent& extent, const Twist& xi, const Intrinsics& rate_by_prior);
@@ -73,6 +82,9 @@ class TwistCheck {
   };
 
   void advance();
+  void begin_anew();
+  void find_factor(double slope, double r, const Eigen::MatrixXd& C, Findings& out) const;
+  std::string opposite() const;
   void add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi);
   void add_to_lags(double gyro, const Twist& xi);
   void end_window();
@@ -86,7 +98,8 @@ class TwistCheck {
   void find_lag(double rate_variance, Findings& out) const;
 
   std::string imu_, wheels_, drives_;
-  int n_drive_;
+  Gyro gyro_is_;
+  int n_drive_, n_steer_;
   Eigen::Matrix3d R_ItoO_;
   Eigen::Vector2d p_IinO_;
   double t_OtoI_s_, sigma_t_OtoI_s_;
@@ -94,6 +107,7 @@ class TwistCheck {
   CellMeans<6> imu_means_;
   CellMeans<3> twist_means_;
   std::optional<ImuSample> last_;
+  std::optional<HeadingSample> last_heading_;
   std::int64_t next_ = 0;  ///< cell
 
   double rate_squares_ = 0.;  ///< of the wheels, sum over samples

@@ -4,11 +4,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "viwo/api/kinematic_model.hpp"
 #include "viwo/plausibility/finding.hpp"
+#include "viwo/wheel/wheel_model.hpp"
 
 namespace viwo {
 
@@ -21,9 +23,13 @@ struct ChannelChange {
     kSteersExchanged,
     kSteerSigns,
     kWheelsExchanged,
+    kSteersInDegrees,
+    kSideSign,
+    kNoSteering,  ///< never done: what angles in degrees have to be told from
   };
   Kind kind = kNone;
   std::size_t a = 0, b = 0;  ///< channels
+  std::uint32_t side = 0;    ///< drives of kSideSign, one bit each
 
   void undo(EncoderSample& sample) const;
   /// "drive_2 turns opposite to what the other wheels say: its sign"
@@ -36,6 +42,11 @@ struct ChannelChange {
 
 /// All that may have been done, one at a time; the first is none.
 std::vector<ChannelChange> channel_changes(const ModelDescription& description);
+
+/// All drives of one side reversed: of those that turn the base to the left when they turn alone,
+/// and of the others. Nothing where a side has one drive, whose sign is among the changes above.
+std::vector<ChannelChange> side_changes(const std::shared_ptr<const WheelModel>& model,
+                                        const Intrinsics& x_WI);
 
 /// A list in YAML: `entry(i)` as texts.
 template <class Entry>
