@@ -56,9 +56,9 @@ bool is_fault_of(const Findings& findings, std::string_view sensor, Checks check
 /// unit, sign, order or zero disagrees in all that it is compared with.
 constexpr std::array<std::string_view, 6> kWheelCauses = {"order",   "turn", "steering",
                                                           "channel", "rate", "steer offsets"};
-/// Of those what makes the wheels alone say another turn than the gyro.
-constexpr std::array<std::string_view, 6> kWheelsAlone = {"order",   "turn",          "steering",
-                                                          "channel", "steer offsets", "parity"};
+/// What the wheels alone, or poses, say of the wheels: why they turn otherwise than the gyro.
+constexpr std::array<std::string_view, 8> kNotOfGyro = {
+    "order", "turn", "steering", "channel", "steer offsets", "parity", "speed", "heading"};
 constexpr std::array<std::string_view, 2> kOrder = {"order", "steering"};
 constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
 /// What no noise is the remedy of.
@@ -87,19 +87,18 @@ void demote_consequences(const Recording& recording, Findings& findings) {
   for (const Headings& other : recording.headings) {
     gyros.push_back(recording.label<HeadingSample>(other.sensor));
   }
-  std::string wheels;  // that contradict themselves
+  std::string wheels;
   for (const Wheels& set : recording.wheels) {
     const std::string label = recording.label<EncoderSample>(set.sensor);
-    if (is_fault_of(findings, label, kWheelsAlone)) wheels = label;
+    if (is_fault_of(findings, label, kNotOfGyro)) wheels = label;
   }
   for (Finding& finding : findings) {
     const bool is_of_gyro = std::find(gyros.begin(), gyros.end(), finding.sensor) != gyros.end();
     if (is_of_gyro && finding.check == "rate" && !wheels.empty()) demote(finding, wheels);
   }
   const Findings all = findings;
-  const bool imu_is_wrong = std::any_of(all.begin(), all.end(), [&](const Finding& f) {
-    return std::find(gyros.begin(), gyros.end(), f.sensor) != gyros.end() &&
-           f.severity == Severity::kFault && is_one_of(f.check, kImuCauses);
+  const auto wrong = std::find_if(gyros.begin(), gyros.end(), [&](const std::string& gyro) {
+    return is_fault_of(all, gyro, kImuCauses);
   });
   for (Finding& finding : findings) {
     if (finding.severity != Severity::kFault) continue;
@@ -113,13 +112,14 @@ void demote_consequences(const Recording& recording, Findings& findings) {
       if (!is_of_stamps(finding.check) || finding.check == "clock") demote(finding, sensor);
     } else if (finding.check.starts_with("sigma_") && is_fault_of(all, sensor, kNoNoise)) {
       demote(finding, sensor);
-    } else if (follows(kContradicted) && (finding.check == "parity" || finding.check == "speed")) {
+    } else if (follows(kContradicted) && (finding.check == "parity" || finding.check == "speed" ||
+                                          finding.check == "clock")) {
       demote(finding, sensor);
-    } else if (imu_is_wrong && finding.check == "clock") {
-      demote(finding, imu);
-    } else if (imu_is_wrong && sensor == imu && !is_one_of(finding.check, kImuCauses) &&
+    } else if (wrong != gyros.end() && finding.check == "clock") {
+      demote(finding, *wrong);
+    } else if (wrong != gyros.end() && sensor == *wrong && !is_one_of(finding.check, kImuCauses) &&
                !is_of_stamps(finding.check) && finding.check != "axes") {
-      demote(finding, imu);
+      demote(finding, *wrong);
     }
   }
 }
