@@ -135,11 +135,11 @@ TEST(InspectWheels, WritesNoNoiseThatIsNone) {
 
 /// Two drives on each side, as a base that skids has them.
 RunSetup four_drives(const std::string& motion = "figure_eight") {
-  return simulated(
-      "viwo_skid_steer",
-      {"sensors.simulator0.duration_s=30", "sensors.simulator0.robot.left_drives=[1, 3]",
-       "sensors.simulator0.robot.right_drives=[2, 4]", "kinematics.left_drives=[1, 3]",
-       "kinematics.right_drives=[2, 4]"});
+  return simulated("viwo_skid_steer",
+                   {"placeholders.motion=" + motion, "sensors.simulator0.duration_s=30",
+                    "sensors.simulator0.robot.left_drives=[1, 3]",
+                    "sensors.simulator0.robot.right_drives=[2, 4]", "kinematics.left_drives=[1, 3]",
+                    "kinematics.right_drives=[2, 4]"});
 }
 
 TEST(InspectWheels, NamesBothOfTwoDrivesOfWhichOneIsReversed) {
