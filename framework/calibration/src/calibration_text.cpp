@@ -80,7 +80,8 @@ std::string wander_text(const WheelWander& wander) {
            "other, for longer than a second, tell it";
   }
   constexpr double kLeastWander = 0.01;  // nothing that anybody would notice
-  if (!(wander.sigma > kLeastWander)) return "the wheels contradict each other as noise does: none wanders";
+  if (!(wander.sigma > kLeastWander))
+    return "the wheels contradict each other as noise does: none wanders";
   const std::string sigma = significant(wander.sigma, 2), time_s = significant(wander.time_s, 2);
   // Priors say how far wheels are from nominal at most: what comes and goes by more is none of it.
   constexpr double kMostWander = 3.;
