@@ -11,29 +11,17 @@
 
 #include <gtest/gtest.h>
 
+#include "../support/in_folder.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/plugin_host/registry.hpp"
 
 namespace viwo {
 
-/// A fixture with an empty folder of its own: tests run side by side.
-class SensorsInFolder : public ::testing::Test {
+class SensorsInFolder : public testing::InFolder {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("viwo_") + info->test_suite_name() + "_" + info->name());
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-    return (folder_ / name).string();
+    return InFolder::write(name, text).string();
   }
-
-  std::filesystem::path folder_;
 };
 
 inline PluginRegistry& registry() {

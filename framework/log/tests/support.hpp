@@ -10,28 +10,13 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include "in_folder.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo::log {
 
-/// A fixture with an empty folder of its own.
-class InFolder : public ::testing::Test {
+class InFolder : public testing::InFolder {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("viwo_") + info->test_suite_name() + "_" + info->name());
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  std::filesystem::path write(const std::string& name, std::string_view text) const {
-    std::filesystem::create_directories((folder_ / name).parent_path());
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-    return folder_ / name;
-  }
-
   std::filesystem::path write_gz(const std::string& name, std::string_view text) const {
     gzFile file = gzopen((folder_ / name).c_str(), "wb");
     gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
@@ -43,8 +28,6 @@ class InFolder : public ::testing::Test {
     std::ifstream stream(file, std::ios::binary);
     return {std::istreambuf_iterator<char>(stream), {}};
   }
-
-  std::filesystem::path folder_;
 };
 
 /// The text of the exception that `f` throws; empty when it throws none.

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "in_folder.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo {
@@ -15,27 +16,7 @@ namespace viwo {
 inline const std::filesystem::path kBadPlugins =
     std::filesystem::path(VIWO_TEST_BINARY_DIR) / "tests/plugins_bad";
 
-/// An empty folder of the running test's own, removed with the fixture.
-class FolderTest : public ::testing::Test {
- protected:
-  FolderTest() {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() /
-              (std::string("viwo_") + info->test_suite_name() + "_" + info->name());
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  ~FolderTest() override { std::filesystem::remove_all(folder_); }
-
-  /// A file with this text in the folder.
-  std::filesystem::path write(const std::string& name, const std::string& text) const {
-    std::filesystem::create_directories((folder_ / name).parent_path());
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-    return folder_ / name;
-  }
-
-  std::filesystem::path folder_;
-};
+using FolderTest = testing::InFolder;
 
 inline std::string read_bytes(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
