@@ -9,6 +9,7 @@
 #include "viwo/eval/json.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/log/files.hpp"
+#include "viwo/math/combination_text.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/setup/calibration_file.hpp"
 
@@ -84,8 +85,8 @@ void describe_undetermined(const CalibrationEstimate& estimate, std::ostringstre
   }
   out << "directions that the data do not determine (in prior sigmas; posterior / prior):\n";
   for (const auto& direction : estimate.undetermined) {
-    out << pad(significant(direction.sigma_ratio, 2), 8) << "  " << direction_text(direction)
-        << "\n";
+    out << pad(significant(direction.sigma_ratio, 2), 8) << "  "
+        << combination_text(direction.weights) << "\n";
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include "calibration_text.hpp"
 #include "segment_choice.hpp"
+#include "viwo/math/combination_text.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/report/curves.hpp"
 
@@ -129,7 +130,7 @@ report::Document page_of(const CalibrationResult& result) {
   for (const auto& direction : estimate.undetermined) {
     document.sections.back().blocks.emplace_back(report::Paragraph{
         "Not determined by the data (sigma is " + significant(direction.sigma_ratio, 2) +
-            " of the prior's): " + direction_text(direction),
+            " of the prior's): " + combination_text(direction.weights),
         kNote});
   }
   if (!result.lengths.empty()) {

@@ -58,17 +58,6 @@ const WheelModel& model_of(const CalibrationResult& result) {
   return *result.setup->recordings.front().setup.model;
 }
 
-std::string direction_text(const UndeterminedDirection& direction) {
-  std::string text;
-  for (const auto& [name, weight] : direction.weights) {
-    if (std::abs(weight) < 0.25 * std::abs(direction.weights.front().second)) break;
-    if (!text.empty()) text += weight < 0. ? " - " : " + ";
-    if (text.empty() && weight < 0.) text += "-";
-    text += significant(std::abs(weight), 2) + " " + name;
-  }
-  return text;
-}
-
 std::string left_out_title(const LeftOut& left_out) {
   return "End error of dead reckoning, recordings left out of the fit by " + left_out.by;
 }

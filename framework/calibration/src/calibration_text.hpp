@@ -27,8 +27,6 @@ std::vector<ErrorRow> error_rows(const CalibrationSetup& setup,
 
 const WheelModel& model_of(const CalibrationResult& result);
 
-/// The largest weights of a direction, with their names.
-std::string direction_text(const UndeterminedDirection& direction);
 std::string left_out_title(const LeftOut& left_out);
 /// What wanders, and what to write into the configuration of a filter.
 std::string wander_text(const WheelWander& wander);
@@ -36,8 +34,9 @@ std::string wander_text(const WheelWander& wander);
 std::vector<std::string> search_text(const CalibrationResult& result);
 /// What the fit cannot explain.
 std::string left_over_text(const CalibrationResult& result);
-/// Offsets of the clocks over the recordings; empty where none were estimated.
+/// Biases of the gyro over the recordings; empty where none were estimated.
 std::string bias_text(const CalibrationResult& result);
+/// Offsets of the clocks, likewise.
 std::string clock_text(const CalibrationResult& result);
 /// "ok", "doubtful" or, without an estimate, "failed".
 std::string status_of(const CalibrationResult& result);

@@ -145,6 +145,13 @@ Assignment parse_assignment(std::string_view text) {
   return {std::move(path), std::move(value)};
 }
 
+void apply(Node& root, std::span<const std::string> assignments) {
+  for (const std::string& text : assignments) {
+    const Assignment assignment = parse_assignment(text);
+    set_path(root, assignment.path, assignment.value);
+  }
+}
+
 void find_placeholders(const Node& node, std::set<std::string>& names) {
   if (node.is_scalar()) {
     replaced(node.scalar(), [&](const std::string& name) { return *names.insert(name).first; });

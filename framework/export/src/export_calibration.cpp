@@ -98,6 +98,14 @@ void Lost::intrinsics_beside() {
   }
 }
 
+void Lost::all_but_geometry() {
+  sigmas();
+  mount();
+  clocks();
+  cameras();
+  intrinsics_beside();
+}
+
 void Lost::radii_but_the_mean(const std::vector<Wheel>& wheels) {
   double least = wheels.front().radius_m, most = least;
   for (const Wheel& wheel : wheels) {

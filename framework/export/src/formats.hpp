@@ -21,6 +21,8 @@ class Lost {
   void clocks();
   void cameras();
   void intrinsics_beside();
+  /// All of these, of a format that has the geometry of the wheels alone.
+  void all_but_geometry();
   /// What differs from wheel to wheel where the format has one number for all.
   void radii_but_the_mean(const std::vector<Wheel>& wheels);
   const std::vector<std::string>& texts() const { return texts_; }

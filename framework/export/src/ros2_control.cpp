@@ -88,11 +88,7 @@ Node mecanum(const Robot& robot, Lost& lost) {
 
 Exported to_ros2_control(const Robot& robot) {
   Lost lost(robot);
-  lost.sigmas();
-  lost.mount();
-  lost.clocks();
-  lost.cameras();
-  lost.intrinsics_beside();
+  lost.all_but_geometry();
   std::string controller = "diff_drive_controller", remark;
   Node params;
   if (robot.base == Base::kAckermann) {

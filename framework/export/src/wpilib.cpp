@@ -75,11 +75,7 @@ std::string import_of(const std::string& package) {
 
 Exported to_wpilib(const Robot& robot) {
   Lost lost(robot);
-  lost.sigmas();
-  lost.mount();
-  lost.clocks();
-  lost.cameras();
-  lost.intrinsics_beside();
+  lost.all_but_geometry();
   std::string imports = import_of("geometry.Translation2d"), body;
   if (robot.base == Base::kSteered) {
     imports += import_of("kinematics.SwerveDriveKinematics");

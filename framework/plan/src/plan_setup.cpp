@@ -106,10 +106,7 @@ void PlanParams::bind(ParamBinder& b) {
 PlanSetup read_plan_setup(const std::filesystem::path& path,
                           const std::vector<std::string>& assignments, PluginRegistry& plugins) {
   Node file = config::load_file(path);
-  for (const std::string& text : assignments) {
-    const config::Assignment assignment = config::parse_assignment(text);
-    config::set_path(file, assignment.path, assignment.value);
-  }
+  config::apply(file, assignments);
   PlanSetup setup;
   config::Errors errors;
   constexpr std::string_view kSections[] = {"kinematics", "goals"};

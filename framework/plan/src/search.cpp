@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "viwo/config/errors.hpp"
+#include "viwo/math/combination_text.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/plan/plan.hpp"
@@ -72,14 +73,11 @@ std::string unknown_direction(const WheelModel& model, const Eigen::MatrixXd& co
   Eigen::Index largest = 0;
   v.cwiseAbs().maxCoeff(&largest);
   if (v[largest] < 0.) v = -v;
-  std::string text;
+  std::vector<std::pair<std::string, double>> weights;
   for (Eigen::Index i = 0; i < n; ++i) {
-    if (std::abs(v[i]) < 0.25 * v[largest]) continue;
-    text += (v[i] < 0. ? (text.empty() ? "-" : " - ") : (text.empty() ? "" : " + ")) +
-            significant(std::abs(v[i]), 2) + " " +
-            model.description().intrinsics[static_cast<std::size_t>(i)].name;
+    weights.emplace_back(model.description().intrinsics[static_cast<std::size_t>(i)].name, v[i]);
   }
-  return text;
+  return combination_text(weights);
 }
 
 /// (PL-6): without what is there by rounding alone, and no more than leaves room for the prior in

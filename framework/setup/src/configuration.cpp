@@ -104,13 +104,6 @@ void refuse_unused(const std::vector<Definition>& defined, const Node& run,
   errors.throw_if_any();
 }
 
-void apply(Node& run, const std::vector<std::string>& assignments) {
-  for (const std::string& text : assignments) {
-    const config::Assignment assignment = config::parse_assignment(text);
-    config::set_path(run, assignment.path, assignment.value);
-  }
-}
-
 Node load_run(const std::filesystem::path& file) {
   Node run = config::load_file(file);
   if (!run.is_map()) config::fail(run.mark(), "a run configuration is a section of keys");
@@ -131,7 +124,7 @@ Node load_run_configuration(const std::filesystem::path& file,
   Node run = load_run(file);
   std::set<std::string> used;
   config::find_placeholders(run, used);  // also what assignments then write over
-  apply(run, assignments);
+  config::apply(run, assignments);
   config::find_placeholders(run, used);
   std::vector<Definition> defined;
   find_definitions(run, defined);
@@ -222,7 +215,7 @@ Node load_base(const Node& configuration, const std::vector<std::string>& assign
   std::set<std::string> used;
   config::find_placeholders(run, used);
   if (const Node* overrides = configuration.find("set")) config::merge(run, *overrides);
-  apply(run, assignments);
+  config::apply(run, assignments);
   config::find_placeholders(run, used);
   config::find_placeholders(configuration, used);  // of all variants
   std::vector<Definition> defined;

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -32,6 +33,9 @@ struct Assignment {
 /// Reads the argument of --set; VALUE is YAML. All positions are "--set path.to.key". Throws
 /// viwo::InputError.
 Assignment parse_assignment(std::string_view text);
+
+/// Carries out arguments of --set, in order. Throws viwo::InputError.
+void apply(Node& root, std::span<const std::string> assignments);
 
 /// Adds the name of every {name} in the scalars below `node` to `names`.
 void find_placeholders(const Node& node, std::set<std::string>& names);
