@@ -217,11 +217,8 @@ int observability_command(const Arguments& arguments) {
 
 int calibrate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
-  calibration::CalibrationSetup setup = [&] {
-    Progress progress;
-    return calibration::read_calibration_setup(arguments.positional[0], arguments.assignments,
-                                               plugins, progress);
-  }();
+  calibration::CalibrationSetup setup = calibration::read_calibration_setup(
+      arguments.positional[0], arguments.assignments, plugins);
   const auto folder = out_folder(arguments);
   make_folder(folder);
   const calibration::CalibrationResult result = [&] {

@@ -6,7 +6,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "filter_reference.hpp"
+#include "by_smoother.hpp"
 #include "joint_search.hpp"
 #include "judgement.hpp"
 #include "motion_reference.hpp"
@@ -85,6 +85,24 @@ void require_readings_in_segments(const CalibrationSetup& setup, const Node& fil
   }
 }
 
+/// What a smoother takes from the base, or does not look at.
+void require_for_smoother(const CalibrationSetup& setup, const Node& file) {
+  for (const char* key : {"segments", "segment_s", "find_steering_zeros", "find_drive_signs",
+                          "estimate_extrinsics", "extrinsics_x_m_y_m_yaw_rad"}) {
+    const Node* const node = file.find(key);
+    if (node == nullptr) continue;
+    config::fail(node->mark(), std::string(key) +
+                                   " is not for reference: smoother, which takes what is "
+                                   "estimated, and where it begins, from the base; zeros anywhere "
+                                   "are found with reference: gyro first (calibration: FILE)");
+  }
+  for (const CalibrationRecording& recording : setup.recordings) {
+    if (!recording.motion.distance_m && !recording.motion.turn_rad) continue;
+    throw InputError("recording '" + recording.label.name +
+                     "': distance_m and turn_deg are not for reference: smoother");
+  }
+}
+
 /// A fit has one noise for all turns, and one gauge.
 void require_one_kind(const std::vector<CalibrationRecording>& recordings) {
   const auto other = std::find_if(recordings.begin(), recordings.end(), [&](const auto& r) {
@@ -97,7 +115,7 @@ void require_one_kind(const std::vector<CalibrationRecording>& recordings) {
 }
 
 CalibrationRecording read_recording(const Recording& label, const Node& base, ReferenceKind kind,
-                                    PluginRegistry& plugins, WorkProgress& progress) {
+                                    PluginRegistry& plugins) {
   const Node run = resolve_placeholders(base, label.labels);
   Node wheels_alone = run;
   if (run.find("updates") != nullptr) {
@@ -105,18 +123,10 @@ CalibrationRecording read_recording(const Recording& label, const Node& base, Re
   }
   RunSetup setup = read_run(wheels_alone, plugins);
   RunData data = collect(setup);
-  const bool by_filter = kind == ReferenceKind::kFilter;
+  const bool is_smoothed = kind == ReferenceKind::kSmoother;
   MotionReference motion =
-      motion_reference(label, setup, data, by_filter ? ReferenceKind::kNone : kind);
-  if (by_filter) {
-    progress.note("recording '" + label.name + "': the filter without wheels");
-    motion.kind = ReferenceKind::kPoses;
-    motion.poses = poses_of_filter(run, "recording '" + label.name + "'", plugins);
-    motion.offset_s = setup.t_OtoI_s;
-    motion.max_gap_s = setup.reference_max_gap_s;
-    setup.extrinsics = setup.O_in_I.value_or(PlanarExtrinsics::Zero());
-  }
-  return {label, std::move(setup), std::move(data), std::move(motion)};
+      motion_reference(label, setup, data, is_smoothed ? ReferenceKind::kNone : kind);
+  return {label, std::move(setup), std::move(data), std::move(motion), run};
 }
 
 }  // namespace
@@ -125,7 +135,7 @@ std::vector<ParamSpec> calibration_params() { return param_specs<CalibrationPara
 
 CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
                                         const std::vector<std::string>& assignments,
-                                        PluginRegistry& plugins, WorkProgress& progress) {
+                                        PluginRegistry& plugins) {
   Node file = config::load_file(path);
   const std::vector<std::string> of_base = assign(assignments, file);
   config::Errors errors;
@@ -136,6 +146,7 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   CalibrationSetup setup;
   setup.name = params.calibration;
   setup.options = params;
+  setup.plugins = &plugins;
   if (setup.options.segment_s > 0. && setup.options.segments == Segments::kAuto) {
     setup.options.segments = Segments::kLength;
   }
@@ -158,10 +169,10 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
                                                           "' has no label '" + label +
                                                           "', by which leave_out_by divides them");
     }
-    setup.recordings.push_back(
-        read_recording(recording, base, params.reference, plugins, progress));
+    setup.recordings.push_back(read_recording(recording, base, params.reference, plugins));
     require_one_kind(setup.recordings);
   }
+  if (setup.options.reference == ReferenceKind::kSmoother) require_for_smoother(setup, file);
   require_readings_in_segments(setup, file);
   if (file.find("extrinsics_x_m_y_m_yaw_rad") == nullptr) {
     setup.options.extrinsics_x_m_y_m_yaw_rad = setup.recordings.front().setup.extrinsics;
@@ -265,7 +276,9 @@ CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress) {
   CalibrationResult result;
   result.search = find_joints(setup, progress);
   const FitStart start = start_of(setup, result.search);
-  const CalibrationOptions options = choose_segments(setup, start, result, progress);
+  const bool is_smoothed = setup.options.reference == ReferenceKind::kSmoother;
+  const CalibrationOptions options =
+      is_smoothed ? setup.options : choose_segments(setup, start, result, progress);
   progress.begin("fits", static_cast<int>(fits.size()));
   std::vector<CalibrationEstimate> estimates(fits.size());
   tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t f) {
@@ -273,7 +286,13 @@ CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress) {
     for (std::size_t i = 0; i < setup.recordings.size(); ++i) {
       if (!fits[f].leaves_out(setup.recordings[i])) used.push_back(i);
     }
-    estimates[f] = fit(setup, used, options, start);
+    if (is_smoothed) {
+      smoother::Smoothed smoothed = smooth(setup, used, f == 0 ? progress : no_progress());
+      estimates[f] = estimate_of(smoothed, setup);
+      if (f == 0) result.smoothed = std::move(smoothed);
+    } else {
+      estimates[f] = fit(setup, used, options, start);
+    }
     progress.done((fits[f].label.empty() ? "all recordings"
                                          : "without " + fits[f].label + " " + fits[f].value) +
                   ": " + std::to_string(estimates[f].iterations) + " iterations");

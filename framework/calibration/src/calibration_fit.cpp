@@ -9,6 +9,7 @@
 
 #include "calibration_problem.hpp"
 #include "fit_costs.hpp"
+#include "undetermined.hpp"
 #include "viwo/calibration/calibrate.hpp"
 #include "viwo/math/se2.hpp"
 
@@ -297,28 +298,11 @@ class Fit {
     };
     estimate_.unknowns +=
         count(prior_.extrinsics_sigma) + static_cast<int>(own_.size()) * count(prior_.own_sigma);
-    Eigen::MatrixXd P_free(n, n);
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j < n; ++j) {
-        P_free(i, j) = P(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(j)]);
-      }
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(P_free);
+    const Eigen::MatrixXd P_free = P(free, free);
     // Below zero: by how many powers of e the data have narrowed what was known.
-    estimate_.log_volume = 0.5 * eigen.eigenvalues().array().log().sum();
+    estimate_.log_volume = P_free.llt().matrixLLT().diagonal().array().log().sum();
     const auto& specs = setup_.recordings.front().setup.model->description().intrinsics;
-    for (int k = n - 1; k >= 0 && eigen.eigenvalues()[k] > 0.5; --k) {
-      UndeterminedDirection direction;
-      direction.sigma_ratio = std::sqrt(eigen.eigenvalues()[k]);
-      for (int i = 0; i < n; ++i) {
-        const auto index = static_cast<std::size_t>(free[static_cast<std::size_t>(i)]);
-        direction.weights.emplace_back(specs[index].name, eigen.eigenvectors()(i, k));
-      }
-      std::stable_sort(
-          direction.weights.begin(), direction.weights.end(),
-          [](const auto& a, const auto& b) { return std::abs(a.second) > std::abs(b.second); });
-      estimate_.undetermined.push_back(std::move(direction));
-    }
+    estimate_.undetermined = undetermined_of(P_free, free, specs);
   }
 
   const CalibrationSetup& setup_;

@@ -7,10 +7,11 @@ void CalibrationOptions::bind(ParamBinder& b) {
     {{"auto", ReferenceKind::kAuto},
      {"poses", ReferenceKind::kPoses},
      {"gyro", ReferenceKind::kGyro},
-     {"filter", ReferenceKind::kFilter},
+     {"smoother", ReferenceKind::kSmoother},
      {"none", ReferenceKind::kNone}},
-    {.help = "what the wheels are compared with: reference poses, the turn by the gyro, the poses "
-             "that the filter of the base finds without its updates of wheels, or nothing but each "
+    {.help = "what the wheels are compared with: reference poses, the turn by the gyro, all that "
+             "the filter of the base takes (smoother: cameras, mount and clocks are calibrated as "
+             "the base asks for; what stands below is not for it), or nothing but each "
              "other; auto: poses where there are any, else the gyro. A label distance_m "
              "of a recording says how far it was driven, along the path of O, a label turn_deg by "
              "how much it has turned from start to end, whole turns with it"});

@@ -76,6 +76,10 @@ void describe_parameters(const CalibrationResult& result, std::ostringstream& ou
         << pad(significant(estimate.extrinsics[i], 6), 12)
         << pad(significant(estimate.extrinsics_sigma[i], 3), 12) << "\n";
   }
+  for (const CalibrationEntry& entry : beside_the_wheels(result)) {
+    out << pad(entry.name, 12) << pad(entry.unit, 6) << pad(significant(entry.nominal, 6), 12)
+        << pad(significant(entry.estimate, 6), 12) << pad(significant(entry.sigma, 3), 12) << "\n";
+  }
 }
 
 void describe_undetermined(const CalibrationEstimate& estimate, std::ostringstream& out) {
@@ -129,6 +133,21 @@ json lengths_json(const CalibrationResult& result) {
   return lengths;
 }
 
+/// Of the smoother; null where none was asked for.
+json smoothed_json(const CalibrationResult& result) {
+  if (!result.smoothed) return {};
+  json entries = json::object();
+  for (const CalibrationEntry& entry : beside_the_wheels(result)) {
+    entries[entry.name] = {{"initial", entry.nominal},
+                           {"final", entry.estimate},
+                           {"sigma", entry.sigma},
+                           {"unit", entry.unit}};
+  }
+  return {{"passes", result.smoothed->iterations},
+          {"last_fall_of_chi_square", result.smoothed->left},
+          {"calibration", entries}};
+}
+
 json summary_of(const CalibrationResult& result) {
   const CalibrationEstimate& estimate = result.all;
   const ReferenceKind kind = result.setup->recordings.front().motion.kind;
@@ -147,6 +166,7 @@ json summary_of(const CalibrationResult& result) {
        {{"estimate", std::vector<double>(estimate.extrinsics.begin(), estimate.extrinsics.end())},
         {"sigma",
          std::vector<double>(estimate.extrinsics_sigma.begin(), estimate.extrinsics_sigma.end())}}},
+      {"smoothed", smoothed_json(result)},
       {"joints", search_text(result)},
       {"segments", segments_text(estimate)},
       {"lengths", lengths_json(result)},
@@ -202,9 +222,8 @@ void add_reference(const CalibrationResult& result, CalibrationFile& file) {
   }
   std::optional<CalibrationEntry> clock = clock_of(result);
   if (!clock) return;
-  // Of the filter's poses, too, it is the IMU's; that of headings is of no IMU.
-  const bool is_of_imu = result.setup->options.reference == ReferenceKind::kFilter ||
-                         (!has_poses && !first.data.imu().empty());
+  // That of headings is of no IMU.
+  const bool is_of_imu = !has_poses && !first.data.imu().empty();
   clock->name = is_of_imu ? "t_OtoI" : "t_OtoB";
   if (is_of_imu) file.clock.push_back(*clock);
   if (has_poses && !is_of_imu) file.reference.push_back(*clock);
@@ -214,9 +233,16 @@ CalibrationFile calibration_file_of(const CalibrationResult& result) {
   using Status = CalibrationFile::Status;
   const RunSetup& setup = result.setup->recordings.front().setup;
   CalibrationFile file;
+  if (result.smoothed) file = result.smoothed->calibration;
   file.status = result.is_trusted() ? Status::kOk : Status::kDoubtful;
   if (!result.all.converged) file.status = Status::kFailed;
   file.reasons = result.doubts;
+  if (result.smoothed) {
+    for (std::size_t i = 0; i < file.intrinsics.size(); ++i) {
+      file.intrinsics[i].sigma = result.all.sigma[static_cast<Eigen::Index>(i)];
+    }
+    return file;
+  }
   file.model = setup.kinematics.info.name;
   file.drive_signs = result.search.drive_signs;
   const std::vector<int> configured = drive_signs(setup);

@@ -40,6 +40,10 @@ report::Table parameter_table(const CalibrationResult& result) {
                           result.all.sigma[k], result.sigma_of_fit[k],
                           (result.all.x_WI[k] - specs[i].nominal) / specs[i].prior_sigma});
   }
+  for (const CalibrationEntry& entry : beside_the_wheels(result)) {
+    table.rows.push_back(
+        {entry.name, entry.unit, entry.nominal, entry.estimate, entry.sigma, entry.sigma, ""});
+  }
   return table;
 }
 

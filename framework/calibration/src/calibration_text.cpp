@@ -109,8 +109,25 @@ std::vector<std::string> search_text(const CalibrationResult& result) {
   return out;
 }
 
+CalibrationFile::Entries beside_the_wheels(const CalibrationResult& result) {
+  CalibrationFile::Entries out;
+  if (!result.smoothed) return out;
+  const CalibrationFile& file = result.smoothed->calibration;
+  for (const auto* entries : {&file.mount, &file.clock, &file.cameras}) {
+    std::copy_if(entries->begin(), entries->end(), std::back_inserter(out),
+                 [](const CalibrationEntry& entry) { return entry.sigma > 0.; });
+  }
+  return out;
+}
+
 std::string left_over_text(const CalibrationResult& result) {
   const CalibrationEstimate& estimate = result.all;
+  if (result.smoothed) {
+    const smoother::Smoothed& smoothed = *result.smoothed;
+    return "smoothed in " + std::to_string(smoothed.iterations) + " passes; of " +
+           std::to_string(smoothed.residuals) + " residual factors " +
+           std::to_string(smoothed.weighed_down) + " were beyond their gates and count for less";
+  }
   const ReferenceKind kind = result.setup->recordings.front().motion.kind;
   std::string text = "what the fit leaves";
   if (kind != ReferenceKind::kNone) {

@@ -32,6 +32,8 @@ std::string left_out_title(const LeftOut& left_out);
 std::string wander_text(const WheelWander& wander);
 /// What was searched and found of the joints; empty for nothing.
 std::vector<std::string> search_text(const CalibrationResult& result);
+/// What a smoother has estimated of mount, clocks and cameras.
+CalibrationFile::Entries beside_the_wheels(const CalibrationResult& result);
 /// What the fit cannot explain.
 std::string left_over_text(const CalibrationResult& result);
 /// Biases of the gyro over the recordings; empty where none were estimated.

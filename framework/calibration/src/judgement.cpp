@@ -112,6 +112,18 @@ void judge_wheels(CalibrationResult& result) {
   }
 }
 
+void judge_smoothed(const smoother::Smoothed& smoothed, CalibrationResult& result) {
+  constexpr double kPart = 0.33;
+  const auto part = static_cast<double>(smoothed.weighed_down) /
+                    static_cast<double>(std::max(1L, smoothed.residuals));
+  if (part > kPart) {
+    result.doubts.push_back(significant(100. * part, 2) +
+                            " % of the residual factors are beyond their gates: sensors that "
+                            "contradict each other, or sigmas that are too small");
+  }
+  result.warnings.insert(result.warnings.end(), smoothed.warnings.begin(), smoothed.warnings.end());
+}
+
 /// Dead reckoning by the wheels that were calibrated ought to end nearer than by the nominal ones.
 void judge_ends(CalibrationResult& result) {
   constexpr double kWorse = 1.2;
@@ -135,6 +147,7 @@ void judge_ends(CalibrationResult& result) {
 /// A gyro tells no scale.
 void judge_scale(CalibrationResult& result) {
   const auto& recordings = result.setup->recordings;
+  if (result.smoothed) return;  // cameras and accelerometer do
   const bool has_scale = std::any_of(recordings.begin(), recordings.end(), [](const auto& one) {
     return one.motion.kind == ReferenceKind::kPoses || one.motion.distance_m.has_value();
   });
@@ -234,6 +247,7 @@ void judge(CalibrationResult& result) {
                             " unknowns that the wheels among themselves do not tell: more or "
                             "longer recordings, or segments: auto");
   }
+  if (result.smoothed) judge_smoothed(*result.smoothed, result);
   judge_knowledge(result);
   judge_what_was_given(result);
   judge_search(result);

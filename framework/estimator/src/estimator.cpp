@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include <Eigen/Geometry>
 #include <time.h>
 
 #include "viwo/filter/health.hpp"
+#include "viwo/math/arrays.hpp"
+#include "viwo/math/so3.hpp"
 
 namespace viwo {
 namespace {
@@ -125,6 +128,7 @@ std::vector<std::string> Estimator::stage_names() const {
 
 void Estimator::start(const ImuPrior& prior) {
   filter_.initialize(prior);
+  if (runner_.observer() != nullptr) runner_.observer()->on_start(filter_, prior);
   intake_.start_at(prior.t_ns, filter_.blocks());
 }
 
@@ -171,8 +175,24 @@ void Estimator::propagate(const EpochData& data) {
     filter_.limit_window(kFirstWindow + static_cast<std::size_t>(epochs_) / kEpochsPerClone);
   }
   const ImuTransition transition = filter_.propagate(data.imu, intake_.gaps_s());
+  if (runner_.observer() != nullptr) runner_.observer()->on_propagated(filter_, transition);
+  if (options_.along != nullptr) follow(*options_.along, data.imu.back());
   filter_.clone(data.imu.back());
   if (runner_.observer() != nullptr) runner_.observer()->on_clone(filter_, transition.Phi);
+}
+
+/// The estimate becomes the given one of this epoch, whose clocks may have been others.
+void Estimator::follow(const GivenPath& path, const ImuSample& sample) {
+  const auto k = static_cast<std::size_t>(epochs_);
+  if (k >= path.epochs.size()) {
+    throw std::out_of_range("there are more epochs than the given path has");
+  }
+  ImuState state = path.epochs[k].state;
+  const double dt_s = seconds_between(path.epochs[k].t_ns, filter_.t_ns());
+  state.p_IinG += dt_s * state.v_IinG;
+  state.R_GtoI =
+      exp_so3(-dt_s * (to_vector(sample.gyro_rad_per_s) - state.gyro_bias)) * state.R_GtoI;
+  filter_.set_imu(state);
 }
 
 void Estimator::watch(const EpochData& data) {

@@ -192,7 +192,7 @@ bool UpdateRunner::call(std::size_t index, Work&& work) {
 bool UpdateRunner::open_rooms(std::size_t index, const StateBlocks& blocks) {
   bool has_room = false;
   for (std::size_t room = 0; room < room_owners_.size(); ++room) {
-    const bool own = room_owners_[room] == index;
+    const bool own = room_owners_[room] == index && !options_.rooms_closed;
     has_room = has_room || own;
     const auto* free = own ? &blocks.free_blocks({static_cast<int>(room)}) : nullptr;
     sink_.rooms()[room] = {free, blocks.rooms()[room].entries, 0};
@@ -235,9 +235,13 @@ void UpdateRunner::settle(const Context& context) {
 }
 
 template <class Factor>
+void UpdateRunner::tell(const Context& context, const Factor& factor) {
+  if (observer_ == nullptr) return;
+  observer_->on_factor(context.filter, updates_[context.index], factor);
+}
+
+template <class Factor>
 FactorResult UpdateRunner::apply(const Context& context, Factor& factor) {
-  const UpdateEntry& entry = updates_[context.index];
-  if (observer_ != nullptr) observer_->on_factor(context.filter, entry, factor);
   for (ExcitationMonitor& monitor : context.monitors) monitor.before(context.filter, factor);
   FactorResult result;
   if constexpr (std::is_same_v<Factor, InformationFactor>) {
@@ -258,11 +262,12 @@ void UpdateRunner::apply_residuals(const Context& context) {
     if (has_moved_ || options_.frozen) {
       residual_factor_ = factor;
       if (has_moved_) take_off(moved_, residual_factor_);
-      if (options_.frozen) {
-        residual_factor_.residual.setZero();
-        residual_factor_.noise = nullptr;  // zeros tell nothing about it
-      }
       next = &residual_factor_;
+    }
+    tell(context, *next);
+    if (options_.frozen) {
+      residual_factor_.residual.setZero();
+      residual_factor_.noise = nullptr;  // zeros tell nothing about it
     }
     const FactorResult result = apply(context, *next);
     const std::int64_t t_ns = context.filter.t_ns();
@@ -293,8 +298,9 @@ void UpdateRunner::apply_information(const Context& context) {
         information->Lambda.topLeftCorner(size, size);
     information_factor_.eta.head(size) = information->eta.head(size);
     if (has_moved_) take_off(moved_, information_factor_);
-    if (options_.frozen) information_factor_.eta.head(size).setZero();
   }
+  tell(context, changes ? information_factor_ : *information);
+  if (options_.frozen) information_factor_.eta.head(information->columns.size()).setZero();
   const FactorResult result =
       changes ? apply(context, information_factor_) : apply(context, std::as_const(*information));
   if (result == FactorResult::kRejected) {

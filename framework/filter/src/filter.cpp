@@ -64,15 +64,19 @@ Filter::Filter(const FilterOptions& options, std::vector<BlockSpec> blocks,
 
 void Filter::initialize(const ImuPrior& prior) {
   t_ns_ = prior.t_ns;
-  imu_ = prior.state;
-  imu_.R_GtoI_fej = imu_.R_GtoI;
-  imu_.p_IinG_fej = imu_.p_IinG;
-  imu_.v_IinG_fej = imu_.v_IinG;
+  set_imu(prior.state);
   clones_.clear();
   std::fill(slots_.begin(), slots_.end(), false);
   ImuMatrix P = prior.P;
   shared_position_.take_from(P.block<3, 3>(kPositionColumn, kPositionColumn));
   covariance_.set_block(0, P);
+}
+
+void Filter::set_imu(const ImuState& state) {
+  imu_ = state;
+  imu_.R_GtoI_fej = imu_.R_GtoI;
+  imu_.p_IinG_fej = imu_.p_IinG;
+  imu_.v_IinG_fej = imu_.v_IinG;
 }
 
 ImuMatrix Filter::imu_covariance() const {
@@ -84,11 +88,7 @@ ImuMatrix Filter::imu_covariance() const {
 ImuTransition Filter::propagate(std::span<const ImuSample> samples,
                                 std::span<const double> gaps_s) {
   if (samples.empty()) return {ImuMatrix::Identity(), ImuMatrix::Zero()};
-  if (!options_.first_estimates) {
-    imu_.R_GtoI_fej = imu_.R_GtoI;
-    imu_.p_IinG_fej = imu_.p_IinG;
-    imu_.v_IinG_fej = imu_.v_IinG;
-  }
+  if (!options_.first_estimates) set_imu(ImuState(imu_));
   const ImuTransition transition =
       viwo::propagate(samples, options_.imu_noise, options_.gravity_m_per_s2, imu_, gaps_s);
   covariance_.propagate(transition);

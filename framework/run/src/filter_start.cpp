@@ -126,6 +126,7 @@ Eigen::Matrix3d R_GtoI(const StateSample& state) {
 
 void start(Estimator& estimator, const RunSetup& run, const RunData& data, std::int64_t from_ns) {
   const FilterSetup& setup = *run.filter;
+  if (setup.start.given) return estimator.start(*setup.start.given);
   const auto states = data.states();
   const auto first =
       std::find_if(states.begin(), states.end(),

@@ -12,6 +12,7 @@
 #include "viwo/run/run.hpp"
 #include "viwo/run/work_progress.hpp"
 #include "viwo/setup/configuration.hpp"
+#include "viwo/smoother/smoother.hpp"
 
 namespace viwo::calibration {
 
@@ -20,8 +21,8 @@ enum class ReferenceKind {
   kAuto,    ///< poses where there are any, else the gyro
   kPoses,   ///< relative poses of the reference body
   kGyro,    ///< the turn by the gyro, about the mean direction of what the accelerometer feels
-  kFilter,  ///< relative poses that the filter of the base finds without its wheels
   kNone,    ///< nothing: the wheels among themselves, and what was measured by hand
+  kSmoother,  ///< no reference: all that the filter of the base takes, smoothed (viwo/smoother)
 };
 
 /// What is compared with the reference (docs/math/batch_calibration.md).
@@ -76,11 +77,13 @@ struct CalibrationRecording {
   RunSetup setup;
   RunData data;
   MotionReference motion;
+  config::Node run = {};  ///< of the filter, for a smoother
 };
 
 /// A calibration file, read, with its recordings.
 struct CalibrationSetup {
   std::string name;
+  PluginRegistry* plugins = nullptr;  ///< that the runs were read with
   CalibrationOptions options;
   std::vector<std::string> leave_out_by;  ///< labels whose values are left out in turn
   std::vector<std::string> report_by;     ///< labels to break the tables down by
@@ -172,6 +175,8 @@ struct LeftOut {
 struct CalibrationResult {
   const CalibrationSetup* setup = nullptr;
   JointSearch search;
+  /// What the smoother found, of cameras, mount and clocks, too.
+  std::optional<smoother::Smoothed> smoothed;
   std::vector<CalibrationEstimate> lengths;  ///< with segments of several lengths, if one is chosen
   std::vector<std::string> failed_lengths;   ///< those that could not be fitted, and why
   CalibrationEstimate all;        ///< from all recordings; its sigmas are not below any `spread`
@@ -191,8 +196,7 @@ std::vector<ParamSpec> calibration_params();
 /// Throws InputError for what is wrong in the configuration or in a recording.
 CalibrationSetup read_calibration_setup(const std::filesystem::path& file,
                                         const std::vector<std::string>& assignments,
-                                        PluginRegistry& plugins,
-                                        WorkProgress& progress = no_progress());
+                                        PluginRegistry& plugins);
 
 /// Nominal values and their sigmas; zeros where they have been found, to be refined.
 FitStart start_of(const CalibrationSetup& setup, const JointSearch& search);

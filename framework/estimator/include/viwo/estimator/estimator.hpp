@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -36,6 +37,15 @@ struct Continuation {
   std::optional<Place> place;
 };
 
+/// The state of the IMU at each epoch, as somebody knows it.
+struct GivenPath {
+  struct Epoch {
+    std::int64_t t_ns = 0;
+    ImuState state;
+  };
+  std::vector<Epoch> epochs;
+};
+
 struct EstimatorOptions {
   FilterOptions filter;
   ScheduleOptions schedule;
@@ -49,6 +59,9 @@ struct EstimatorOptions {
   ImuLimits imu;
   HealthLimits health;
   Continuation continuation;
+  /// The estimate of each epoch is the given one, moved to its time, with RunnerOptions::frozen: the
+  /// covariance is that of a filter that is linearised there.
+  std::shared_ptr<const GivenPath> along;
 };
 
 /// `prior`, turned about the vertical so that its R_GtoI is as near as it gets to that of `place`,
@@ -121,6 +134,7 @@ class Estimator {
             DeclarationTable declared);
   bool find_start();
   void propagate(const EpochData& data);
+  void follow(const GivenPath& path, const ImuSample& sample);
   void watch(const EpochData& data);
 
   EstimatorOptions options_;

@@ -44,9 +44,13 @@ class UpdateFailure : public std::runtime_error {
 class EstimatorObserver {
  public:
   virtual ~EstimatorObserver() = default;
-  /// The inertial state has moved by `Phi` and its newest clone exists.
+  /// The filter begins.
+  virtual void on_start(const Filter& /*filter*/, const ImuPrior& /*prior*/) {}
+  /// The inertial state has moved by `transition`.
+  virtual void on_propagated(const Filter& /*filter*/, const ImuTransition& /*transition*/) {}
+  /// And its newest clone exists.
   virtual void on_clone(const Filter& /*filter*/, const ImuMatrix& /*Phi*/) {}
-  /// Before a factor of an update is applied.
+  /// Before a factor of an update is applied; with its residual also where that is taken as zero.
   virtual void on_factor(const Filter& /*filter*/, const UpdateEntry& /*update*/,
                          const ResidualFactor& /*factor*/) {}
   virtual void on_factor(const Filter& /*filter*/, const UpdateEntry& /*update*/,
@@ -60,6 +64,8 @@ struct RunnerOptions {
   /// Residuals are taken as zero: the estimate is only propagated, its covariance is that of a
   /// filter. For analyses along a motion that is known.
   bool frozen = false;
+  /// No blocks come and go: rooms are always full.
+  bool rooms_closed = false;
   /// An update that has thrown this often is turned off; at least 1.
   int max_update_failures = 10;
 };
@@ -94,6 +100,8 @@ class UpdateRunner {
   EpochData data_of(std::size_t index, const EpochData& data);
   void apply_residuals(const Context& context);
   void apply_information(const Context& context);
+  template <class Factor>
+  void tell(const Context& context, const Factor& factor);
   template <class Factor>
   FactorResult apply(const Context& context, Factor& factor);
   void settle(const Context& context);

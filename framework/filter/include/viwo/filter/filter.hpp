@@ -47,6 +47,8 @@ class Filter {
   /// Moves the inertial state to the stamp of the last sample; the first one is at t_ns(). Returns
   /// the transition (identity, without noise, for no samples).
   ImuTransition propagate(std::span<const ImuSample> samples, std::span<const double> gaps_s = {});
+  /// Another estimate, at which Jacobians are taken from now on, too.
+  void set_imu(const ImuState& state);
   /// Something has moved the IMU's state that no noise explains: its covariance grows by what it
   /// may be off, `times` over (F-28).
   void loosen(double times);

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,7 @@ struct StartSetup {
   double sigma_accel_bias_m_per_s2 = 0.;
   double window_s = 1.;           ///< of data that a start without a reference looks at
   double state_error_scale = 0.;  ///< start at the reference plus this times a draw of the prior
+  std::optional<ImuPrior> given = {};  ///< by whom has the filter run again
 };
 
 /// Whether a filter that has diverged is started anew.

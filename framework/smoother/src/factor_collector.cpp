@@ -1,0 +1,127 @@
+#include "factor_collector.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "viwo/math/chi2.hpp"
+#include "viwo/math/so3.hpp"
+
+namespace viwo::smoother {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using ImuVector = Eigen::Matrix<double, kImuSize, 1>;
+
+/// The inverse of a covariance whose units differ by many orders of magnitude. What has no noise at
+/// all (a bias that does not walk) gets a little.
+ImuMatrix information_of(const ImuMatrix& covariance) {
+  constexpr double kLeast = 1e-18;
+  const ImuVector scale = covariance.diagonal().cwiseMax(kLeast).cwiseSqrt().cwiseInverse();
+  ImuMatrix unit = scale.asDiagonal() * covariance * scale.asDiagonal();
+  for (int i = 0; i < kImuSize; ++i) {
+    if (!(covariance(i, i) > kLeast)) unit(i, i) = 1.;
+  }
+  const ImuMatrix inverse = unit.ldlt().solve(ImuMatrix::Identity());
+  return scale.asDiagonal() * inverse * scale.asDiagonal();
+}
+
+}  // namespace
+
+ImuVector difference(const ImuState& to, const ImuState& from) {
+  ImuVector dx;
+  dx << -log_so3(to.R_GtoI * from.R_GtoI.transpose()), to.p_IinG - from.p_IinG,
+      to.v_IinG - from.v_IinG, to.gyro_bias - from.gyro_bias, to.accel_bias - from.accel_bias;
+  return dx;
+}
+
+void retract(const Eigen::Ref<const Eigen::VectorXd>& dx, ImuState& state) {
+  state.R_GtoI = normalized_rotation(exp_so3(-dx.segment<3>(kThetaColumn)) * state.R_GtoI);
+  state.p_IinG += dx.segment<3>(kPositionColumn);
+  state.v_IinG += dx.segment<3>(kVelocityColumn);
+  state.gyro_bias += dx.segment<3>(kGyroBiasColumn);
+  state.accel_bias += dx.segment<3>(kAccelBiasColumn);
+}
+
+FactorCollector::FactorCollector(const PathRecorder& run, const ImuState& start, std::size_t epochs,
+                                 std::vector<int> column_of, int n_shared)
+    : system_(n_shared), column_of_(std::move(column_of)) {
+  // Behind the path, where blocks of the recording itself stand.
+  const int behind = kImuSize * (static_cast<int>(epochs) + 1);
+  for (int& column : column_of_) {
+    if (column >= 0) column += behind;
+  }
+  columns_.resize(kImuSize);
+  std::iota(columns_.begin(), columns_.end(), 0);
+  const ImuMatrix Lambda = information_of(run.start().P);
+  system_.add(columns_, Lambda, -Lambda * difference(start, run.start().state));
+}
+
+void FactorCollector::on_propagated(const Filter& filter, const ImuTransition& transition) {
+  transition_ = transition;
+  predicted_ = filter.imu();
+}
+
+void FactorCollector::on_clone(const Filter& filter, const ImuMatrix& /*Phi*/) {
+  const auto slot = static_cast<std::size_t>(filter.clones().back().slot);
+  if (slot >= epoch_in_slot_.size()) epoch_in_slot_.resize(slot + 1);
+  path_.epochs.push_back({filter.t_ns(), filter.imu()});
+  epoch_in_slot_[slot] = path_.epochs.size();
+  // (S-2)
+  const ImuMatrix information = information_of(transition_.Q);
+  Eigen::Matrix<double, kImuSize, 2 * kImuSize> J;
+  J << -transition_.Phi, ImuMatrix::Identity();
+  columns_.resize(2 * kImuSize);
+  std::iota(columns_.begin(), columns_.end(),
+            kImuSize * (static_cast<int>(path_.epochs.size()) - 1));
+  const Eigen::Matrix<double, 2 * kImuSize, kImuSize> weighted = J.transpose() * information;
+  system_.add(columns_, weighted * J, -weighted * difference(filter.imu(), predicted_));
+}
+
+int FactorCollector::unknown(const Filter& filter, int column) const {
+  const int first_block = filter.blocks().first_column();
+  if (column >= first_block) return column_of_[static_cast<std::size_t>(column - first_block)];
+  if (column < kImuSize) return kImuSize * static_cast<int>(path_.epochs.size()) + column;
+  const int of_clones = column - kImuSize;
+  const std::size_t epoch = epoch_in_slot_[static_cast<std::size_t>(of_clones / kPoseSize)];
+  return kImuSize * static_cast<int>(epoch) + of_clones % kPoseSize;
+}
+
+void FactorCollector::collect(const Filter& filter, const FactorColumns& columns) {
+  columns_.clear();
+  for (const ColumnRange& range : columns.blocks()) {
+    for (int i = 0; i < range.count; ++i) columns_.push_back(unknown(filter, range.first + i));
+  }
+}
+
+void FactorCollector::on_factor(const Filter& filter, const UpdateEntry& /*update*/,
+                                const ResidualFactor& factor) {
+  const Eigen::LLT<MatrixXd> R(factor.R);
+  if (R.info() != Eigen::Success || !factor.residual.allFinite() || !factor.H.allFinite()) return;
+  const MatrixXd H = R.matrixL().solve(MatrixXd(factor.H));
+  const VectorXd r = R.matrixL().solve(VectorXd(factor.residual));
+  ++rows_;
+  // (S-3)
+  double weight = 1.;
+  if (factor.gate_probability > 0.) {
+    const double gate = chi2_quantile(1. - factor.gate_probability, static_cast<double>(r.size()));
+    weight = std::min(1., gate / r.squaredNorm());
+  }
+  if (weight < 1.) ++weighed_down_;
+  collect(filter, factor.columns);
+  system_.add(columns_, weight * (H.transpose() * H), weight * (H.transpose() * r));
+}
+
+void FactorCollector::on_factor(const Filter& filter, const UpdateEntry& /*update*/,
+                                const InformationFactor& factor) {
+  const int n = factor.columns.size();
+  if (n == 0) return;
+  if (!factor.eta.head(n).allFinite()) return;
+  collect(filter, factor.columns);
+  system_.add(columns_, factor.Lambda.topLeftCorner(n, n), factor.eta.head(n));
+}
+
+}  // namespace viwo::smoother

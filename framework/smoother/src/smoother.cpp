@@ -1,0 +1,312 @@
+#include "viwo/smoother/smoother.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <tbb/parallel_for.h>
+
+#include "block_values.hpp"
+#include "factor_collector.hpp"
+#include "path_recorder.hpp"
+#include "viwo/config/overrides.hpp"
+#include "viwo/math/significant.hpp"
+
+namespace viwo::smoother {
+namespace {
+
+using config::Node;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kMostPasses = 15;
+/// Nothing moves by more than a tenth of its sigma. Gates, which open and close, leave less.
+constexpr double kConverged = 0.01;
+
+using Values = std::vector<std::vector<double>>;  ///< of blocks
+
+/// One recording between two passes.
+struct Recording {
+  const Input* input = nullptr;
+  Node run;  ///< with the noises that the filter has found
+  std::optional<PathRecorder> filter;
+  std::vector<int> column_of;  ///< of columns of blocks
+  ImuState start;
+  std::shared_ptr<GivenPath> path;
+  Values blocks;
+  std::optional<FactorCollector> factors;
+  RunResult result;
+};
+
+/// What is the same in all recordings: columns of blocks of cameras and wheels that are estimated.
+struct Shared {
+  std::vector<Eigen::Index> columns;  ///< of BlockPrior::P, of the first recording
+  MatrixXd Lambda;                    ///< of the prior
+
+  int size() const { return static_cast<int>(columns.size()); }
+};
+
+[[noreturn]] void fail(const Recording& recording, const std::string& text) {
+  throw InputError(recording.input->name + ": smoother: " + text);
+}
+
+RunResult run(const Recording& recording, RunSetup& setup, const RunHooks& hooks) {
+  RunResult result = run_filter(setup, collect(setup), hooks);
+  if (result.status == RunStatus::kOk && result.pieces.size() == 1) return result;
+  fail(recording, std::string("the filter ends as '") + name(result.status) + "'" +
+                      (result.cause.empty() ? "" : ": " + result.cause));
+}
+
+RunSetup set_up(const Recording& recording, PluginRegistry& plugins) {
+  RunSetup setup = read_run(recording.run, plugins);
+  if (!setup.filter) fail(recording, "the run needs a section 'updates'");
+  setup.filter->restart = Restart::kNever;
+  return setup;
+}
+
+/// Noises that were found become those of the configuration: what is left when a whole recording is
+/// fitted says less about them.
+void hold_noises(const RunResult& result, const Node& resolved, Node& run) {
+  for (const NoiseFound& noise : result.noises) {
+    const std::size_t dot = noise.name.rfind('.');
+    std::string update = noise.name.substr(0, dot);
+    // Of several wheel sets each has an instance, SET.UPDATE.
+    update = update.substr(update.rfind('.') + 1);
+    const std::string path = "updates." + update + ".", parameter = noise.name.substr(dot + 1);
+    if (resolved.find("updates")->find(update)->find(parameter) == nullptr) continue;
+    config::set_path(run, path + parameter, Node::scalar_of(significant(noise.found, 17)));
+    config::set_path(run, path + "find_noise", Node::scalar_of("false"));
+  }
+}
+
+/// The filter as it is configured: where the smoother begins.
+void run_filter_of(Recording& recording, PluginRegistry& plugins) {
+  RunSetup setup = set_up(recording, plugins);
+  RunHooks hooks;
+  hooks.on_start = [&](const Estimator& estimator) { return &recording.filter.emplace(estimator); };
+  recording.result = run(recording, setup, hooks);
+  hold_noises(recording.result, setup.resolved, recording.run);
+  recording.start = recording.filter->start().state;
+  recording.path = std::make_shared<GivenPath>(recording.filter->path());
+  recording.blocks = recording.filter->blocks();
+  for (const BlockSpec& spec : recording.filter->prior().specs) {
+    const bool moves = spec.process != Process::kConstant &&
+                       std::any_of(spec.entries.begin(), spec.entries.end(),
+                                   [](const BlockEntry& e) { return e.process_sigma > 0.; });
+    if (moves) {
+      fail(recording, "'" + spec.name +
+                          "' moves while the filter runs, and a smoother takes it as constant: "
+                          "turn that off");
+    }
+  }
+}
+
+/// Which unknown each column of blocks is. Blocks that are not of cameras and wheels (where the
+/// Earth is) are the recording's own.
+void number_columns(Recording& recording, Shared* shared) {
+  const BlockPrior& prior = recording.filter->prior();
+  recording.column_of.assign(static_cast<std::size_t>(prior.P.rows()), kHeld);
+  int next_shared = 0, next_own = 0;
+  for (std::size_t b = 0; b < prior.specs.size(); ++b) {
+    const BlockSpec& spec = prior.specs[b];
+    if (prior.first[b] < 0) continue;
+    for (std::size_t i = 0; i < spec.entries.size(); ++i) {
+      const auto column = static_cast<std::size_t>(prior.first[b]) + i;
+      const auto at = static_cast<Eigen::Index>(column);
+      if (!(prior.P(at, at) > 0.)) continue;
+      const bool is_shared = is_of_the_rig(spec.name);
+      recording.column_of[column] = is_shared ? smoother::shared(next_shared++) : next_own++;
+      if (is_shared && shared != nullptr) shared->columns.push_back(at);
+    }
+  }
+}
+
+Shared number_columns(std::vector<Recording>& recordings) {
+  Shared shared;
+  for (Recording& recording : recordings) {
+    const bool is_first = &recording == &recordings.front();
+    number_columns(recording, is_first ? &shared : nullptr);
+    const auto n = std::count_if(recording.column_of.begin(), recording.column_of.end(),
+                                 [](int column) { return column < 0 && column != kHeld; });
+    if (n != shared.size()) fail(recording, "it estimates other parameters than the first one");
+  }
+  const MatrixXd P = recordings.front().filter->prior().P(shared.columns, shared.columns);
+  shared.Lambda = P.llt().solve(MatrixXd::Identity(P.rows(), P.cols()));
+  return shared;
+}
+
+/// By how much the blocks are off their prior, by columns.
+VectorXd off_prior(const Recording& recording) {
+  const BlockPrior& prior = recording.filter->prior();
+  VectorXd off = VectorXd::Zero(prior.P.rows());
+  for (std::size_t b = 0; b < prior.specs.size(); ++b) {
+    if (prior.first[b] < 0) continue;
+    const BlockSpec& spec = prior.specs[b];
+    const VectorXd dx = difference(spec, recording.blocks[b], spec.value);
+    off.segment(prior.first[b], dx.size()) = dx;
+  }
+  return off;
+}
+
+/// The priors of blocks that only this recording has.
+void add_own_priors(Recording& recording) {
+  const BlockPrior& prior = recording.filter->prior();
+  const VectorXd off = off_prior(recording);
+  const int behind = kImuSize * (static_cast<int>(recording.path->epochs.size()) + 1);
+  for (std::size_t column = 0; column < recording.column_of.size(); ++column) {
+    const int own = recording.column_of[column];
+    if (own < 0) continue;
+    const auto at = static_cast<Eigen::Index>(column);
+    const int unknown = behind + own;
+    const MatrixXd Lambda = MatrixXd::Constant(1, 1, 1. / prior.P(at, at));
+    recording.factors->system().add({&unknown, 1}, Lambda, -Lambda * off.segment<1>(at));
+  }
+}
+
+/// Along the path, with the blocks as they are now (S-1).
+void collect_factors(Recording& recording, int n_shared, PluginRegistry& plugins) {
+  RunSetup setup = set_up(recording, plugins);
+  EstimatorOptions& options = setup.filter->options;
+  options.runner.frozen = options.runner.rooms_closed = true;
+  options.monitor.enabled = false;
+  options.along = recording.path;
+  const BlockPrior& prior = recording.filter->prior();
+  for (std::size_t b = 0; b < prior.specs.size(); ++b) {
+    options.continuation.blocks.emplace_back(prior.specs[b].name, recording.blocks[b]);
+  }
+  setup.filter->start.given = recording.filter->start();
+  setup.filter->start.given->state = recording.start;
+  recording.factors.emplace(*recording.filter, recording.start, recording.path->epochs.size(),
+                            recording.column_of, n_shared);
+  add_own_priors(recording);
+  RunHooks hooks;
+  hooks.on_start = [&](const Estimator&) { return &*recording.factors; };
+  recording.result = run(recording, setup, hooks);
+  if (recording.factors->path().epochs.size() != recording.path->epochs.size()) {
+    fail(recording, "its epochs change with the clocks");
+  }
+  if (!recording.factors->system().eliminate()) fail(recording, "the motion is not determined");
+}
+
+/// What all recordings and the prior say of the shared unknowns.
+struct Normal {
+  MatrixXd Lambda;
+  VectorXd eta;
+  double gain = 0.;  ///< by how much the cost falls with the unknowns of the recordings alone
+};
+
+Normal sum(std::vector<Recording>& recordings, const Shared& shared) {
+  Normal sum{shared.Lambda, VectorXd(), 0.};
+  sum.eta = -shared.Lambda * off_prior(recordings.front())(shared.columns);
+  for (Recording& recording : recordings) {
+    sum.Lambda += recording.factors->system().Lambda();
+    sum.eta += recording.factors->system().eta();
+    sum.gain += recording.factors->system().gain();
+  }
+  return sum;
+}
+
+/// Moves the estimate of a recording.
+void move(Recording& recording, const VectorXd& dx_shared) {
+  const VectorXd own = recording.factors->system().own(dx_shared);
+  retract(own.head<kImuSize>(), recording.start);
+  auto path = std::make_shared<GivenPath>(recording.factors->path());
+  for (std::size_t k = 0; k < path->epochs.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(kImuSize * (k + 1));
+    retract(own.segment<kImuSize>(at), path->epochs[k].state);
+  }
+  const auto behind = static_cast<Eigen::Index>(kImuSize * (path->epochs.size() + 1));
+  recording.path = std::move(path);
+  const BlockPrior& prior = recording.filter->prior();
+  for (std::size_t b = 0; b < prior.specs.size(); ++b) {
+    if (prior.first[b] < 0) continue;
+    VectorXd dx = VectorXd::Zero(static_cast<Eigen::Index>(prior.specs[b].entries.size()));
+    for (Eigen::Index i = 0; i < dx.size(); ++i) {
+      const int unknown = recording.column_of[static_cast<std::size_t>(prior.first[b] + i)];
+      if (unknown == kHeld) continue;
+      dx[i] = unknown < 0 ? dx_shared[~unknown] : own[behind + unknown];
+    }
+    retract(prior.specs[b], dx, recording.blocks[b]);
+  }
+}
+
+/// The values of all blocks with the covariance of the shared ones, as a filter has them that
+/// begins with what was found.
+CalibrationFile calibration_of(const Recording& first, const Shared& shared,
+                               const MatrixXd& covariance, const RunSetup& setup) {
+  const BlockPrior& prior = first.filter->prior();
+  FilterOptions options;
+  std::vector<BlockSpec> specs = prior.specs;
+  Eigen::VectorXd sigma = covariance.diagonal().cwiseSqrt();
+  std::vector<BlockEntry*> entries(static_cast<std::size_t>(prior.P.rows()), nullptr);
+  for (std::size_t b = 0; b < specs.size(); ++b) {
+    specs[b].value = first.blocks[b];
+    for (std::size_t i = 0; i < specs[b].entries.size(); ++i) {
+      if (prior.first[b] >= 0) {
+        entries[static_cast<std::size_t>(prior.first[b]) + i] = &specs[b].entries[i];
+      }
+    }
+  }
+  for (int k = 0; k < shared.size(); ++k) {
+    BlockEntry& entry =
+        *entries[static_cast<std::size_t>(shared.columns[static_cast<std::size_t>(k)])];
+    entry.sigma = sigma[k];
+    options.correlations.entries.push_back(entry.name);
+  }
+  options.correlations.matrix =
+      sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
+  CalibrationFile file = calibration_file_of(Filter(options, std::move(specs)));
+  describe_rig(setup, file);
+  return file;
+}
+
+}  // namespace
+
+Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProgress& progress) {
+  std::vector<Recording> recordings(inputs.size());
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    recordings[i].input = &inputs[i];
+    recordings[i].run = inputs[i].run;
+  }
+  const auto for_each = [&](auto&& work) {
+    tbb::parallel_for(std::size_t{0}, recordings.size(),
+                      [&](std::size_t i) { work(recordings[i]); });
+  };
+  for_each([&](Recording& recording) { run_filter_of(recording, plugins); });
+  progress.note("smoother: the filter has gone before");
+  const Shared shared = number_columns(recordings);
+  for (Recording& recording : recordings) recording.blocks = recordings.front().blocks;
+  Smoothed out;
+  for (const Recording& recording : recordings) {
+    for (const std::string& warning : recording.result.warnings) {
+      out.warnings.push_back(recording.input->name + ": " + warning);
+    }
+  }
+  MatrixXd covariance;
+  while (!out.converged && out.iterations < kMostPasses) {
+    for_each([&](Recording& recording) { collect_factors(recording, shared.size(), plugins); });
+    const Normal normal = sum(recordings, shared);
+    const Eigen::LLT<MatrixXd> llt(normal.Lambda);
+    if (llt.info() != Eigen::Success) fail(recordings.front(), "the calibration is not determined");
+    covariance = llt.solve(MatrixXd::Identity(shared.size(), shared.size()));
+    const VectorXd dx = llt.solve(normal.eta);
+    out.left = normal.gain + normal.eta.dot(dx);
+    for (Recording& recording : recordings) move(recording, dx);
+    ++out.iterations;
+    out.converged = out.left < kConverged;
+    progress.note("smoother, pass " + std::to_string(out.iterations) + ": chi-square falls by " +
+                  significant(out.left, 3));
+  }
+  for (Recording& recording : recordings) {
+    out.runs.push_back(std::move(recording.result));
+    out.residuals += recording.factors->rows();
+    out.weighed_down += recording.factors->weighed_down();
+  }
+  out.calibration =
+      calibration_of(recordings.front(), shared, covariance, set_up(recordings.front(), plugins));
+  return out;
+}
+
+}  // namespace viwo::smoother
