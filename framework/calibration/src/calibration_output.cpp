@@ -144,7 +144,7 @@ json smoothed_json(const CalibrationResult& result) {
                            {"unit", entry.unit}};
   }
   return {{"passes", result.smoothed->iterations},
-          {"last_fall_of_chi_square", result.smoothed->left},
+          {"last_step_sigmas", std::sqrt(result.smoothed->left)},
           {"calibration", entries}};
 }
 

@@ -66,11 +66,13 @@ void take_off(const Eigen::VectorXd& dx, InformationFactor& factor) {
 /// Blocks of the rooms of one update; nobody else's.
 class OwnBlocks final : public BlockEdits {
  public:
-  OwnBlocks(Filter& filter, const std::vector<std::size_t>& room_owners, std::size_t update)
-      : filter_(filter), room_owners_(room_owners), update_(update) {}
+  OwnBlocks(Filter& filter, const std::vector<std::size_t>& room_owners, std::size_t update,
+            EstimatorObserver* observer)
+      : filter_(filter), room_owners_(room_owners), update_(update), observer_(observer) {}
 
   void drop(BlockId id) override {
     require_own(id, "drops");
+    if (observer_ != nullptr) observer_->on_drop(filter_, id);
     filter_.drop(id);
   }
   void rewrite(const BlockRewrite& block) override {
@@ -107,6 +109,7 @@ class OwnBlocks final : public BlockEdits {
   Filter& filter_;
   const std::vector<std::size_t>& room_owners_;
   std::size_t update_;
+  EstimatorObserver* observer_;
 };
 
 }  // namespace
@@ -192,9 +195,12 @@ bool UpdateRunner::call(std::size_t index, Work&& work) {
 bool UpdateRunner::open_rooms(std::size_t index, const StateBlocks& blocks) {
   bool has_room = false;
   for (std::size_t room = 0; room < room_owners_.size(); ++room) {
-    const bool own = room_owners_[room] == index && !options_.rooms_closed;
+    static const std::vector<BlockId> kNone;
+    const bool own = room_owners_[room] == index;
     has_room = has_room || own;
-    const auto* free = own ? &blocks.free_blocks({static_cast<int>(room)}) : nullptr;
+    const bool is_closed = options_.no_crowds && blocks.rooms()[room].blocks > 1;
+    const auto* free = is_closed ? &kNone : &blocks.free_blocks({static_cast<int>(room)});
+    if (!own) free = nullptr;
     sink_.rooms()[room] = {free, blocks.rooms()[room].entries, 0};
   }
   return has_room;
@@ -229,7 +235,7 @@ void UpdateRunner::run(std::size_t index, const EpochData& data, Filter& filter,
 }
 
 void UpdateRunner::settle(const Context& context) {
-  OwnBlocks edits(context.filter, room_owners_, context.index);
+  OwnBlocks edits(context.filter, room_owners_, context.index, observer_);
   Update& update = *updates_[context.index].update;
   call(context.index, [&] { update.settle(context.filter.view(), edits); });
 }

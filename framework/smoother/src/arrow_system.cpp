@@ -68,7 +68,6 @@ bool ArrowSystem::eliminate() {
   const Eigen::Map<const Eigen::VectorXd> eta(eta_own_.data(), n_own_);
   by_shared_ = llt_.solve(across);
   alone_ = llt_.solve(eta);
-  gain_ = eta.dot(alone_);
   Lambda_ -= across.transpose() * by_shared_;
   Lambda_ = (0.5 * (Lambda_ + Lambda_.transpose())).eval();
   eta_ -= across.transpose() * alone_;

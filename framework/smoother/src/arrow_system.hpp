@@ -32,8 +32,6 @@ class ArrowSystem {
   const Eigen::VectorXd& eta() const { return eta_; }
   /// After eliminate(): the own unknowns where the shared ones are `dx_shared` (S-5).
   Eigen::VectorXd own(const Eigen::VectorXd& dx_shared) const;
-  /// After eliminate(): by how much the cost falls with the own unknowns alone.
-  double gain() const { return gain_; }
 
  private:
   void gather();
@@ -48,7 +46,6 @@ class ArrowSystem {
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt_;
   Eigen::MatrixXd by_shared_;  ///< own^-1 across
   Eigen::VectorXd alone_;      ///< own^-1 eta
-  double gain_ = 0.;
 };
 
 }  // namespace viwo::smoother

@@ -1,6 +1,7 @@
 #include "factor_collector.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include <Eigen/Cholesky>
@@ -47,12 +48,14 @@ void retract(const Eigen::Ref<const Eigen::VectorXd>& dx, ImuState& state) {
 }
 
 FactorCollector::FactorCollector(const PathRecorder& run, const ImuState& start, std::size_t epochs,
-                                 std::vector<int> column_of, int n_shared)
-    : system_(n_shared), column_of_(std::move(column_of)) {
+                                 const BlockColumns& columns, int n_shared)
+    : system_(n_shared), blocks_(columns), prior_(run.prior().P) {
   // Behind the path, where blocks of the recording itself stand.
   const int behind = kImuSize * (static_cast<int>(epochs) + 1);
-  for (int& column : column_of_) {
-    if (column >= 0) column += behind;
+  first_moving_ = behind + blocks_.own;
+  next_in_room_ = first_moving_ + static_cast<int>(blocks_.moving.size() * epochs);
+  for (int& unknown : blocks_.unknown) {
+    if (unknown >= 0) unknown += behind;
   }
   columns_.resize(kImuSize);
   std::iota(columns_.begin(), columns_.end(), 0);
@@ -79,11 +82,47 @@ void FactorCollector::on_clone(const Filter& filter, const ImuMatrix& /*Phi*/) {
             kImuSize * (static_cast<int>(path_.epochs.size()) - 1));
   const Eigen::Matrix<double, 2 * kImuSize, kImuSize> weighted = J.transpose() * information;
   system_.add(columns_, weighted * J, -weighted * difference(filter.imu(), predicted_));
+  tie_moving(filter);
 }
 
-int FactorCollector::unknown(const Filter& filter, int column) const {
+/// (S-6)
+void FactorCollector::tie_moving(const Filter& filter) {
+  const auto n = static_cast<int>(blocks_.moving.size());
+  const auto epoch = static_cast<int>(path_.epochs.size()) - 1;
+  for (int i = 0; i < n; ++i) {
+    const MovingEntry& entry = blocks_.moving[static_cast<std::size_t>(i)];
+    const int now = first_moving_ + n * epoch + i;
+    blocks_.unknown[static_cast<std::size_t>(entry.column)] = now;
+    if (epoch == 0) {
+      const double variance = prior_(entry.column, entry.column);
+      system_.add({&now, 1}, MatrixXd::Constant(1, 1, 1. / variance), VectorXd::Zero(1));
+      continue;
+    }
+    const double dt_s =
+        seconds_between(path_.epochs[static_cast<std::size_t>(epoch) - 1].t_ns, filter.t_ns());
+    const bool settles = entry.time_constant_s > 0.;
+    const double kept = settles ? std::exp(-dt_s / entry.time_constant_s) : 1.;
+    const double gained = settles ? 1. - kept * kept : dt_s;
+    const Eigen::Vector2d J(-kept, 1.);
+    const int both[] = {now - n, now};
+    system_.add(both, J * J.transpose() / (gained * std::pow(entry.process_sigma, 2)),
+                Eigen::Vector2d::Zero());
+  }
+}
+
+void FactorCollector::on_drop(const Filter& filter, BlockId block) {
+  const BlockView& view = filter.blocks().view(block);
+  const auto first = blocks_.unknown.begin() + view.column() - filter.blocks().first_column();
+  std::fill(first, first + view.size(), kInRoom);
+}
+
+int FactorCollector::unknown(const Filter& filter, int column) {
   const int first_block = filter.blocks().first_column();
-  if (column >= first_block) return column_of_[static_cast<std::size_t>(column - first_block)];
+  if (column >= first_block) {
+    int& unknown = blocks_.unknown[static_cast<std::size_t>(column - first_block)];
+    if (unknown == kInRoom) unknown = next_in_room_++;
+    return unknown;
+  }
   if (column < kImuSize) return kImuSize * static_cast<int>(path_.epochs.size()) + column;
   const int of_clones = column - kImuSize;
   const std::size_t epoch = epoch_in_slot_[static_cast<std::size_t>(of_clones / kPoseSize)];

@@ -10,17 +10,33 @@
 
 namespace viwo::smoother {
 
+/// One entry of a block that moves while the filter runs: it is another unknown in each epoch.
+struct MovingEntry {
+  int column = 0;  ///< of blocks
+  double process_sigma = 0.;
+  double time_constant_s = 0.;  ///< 0: a random walk
+};
+
+/// Of a block in a room: another unknown whenever it is added.
+inline constexpr int kInRoom = kHeld + 1;
+
+/// Which unknown each column of blocks in the state is, counted from the first one.
+struct BlockColumns {
+  std::vector<int> unknown;  ///< shared, kHeld, kInRoom, or of the recording from 0 on
+  int own = 0;               ///< of these
+  std::vector<MovingEntry> moving;
+};
+
 /// Unknowns of a state of the IMU; those of the start come first, then those of each epoch, then
-/// blocks that only this recording has.
+/// blocks that only this recording has, then what moves, epoch by epoch.
 class FactorCollector final : public EstimatorObserver {
  public:
-  /// `column_of`: for each column of blocks in the state, counted from the first one, which unknown
-  /// it is, behind the path as `own` or shared; `n_shared` of those.
   FactorCollector(const PathRecorder& run, const ImuState& start, std::size_t epochs,
-                  std::vector<int> column_of, int n_shared);
+                  const BlockColumns& columns, int n_shared);
 
   void on_propagated(const Filter& filter, const ImuTransition& transition) override;
   void on_clone(const Filter& filter, const ImuMatrix& Phi) override;
+  void on_drop(const Filter& filter, BlockId block) override;
   void on_factor(const Filter& filter, const UpdateEntry& update,
                  const ResidualFactor& factor) override;
   void on_factor(const Filter& filter, const UpdateEntry& update,
@@ -34,11 +50,15 @@ class FactorCollector final : public EstimatorObserver {
   long weighed_down() const { return weighed_down_; }
 
  private:
+  void tie_moving(const Filter& filter);
   void collect(const Filter& filter, const FactorColumns& columns);
-  int unknown(const Filter& filter, int column) const;
+  int unknown(const Filter& filter, int column);
 
   ArrowSystem system_;
-  std::vector<int> column_of_;
+  BlockColumns blocks_;
+  int first_moving_ = 0;
+  int next_in_room_ = 0;
+  const Eigen::MatrixXd& prior_;
   GivenPath path_;
   std::vector<std::size_t> epoch_in_slot_;
   ImuTransition transition_;

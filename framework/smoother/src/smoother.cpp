@@ -1,6 +1,7 @@
 #include "viwo/smoother/smoother.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -32,7 +33,7 @@ struct Recording {
   const Input* input = nullptr;
   Node run;  ///< with the noises that the filter has found
   std::optional<PathRecorder> filter;
-  std::vector<int> column_of;  ///< of columns of blocks
+  BlockColumns columns;
   ImuState start;
   std::shared_ptr<GivenPath> path;
   Values blocks;
@@ -91,34 +92,40 @@ void run_filter_of(Recording& recording, PluginRegistry& plugins) {
   recording.start = recording.filter->start().state;
   recording.path = std::make_shared<GivenPath>(recording.filter->path());
   recording.blocks = recording.filter->blocks();
-  for (const BlockSpec& spec : recording.filter->prior().specs) {
-    const bool moves = spec.process != Process::kConstant &&
-                       std::any_of(spec.entries.begin(), spec.entries.end(),
-                                   [](const BlockEntry& e) { return e.process_sigma > 0.; });
-    if (moves) {
-      fail(recording, "'" + spec.name +
-                          "' moves while the filter runs, and a smoother takes it as constant: "
-                          "turn that off");
-    }
-  }
+}
+
+bool moves(const BlockSpec& spec) {
+  return spec.process != Process::kConstant &&
+         std::any_of(spec.entries.begin(), spec.entries.end(),
+                     [](const BlockEntry& entry) { return entry.process_sigma > 0.; });
 }
 
 /// Which unknown each column of blocks is. Blocks that are not of cameras and wheels (where the
 /// Earth is) are the recording's own.
 void number_columns(Recording& recording, Shared* shared) {
   const BlockPrior& prior = recording.filter->prior();
-  recording.column_of.assign(static_cast<std::size_t>(prior.P.rows()), kHeld);
-  int next_shared = 0, next_own = 0;
+  BlockColumns& columns = recording.columns;
+  columns.unknown.assign(static_cast<std::size_t>(prior.P.rows()), kInRoom);
+  int next_shared = 0;
   for (std::size_t b = 0; b < prior.specs.size(); ++b) {
     const BlockSpec& spec = prior.specs[b];
     if (prior.first[b] < 0) continue;
+    if (moves(spec) && spec.rotations > 0) fail(recording, "'" + spec.name + "' turns");
     for (std::size_t i = 0; i < spec.entries.size(); ++i) {
       const auto column = static_cast<std::size_t>(prior.first[b]) + i;
       const auto at = static_cast<Eigen::Index>(column);
+      columns.unknown[column] = kHeld;
       if (!(prior.P(at, at) > 0.)) continue;
-      const bool is_shared = is_of_the_rig(spec.name);
-      recording.column_of[column] = is_shared ? smoother::shared(next_shared++) : next_own++;
-      if (is_shared && shared != nullptr) shared->columns.push_back(at);
+      if (moves(spec)) {
+        const bool settles = spec.process == Process::kGaussMarkov;
+        columns.moving.push_back({static_cast<int>(column), spec.entries[i].process_sigma,
+                                  settles ? spec.time_constant_s : 0.});
+      } else if (is_of_the_rig(spec.name)) {
+        columns.unknown[column] = smoother::shared(next_shared++);
+        if (shared != nullptr) shared->columns.push_back(at);
+      } else {
+        columns.unknown[column] = columns.own++;
+      }
     }
   }
 }
@@ -128,8 +135,8 @@ Shared number_columns(std::vector<Recording>& recordings) {
   for (Recording& recording : recordings) {
     const bool is_first = &recording == &recordings.front();
     number_columns(recording, is_first ? &shared : nullptr);
-    const auto n = std::count_if(recording.column_of.begin(), recording.column_of.end(),
-                                 [](int column) { return column < 0 && column != kHeld; });
+    const auto n = std::count_if(recording.columns.unknown.begin(), recording.columns.unknown.end(),
+                                 [](int unknown) { return unknown < 0 && unknown > kInRoom; });
     if (n != shared.size()) fail(recording, "it estimates other parameters than the first one");
   }
   const MatrixXd P = recordings.front().filter->prior().P(shared.columns, shared.columns);
@@ -155,8 +162,8 @@ void add_own_priors(Recording& recording) {
   const BlockPrior& prior = recording.filter->prior();
   const VectorXd off = off_prior(recording);
   const int behind = kImuSize * (static_cast<int>(recording.path->epochs.size()) + 1);
-  for (std::size_t column = 0; column < recording.column_of.size(); ++column) {
-    const int own = recording.column_of[column];
+  for (std::size_t column = 0; column < recording.columns.unknown.size(); ++column) {
+    const int own = recording.columns.unknown[column];
     if (own < 0) continue;
     const auto at = static_cast<Eigen::Index>(column);
     const int unknown = behind + own;
@@ -169,17 +176,18 @@ void add_own_priors(Recording& recording) {
 void collect_factors(Recording& recording, int n_shared, PluginRegistry& plugins) {
   RunSetup setup = set_up(recording, plugins);
   EstimatorOptions& options = setup.filter->options;
-  options.runner.frozen = options.runner.rooms_closed = true;
+  options.runner.frozen = options.runner.no_crowds = true;
   options.monitor.enabled = false;
   options.along = recording.path;
   const BlockPrior& prior = recording.filter->prior();
   for (std::size_t b = 0; b < prior.specs.size(); ++b) {
+    if (moves(prior.specs[b])) continue;  // linear: taken at what was declared
     options.continuation.blocks.emplace_back(prior.specs[b].name, recording.blocks[b]);
   }
   setup.filter->start.given = recording.filter->start();
   setup.filter->start.given->state = recording.start;
   recording.factors.emplace(*recording.filter, recording.start, recording.path->epochs.size(),
-                            recording.column_of, n_shared);
+                            recording.columns, n_shared);
   add_own_priors(recording);
   RunHooks hooks;
   hooks.on_start = [&](const Estimator&) { return &*recording.factors; };
@@ -194,16 +202,14 @@ void collect_factors(Recording& recording, int n_shared, PluginRegistry& plugins
 struct Normal {
   MatrixXd Lambda;
   VectorXd eta;
-  double gain = 0.;  ///< by how much the cost falls with the unknowns of the recordings alone
 };
 
 Normal sum(std::vector<Recording>& recordings, const Shared& shared) {
-  Normal sum{shared.Lambda, VectorXd(), 0.};
+  Normal sum{shared.Lambda, VectorXd()};
   sum.eta = -shared.Lambda * off_prior(recordings.front())(shared.columns);
   for (Recording& recording : recordings) {
     sum.Lambda += recording.factors->system().Lambda();
     sum.eta += recording.factors->system().eta();
-    sum.gain += recording.factors->system().gain();
   }
   return sum;
 }
@@ -221,10 +227,10 @@ void move(Recording& recording, const VectorXd& dx_shared) {
   recording.path = std::move(path);
   const BlockPrior& prior = recording.filter->prior();
   for (std::size_t b = 0; b < prior.specs.size(); ++b) {
-    if (prior.first[b] < 0) continue;
+    if (prior.first[b] < 0 || moves(prior.specs[b])) continue;
     VectorXd dx = VectorXd::Zero(static_cast<Eigen::Index>(prior.specs[b].entries.size()));
     for (Eigen::Index i = 0; i < dx.size(); ++i) {
-      const int unknown = recording.column_of[static_cast<std::size_t>(prior.first[b] + i)];
+      const int unknown = recording.columns.unknown[static_cast<std::size_t>(prior.first[b] + i)];
       if (unknown == kHeld) continue;
       dx[i] = unknown < 0 ? dx_shared[~unknown] : own[behind + unknown];
     }
@@ -258,6 +264,13 @@ CalibrationFile calibration_of(const Recording& first, const Shared& shared,
   options.correlations.matrix =
       sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
   CalibrationFile file = calibration_file_of(Filter(options, std::move(specs)));
+  const CalibrationFile nominal = calibration_file_of(Filter({}, prior.specs));
+  for (auto section : {&CalibrationFile::intrinsics, &CalibrationFile::mount,
+                       &CalibrationFile::clock, &CalibrationFile::cameras}) {
+    for (std::size_t i = 0; i < (file.*section).size(); ++i) {
+      (file.*section)[i].nominal = (nominal.*section)[i].nominal;
+    }
+  }
   describe_rig(setup, file);
   return file;
 }
@@ -292,12 +305,13 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
     if (llt.info() != Eigen::Success) fail(recordings.front(), "the calibration is not determined");
     covariance = llt.solve(MatrixXd::Identity(shared.size(), shared.size()));
     const VectorXd dx = llt.solve(normal.eta);
-    out.left = normal.gain + normal.eta.dot(dx);
+    out.left = normal.eta.dot(dx);
     for (Recording& recording : recordings) move(recording, dx);
     ++out.iterations;
     out.converged = out.left < kConverged;
-    progress.note("smoother, pass " + std::to_string(out.iterations) + ": chi-square falls by " +
-                  significant(out.left, 3));
+    progress.note("smoother, pass " + std::to_string(out.iterations) +
+                  ": the calibration moves by " + significant(std::sqrt(out.left), 3) +
+                  " of its sigmas");
   }
   for (Recording& recording : recordings) {
     out.runs.push_back(std::move(recording.result));

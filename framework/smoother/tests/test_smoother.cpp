@@ -77,9 +77,6 @@ TEST(Smoother, TakesAllCamerasWithIt) {
 
 TEST(Smoother, SaysWhatItCannotSmooth) {
   EXPECT_THAT(
-      [] { testing::smoothed({swerve_run(1, "circle", {"wheels.intrinsics_wander=0.1"})}); },
-      ThrowsMessage<InputError>(::testing::HasSubstr("moves while the filter runs")));
-  EXPECT_THAT(
       [] { testing::smoothed({swerve_run(1, "circle", {"estimator.type=dead_reckoning"})}); },
       ThrowsMessage<InputError>("recording '1': smoother: the run needs a section 'updates'"));
   EXPECT_THAT(

@@ -59,8 +59,8 @@ struct EstimatorOptions {
   ImuLimits imu;
   HealthLimits health;
   Continuation continuation;
-  /// The estimate of each epoch is the given one, moved to its time, with RunnerOptions::frozen: the
-  /// covariance is that of a filter that is linearised there.
+  /// The estimate of each epoch is the given one, moved to its time, with RunnerOptions::frozen:
+  /// the covariance is that of a filter that is linearised there.
   std::shared_ptr<const GivenPath> along;
 };
 

@@ -55,6 +55,8 @@ class EstimatorObserver {
                          const ResidualFactor& /*factor*/) {}
   virtual void on_factor(const Filter& /*filter*/, const UpdateEntry& /*update*/,
                          const InformationFactor& /*factor*/) {}
+  /// An update is about to drop a block of a room.
+  virtual void on_drop(const Filter& /*filter*/, BlockId /*block*/) {}
   /// All updates of an epoch are done; before the oldest clone is dropped. `data` has the IMU, and
   /// the streams by StreamId::index.
   virtual void on_epoch(const Filter& /*filter*/, const EpochData& /*data*/) {}
@@ -64,8 +66,8 @@ struct RunnerOptions {
   /// Residuals are taken as zero: the estimate is only propagated, its covariance is that of a
   /// filter. For analyses along a motion that is known.
   bool frozen = false;
-  /// No blocks come and go: rooms are always full.
-  bool rooms_closed = false;
+  /// Rooms of more than one block are always full: crowds (landmarks) can be done without.
+  bool no_crowds = false;
   /// An update that has thrown this often is turned off; at least 1.
   int max_update_failures = 10;
 };

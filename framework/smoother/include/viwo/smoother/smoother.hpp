@@ -28,7 +28,7 @@ struct Smoothed {
   std::vector<std::string> warnings;  ///< of the filter that went before
   int iterations = 0;
   bool converged = false;
-  double left = 0.;       ///< by how much the last step lowered the cost, in units of chi-square
+  double left = 0.;       ///< square of the last step of the calibration, in its sigmas
   long residuals = 0;     ///< factors with a residual, in the last pass
   long weighed_down = 0;  ///< those beyond their gates
 };
