@@ -51,6 +51,10 @@ void add_option(const std::string& name, po::options_description& options) {
   } else if (name == "fix") {
     add("fix", po::value<std::string>()->value_name("FILE"),
         "the configuration with all that is to be written into it, as a file of its own");
+  } else if (name == "plan") {
+    add("plan", po::value<std::string>()->value_name("PLAN"),
+        "a plan file of this base (viwo plan): which piece of motion the calibration lacks most, "
+        "and what it would tell; said at the end, of live sensors also when it changes");
   } else if (name == "show") {
     add("show", "a window with the tracks in the images, the trajectory and the calibration");
   } else if (name == "video") {
@@ -171,6 +175,7 @@ Arguments arguments_of(const po::variables_map& values) {
   arguments.video = text("video");
   arguments.figures = text("figures");
   arguments.fix = text("fix");
+  arguments.plan = text("plan");
   arguments.reference = text("reference");
   arguments.estimate = text("estimate");
   arguments.align = text("align");

@@ -30,7 +30,8 @@ struct Arguments {
   std::string figures;          ///< "svg", "pdf" or none
   std::filesystem::path fix;    ///< none if empty
   std::string reference, estimate, align;
-  std::string to;  ///< a format of export
+  std::string to;              ///< a format of export
+  std::filesystem::path plan;  ///< of which pieces a run says what is missing; none if empty
 };
 
 /// One command: what it is called, what it takes, what it does.

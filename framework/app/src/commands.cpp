@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "command_line.hpp"
+#include "forecast_output.hpp"
 #include "interrupt.hpp"
 #include "progress.hpp"
 #include "viwo/calibration/calibrate.hpp"
@@ -131,6 +132,8 @@ int run_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
   refuse_to_overwrite(setup, out_folder(arguments));
+  std::optional<ForecastOutput> forecast;
+  if (!arguments.plan.empty()) forecast.emplace(arguments.plan, setup, plugins);
   view::PictureSinks sinks = view::open_sinks(setup, arguments.show, arguments.video);
   const RunData data = collect(setup, LiveSensors::kAllowed);
   view::RunPictures pictures(setup, data, std::move(sinks));
@@ -150,13 +153,16 @@ int run_command(const Arguments& arguments) {
     hooks.progress = [&](double fraction) { progress.at(fraction); };
     hooks.interrupted = [&] { return interrupt && interrupt->raised(); };
     if (!data.live.empty()) output.emplace(setup, folder, hooks);
+    if (forecast) forecast->watch(hooks, !data.live.empty());
     result = viwo::run(setup, data, hooks);
     if (output) output->finish(result);
   }
   const std::string picture_failure = pictures.finish(result);
   write_run(folder, setup, result);
   figures.write(report_of(setup, result));
-  std::cout << describe(result) << "report: " << (folder / "report.html").string() << "\n";
+  std::cout << describe(result);
+  if (forecast) std::cout << "forecast: " << forecast->text() << "\n";
+  std::cout << "report: " << (folder / "report.html").string() << "\n";
   if (!picture_failure.empty()) throw std::runtime_error(picture_failure);
   return result.status == RunStatus::kOk ? 0 : 1;
 }
@@ -217,8 +223,8 @@ int observability_command(const Arguments& arguments) {
 
 int calibrate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
-  calibration::CalibrationSetup setup = calibration::read_calibration_setup(
-      arguments.positional[0], arguments.assignments, plugins);
+  calibration::CalibrationSetup setup =
+      calibration::read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
   const auto folder = out_folder(arguments);
   make_folder(folder);
   const calibration::CalibrationResult result = [&] {

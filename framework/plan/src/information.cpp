@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Dense>
+
+#include "viwo/api/status.hpp"
 
 namespace viwo::plan {
 namespace {
@@ -60,6 +63,24 @@ WheelInformation::WheelInformation(std::shared_ptr<const WheelModel> model,
                                    const KnowledgeParams& known)
     : model_(std::move(model)), known_(known), preintegrator_(model_, preintegration()) {
   preintegrator_.set_intrinsics(model_->nominal());
+  const int size = model_->n_intrinsics() + 1;
+  before_ = Eigen::MatrixXd::Identity(size, size);
+}
+
+void WheelInformation::set_known(const Eigen::MatrixXd& P) {
+  const Intrinsics prior = model_->prior_sigma();
+  std::vector<int> free;
+  for (int i = 0; i < prior.size(); ++i) {
+    if (prior[i] > 0. && P(i, i) > 0.) free.push_back(i);
+  }
+  const Eigen::VectorXd scale = prior(free);
+  const Eigen::MatrixXd inverse = scale.cwiseInverse().asDiagonal();
+  const Eigen::LLT<Eigen::MatrixXd> llt(inverse * P(free, free) * inverse);
+  if (llt.info() != Eigen::Success) throw InputError("a covariance that is not positive definite");
+  const auto n = static_cast<Eigen::Index>(free.size());
+  before_.setIdentity();
+  const Eigen::MatrixXd information = llt.solve(Eigen::MatrixXd::Identity(n, n));
+  before_(free, free) = information;
 }
 
 Information WheelInformation::of(std::span<const EncoderSample> samples, std::int64_t begin_ns,
@@ -114,7 +135,7 @@ void WheelInformation::add_path(std::span<const EncoderSample> samples, std::int
 
 Eigen::MatrixXd WheelInformation::covariance(const Information& drive) const {
   const Eigen::Index size = drive.N.rows();
-  Eigen::MatrixXd N = Eigen::MatrixXd::Identity(size, size) + drive.N;  // (PL-2)
+  Eigen::MatrixXd N = before_ + drive.N;  // (PL-2)
   if (known_.distance) {
     N += drive.path * drive.path.transpose() / (known_.sigma_distance_m * known_.sigma_distance_m);
   }

@@ -30,14 +30,8 @@ class Search {
  private:
   using Sequence = std::vector<std::size_t>;
 
-  /// (PL-5)
   double left(const Information& drive) const {
-    const Intrinsics sigma = wheels_.sigma(drive);
-    double sum = 0.;
-    for (const Goal& goal : setup_.goals) {
-      sum += std::max(0., std::log(sigma[goal.intrinsic] / goal.sigma));
-    }
-    return sum;
+    return left_of(setup_.goals, wheels_.sigma(drive));
   }
   Information sum_of(const Sequence& sequence) const {
     Information sum = Information::zero(setup_.model->n_intrinsics());
@@ -270,6 +264,14 @@ std::function<Twist(double t_s)> twist_of(const Plan& plan) {
     const auto& [from_s, twist] = *std::prev(behind);
     return twist(t_s - from_s);
   };
+}
+
+double left_of(const std::vector<Goal>& goals, const Intrinsics& sigma) {
+  double sum = 0.;
+  for (const Goal& goal : goals) {
+    sum += std::max(0., std::log(sigma[goal.intrinsic] / goal.sigma));
+  }
+  return sum;
 }
 
 WorstGoal worst_goal(const std::vector<Goal>& goals, const Intrinsics& sigma) {

@@ -188,6 +188,7 @@ class FilterRun {
         feed_->on_epoch(*estimator_, piece, warnings_.now(now_s()));
       }
       if (hooks_.on_epoch) hooks_.on_epoch(result_);
+      if (hooks_.on_estimate) hooks_.on_estimate(now_s(), estimator_->filter());
       tell_progress();
     }
   }

@@ -46,6 +46,9 @@ class WheelInformation {
   Information of(std::span<const EncoderSample> samples, std::int64_t begin_ns,
                  std::int64_t end_ns);
 
+  /// What is known before a drive, instead of the prior of the model: covariance of the intrinsics.
+  /// InputError where that is none.
+  void set_known(const Eigen::MatrixXd& P);
   /// Covariance of the unknowns in prior units after a drive (PL-2).
   Eigen::MatrixXd covariance(const Information& drive) const;
   /// Sigmas of the intrinsics, 0 where the gauge holds one.
@@ -64,6 +67,7 @@ class WheelInformation {
   KnowledgeParams known_;
   Preintegrator preintegrator_;
   PreintegratedPose segment_;
+  Eigen::MatrixXd before_;  ///< information without a drive, in prior units
 };
 
 }  // namespace viwo::plan

@@ -65,6 +65,9 @@ struct WorstGoal {
 };
 WorstGoal worst_goal(const std::vector<Goal>& goals, const Intrinsics& sigma);
 
+/// How far sigmas are above their goals: the sum of logarithms (PL-5).
+double left_of(const std::vector<Goal>& goals, const Intrinsics& sigma);
+
 /// Throws InputError for goals that no motion on this floor reaches, with what stays unknown.
 Plan make_plan(const PlanSetup& setup);
 

@@ -27,6 +27,8 @@ struct RunHooks {
   /// An epoch is done, and recorded in the result, which is not complete yet. The time this takes
   /// is none of the epoch's.
   std::function<void(const RunResult&)> on_epoch;
+  /// The same with what the filter knows: time since the start [s].
+  std::function<void(double, const Filter&)> on_estimate;
   std::function<bool()> interrupted;  ///< whether the run is to end now, with what it has
   /// Something is wrong with the run, said when it is first seen: time since the start [s], what.
   std::function<void(double, const std::string&)> on_warning;
