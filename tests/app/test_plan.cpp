@@ -25,6 +25,22 @@ TEST_F(PlanTest, WritesADriveThatASimulatorFollowsAndACalibrationTakes) {
   EXPECT_NE(calibrated.out.find("delta_o4"), std::string::npos) << calibrated.out;
 }
 
+TEST_F(PlanTest, SaysWhatIsMissingOfARun) {
+  const std::string run = kPlans + "../runs/viwo_swerve.yaml";
+  const std::vector<std::string> words{"run",    run,
+                                       "--out",  "out",
+                                       "--set",  "placeholders.motion=circle",
+                                       "--set",  "sensors.simulator0.duration_s=10",
+                                       "--plan", kPlans + "swerve.yaml"};
+  const Outcome outcome = expect_done(words);
+  EXPECT_NE(outcome.out.find("forecast: delta_o"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find(" after another '"), std::string::npos) << outcome.out;
+  expect_refused({"run", kPlans + "../runs/viwo_skid_steer.yaml", "--out", "other", "--plan",
+                  kPlans + "swerve.yaml"},
+                 "the plan is for another base: it has no intrinsic 'r_left'");
+  EXPECT_FALSE(std::filesystem::exists(at("other")));
+}
+
 TEST_F(PlanTest, ThatTakesTooLongIsAFailure) {
   const Outcome outcome =
       viwo({"plan", kPlans + "swerve.yaml", "--out", "out", "--set", "max_path_m=2"});

@@ -360,6 +360,7 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
   EXPECT_EQ(files,
             (std::set<std::string>{
                 "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
+                "calibrations/smoothed_swerve.yaml",
                 "cameras/euroc.yaml", "cameras/kaist_urban.yaml", "cameras/pinhole.yaml",
                 "cameras/t265_like.yaml", "cluster/kubernetes.yaml",
                 "experiments/calibrate_ackermann.yaml", "experiments/calibrate_mecanum.yaml",

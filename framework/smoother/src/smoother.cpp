@@ -292,11 +292,6 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
   const Shared shared = number_columns(recordings);
   for (Recording& recording : recordings) recording.blocks = recordings.front().blocks;
   Smoothed out;
-  for (const Recording& recording : recordings) {
-    for (const std::string& warning : recording.result.warnings) {
-      out.warnings.push_back(recording.input->name + ": " + warning);
-    }
-  }
   MatrixXd covariance;
   while (!out.converged && out.iterations < kMostPasses) {
     for_each([&](Recording& recording) { collect_factors(recording, shared.size(), plugins); });
@@ -314,6 +309,9 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
                   " of its sigmas");
   }
   for (Recording& recording : recordings) {
+    for (const std::string& warning : recording.result.warnings) {
+      out.warnings.push_back(recording.input->name + ": " + warning);
+    }
     out.runs.push_back(std::move(recording.result));
     out.residuals += recording.factors->rows();
     out.weighed_down += recording.factors->weighed_down();

@@ -25,7 +25,7 @@ struct Smoothed {
   /// The last pass over each recording, along its smoothed path. What it says of the calibration is
   /// that of a filter that is linearised there.
   std::vector<RunResult> runs;
-  std::vector<std::string> warnings;  ///< of the filter that went before
+  std::vector<std::string> warnings;  ///< of these passes
   int iterations = 0;
   bool converged = false;
   double left = 0.;       ///< square of the last step of the calibration, in its sigmas
