@@ -25,12 +25,12 @@ class ArrowSystem {
   void add(std::span<const int> columns, const Eigen::Ref<const Eigen::MatrixXd>& Lambda,
            const Eigen::Ref<const Eigen::VectorXd>& eta);
 
-  /// Takes the recording's own unknowns out (S-4). False when they are not determined.
+  /// Takes the recording's own unknowns out (SM-4). False when they are not determined.
   bool eliminate();
   /// After eliminate(): what is left of the shared ones.
   const Eigen::MatrixXd& Lambda() const { return Lambda_; }
   const Eigen::VectorXd& eta() const { return eta_; }
-  /// After eliminate(): the own unknowns where the shared ones are `dx_shared` (S-5).
+  /// After eliminate(): the own unknowns where the shared ones are `dx_shared` (SM-5).
   Eigen::VectorXd own(const Eigen::VectorXd& dx_shared) const;
 
  private:

@@ -73,7 +73,7 @@ void FactorCollector::on_clone(const Filter& filter, const ImuMatrix& /*Phi*/) {
   if (slot >= epoch_in_slot_.size()) epoch_in_slot_.resize(slot + 1);
   path_.epochs.push_back({filter.t_ns(), filter.imu()});
   epoch_in_slot_[slot] = path_.epochs.size();
-  // (S-2)
+  // (SM-2)
   const ImuMatrix information = information_of(transition_.Q);
   Eigen::Matrix<double, kImuSize, 2 * kImuSize> J;
   J << -transition_.Phi, ImuMatrix::Identity();
@@ -85,7 +85,7 @@ void FactorCollector::on_clone(const Filter& filter, const ImuMatrix& /*Phi*/) {
   tie_moving(filter);
 }
 
-/// (S-6)
+/// (SM-6)
 void FactorCollector::tie_moving(const Filter& filter) {
   const auto n = static_cast<int>(blocks_.moving.size());
   const auto epoch = static_cast<int>(path_.epochs.size()) - 1;
@@ -143,7 +143,7 @@ void FactorCollector::on_factor(const Filter& filter, const UpdateEntry& /*updat
   const MatrixXd H = R.matrixL().solve(MatrixXd(factor.H));
   const VectorXd r = R.matrixL().solve(VectorXd(factor.residual));
   ++rows_;
-  // (S-3)
+  // (SM-3)
   double weight = 1.;
   if (factor.gate_probability > 0.) {
     const double gate = chi2_quantile(1. - factor.gate_probability, static_cast<double>(r.size()));

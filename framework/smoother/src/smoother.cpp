@@ -12,8 +12,10 @@
 #include "block_values.hpp"
 #include "factor_collector.hpp"
 #include "path_recorder.hpp"
+#include "viwo/api/status.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/setup/calibration_file.hpp"
 
 namespace viwo::smoother {
 namespace {
@@ -172,7 +174,7 @@ void add_own_priors(Recording& recording) {
   }
 }
 
-/// Along the path, with the blocks as they are now (S-1).
+/// Along the path, with the blocks as they are now (SM-1).
 void collect_factors(Recording& recording, int n_shared, PluginRegistry& plugins) {
   RunSetup setup = set_up(recording, plugins);
   EstimatorOptions& options = setup.filter->options;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "viwo/plugin_host/registry.hpp"
 #include "viwo/run/run.hpp"
 #include "viwo/run/work_progress.hpp"
 #include "viwo/setup/configuration.hpp"
@@ -18,10 +19,10 @@ namespace viwo::calibration {
 
 /// What the motion of the wheels is compared with.
 enum class ReferenceKind {
-  kAuto,    ///< poses where there are any, else the gyro
-  kPoses,   ///< relative poses of the reference body
-  kGyro,    ///< the turn by the gyro, about the mean direction of what the accelerometer feels
-  kNone,    ///< nothing: the wheels among themselves, and what was measured by hand
+  kAuto,      ///< poses where there are any, else the gyro
+  kPoses,     ///< relative poses of the reference body
+  kGyro,      ///< the turn by the gyro, about the mean direction of what the accelerometer feels
+  kNone,      ///< nothing: the wheels among themselves, and what was measured by hand
   kSmoother,  ///< no reference: all that the filter of the base takes, smoothed (viwo/smoother)
 };
 
