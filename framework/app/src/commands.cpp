@@ -11,6 +11,7 @@
 #include "viwo/calibration/calibrate.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/eval/accuracy.hpp"
+#include "viwo/eval/json.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/experiment/folder_lock.hpp"
 #include "viwo/export/export_calibration.hpp"
@@ -309,7 +310,7 @@ int evaluate_command(const Arguments& arguments) {
   const Trajectory reference = log::read_tum(arguments.reference);
   const Trajectory estimate = log::read_tum(arguments.estimate);
   const eval::Accuracy accuracy = eval::evaluate(reference, estimate, options);
-  const std::string text = eval::to_json(accuracy).dump(2) + "\n";
+  const std::string text = json_text(eval::to_json(accuracy));
   std::cout << text;
   if (arguments.out) {
     make_folder(*arguments.out);

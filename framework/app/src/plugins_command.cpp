@@ -7,6 +7,7 @@
 #include "viwo/calibration/calibrate.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/eval/json.hpp"
 #include "viwo/plan/plan.hpp"
 #include "viwo/setup/schema.hpp"
 
@@ -70,7 +71,7 @@ int schema(PluginRegistry& plugins) {
   for (const PluginListing& listing : plugins.list()) {
     if (listing.info) infos.push_back(*listing.info);
   }
-  std::cout << run_schema(infos).dump(2) << "\n";
+  std::cout << json_text(run_schema(infos));
   return 0;
 }
 

@@ -296,7 +296,7 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
   log::make_folder(folder);
   log::write_text(folder / "calibration.yaml",
                   calibration_text(calibration_file_of(result), "viwo calibrate"));
-  log::write_text(folder / "summary.json", summary_of(result).dump(2) + "\n");
+  log::write_text(folder / "summary.json", json_text(summary_of(result)));
   log::write_text(folder / "report.html", report::to_html(page_of(result)));
 }
 

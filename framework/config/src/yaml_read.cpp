@@ -1,115 +1,235 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <iterator>
-#include <system_error>
+#include <map>
+#include <optional>
+#include <sstream>
 #include <utility>
 #include <vector>
 
-#include <yaml-cpp/yaml.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/parser.h>
 
 #include "parse_text.hpp"
+#include "viwo/config/regular_file.hpp"
 #include "viwo/config/yaml.hpp"
 
 namespace viwo::config {
 namespace {
 
-// Aliases make a small text a tree of any size, or of infinite depth when a value contains itself.
+// Aliases make a small text a tree of any size, and everything that is done with a tree goes down
+// into it. No configuration comes near any of these.
 constexpr int kMaxDepth = 100;
-constexpr int kMaxNodes = 1'000'000;
+constexpr std::size_t kMaxValues = 100'000;
+constexpr std::size_t kMaxCharacters = 4 * kMaxYamlBytes;
 
-/// Copies a yaml-cpp tree; aliases become copies.
-class Converter {
+/// What a value needs, with all that is below it.
+struct Extent {
+  std::size_t values = 1;
+  std::size_t characters = 0;
+  int depth = 0;  ///< of what is deepest below it
+
+  void add(const Extent& below) {
+    values += below.values;
+    characters += below.characters;
+    depth = std::max(depth, below.depth + 1);
+  }
+};
+
+Extent extent_of(const Node& node) {
+  Extent extent;
+  if (node.is_scalar()) extent.characters = node.scalar().size();
+  for (const Node& item : node.items()) extent.add(extent_of(item));
+  for (const Node::Entry& entry : node.entries()) {
+    extent.add(extent_of(entry.value));
+    extent.characters += entry.key.size();
+  }
+  return extent;
+}
+
+/// A section whose end has not been read yet.
+class OpenMap {
  public:
-  Converter(std::string origin, bool with_positions)
-      : origin_(std::move(origin)), with_positions_(with_positions) {}
+  explicit OpenMap(const Mark& mark) : map_(Node::empty_map(mark)) {}
+
+  /// Keys and values in turn.
+  void add(Node node) {
+    if (!key_) {
+      if (!node.is_scalar()) fail(node.mark(), "a key must be text");
+      key_ = std::move(node);
+      return;
+    }
+    const Node key = *std::exchange(key_, std::nullopt);
+    if (key.scalar() == "<<" && !key.quoted()) return take_merged(std::move(node), key.mark());
+    // yaml-cpp places a missing value anywhere; where its key is helps more.
+    if (node.is_null()) node.set_mark(key.mark());
+    const auto [first, is_new] = written_.emplace(key.scalar(), key.mark());
+    if (!is_new) {
+      fail(key.mark(), "key '" + key.scalar() + "' appears twice (first at " +
+                           first->second.text() + ")");
+    }
+    map_.entries().push_back({key.scalar(), key.mark(), std::move(node)});
+  }
+
+  Node close() && {
+    for (Node& source : merged_) {
+      for (Node::Entry& entry : source.entries()) {
+        if (!written_.emplace(entry.key, entry.key_mark).second) continue;
+        map_.entries().push_back(std::move(entry));
+      }
+    }
+    return std::move(map_);
+  }
+
+ private:
+  void take_merged(Node value, const Mark& mark) {
+    if (value.is_map()) {
+      merged_.push_back(std::move(value));
+      return;
+    }
+    if (!value.is_list()) fail(mark, "'<<' needs a section or a list of sections");
+    for (Node& item : value.items()) {
+      if (!item.is_map()) fail(mark, "'<<' needs a section or a list of sections");
+      merged_.push_back(std::move(item));
+    }
+  }
+
+  Node map_;
+  std::optional<Node> key_;  ///< whose value comes next
+  std::map<std::string, Mark> written_;
+  std::vector<Node> merged_;
+};
+
+/// Makes the tree of one document from the parser's events, and ends with the first that goes too
+/// far: what is refused has not been built. Aliases become copies.
+class TreeBuilder final : public YAML::EventHandler {
+ public:
+  TreeBuilder(std::string_view text, std::string origin, bool with_positions)
+      : text_(text), origin_(std::move(origin)), with_positions_(with_positions) {}
 
   Mark mark_of(const YAML::Mark& mark) const {
     if (!with_positions_ || mark.is_null()) return Mark{origin_};
     return Mark{origin_, mark.line + 1, mark.column + 1};
   }
 
-  Node convert(const YAML::Node& yaml, int depth = 0) {
-    const Mark mark = mark_of(yaml.Mark());
-    if (depth > kMaxDepth) fail(mark, "nested too deeply (does an alias contain itself?)");
-    if (++nodes_ > kMaxNodes) fail(mark, "too large (aliases of aliases?)");
-    switch (yaml.Type()) {
-      case YAML::NodeType::Scalar:
-        return Node::scalar_of(yaml.Scalar(), mark, is_quoted(yaml));
-      case YAML::NodeType::Sequence: {
-        Node list = Node::list_of({}, mark);
-        for (const YAML::Node& item : yaml) list.items().push_back(convert(item, depth + 1));
-        return list;
-      }
-      case YAML::NodeType::Map:
-        return convert_map(yaml, mark, depth);
-      default:
-        return Node::null(mark);
+  Node take() && { return root_ ? std::move(*root_) : Node::null(mark_of({})); }
+
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    if (++documents_ == 1) return;
+    // What the parser does not know in this place ends a document for it.
+    const auto at = std::min(static_cast<std::size_t>(std::max(mark.pos, 0)), text_.size());
+    const std::string_view rest = text_.substr(at);
+    if (rest.empty() || rest.starts_with("---")) {
+      fail(mark_of(mark), "a second YAML document: only one is allowed");
     }
+    fail(mark_of(mark), std::string("not valid YAML: '") + rest.front() + "' does not belong here");
   }
+  void OnDocumentEnd() override {}
+
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    count(mark, {});
+    add(Node::null(mark_of(mark)), anchor, mark);
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                const std::string& value) override {
+    count(mark, {.characters = value.size()});
+    if (value.find('\0') != std::string::npos) fail(mark_of(mark), "a text with a zero byte");
+    add(Node::scalar_of(value, mark_of(mark), tag == "!"), anchor, mark);
+  }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    const auto found = anchored_.find(anchor);
+    if (found == anchored_.end()) fail(mark_of(mark), "this alias stands within its own value");
+    count(mark, extent_of(found->second));
+    add(found->second, YAML::NullAnchor, mark);
+  }
+
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& /*tag*/, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value /*style*/) override {
+    count(mark, {});
+    open_.push_back({anchor, mark, Node::list_of({}, mark_of(mark)), std::nullopt});
+  }
+  void OnMapStart(const YAML::Mark& mark, const std::string& /*tag*/, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value /*style*/) override {
+    count(mark, {});
+    open_.push_back({anchor, mark, {}, OpenMap(mark_of(mark))});
+  }
+  void OnSequenceEnd() override { close(); }
+  void OnMapEnd() override { close(); }
 
  private:
-  static bool is_quoted(const YAML::Node& scalar) { return scalar.Tag() == "!"; }
+  /// A list or a section.
+  struct Open {
+    YAML::anchor_t anchor;
+    YAML::Mark mark;
+    Node list;
+    std::optional<OpenMap> map;
+  };
 
-  Node convert_map(const YAML::Node& yaml, const Mark& mark, int depth) {
-    Node map = Node::empty_map(mark);
-    std::vector<Node> merged;
-    for (const auto& pair : yaml) {
-      const Mark key_mark = mark_of(pair.first.Mark());
-      if (!pair.first.IsScalar()) fail(key_mark, "a key must be text");
-      const std::string& key = pair.first.Scalar();
-      Node value = convert(pair.second, depth + 1);
-      if (key == "<<" && !is_quoted(pair.first)) {
-        take_merged(std::move(value), key_mark, merged);
-        continue;
-      }
-      // yaml-cpp places a missing value anywhere; where its key is helps more.
-      if (value.is_null()) value.set_mark(key_mark);
-      if (const Node::Entry* first = map.find_entry(key)) {
-        fail(key_mark, "key '" + key + "' appears twice (first at " + first->key_mark.text() + ")");
-      }
-      map.set(key, std::move(value), key_mark);
+  /// Refuses what goes beyond the limits.
+  void count(const YAML::Mark& mark, const Extent& more) {
+    if (static_cast<int>(open_.size()) + more.depth > kMaxDepth) {
+      fail(mark_of(mark), "nested deeper than " + std::to_string(kMaxDepth));
     }
-    for (Node& source : merged) {
-      for (Node::Entry& entry : source.entries()) {
-        if (map.find(entry.key) != nullptr) continue;
-        map.set(entry.key, std::move(entry.value), entry.key_mark);
-      }
+    total_.add(more);
+    if (total_.values > kMaxValues) {
+      fail(mark_of(mark), "more than " + std::to_string(kMaxValues) +
+                              " values, with those that aliases stand for");
     }
-    return map;
-  }
-
-  static void take_merged(Node value, const Mark& mark, std::vector<Node>& merged) {
-    if (value.is_map()) {
-      merged.push_back(std::move(value));
-      return;
-    }
-    if (!value.is_list()) fail(mark, "'<<' needs a section or a list of sections");
-    for (Node& item : value.items()) {
-      if (!item.is_map()) fail(mark, "'<<' needs a section or a list of sections");
-      merged.push_back(std::move(item));
+    if (total_.characters > kMaxCharacters) {
+      fail(mark_of(mark), "more than " + std::to_string(kMaxCharacters >> 20) +
+                              " MiB of text, with that which aliases stand for");
     }
   }
 
+  void add(Node node, YAML::anchor_t anchor, const YAML::Mark& mark) {
+    if (anchor != YAML::NullAnchor) {
+      count(mark, extent_of(node));  // it is kept, too
+      anchored_.insert_or_assign(anchor, node);
+    }
+    if (open_.empty()) {
+      root_ = std::move(node);
+    } else if (open_.back().map) {
+      open_.back().map->add(std::move(node));
+    } else {
+      open_.back().list.items().push_back(std::move(node));
+    }
+  }
+
+  void close() {
+    Open last = std::move(open_.back());
+    open_.pop_back();
+    add(last.map ? std::move(*last.map).close() : std::move(last.list), last.anchor, last.mark);
+  }
+
+  std::string_view text_;
   std::string origin_;
   bool with_positions_;
-  int nodes_ = 0;
+  int documents_ = 0;
+  Extent total_;
+  std::vector<Open> open_;
+  std::map<YAML::anchor_t, Node> anchored_;
+  std::optional<Node> root_;
 };
 
 }  // namespace
 
 Node parse_text(std::string_view text, const std::string& origin, bool with_positions) {
-  Converter converter(origin, with_positions);
+  if (text.size() > kMaxYamlBytes) {
+    fail(Mark{origin}, "is larger than " + std::to_string(kMaxYamlBytes >> 20) +
+                           " MiB, as no YAML that viwo reads is");
+  }
   if (text.find('\0') != std::string_view::npos) fail(Mark{origin}, "is not a text file");
+  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
+  TreeBuilder builder(text, origin, with_positions);
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(text));
-    if (documents.empty()) return Node::null(Mark{origin, with_positions ? 1 : 0, 1});
-    if (documents.size() > 1) {
-      fail(converter.mark_of(documents[1].Mark()), "a second YAML document: only one is allowed");
+    std::istringstream stream{std::string(text)};
+    YAML::Parser parser(stream);
+    while (parser.HandleNextDocument(builder)) {
     }
-    return converter.convert(documents.front());
+    return std::move(builder).take();
   } catch (const YAML::Exception& error) {
-    fail(converter.mark_of(error.mark), "not valid YAML: " + error.msg);
+    fail(builder.mark_of(error.mark), "not valid YAML: " + error.msg);
   }
 }
 
@@ -119,14 +239,14 @@ Node parse(std::string_view text, const std::string& origin) {
 
 Node load_file(const std::filesystem::path& file) {
   const Mark mark{file.string()};
-  std::error_code error;
-  const auto status = std::filesystem::status(file, error);
-  if (status.type() == std::filesystem::file_type::not_found) fail(mark, "no such file");
-  if (std::filesystem::is_directory(status)) fail(mark, "is a folder, not a file");
+  require_regular_file(file);
   std::ifstream stream(file, std::ios::binary);
+  if (!stream && errno == ENOENT) fail(mark, "no such file");
   if (!stream) fail(mark, std::string("cannot be read: ") + std::strerror(errno));
-  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  std::string text(kMaxYamlBytes + 1, '\0');  // no more of any file
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) fail(mark, "cannot be read");
+  text.resize(static_cast<std::size_t>(stream.gcount()));
   return parse(text, file.string());
 }
 

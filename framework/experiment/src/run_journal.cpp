@@ -80,7 +80,7 @@ void RunJournal::write(const RunKey& key, const RunResult& run) const {
   std::string bytes;
   nlohmann::json::to_cbor(entry, bytes);
   bytes += checksum(bytes);
-  log::write_text(file_of(key), bytes);
+  log::write_bytes(file_of(key), bytes);
 }
 
 void RunJournal::remove() const {

@@ -9,7 +9,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "viwo/api/status.hpp"
+#include "viwo/math/utf8.hpp"
 
 namespace viwo::log {
 namespace {
@@ -28,23 +28,6 @@ bool sync_folder(const std::filesystem::path& folder) {
 }
 
 }  // namespace
-
-void require_regular_file(const std::filesystem::path& file) {
-  namespace fs = std::filesystem;
-  std::error_code ignored;
-  switch (fs::status(file, ignored).type()) {
-    case fs::file_type::directory:
-      throw InputError(file.string() + "  is a folder, not a file");
-    case fs::file_type::fifo:
-    case fs::file_type::socket:
-      throw InputError(file.string() + "  is a pipe, not a file");
-    case fs::file_type::character:
-    case fs::file_type::block:
-      throw InputError(file.string() + "  is a device, not a file");
-    default:  // whether it is there shows when it is opened
-      return;
-  }
-}
 
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
@@ -100,10 +83,14 @@ void FileWriter::commit() {
   if (!sync_folder(file_.parent_path())) fail();
 }
 
-void write_text(const std::filesystem::path& file, const std::string& text) {
+void write_bytes(const std::filesystem::path& file, std::string_view bytes) {
   FileWriter out(file);
-  out.write(text);
+  out.write(bytes);
   out.commit();
+}
+
+void write_text(const std::filesystem::path& file, std::string_view text) {
+  write_bytes(file, valid_utf8(text));
 }
 
 }  // namespace viwo::log

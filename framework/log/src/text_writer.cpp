@@ -1,6 +1,7 @@
 #include "viwo/log/text_writer.hpp"
 
 #include "viwo/log/text.hpp"
+#include "viwo/math/utf8.hpp"
 
 namespace viwo::log {
 namespace {
@@ -15,7 +16,7 @@ void TextWriter::flush() {
 }
 
 TextWriter& TextWriter::operator<<(std::string_view text) {
-  pending_ += text;
+  append_valid_utf8(pending_, text);
   if (pending_.size() >= kFlushBytes) flush();
   return *this;
 }

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "viwo/eval/json.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/log/text_writer.hpp"
 #include "viwo/log/tum.hpp"
@@ -162,7 +163,7 @@ std::string pad(const std::string& text, std::size_t width) {
 void write_plan(const std::filesystem::path& folder, const PlanSetup& setup, const Plan& plan) {
   log::make_folder(folder);
   write_motion(folder, plan);
-  log::write_text(folder / "summary.json", summary_of(setup, plan).dump(2) + "\n");
+  log::write_text(folder / "summary.json", json_text(summary_of(setup, plan)));
   log::write_text(folder / "report.html", report::to_html(page_of(setup, plan)));
 }
 

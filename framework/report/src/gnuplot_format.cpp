@@ -6,7 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-#include <nlohmann/json.hpp>
+#include "viwo/math/utf8.hpp"
 
 namespace viwo::report {
 namespace {
@@ -45,10 +45,7 @@ std::string rounded(double value) {
 }
 
 std::string one_line(std::string_view text) {
-  // The JSON library replaces what is not UTF-8.
-  const std::string dumped = nlohmann::json(std::string(text))
-                                 .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  std::string result = nlohmann::json::parse(dumped).get<std::string>();
+  std::string result = valid_utf8(text);
   for (char& c : result) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
   }

@@ -205,7 +205,7 @@ void write_run(const std::filesystem::path& folder, const RunSetup& setup,
   }
   if (!result.reference.empty()) log::write_tum(folder / "reference.tum", result.reference);
   write_start_of_next(folder / "calibration.yaml", setup, result);
-  log::write_text(folder / "summary.json", summary_of(setup, result).dump(2) + "\n");
+  log::write_text(folder / "summary.json", json_text(summary_of(setup, result)));
   log::write_text(folder / "report.html", report::to_html(report_of(setup, result)));
 }
 

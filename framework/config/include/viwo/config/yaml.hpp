@@ -1,6 +1,7 @@
 // YAML text to Node and back.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -10,9 +11,14 @@
 
 namespace viwo::config {
 
+/// No YAML that is read is larger.
+inline constexpr std::size_t kMaxYamlBytes = std::size_t{1} << 20;
+
 /// Reads one YAML document. Anchors, aliases and merge keys are expanded. Throws viwo::InputError
-/// with file:line:column for syntax errors, duplicate keys, keys that are not text, and values that
-/// contain themselves; with the file for one that is missing or cannot be read.
+/// with file:line:column for syntax errors, duplicate keys, keys that are not text, values that
+/// contain themselves, and for what is nested deeper than 100 or has more than 100000 values, those
+/// included that aliases stand for; with the file for one that is missing, cannot be read, is too
+/// large, or is none (a pipe, a device).
 Node load_file(const std::filesystem::path& file);
 
 /// The same for a text; `origin` stands for the file in positions.

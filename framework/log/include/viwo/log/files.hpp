@@ -3,16 +3,15 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 #include <string_view>
+
+#include "viwo/config/regular_file.hpp"
 
 namespace viwo::log {
 
 void make_folder(const std::filesystem::path& folder);
 
-/// InputError "file  is a pipe, not a file" for what is there and cannot be read as one: folders,
-/// pipes, whose reader waits for ever, and devices.
-void require_regular_file(const std::filesystem::path& file);
+using config::require_regular_file;
 
 /// When what is written is under the name of the file.
 enum class Appears {
@@ -41,6 +40,9 @@ class FileWriter {
 };
 
 /// All of it or nothing new is there under the name, also after a loss of power.
-void write_text(const std::filesystem::path& file, const std::string& text);
+void write_bytes(const std::filesystem::path& file, std::string_view bytes);
+
+/// The same; what is not UTF-8 becomes U+FFFD, so that others can read every text that viwo writes.
+void write_text(const std::filesystem::path& file, std::string_view text);
 
 }  // namespace viwo::log

@@ -17,6 +17,7 @@ class TextWriter {
   explicit TextWriter(const std::filesystem::path& file, Appears appears = Appears::kWhole)
       : file_(file, appears) {}
 
+  /// What is not UTF-8 becomes U+FFFD, as by write_text().
   TextWriter& operator<<(std::string_view text);
   /// Shortest text that reads back to the same bits.
   TextWriter& operator<<(double value);
