@@ -13,6 +13,9 @@ namespace {
 
 namespace po = boost::program_options;
 
+/// Each is a thread.
+constexpr int kMostJobs = 1024;
+
 /// Every option of any command, by name.
 void add_option(const std::string& name, po::options_description& options) {
   auto add = options.add_options();
@@ -110,6 +113,9 @@ void check_ranges(const Command& command, const po::variables_map& values) {
   }
   if (values.contains("jobs") && values["jobs"].as<int>() < 0) {
     refuse(command, "--jobs must not be negative");
+  }
+  if (values.contains("jobs") && values["jobs"].as<int>() > kMostJobs) {
+    refuse(command, "--jobs must be at most " + std::to_string(kMostJobs));
   }
   if (values.contains("figures") && values["figures"].as<std::string>() != "svg" &&
       values["figures"].as<std::string>() != "pdf") {

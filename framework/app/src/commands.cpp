@@ -160,10 +160,10 @@ int run_command(const Arguments& arguments) {
   }
   const std::string picture_failure = pictures.finish(result);
   write_run(folder, setup, result);
-  figures.write(report_of(setup, result));
   std::cout << describe(result);
   if (forecast) std::cout << "forecast: " << forecast->text() << "\n";
-  std::cout << "report: " << (folder / "report.html").string() << "\n";
+  std::cout << "report: " << (folder / "report.html").string() << std::endl;
+  figures.write(report_of(setup, result));
   if (!picture_failure.empty()) throw std::runtime_error(picture_failure);
   return result.status == RunStatus::kOk ? 0 : 1;
 }
@@ -192,10 +192,10 @@ int experiment_command(const Arguments& arguments) {
   }();
   if (options.shard) return shard_is_done(result, *options.shard, arguments.positional[0], folder);
   write_experiment(folder, result);
-  figures.write(report_of(result));
   std::cout << describe(result) << "\n"
             << result.runs.size() << " runs in " << significant(result.wall_s, 3)
-            << " s; report: " << (folder / "report.html").string() << "\n";
+            << " s; report: " << (folder / "report.html").string() << std::endl;
+  figures.write(report_of(result));
   for (const ExperimentRun& run : result.runs) {
     if (run.result.status != RunStatus::kOk) return 1;
   }
@@ -215,10 +215,10 @@ int observability_command(const Arguments& arguments) {
     return observability::analyse(setup, plugins, progress);
   }();
   write_observability(folder, report);
-  figures.write(report_of(report));
   std::cout << describe(report) << "\n"
             << report.results.size() << " analyses in " << significant(report.wall_s, 3)
-            << " s; report: " << (folder / "report.html").string() << "\n";
+            << " s; report: " << (folder / "report.html").string() << std::endl;
+  figures.write(report_of(report));
   return 0;
 }
 

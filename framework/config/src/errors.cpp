@@ -22,6 +22,10 @@ std::string Errors::text() const {
     return std::tie(a.first.file, a.first.line, a.first.column) <
            std::tie(b.first.file, b.first.line, b.first.column);
   });
+  // Who reads further would not read them either; their number says that something else is wrong.
+  constexpr std::size_t kMaxShown = 100;
+  const std::size_t more = sorted.size() - std::min(sorted.size(), kMaxShown);
+  sorted.resize(sorted.size() - more);
   std::string all;
   for (const auto& [mark, text] : sorted) {
     if (!all.empty()) all += '\n';
@@ -29,6 +33,7 @@ std::string Errors::text() const {
     if (!position.empty()) all += position + "  ";
     all += text;
   }
+  if (more > 0) all += "\nand " + std::to_string(more) + " more";
   return all;
 }
 

@@ -141,6 +141,10 @@ Assignment parse_assignment(std::string_view text) {
     fail(Mark{"--set " + std::string(text)}, "expected path.to.key=value");
   }
   std::string path{text.substr(0, equals)};
+  // Every value keeps it as its position.
+  constexpr std::size_t kMaxPath = 1000;
+  if (path.size() > kMaxPath)
+    fail(Mark{"--set"}, "a path of " + std::to_string(path.size()) + " characters");
   Node value = parse_text(text.substr(equals + 1), "--set " + path, false);
   return {std::move(path), std::move(value)};
 }

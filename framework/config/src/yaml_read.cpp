@@ -66,8 +66,8 @@ class OpenMap {
     if (node.is_null()) node.set_mark(key.mark());
     const auto [first, is_new] = written_.emplace(key.scalar(), key.mark());
     if (!is_new) {
-      fail(key.mark(), "key '" + key.scalar() + "' appears twice (first at " +
-                           first->second.text() + ")");
+      fail(key.mark(),
+           "key '" + key.scalar() + "' appears twice (first at " + first->second.text() + ")");
     }
     map_.entries().push_back({key.scalar(), key.mark(), std::move(node)});
   }

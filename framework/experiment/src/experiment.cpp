@@ -75,6 +75,21 @@ void find_baseline(const Node& file, const std::string& name, ExperimentSetup& s
   setup.baseline = static_cast<std::size_t>(found - names.begin());
 }
 
+/// Each takes a place in memory and in the journal, and is checked before the first one begins.
+constexpr std::uint64_t kMostRuns = 100'000;
+
+/// `seeds`: where their number stands.
+void require_possible(const ExperimentSetup& setup, const config::Mark& seeds) {
+  const std::uint64_t variants = setup.variants.size(), recordings = setup.recordings.size();
+  const std::uint64_t cells = variants * recordings;  // both are limited by the size of the file
+  const auto runs = cells * static_cast<std::uint64_t>(setup.seeds);
+  if (runs <= kMostRuns) return;
+  config::fail(seeds, std::to_string(variants) + " variants x " + std::to_string(recordings) +
+                          " recordings x " + std::to_string(setup.seeds) + " seeds are " +
+                          std::to_string(runs) + " runs, an experiment has up to " +
+                          std::to_string(kMostRuns) + " - make several of it");
+}
+
 /// Variant, recording and seed.
 std::string title_of(const ExperimentSetup& setup, const ExperimentRun& run) {
   std::string line = setup.variants[run.variant].name;
@@ -324,6 +339,10 @@ ExperimentSetup read_experiment(const std::filesystem::path& path,
   require_labels(setup.report_by, setup.recordings, file, "report_by");
   read_variants(file, setup);
   find_baseline(file, params.baseline, setup);
+  const Node* const seeds = file.find("seeds");
+  require_possible(setup, options.seeds      ? config::Mark{"--seeds"}
+                          : seeds != nullptr ? seeds->mark()
+                                             : file.mark());
   return setup;
 }
 

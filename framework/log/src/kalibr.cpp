@@ -30,7 +30,8 @@ Node load(const std::filesystem::path& file) {
   TextReader reader(file);
   std::string text;
   std::string_view line;
-  while (reader.next(line)) {
+  // What goes beyond the limit is not read; the parser refuses it.
+  while (text.size() <= config::kMaxYamlBytes && reader.next(line)) {
     if (reader.line_number() != 1 || !line.starts_with("%YAML:")) text += line;
     text += '\n';
   }

@@ -1,6 +1,7 @@
 // Plots as gnuplot scripts, and gnuplot as a process.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <string>
 
@@ -25,8 +26,10 @@ GnuplotFigure gnuplot_curves(const Plot& plot, const std::string& name, FigureFo
 GnuplotFigure gnuplot_heat_map(const Plot& plot, const std::string& name, FigureFormat format);
 
 /// Runs `gnuplot SCRIPT` in `folder`, without a shell. Throws InputError when there is no gnuplot
-/// in PATH, std::runtime_error with what it wrote to its standard error when it fails.
-void run_gnuplot(const std::filesystem::path& folder, const std::string& script);
+/// in PATH, std::runtime_error with what it wrote to its standard error when it fails, or is not
+/// done in time (a figure takes a fraction of a second) and is stopped.
+void run_gnuplot(const std::filesystem::path& folder, const std::string& script,
+                 std::chrono::milliseconds limit = std::chrono::seconds(60));
 
 /// Throws InputError when gnuplot cannot be run.
 void require_gnuplot();

@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
-
-#include <yaml-cpp/yaml.h>
 
 #include "bag_file.hpp"
 #include "database.hpp"
 #include "mcap_file.hpp"
 #include "ros2_fields.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/config/yaml.hpp"
 
 namespace viwo::bag {
 namespace {
@@ -26,29 +26,34 @@ constexpr const char* kRemedy =
     "- `ros2 bag convert` makes it";
 constexpr const char* kMcap = ".mcap";
 
+/// The text at a key of a section; empty if there is none.
+std::string text_at(const config::Node& section, std::string_view key) {
+  const config::Node* const value = section.find(key);
+  return value != nullptr && value->is_scalar() ? value->scalar() : "";
+}
+
 /// The files that metadata.yaml lists.
 std::vector<fs::path> files_of(const fs::path& folder, const fs::path& metadata) {
+  const config::Node root = config::load_file(metadata);
+  const config::Node* const info = root.find("rosbag2_bagfile_information");
+  if (info == nullptr || !info->is_map()) {
+    throw InputError(metadata.string() + "  has no rosbag2_bagfile_information");
+  }
+  const std::string storage = text_at(*info, "storage_identifier");
+  if (storage != "sqlite3" && storage != "mcap") {
+    throw InputError(folder.string() + "  is stored as '" + storage + "'" + kRemedy);
+  }
+  const std::string compression = text_at(*info, "compression_format");
+  if (!compression.empty()) {
+    throw InputError(folder.string() + "  is compressed (" + compression + ")" + kRemedy);
+  }
   std::vector<fs::path> files;
-  try {
-    const YAML::Node info = YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"];
-    if (!info.IsMap()) {
-      throw InputError(metadata.string() + "  has no rosbag2_bagfile_information");
-    }
-    const auto text = [&info](const char* key) { return info[key].as<std::string>(""); };
-    const std::string storage = text("storage_identifier");
-    if (storage != "sqlite3" && storage != "mcap") {
-      throw InputError(folder.string() + "  is stored as '" + storage + "'" + kRemedy);
-    }
-    if (!text("compression_format").empty()) {
-      throw InputError(folder.string() + "  is compressed (" + text("compression_format") + ")" +
-                       kRemedy);
-    }
-    for (const YAML::Node& file : info["relative_file_paths"]) {
+  if (const config::Node* const listed = info->find("relative_file_paths")) {
+    for (const config::Node& file : listed->items()) {
+      if (!file.is_scalar()) config::fail(file.mark(), "the name of a file must be a single value");
       // Early versions write the folder, too.
-      files.push_back(folder / fs::path(file.as<std::string>()).filename());
+      files.push_back(folder / fs::path(file.scalar()).filename());
     }
-  } catch (const YAML::Exception& error) {
-    throw InputError(metadata.string() + "  cannot be read: " + error.what());
   }
   if (files.empty()) throw InputError(metadata.string() + "  lists no files");
   return files;

@@ -28,7 +28,7 @@ class Errors {
   bool empty() const { return errors_.empty(); }
   std::size_t size() const { return errors_.size(); }
 
-  /// One line per error, "file:line:column  text", sorted by position.
+  /// One line per error, "file:line:column  text", sorted by position; of very many the first.
   std::string text() const;
 
   /// Throws viwo::InputError with text() unless empty.

@@ -1,4 +1,5 @@
-// Texts from anywhere (names of files, printed messages) as UTF-8, which those who read results need.
+// Texts from anywhere (names of files, printed messages) as UTF-8, which those who read results
+// need.
 #pragma once
 
 #include <algorithm>
