@@ -5,12 +5,12 @@ The tests that follow use an installation that was moved after it was installed:
 depends neither on the build folder nor on the prefix that was given.
 """
 
-import re
 import shutil
 import subprocess
 import unittest
 
 from installed import Installation
+from run_paths import entries, linked_files, wrong_entries
 
 
 def dynamic_section(file):
@@ -42,9 +42,11 @@ class Install(unittest.TestCase):
                 paths[str(plugin.relative_to(prefix))] = '$ORIGIN/../../..'
             self.assertGreater(len(paths), 15)
             for name, path in paths.items():
-                dynamic = dynamic_section(prefix / name)
-                self.assertEqual(re.findall(r'R(?:UN)?PATH\).*\[(.*)\]', dynamic), [path], name)
-                self.assertIn('[libviwo_api.so.9]', dynamic, name)
+                self.assertEqual(entries(prefix / name), [path], name)
+                self.assertIn('[libviwo_api.so.9]', dynamic_section(prefix / name), name)
+        with self.subTest('no program or library looks for libraries elsewhere'):
+            self.assertGreater(len(linked_files(prefix)), 17)
+            self.assertEqual(wrong_entries(prefix), [])
         with self.subTest('the library has its name and version'):
             self.assertIn('soname: [libviwo_api.so.9]',
                           dynamic_section(prefix / 'lib/libviwo_api.so'))

@@ -7,6 +7,8 @@ import subprocess
 import sys
 import unittest
 
+from run_paths import wrong_entries
+
 
 class Installation:
     """Folders of one test; paths from the command line of the test."""
@@ -57,5 +59,6 @@ class ConsumerTest(unittest.TestCase):
         self.run_command(Installation.cmake, '-S', folder, '-B', folder / 'build')
         output = self.run_command(Installation.cmake, '--build', folder / 'build')
         self.assertNotIn('warning:', output)
+        self.assertEqual(wrong_entries(folder / 'build', [f'{Installation.prefix}/lib/']), [])
         return self.run_command(Installation.cmake.parent / 'ctest', '--test-dir', folder / 'build',
                                 '--output-on-failure')

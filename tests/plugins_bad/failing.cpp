@@ -13,8 +13,8 @@ struct Params {
   std::string what = "std";
 
   void bind(ParamBinder& b) {
-    b(VIWO_PARAM(what), {.choices = "std|int|contract|declare|input|start|seed",
-                         .help = "seed: that is logged; else what is thrown"});
+    b(VIWO_PARAM(what), {.choices = "std|int|bytes|contract|declare|input|start|seed",
+                         .help = "seed: that is logged; else what is thrown, bytes: of a caf\xe9"});
   }
 };
 
@@ -40,6 +40,7 @@ class Failing final : public Update {
     sink.count(1, 0);
     if (++calls_ % 2 == 1) return;
     if (what_ == "int") throw 42;
+    if (what_ == "bytes") throw std::runtime_error("lost in a caf\xe9");
     if (what_ == "contract") throw ContractError("takes what it may not");
     throw std::runtime_error("lost in call " + std::to_string(calls_));
   }

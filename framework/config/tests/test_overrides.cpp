@@ -138,5 +138,19 @@ TEST(Suggestions, ListWhatIsKnownIfNothingIsNear) {
   EXPECT_EQ(did_you_mean("analytic", {}), "");
 }
 
+TEST(Assignment, RefusesWhatMakesNoEndOfValues) {
+  const auto error_of = [](const std::string& text) -> std::string {
+    try {
+      parse_assignment(text);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(error_of("name=,"), "--set name  not valid YAML: ',' does not belong here");
+  // Each value of the list would keep the path.
+  EXPECT_EQ(error_of(std::string(1001, 'a') + "=[1, 2]"), "--set  a path of 1001 characters");
+}
+
 }  // namespace
 }  // namespace viwo::config

@@ -384,5 +384,13 @@ TEST(Params, AreDescribedAsATemplate) {
   EXPECT_EQ(parse(text, "t").find("solve")->scalar(), "plain");
 }
 
+TEST(Errors, AreNoMoreThanSomebodyReads) {
+  Errors errors;
+  for (int line = 1000; line > 0; --line) errors.add({"f.yaml", line, 1}, "wrong");
+  const std::string text = errors.text();
+  EXPECT_EQ(text.substr(0, 40), "f.yaml:1:1  wrong\nf.yaml:2:1  wrong\nf.ya");
+  EXPECT_TRUE(text.ends_with("f.yaml:100:1  wrong\nand 900 more")) << text;
+}
+
 }  // namespace
 }  // namespace viwo::config

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "viwo/api/status.hpp"
 #include "viwo/config/yaml.hpp"
@@ -88,25 +89,95 @@ TEST(Yaml, ReportsASyntaxErrorWithItsPosition) {
 
 TEST(Yaml, RefusesASecondDocument) {
   EXPECT_EQ(parse_error("---\na: 1\n---\nb: 2\n"),
-            "f.yaml:4:1  a second YAML document: only one is allowed");
+            "f.yaml:3:1  a second YAML document: only one is allowed");
+  // With the mark that some editors put in front.
+  EXPECT_EQ(parse_error("\xef\xbb\xbf"
+                        "a: 1\n---\nb: 2\n"),
+            "f.yaml:2:1  a second YAML document: only one is allowed");
+}
+
+// Of these the parser makes documents without end, or ends one in its middle.
+TEST(Yaml, SaysWhatDoesNotBelongWhereItIs) {
+  EXPECT_EQ(parse_error(","), "f.yaml:1:1  not valid YAML: ',' does not belong here");
+  EXPECT_EQ(parse_error("\xef\xbb\xbf,"), "f.yaml:1:1  not valid YAML: ',' does not belong here");
+  EXPECT_EQ(parse_error("# a\n,,,\n"), "f.yaml:2:1  not valid YAML: ',' does not belong here");
+  EXPECT_EQ(parse_error("[a]\n[b]\n"), "f.yaml:2:1  not valid YAML: '[' does not belong here");
+  EXPECT_EQ(parse_error("\"a\" \"b\"\n"), "f.yaml:1:5  not valid YAML: '\"' does not belong here");
+}
+
+std::string numbered(const char* prefix, int i) { return prefix + std::to_string(i); }
+
+std::string repeated(const std::string& text, std::size_t n) {
+  std::string all;
+  for (std::size_t i = 0; i < n; ++i) all += text;
+  return all;
+}
+
+constexpr const char* kTooMany = "  more than 100000 values, with those that aliases stand for";
+
+TEST(Yaml, TakesAsManyValuesAsItSays) {
+  const std::string row = "- [" + repeated("a,", 998) + "a]\n";  // 1000 values, with its list
+  const std::string most = repeated(row, 99) + "- [" + repeated("a,", 997) + "a]\n";
+  EXPECT_EQ(parse(most, "f.yaml").items().size(), 100U);
+  EXPECT_EQ(parse_error(most + "- a\n"), std::string("f.yaml:101:3") + kTooMany);
+  std::string keys;
+  for (int i = 0; i < 49'999; ++i) keys += numbered("k", i) + ": 1\n";
+  EXPECT_EQ(parse(keys, "f.yaml").entries().size(), 49'999U);
+  EXPECT_EQ(parse_error(keys + "more: 1\n"), std::string("f.yaml:50000:7") + kTooMany);
 }
 
 TEST(Yaml, RefusesAliasesThatExplode) {
   std::string text = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
   for (int i = 1; i < 10; ++i) {
-    const std::string last = std::string("*a").append(std::to_string(i - 1));
-    const std::string key = std::string("a").append(std::to_string(i));
-    text.append(key).append(": &").append(key).append(" [").append(last);
-    for (int k = 1; k < 10; ++k) text.append(", ").append(last);
-    text.append("]\n");
+    const std::string last = numbered("*a", i - 1);
+    text += numbered("a", i) + ": " + numbered("&a", i) + " [" + last;
+    text += repeated(", " + last, 9) + "]\n";
   }
-  EXPECT_THAT(parse_error(text), ::testing::EndsWith("  too large (aliases of aliases?)"));
+  EXPECT_EQ(parse_error(text), std::string("f.yaml:5:40") + kTooMany);
+  // What an anchor keeps counts, too: a hundred of them around the same values.
+  std::string nested;
+  for (int i = 0; i < 99; ++i) nested += numbered("&a", i) + " [";
+  EXPECT_THAT(parse_error(nested + repeated("x,", 2000) + repeated("]", 99)),
+              ::testing::EndsWith(kTooMany));
+}
+
+TEST(Yaml, RefusesAliasesOfALongText) {
+  const std::string long_text(500'000, 'x');
+  EXPECT_EQ(parse_error("a: &a " + long_text + "\nb: [" + repeated("*a, ", 10'000) + "]\n"),
+            "f.yaml:2:29  more than 4 MiB of text, with that which aliases stand for");
+}
+
+TEST(Yaml, RefusesAValueThatContainsItself) {
+  EXPECT_EQ(parse_error("a: &a [1, *a]\n"), "f.yaml:1:11  this alias stands within its own value");
+  EXPECT_EQ(parse_error("a: &a\n  b:\n    <<: *a\n"),
+            "f.yaml:3:9  this alias stands within its own value");
+  // The name of an anchor may be given again.
+  EXPECT_EQ(parse("- &a 1\n- *a\n- &a 2\n- *a\n", "f.yaml"), parse("[1, 1, 2, 2]", "f.yaml"));
 }
 
 TEST(Yaml, RefusesDeepNesting) {
-  EXPECT_THAT(parse_error(std::string(200, '[') + std::string(200, ']')),
-              ::testing::EndsWith("  nested too deeply (does an alias contain itself?)"));
-  EXPECT_THAT(parse_error(std::string(100000, '[')), ::testing::HasSubstr("not valid YAML"));
+  const auto lists = [](std::size_t n) { return std::string(n, '[') + std::string(n, ']'); };
+  EXPECT_EQ(parse(lists(101), "f.yaml").items().size(), 1U);
+  EXPECT_EQ(parse_error(lists(102)), "f.yaml:1:102  nested deeper than 100");
+  for (const char* open : {"[", "- ", "? ", "{"}) {
+    EXPECT_THAT(parse_error(repeated(open, 100'000)),
+                ::testing::EndsWith("nested deeper than 100"));
+  }
+  // Neither half is too deep.
+  const std::string half = std::string(60, '[') + "x" + std::string(60, ']');
+  const std::string on_it = std::string(60, '[') + "*a" + std::string(60, ']');
+  EXPECT_EQ(parse_error("a: &a " + half + "\nb: " + on_it + "\n"),
+            "f.yaml:2:64  nested deeper than 100");
+}
+
+TEST(Yaml, RefusesWhatIsTooLarge) {
+  const std::string text(kMaxYamlBytes, '#');
+  EXPECT_TRUE(parse(text, "f.yaml").is_null());
+  EXPECT_EQ(parse_error(text + "#"), "f.yaml  is larger than 1 MiB, as no YAML that viwo reads is");
+}
+
+TEST(Yaml, RefusesAZeroByteThatIsWrittenInLetters) {
+  EXPECT_EQ(parse_error("a: \"b\\0c\"\n"), "f.yaml:1:4  a text with a zero byte");
 }
 
 TEST(Yaml, RefusesBinaryText) {
@@ -135,6 +206,23 @@ TEST(Yaml, SaysThatAFolderIsNotAFile) {
   } catch (const InputError& error) {
     EXPECT_EQ(error.what(), folder.string() + "  is a folder, not a file");
   }
+}
+
+TEST(Yaml, ReadsNoPipesAndDevices) {
+  const auto error_of = [](const std::filesystem::path& file) -> std::string {
+    try {
+      load_file(file);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  const auto pipe = std::filesystem::temp_directory_path() / "viwo_test_yaml_pipe";
+  std::filesystem::remove(pipe);
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(error_of(pipe), pipe.string() + "  is a pipe, not a file");
+  std::filesystem::remove(pipe);
+  EXPECT_EQ(error_of("/dev/zero"), "/dev/zero  is a device, not a file");
 }
 
 TEST(Yaml, LoadsAFile) {

@@ -167,6 +167,15 @@ TEST_F(Kalibr, RefusesFilesWithoutCamerasOrWithGapsInTheirNumbers) {
             absent.string() + "  cannot be read: No such file or directory");
 }
 
+TEST_F(Kalibr, ReadsNoMoreOfAFileThanAnyHas) {
+  const std::string too_large = "  is larger than 1 MiB, as no YAML that viwo reads is";
+  std::string comments;
+  for (int i = 0; i < 1'000'000; ++i) comments += "# 1\n";
+  EXPECT_EQ(refusal(comments), "F" + too_large);
+  const auto packed = write_gz("k.yaml.gz", comments);
+  EXPECT_EQ(message_of([&] { read_kalibr_cameras(packed); }), packed.string() + too_large);
+}
+
 TEST_F(Kalibr, ReadsImuNoisesWithAndWithoutALevel) {
   const std::string keys[] = {"accelerometer_noise_density: 0.002", "gyroscope_noise_density: 1e-4",
                               "accelerometer_random_walk: 0.003", "gyroscope_random_walk: 0"};

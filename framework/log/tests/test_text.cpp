@@ -236,5 +236,18 @@ TEST_F(TextWriterTest, ReportsAFullDiskAndAMissingFolder) {
             "cannot write " + (folder_ / "none" / "a").string() + ": No such file or directory");
 }
 
+TEST_F(TextWriterTest, WritesUtf8WhateverTheTexts) {
+  const auto file = folder_ / "names.csv";
+  TextWriter out(file);
+  out << "caf\xe9,"
+      << "caf\xc3\xa9\n";
+  out.close();
+  EXPECT_EQ(content(file), "caf\xef\xbf\xbd,caf\xc3\xa9\n");
+  write_text(file, "na\xefve");
+  EXPECT_EQ(content(file), "na\xef\xbf\xbdve");
+  write_bytes(file, "na\xefve");
+  EXPECT_EQ(content(file), "na\xefve");
+}
+
 }  // namespace
 }  // namespace viwo::log

@@ -12,6 +12,7 @@
 #include "viwo/math/se2.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/math/trajectory.hpp"
+#include "viwo/math/utf8.hpp"
 #include "viwo/testing/jacobian.hpp"
 
 namespace viwo {
@@ -135,6 +136,33 @@ TEST(Interpolation, IsLinearInPlaceAndEvenInTurnsAndStopsAtGaps) {
   EXPECT_FALSE(interpolate(way, -1, 1.5));
   EXPECT_FALSE(interpolate(way, 5'000'000'001, 1.5));
   EXPECT_TRUE(interpolate(way, 5'000'000'000, 1.5));
+}
+
+TEST(Utf8, KeepsCharactersAndReplacesEachOtherByte) {
+  const std::string no = "\xef\xbf\xbd";
+  const auto expect = [](const std::string& text, const std::string& expected) {
+    EXPECT_EQ(valid_utf8(text), expected);
+  };
+  // The first and the last character of each length, and those beside the halves of pairs.
+  for (const std::string text :
+       {"plain", "\x7f", "\xc2\x80", "\xdf\xbf", "\xe0\xa0\x80", "\xed\x9f\xbf", "\xee\x80\x80",
+        "\xef\xbf\xbf", "\xf0\x90\x80\x80", "\xf4\x8f\xbf\xbf", "caf\xc3\xa9 \xf0\x9f\x9a\x97!"}) {
+    expect(text, text);
+  }
+  expect("", "");
+  expect(std::string("a\0b", 3), std::string("a\0b", 3));
+  expect("caf\xe9", "caf" + no);
+  expect("\xe9t\xe9", no + "t" + no);
+  expect("a\x80z", "a" + no + "z");      // follows nothing
+  expect("\xc3", no);                    // ends in its middle
+  expect("\xe2\x82<", no + no + "<");    // goes on as something else
+  expect("\xf0\x9f\x9a", no + no + no);  // ends in its middle
+  expect("\xc0\xaf", no + no);           // a detour to '/'
+  expect("\xe0\x80\xaf", no + no + no);  // a longer one
+  expect("\xf0\x80\x80\xaf", no + no + no + no);
+  expect("\xed\xa0\x80", no + no + no);           // half of a pair
+  expect("\xf4\x90\x80\x80", no + no + no + no);  // beyond the last
+  expect("\xf5\xff\xfe", no + no + no);           // in no text at all
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // Figures for a paper: what gnuplot drew, read back from the SVG; and what happens without it.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -19,6 +20,7 @@
 #include <zlib.h>
 
 #include "browser.hpp"
+#include "gnuplot.hpp"
 #include "gnuplot_format.hpp"
 #include "sample.hpp"
 #include "viwo/api/status.hpp"
@@ -348,6 +350,31 @@ TEST(Figures, RepeatWhatGnuplotDidNotLike) {
     EXPECT_EQ(error.what(), "gnuplot failed on " + folder.path().string() +
                                 "/01_top_view_first_run.gp:\nline 3: no such terminal");
   }
+}
+
+TEST(Figures, DoNotWaitForAGnuplotThatHangs) {
+  using namespace std::chrono_literals;
+  const TemporaryFolder programs;
+  const auto program = programs.path() / "gnuplot";
+  const PathVariable path(programs.path().string() + ":" + std::getenv("PATH"));
+  const auto error_of = [&](const std::string& body) -> std::string {
+    std::ofstream(program) << "#!/bin/sh\n" << body << "\n";
+    std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+    try {
+      run_gnuplot(programs.path(), "a.gp", 200ms);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "done";
+  };
+  const std::string stopped = "gnuplot was stopped: it had not finished " +
+                              (programs.path() / "a.gp").string() + " after 0.2 s";
+  EXPECT_EQ(error_of("exec sleep 100"), stopped);
+  // Whoever holds its standard error is not waited for either, nor is one that has closed it.
+  EXPECT_EQ(error_of("echo waiting >&2; sleep 100 & wait"), stopped + ":\nwaiting");
+  EXPECT_EQ(error_of("exec 2>/dev/null; exec sleep 100"), stopped);
+  EXPECT_EQ(error_of("while :; do echo much >&2; done").substr(0, stopped.size()), stopped);
+  EXPECT_EQ(error_of("exit 0"), "done");
 }
 
 }  // namespace
