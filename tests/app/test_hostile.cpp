@@ -1,5 +1,6 @@
 // Configurations and texts that nobody writes by mistake: what is wrong is said, nothing is lost.
 #include <algorithm>
+#include <cstdlib>
 #include <regex>
 
 #include <sys/stat.h>
@@ -10,14 +11,12 @@ namespace viwo {
 namespace {
 
 /// Whether others can read it: Python and browsers refuse a file for one byte.
-bool is_utf8(const std::string& text) {
-  // What nlohmann::json takes for a string it gives back.
-  try {
-    static_cast<void>(nlohmann::json(text).dump());
-    return true;
-  } catch (const nlohmann::json::exception&) {
-    return false;
-  }
+bool is_utf8(std::string text) {
+  const auto is_special = [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 || c == '"' || c == '\\';
+  };
+  std::replace_if(text.begin(), text.end(), is_special, ' ');
+  return nlohmann::json::accept('"' + text + '"');  // which then says nothing else
 }
 
 class HostileTest : public CommandLineTest {
@@ -31,7 +30,7 @@ class HostileTest : public CommandLineTest {
       EXPECT_TRUE(is_utf8(text)) << name;
       EXPECT_GT(text.size(), 0U) << name;
       if (entry.path().extension() == ".json") {
-        EXPECT_NO_THROW(static_cast<void>(nlohmann::json::parse(text))) << name;
+        EXPECT_TRUE(nlohmann::json::accept(text)) << name;
       }
       ++n;
     }

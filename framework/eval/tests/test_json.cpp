@@ -12,7 +12,7 @@ TEST(Json, IsUtf8WhateverItsTexts) {
   EXPECT_EQ(
       text,
       "{\n  \"na\xef\xbf\xbdve\": [\n    \"caf\xef\xbf\xbd\",\n    \"caf\xc3\xa9\"\n  ]\n}\n");
-  EXPECT_NO_THROW(static_cast<void>(nlohmann::json::parse(text)));
+  EXPECT_TRUE(nlohmann::json::accept(text));
 }
 
 }  // namespace

@@ -109,7 +109,8 @@ TEST_F(Ros2Bag, RefusesWhatItCannotRead) {
   EXPECT_THAT(error_of(section(kAll, "")),
               HasSubstr(file("bag_1.db3") + "  cannot be read: No such file or directory"));
   std::ofstream(folder_ / "metadata.yaml") << "a: [1\n";
-  EXPECT_THAT(error_of(section(kAll, "")), HasSubstr(file("metadata.yaml") + ":2:1  not valid YAML: "));
+  EXPECT_THAT(error_of(section(kAll, "")),
+              HasSubstr(file("metadata.yaml") + ":2:1  not valid YAML: "));
   EXPECT_THAT(error_of(section(kAll, "bag_0.db3.zstd")), HasSubstr("is a file .zstd" + remedy));
   fs::create_directories(folder_ / "none");
   EXPECT_THAT(error_of(section(kAll, "none")),
