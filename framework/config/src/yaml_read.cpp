@@ -206,7 +206,7 @@ class TreeBuilder final : public YAML::EventHandler {
   std::string origin_;
   bool with_positions_;
   int documents_ = 0;
-  Extent total_;
+  Extent total_{.values = 0};
   std::vector<Open> open_;
   std::map<YAML::anchor_t, Node> anchored_;
   std::optional<Node> root_;
