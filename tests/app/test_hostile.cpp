@@ -138,7 +138,7 @@ TEST_F(HostileTest, WhatAConfigurationNamesIsAFile) {
   write("e.yaml", "experiment: e\nbase: pipe\nvariants: {a: }\n");
   expect_refused({"experiment", "e.yaml", "--out", "out"}, pipe);
   const std::string swerve = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/viwo_swerve.yaml";
-  for (const std::string& set :
+  for (const std::string set :
        {"kinematics.calibration=PIPE", "calibration=PIPE", "cameras.kalibr=PIPE",
         "imu={kalibr: PIPE}", "sensors.simulator0.cameras=PIPE",
         "sensors={imu0: {type: asl_imu, path: PIPE}}",
