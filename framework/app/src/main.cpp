@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <new>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -110,10 +112,15 @@ int main(int argc, char** argv) {
       std::cerr << "viwo was built differently from its libviwo_api.so: rebuild both\n";
       return 1;
     }
-    return viwo::app::dispatch({argv + 1, argv + argc});
+    const int code = viwo::app::dispatch({argv + 1, argv + argc});
+    if (!std::cout.flush()) throw std::runtime_error("viwo: the standard output cannot be written");
+    return code;
   } catch (const viwo::InputError& error) {
     std::cerr << error.what() << "\n";
     return 2;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "viwo: there is not enough memory\n";
+    return 1;
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

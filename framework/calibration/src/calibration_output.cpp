@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <sstream>
+#include <ostream>
 
 #include "calibration_text.hpp"
 #include "segment_choice.hpp"
@@ -11,6 +11,7 @@
 #include "viwo/log/files.hpp"
 #include "viwo/math/combination_text.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/text_stream.hpp"
 #include "viwo/setup/calibration_file.hpp"
 
 namespace viwo::calibration {
@@ -24,7 +25,7 @@ std::string pad(const std::string& text, std::size_t width) {
 }
 
 void describe_errors(const std::string& title, const CalibrationSetup& setup,
-                     const std::vector<ValidationRun>& runs, std::ostringstream& out) {
+                     const std::vector<ValidationRun>& runs, std::ostream& out) {
   const std::vector<ErrorRow> rows = error_rows(setup, runs);
   if (rows.empty()) return;
   out << "\n"
@@ -55,7 +56,7 @@ json errors_json(const CalibrationSetup& setup, const std::vector<ValidationRun>
   return out;
 }
 
-void describe_parameters(const CalibrationResult& result, std::ostringstream& out) {
+void describe_parameters(const CalibrationResult& result, std::ostream& out) {
   const CalibrationEstimate& estimate = result.all;
   out << pad("parameter", 12) << pad("unit", 6) << pad("nominal", 12) << pad("estimate", 12)
       << pad("sigma", 12) << pad("change/prior", 14) << "\n";
@@ -82,7 +83,7 @@ void describe_parameters(const CalibrationResult& result, std::ostringstream& ou
   }
 }
 
-void describe_undetermined(const CalibrationEstimate& estimate, std::ostringstream& out) {
+void describe_undetermined(const CalibrationEstimate& estimate, std::ostream& out) {
   if (estimate.undetermined.empty()) {
     out << "the data determine all directions better than the prior\n";
     return;
@@ -266,7 +267,7 @@ CalibrationFile calibration_file_of(const CalibrationResult& result) {
 }  // namespace
 
 std::string describe(const CalibrationResult& result) {
-  std::ostringstream out;
+  TextStream out;
   describe_parameters(result, out);
   if (!result.left_out.empty()) {
     out << "sigma: that of the fit, or of how the estimate changes when ";

@@ -1,11 +1,11 @@
 // What an experiment leaves behind: runs.csv, summary.json, report.html.
 #include <cmath>
-#include <sstream>
 
 #include "experiment_statistics.hpp"
 #include "run_journal.hpp"
 #include "viwo/eval/json.hpp"
 #include "viwo/log/files.hpp"
+#include "viwo/math/text_stream.hpp"
 #include "viwo/report/html.hpp"
 #include "viwo/results/run_output.hpp"
 
@@ -138,7 +138,7 @@ std::string csv_field(const std::string& text) {
 
 std::string runs_csv(const ExperimentResult& result) {
   const std::vector<Metric> metrics = all_metrics(result);
-  std::ostringstream csv;
+  TextStream csv;
   csv.precision(12);
   csv << "variant,recording,seed,status,duration_s,wall_s,samples,rank_deficient,gated";
   for (const Metric& metric : metrics) csv << ',' << metric.key;

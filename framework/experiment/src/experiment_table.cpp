@@ -1,10 +1,11 @@
 // The tables of an experiment on the terminal.
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <ostream>
 
 #include "experiment_statistics.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/text_stream.hpp"
 #include "viwo/results/run_output.hpp"
 
 namespace viwo::experiment {
@@ -123,7 +124,7 @@ void add_calibration(const ExperimentResult& result, const Group& all, std::ostr
 }  // namespace
 
 std::string describe(const ExperimentResult& result) {
-  std::ostringstream out;
+  TextStream out;
   const auto groups = groups_of(result);
   for (const Group& group : groups) add_means(result, group, out);
   add_paired(result, groups.front(), out);

@@ -61,6 +61,13 @@ bool is_camera_folder(const fs::path& name) {
   return false;
 }
 
+/// Calls `work` with the name of each folder that a log may have.
+template <class Work>
+void for_each_folder(Work&& work) {
+  for (const char* const table : kFolders) work(table);
+  for (std::size_t camera = 0; camera <= kMaxCamera; ++camera) work(camera_folder(camera));
+}
+
 /// Folder `data` of images in the folder of a camera.
 void check_images_are_ours(const fs::path& folder, const fs::path& data) {
   for (const auto& file : fs::directory_iterator(folder / data)) {
@@ -257,7 +264,10 @@ void AslWriter::Tables::write(const ImageSample& image) {
   }
   const std::string name = std::to_string(image.t_ns) + ".png";
   image.source->read(pixels);
-  write_png(place / kImages / name, pixels);
+  const std::vector<std::uint8_t> png = encode_png(pixels);
+  FileWriter file(place / kImages / name, Appears::kAtOnce);
+  file.write({reinterpret_cast<const char*>(png.data()), png.size()});
+  file.commit();
   *table << image.t_ns << "," << name << "\n";
 }
 
@@ -269,13 +279,19 @@ AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>(
   make_folder(folder);
   check_is_ours(folder);
   // A table that the new log does not have must not stay behind.
-  for (const char* const table : kFolders) fs::remove_all(folder / table);
-  for (std::size_t camera = 0; camera <= kMaxCamera; ++camera) {
-    fs::remove_all(folder / camera_folder(camera));
-  }
+  for_each_folder([&](const fs::path& ours) { fs::remove_all(folder / ours); });
 }
 
-AslWriter::~AslWriter() = default;
+AslWriter::~AslWriter() {
+  if (closed_) return;
+  const fs::path folder = std::move(tables_->folder);
+  tables_.reset();
+  try {
+    for_each_folder([&](const fs::path& ours) { fs::remove_all(folder / ours); });
+  } catch (...) {
+    // Why it is not closed is known; what stays has no table, or not all of them.
+  }
+}
 
 bool AslWriter::write(const Measurement& measurement) {
   return tables_->write_one_of<ImuSample, EncoderSample, FeatureSample, ImageSample, PoseSample,
@@ -291,6 +307,7 @@ void AslWriter::close() {
   for (auto& table : tables_->image_tables) {
     if (table) table->close();
   }
+  closed_ = true;
 }
 
 }  // namespace viwo::log

@@ -1,11 +1,11 @@
 // What an analysis leaves behind: observability.json, report.html, the table on the terminal.
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "viwo/eval/json.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/text_stream.hpp"
 #include "viwo/observability/observability.hpp"
 #include "viwo/report/html.hpp"
 #include "viwo/results/run_output.hpp"
@@ -252,7 +252,7 @@ void write_observability(const std::filesystem::path& folder, const Observabilit
 }
 
 std::string describe(const ObservabilityReport& report) {
-  std::ostringstream out;
+  TextStream out;
   std::size_t motion_width = 6, variant_width = 7;
   for (const ObservabilityResult& result : report.results) {
     motion_width = std::max(motion_width, motion_name(report, result).size());

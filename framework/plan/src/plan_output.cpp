@@ -1,7 +1,6 @@
 // What a plan leaves behind: plan.csv, plan.tum, summary.json, report.html, the table on the
 // terminal.
 #include <cmath>
-#include <sstream>
 
 #include <nlohmann/json.hpp>
 
@@ -11,6 +10,7 @@
 #include "viwo/log/tum.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/text_stream.hpp"
 #include "viwo/plan/plan.hpp"
 #include "viwo/report/document.hpp"
 #include "viwo/report/html.hpp"
@@ -168,7 +168,7 @@ void write_plan(const std::filesystem::path& folder, const PlanSetup& setup, con
 }
 
 std::string describe(const PlanSetup& setup, const Plan& plan) {
-  std::ostringstream out;
+  TextStream out;
   std::size_t width = 5;
   for (const PlannedPiece& one : plan.pieces) width = std::max(width, one.piece.name.size());
   width += 2;

@@ -4,9 +4,10 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <sstream>
 
 #include "viwo/math/utf8.hpp"
+
+#include "viwo/math/text_stream.hpp"
 
 namespace viwo::report {
 namespace {
@@ -38,7 +39,7 @@ std::string number(double value) {
 }
 
 std::string rounded(double value) {
-  std::ostringstream out;
+  TextStream out;
   out.precision(4);
   out << value;
   return out.str();

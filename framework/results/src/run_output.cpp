@@ -2,7 +2,7 @@
 #include "viwo/results/run_output.hpp"
 
 #include <cmath>
-#include <sstream>
+#include <ostream>
 
 #include <sys/resource.h>
 
@@ -11,6 +11,7 @@
 #include "viwo/log/files.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/text_stream.hpp"
 #include "viwo/report/html.hpp"
 #include "viwo/results/metrics.hpp"
 #include "viwo/results/run_stream.hpp"
@@ -222,7 +223,7 @@ void describe_odometry(const PreintegratedPose& total, std::ostream& out) {
 }  // namespace
 
 std::string describe(const RunResult& result) {
-  std::ostringstream out;
+  TextStream out;
   out << "status " << name(result.status);
   if (!result.cause.empty()) out << ": " << result.cause;
   out << "\n" << significant(result.duration_s, 4) << " s, ";

@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "begin_thread.hpp"
 #include "bounded_series.hpp"
 #include "channels.hpp"
 #include "feed.hpp"
@@ -62,11 +63,17 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
 
   void begin() {
     const auto self = shared_from_this();
-    for (const SensorStream& stream : live_) {
-      add_thread(stream.name, [self, &stream] { self->listen(stream); });
-    }
-    for (Worker& worker : workers_) {
-      add_thread(worker.stream.name, [self, &worker] { self->work(worker); });
+    threads_.reserve(live_.size() + workers_.size());
+    try {
+      for (const SensorStream& stream : live_) {
+        add_thread(stream.name, [self, &stream] { self->listen(stream); });
+      }
+      for (Worker& worker : workers_) {
+        add_thread(worker.stream.name, [self, &worker] { self->work(worker); });
+      }
+    } catch (...) {
+      stop();  // those that have begun
+      throw;
     }
   }
 
@@ -156,8 +163,13 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   /// Ends all threads; the names of the sensors whose threads do not.
   std::vector<std::string> stop() {
     if (threads_.empty()) return {};
-    stop_sensors();
-    for (const Worker& worker : workers_) worker.input->end();
+    std::exception_ptr error;
+    try {
+      stop_sensors();
+    } catch (...) {
+      error = std::current_exception();  // after the threads
+    }
+    end_inputs();
     std::vector<std::string> left;
     {
       std::unique_lock lock(mutex_);
@@ -168,6 +180,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     }
     for (std::thread& thread : threads_) left.empty() ? thread.join() : thread.detach();
     threads_.clear();
+    if (error) std::rethrow_exception(error);
     return left;
   }
 
@@ -190,11 +203,49 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
       const std::scoped_lock lock(mutex_);
       running_.push_back(sensor);
     }
-    threads_.emplace_back(std::move(work));
+    try {
+      threads_.push_back(begin_thread("sensor '" + sensor + "'", [this, &sensor, work] {
+        try {
+          work();
+        } catch (...) {
+          end_with(std::current_exception());
+        }
+        note_end(sensor);
+      }));
+    } catch (...) {
+      note_end(sensor);
+      throw;
+    }
+  }
+
+  /// Nothing may leave a thread. The run ends, also when other sensors could go on.
+  void end_with(std::exception_ptr error) {
+    {
+      const std::scoped_lock lock(mutex_);
+      if (!error_) error_ = std::move(error);
+    }
+    try {
+      stop_sensors();
+    } catch (...) {
+      // The first error is the cause.
+    }
+    end_inputs();
+  }
+
+  void note_end(const std::string& sensor) {
+    {
+      const std::scoped_lock lock(mutex_);
+      running_.erase(std::find(running_.begin(), running_.end(), sensor));
+    }
+    changed_.notify_all();
+  }
+
+  void end_inputs() {
+    for (const Worker& worker : workers_) worker.input->end();
   }
 
   void listen(const SensorStream& stream) {
-    run_thread(stream, [&](const Measurement& measurement) {
+    read(stream, [&](const Measurement& measurement) {
       const auto* image = measurement.get_if<ImageSample>();
       if (image == nullptr) return true;
       {
@@ -217,7 +268,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     auto begin = Clock::now();
     double waited_ms = 0., spent_ms = 0.;
     std::optional<std::int64_t> stamp;
-    run_thread(worker.stream, [&](const Measurement& measurement) {
+    read(worker.stream, [&](const Measurement& measurement) {
       if (stamp && stamp_ns(measurement) != *stamp) {
         worker.ms_per_stamp.add(std::exchange(spent_ms, 0.));
       }
@@ -232,33 +283,20 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
 
   /// Reads a sensor to its end; `wanted` says whether the estimator is to have a measurement.
   template <class Wanted>
-  void run_thread(const SensorStream& stream, Wanted&& wanted) {
-    try {
-      Measurement measurement;
-      while (guarded(stream.info, "next", [&] { return stream.sensor->next(measurement); }) ==
-             Status::kOk) {
-        if (has_ended()) break;
-        if (!wanted(measurement)) continue;
-        {
-          std::unique_lock lock(mutex_);
-          room_.wait(lock, [this] { return ended_ || arrivals_.size() < kMaxArrivals; });
-          if (ended_) break;
-          arrivals_.push_back({&stream.name, std::move(measurement)});
-        }
-        changed_.notify_all();
-      }
-    } catch (...) {
+  void read(const SensorStream& stream, Wanted&& wanted) {
+    Measurement measurement;
+    while (guarded(stream.info, "next", [&] { return stream.sensor->next(measurement); }) ==
+           Status::kOk) {
+      if (is_at_end()) break;
+      if (!wanted(measurement)) continue;
       {
-        const std::scoped_lock lock(mutex_);
-        if (!error_) error_ = std::current_exception();
+        std::unique_lock lock(mutex_);
+        room_.wait(lock, [this] { return ended_ || arrivals_.size() < kMaxArrivals; });
+        if (ended_) break;
+        arrivals_.push_back({&stream.name, std::move(measurement)});
       }
-      stop_sensors();  // the run ends, also when the others could go on
+      changed_.notify_all();
     }
-    {
-      const std::scoped_lock lock(mutex_);
-      running_.erase(std::find(running_.begin(), running_.end(), stream.name));
-    }
-    changed_.notify_all();
   }
 
   /// Whether an update takes this kind from this sensor.
@@ -269,7 +307,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     });
   }
 
-  bool has_ended() {
+  bool is_at_end() {
     const std::scoped_lock lock(mutex_);
     return ended_;
   }
@@ -367,7 +405,13 @@ class LiveFeedOwner final : public Feed {
   explicit LiveFeedOwner(std::shared_ptr<LiveFeed> feed) : feed_(std::move(feed)) {
     feed_->begin();
   }
-  ~LiveFeedOwner() override { feed_->stop(); }
+  ~LiveFeedOwner() override {
+    try {
+      feed_->stop();
+    } catch (...) {
+      // finish() has said it, or what made it superfluous.
+    }
+  }
   bool next(Estimator& estimator) override { return feed_->next(estimator); }
   bool is_over() override { return feed_->is_over(); }
   void on_epoch(const Estimator& estimator, int piece,

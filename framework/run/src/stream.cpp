@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "begin_thread.hpp"
+
 namespace viwo {
 namespace {
 
@@ -11,7 +13,10 @@ constexpr std::size_t kAhead = 16;
 }  // namespace
 
 Prefetch::Prefetch(const SensorStream& stream)
-    : name_(stream.name), info_(stream.info), sensor_(stream.sensor), thread_([this] { read(); }) {}
+    : name_(stream.name),
+      info_(stream.info),
+      sensor_(stream.sensor),
+      thread_(begin_thread("sensor '" + stream.name + "'", [this] { read(); })) {}
 
 void Prefetch::stop() {
   if (!thread_.joinable()) return;
@@ -43,22 +48,22 @@ Status Prefetch::read_one(Measurement& out) {
 
 void Prefetch::read() {
   for (;;) {
-    Measurement measurement;
     bool more = false;
     std::exception_ptr error;
     try {
+      Measurement measurement;
       more = read_one(measurement) == Status::kOk;
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return stop_ || ahead_.size() < kAhead; });
+      more = more && !stop_;
+      if (more) ahead_.push_back(std::move(measurement));
     } catch (...) {
+      more = false;
       error = std::current_exception();
     }
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return stop_ || ahead_.size() < kAhead; });
-    if (more && !stop_) {
-      ahead_.push_back(std::move(measurement));
-    } else {
-      ended_ = true;
-      error_ = error;
-    }
+    const std::scoped_lock lock(mutex_);
+    ended_ = !more;
+    error_ = error;
     changed_.notify_all();
     if (ended_) return;
   }

@@ -68,12 +68,14 @@ class AslWriter {
   [[nodiscard]] bool write(const Measurement& measurement);
   /// A pose that is a measurement and no reference: into poses0, which asl_pose reads.
   void write_measured(const PoseSample& pose);
-  /// Must be called at the end: the last bytes may fail, too.
+  /// Must be called at the end: the last bytes may fail, too. A log that is not closed is removed:
+  /// some of its tables would look like all of it.
   void close();
 
  private:
   struct Tables;
   std::unique_ptr<Tables> tables_;
+  bool closed_ = false;
 };
 
 }  // namespace viwo::log
