@@ -111,6 +111,8 @@ class Subject:
 
 
 class EveryCall(unittest.TestCase):
+    longMessage = False
+
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="viwo_failing_"))
@@ -142,9 +144,9 @@ class EveryCall(unittest.TestCase):
         }[name])
 
     def assert_same(self, out, whole, where):
-        self.assertEqual(files_below(out), files_below(whole), where)
+        self.assertEqual(files_below(out), files_below(whole), "files are missing: " + where)
         for file in files_below(out):
-            self.assertEqual(content(out / file), content(whole / file), f"{where}{file}")
+            self.assertEqual(content(out / file), content(whole / file), f"{file} differs: {where}")
 
     def assert_whole(self, out, whole, where):
         """What is there under the name of a result is all of it; a run that failed says so."""
@@ -155,9 +157,9 @@ class EveryCall(unittest.TestCase):
             if summary.get("status", "ok") != "ok" or any(cell["failed"] for cell in cells):
                 return
         for file in there:
-            self.assertNotEqual(file.suffix, ".tmp", where)
+            self.assertNotEqual(file.suffix, ".tmp", f"{file}: {where}")
             if "journal" not in file.parts:
-                self.assertEqual(content(out / file), content(whole / file), f"{where}{file}")
+                self.assertEqual(content(out / file), content(whole / file), f"{file} differs: {where}")
 
     def check(self, name, kind, call, undisturbed):
         out = self.out / f"{kind}_{call}"
@@ -175,7 +177,8 @@ class EveryCall(unittest.TestCase):
                 done.returncode == 0 or not re.search(REASONS[kind], said)):
             if not SAID.search(done.stdout):
                 self.assertEqual(without_numbers(done.stdout, out),
-                                 without_numbers(undisturbed.stdout, whole), where)
+                                 without_numbers(undisturbed.stdout, whole),
+                                 "other words: " + where)
                 self.assert_same(out, whole, where)
         else:
             self.assertIn(done.returncode, (1, 2), where)
@@ -186,21 +189,25 @@ class EveryCall(unittest.TestCase):
     def disturb(self, name, *kinds):
         subject = self.subject(name)
         for kind in kinds:
-            count, undisturbed = subject.calls(kind, self.out / "whole")
-            rest = range(FIRST + 1, count + 1)
-            calls = [*range(1, min(FIRST, count) + 1),
-                     *random.Random(1).sample(rest, min(DRAWN, len(rest)))]
-            faults = []
-            with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-                done = {pool.submit(self.check, name, kind, call, undisturbed): call
-                        for call in calls}
-                for each in concurrent.futures.as_completed(done):
-                    if each.exception():
-                        faults.append(str(each.exception()))
-            print(f"{name}: {len(calls)} of {count} calls ({kind}), {len(faults)} wrong")
-            self.assertFalse(faults, f"{name}, {kind}: {len(faults)} of {len(calls)} calls; first:\n"
-                             + "\n".join(sorted(faults)[:5]))
-            shutil.rmtree(self.out / "whole")
+            with self.subTest(kind=kind):
+                self.disturb_by(subject, name, kind)
+
+    def disturb_by(self, subject, name, kind):
+        shutil.rmtree(self.out / "whole", ignore_errors=True)
+        count, undisturbed = subject.calls(kind, self.out / "whole")
+        rest = range(FIRST + 1, count + 1)
+        calls = [*range(1, min(FIRST, count) + 1),
+                 *random.Random(1).sample(rest, min(DRAWN, len(rest)))]
+        faults = []
+        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+            done = {pool.submit(self.check, name, kind, call, undisturbed): call
+                    for call in calls}
+            for each in concurrent.futures.as_completed(done):
+                if each.exception():
+                    faults.append(str(each.exception()))
+        print(f"{name}: {len(calls)} of {count} calls ({kind}), {len(faults)} wrong")
+        self.assertFalse(faults, f"{name}, {kind}: {len(faults)} of {len(calls)} calls; first:\n"
+                         + "\n".join(sorted(faults)[:5]))
 
     def test_run(self):
         self.disturb("run", "disk", "open", "read", "mmap", "thread", "memory")

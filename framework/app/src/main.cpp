@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "command_line.hpp"
+#include "out_of_memory.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
@@ -107,6 +108,7 @@ int dispatch(const std::vector<std::string>& words) {
 }  // namespace viwo::app
 
 int main(int argc, char** argv) {
+  viwo::app::end_well_without_memory();
   try {
     if (!viwo::host_record_is_consistent()) {
       std::cerr << "viwo was built differently from its libviwo_api.so: rebuild both\n";

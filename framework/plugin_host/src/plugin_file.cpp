@@ -12,6 +12,9 @@
 
 #include "viwo/plugin_host/plugin_info.hpp"
 
+/// Of what this code is linked into; by the linker.
+extern "C" __attribute__((visibility("hidden"))) const ElfW(Ehdr) __ehdr_start;
+
 namespace viwo {
 namespace {
 
@@ -29,12 +32,7 @@ T copy_at(const std::string& bytes, std::size_t offset) {
 }
 
 /// The machine that this program is built for.
-std::uint16_t own_machine() {
-  ElfHeader header{};
-  std::ifstream("/proc/self/exe", std::ios::binary)
-      .read(reinterpret_cast<char*>(&header), sizeof(header));
-  return header.e_machine;
-}
+std::uint16_t own_machine() { return __ehdr_start.e_machine; }
 
 bool fits(std::uint64_t offset, std::uint64_t size, std::uint64_t total) {
   return offset <= total && size <= total - offset;
