@@ -190,6 +190,16 @@ TEST_F(AslTest, AWrittenLogReadsBackToTheSameBits) {
   }
 }
 
+TEST_F(AslTest, ALogThatIsNotClosedLeavesNothing) {
+  {
+    AslWriter writer(folder_ / "log");
+    for (const Measurement& measurement : some_measurements()) {
+      EXPECT_TRUE(writer.write(measurement));
+    }
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "log"));
+}
+
 TEST_F(AslTest, WritesTheDocumentedColumns) {
   AslWriter writer(folder_ / "log");
   EncoderSample sample;

@@ -13,7 +13,8 @@
 #include "viwo/plugin_host/plugin_info.hpp"
 
 /// Of what this code is linked into; by the linker.
-extern "C" __attribute__((visibility("hidden"))) const ElfW(Ehdr) __ehdr_start;
+extern "C" __attribute__((visibility("hidden")))
+const ElfW(Ehdr) __ehdr_start;  // NOLINT(bugprone-reserved-identifier)
 
 namespace viwo {
 namespace {

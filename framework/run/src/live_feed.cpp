@@ -136,6 +136,11 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     for (const std::string& name : left) {
       result.warnings.push_back("sensor '" + name + "' did not end when it was asked to");
     }
+    try {
+      if (stop_error_) std::rethrow_exception(stop_error_);
+    } catch (const std::exception& error) {
+      result.warnings.push_back(std::string("a sensor could not be stopped: ") + error.what());
+    }
     const auto has_ended = [&](const std::string& name) {
       return std::find(left.begin(), left.end(), name) == left.end();
     };
@@ -163,12 +168,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   /// Ends all threads; the names of the sensors whose threads do not.
   std::vector<std::string> stop() {
     if (threads_.empty()) return {};
-    std::exception_ptr error;
-    try {
-      stop_sensors();
-    } catch (...) {
-      error = std::current_exception();  // after the threads
-    }
+    stop_sensors();
     end_inputs();
     std::vector<std::string> left;
     {
@@ -180,7 +180,6 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     }
     for (std::thread& thread : threads_) left.empty() ? thread.join() : thread.detach();
     threads_.clear();
-    if (error) std::rethrow_exception(error);
     return left;
   }
 
@@ -224,11 +223,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
       const std::scoped_lock lock(mutex_);
       if (!error_) error_ = std::move(error);
     }
-    try {
-      stop_sensors();
-    } catch (...) {
-      // The first error is the cause.
-    }
+    stop_sensors();
     end_inputs();
   }
 
@@ -312,9 +307,15 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     return ended_;
   }
 
+  /// All of them, whatever one of them does; finish() says what.
   void stop_sensors() {
     for (const SensorStream& stream : live_) {
-      guarded(stream.info, "stop", [&] { stream.sensor->stop(); });
+      try {
+        guarded(stream.info, "stop", [&] { stream.sensor->stop(); });
+      } catch (...) {
+        const std::scoped_lock lock(mutex_);
+        stop_error_ = std::current_exception();
+      }
     }
   }
 
@@ -395,7 +396,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   std::deque<Arrival> arrivals_;
   std::deque<std::pair<std::int64_t, Clock::time_point>> seen_;  ///< images: stamp and arrival
   std::vector<std::string> running_;  ///< sensors whose threads have not ended
-  std::exception_ptr error_;
+  std::exception_ptr error_, stop_error_;
   std::vector<std::thread> threads_;
 };
 
@@ -405,13 +406,7 @@ class LiveFeedOwner final : public Feed {
   explicit LiveFeedOwner(std::shared_ptr<LiveFeed> feed) : feed_(std::move(feed)) {
     feed_->begin();
   }
-  ~LiveFeedOwner() override {
-    try {
-      feed_->stop();
-    } catch (...) {
-      // finish() has said it, or what made it superfluous.
-    }
-  }
+  ~LiveFeedOwner() override { feed_->stop(); }
   bool next(Estimator& estimator) override { return feed_->next(estimator); }
   bool is_over() override { return feed_->is_over(); }
   void on_epoch(const Estimator& estimator, int piece,

@@ -314,6 +314,44 @@ TEST(LiveFeed, EndsWithTheErrorOfItsSensor) {
   }
 }
 
+TEST(LiveFeed, EndsWithTheErrorOfItsSensorThoughThatCannotBeStopped) {
+  class Broken final : public Device {
+   public:
+    Broken() : Device({}, false) {}
+    Status next(Measurement& /*out*/) override { throw InputError("the cable is out"); }
+    void stop() override { throw InputError("and nobody listens"); }
+  };
+  RunSetup setup = standing_then_driving();
+  RunData data;
+  data.live.push_back(stream("device", std::make_shared<Broken>()));
+  try {
+    run_filter(setup, data);
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "the cable is out");
+  }
+}
+
+TEST(LiveFeed, KeepsTheResultsOfASensorThatCannotBeStopped) {
+  class Stubborn final : public Device {
+   public:
+    using Device::Device;
+    void stop() override { throw InputError("nobody listens"); }
+  };
+  RunSetup setup = standing_then_driving();
+  const RunData recorded = collect(setup);
+  RunData data;
+  setup.routes = routes_of_device(setup);
+  data.live.push_back(
+      stream("device", std::make_shared<Stubborn>(in_time_order(recorded.recorded), false)));
+  const RunResult live = run_filter(setup, data);
+  EXPECT_EQ(live.status, RunStatus::kOk) << live.cause;
+  EXPECT_GT(live.estimate.size(), 10U);
+  EXPECT_EQ(std::count(live.warnings.begin(), live.warnings.end(),
+                       "a sensor could not be stopped: nobody listens"),
+            1);
+}
+
 TEST(LiveFeed, KeepsTheResultsUpToTheErrorOfOneOfItsSensors) {
   /// Breaks after all else has been given.
   class Breaking final : public Device {
