@@ -27,7 +27,7 @@ set(VIWO_NO_FALSE_WARNINGS
     $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overread>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized>)
-set(VIWO_WARNINGS -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+set(VIWO_WARNINGS -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
     ${VIWO_NO_FALSE_WARNINGS})
 if(VIWO_WERROR)
   list(APPEND VIWO_WARNINGS -Werror)
