@@ -34,7 +34,7 @@ REASONS = {
     "disk": "No space left on device",
     "open": "Too many open files|cannot|not found|missing",
     "read": "Input/output error|cannot|read|truncated",
-    "mmap": "memory|[Mm]emory|mmap",
+    "mmap": "memory|alloc|mmap",
     "thread": "thread|Resource temporarily unavailable",
     "memory": "memory|alloc",
 }
