@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -23,7 +24,8 @@ using Matrix = Eigen::MatrixXd;
 /// angles, of any kinematic model: its rows alone are asked.
 class Offsets {
  public:
-  explicit Offsets(const Wheels& wheels)
+  /// `unit`: what the angles are multiplied by.
+  explicit Offsets(const Wheels& wheels, double unit = 1.)
       : solver_(wheels.model, {}), n_(wheels.model->description().n_steer) {
     solver_.set_intrinsics(wheels.prior.wheels.x_WI);
     // Those that move: a base at rest contradicts nothing.
@@ -39,7 +41,10 @@ class Offsets {
       }
     }
     const std::size_t stride = std::max<std::size_t>(1, moving.size() / kMost);
-    for (std::size_t i = 0; i < moving.size(); i += stride) samples_.push_back(*moving[i]);
+    for (std::size_t i = 0; i < moving.size(); i += stride) {
+      samples_.push_back(*moving[i]);
+      for (double& angle : samples_.back().steer_rad) angle *= unit;
+    }
   }
 
   int n() const { return n_; }
@@ -205,10 +210,63 @@ double prior_of_angles(const Wheels& wheels) {
   return prior;
 }
 
-void check_offsets(const Wheels& wheels, const std::string& label, Findings& out) {
+/// Whether the angles go from one to the next, as what is steered does, and noise does not.
+bool go_on(const Wheels& wheels) {
+  double steps = 0., varies = 0.;
+  const auto& samples = wheels.samples;
+  const auto n = static_cast<double>(samples.size());
+  for (std::size_t i = 0; i < static_cast<std::size_t>(wheels.model->description().n_steer); ++i) {
+    double sum = 0., squares = 0.;
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      const double angle = samples[k].steer_rad[i];
+      sum += angle;
+      squares += angle * angle;
+      if (k > 0) steps += std::pow(angle - samples[k - 1].steer_rad[i], 2);
+    }
+    varies += squares - sum * sum / n;
+  }
+  constexpr double kWhite = 2., kPart = 0.1;
+  return steps < kPart * kWhite * varies;
+}
+
+/// Angles that no constants make fit, and that fit when they are as small as they are in degrees.
+/// Where the base drives nearly straight on, no angles at all would fit as well: then the motion
+/// does not tell the unit, only that it is not this one.
+bool check_unit(const Recording& recording, const Wheels& wheels, Offsets& problem,
+                const std::string& label, Findings& out) {
+  const bool is_told = std::any_of(
+      recording.implausible.begin(), recording.implausible.end(), [&](const viwo::Finding& found) {
+        return found.key == label + " steering" || found.key == label + " order";
+      });
+  if (is_told || !go_on(wheels)) return false;
+  const double before = problem.cost(Vector::Zero(problem.n()));
+  constexpr double kLeast_m_per_s = 0.01;
+  const double rows = wheels.model->n_rows() * static_cast<double>(problem.size());
+  if (before < rows * kLeast_m_per_s * kLeast_m_per_s) return false;
+  constexpr double kDegree = std::numbers::pi / 180., kMost = 0.1;
+  Offsets in_degrees(wheels, kDegree);
+  const double left = in_degrees.fit(Vector::Zero(problem.n())).cost;
+  if (left > kMost * std::min(before, best_fit(problem, before).cost)) return false;
+  const auto mm = [&](double cost) { return significant(1e3 * std::sqrt(cost / rows), 2); };
+  out.push_back({label,
+                 Severity::kFault,
+                 "steering",
+                 "the wheels contradict each other by " + mm(before) +
+                     " mm/s, whatever constants are added to the steering angles, and by " +
+                     mm(left) +
+                     " mm/s if these are in degrees (steer_scale: 0.0174533), or are taken "
+                     "before a gear, as at a steering wheel",
+                 {{"residual as configured", std::sqrt(before / rows), "m/s"},
+                  {"residual in degrees", std::sqrt(left / rows), "m/s"}}});
+  return true;
+}
+
+void check_offsets(const Recording& recording, const Wheels& wheels, const std::string& label,
+                   Findings& out) {
   Offsets problem(wheels);
   constexpr std::size_t kFewest = 100;
   if (problem.n() == 0 || wheels.model->n_rows() <= 3 || problem.size() < kFewest) return;
+  if (check_unit(recording, wheels, problem, label, out)) return;
   Finding finding{label, Severity::kNote, "steer offsets",
                   "offsets of the steering cannot be told from this motion"};
   const std::optional<Found> found = find_offsets(problem);
@@ -254,7 +312,7 @@ void check_offsets(const Wheels& wheels, const std::string& label, Findings& out
 void check_steer_offsets(const Recording& recording, Findings& out) {
   for (const Wheels& wheels : recording.wheels) {
     if (wheels.samples.empty() || !wheels.unusable.empty()) continue;
-    check_offsets(wheels, recording.label<EncoderSample>(wheels.sensor), out);
+    check_offsets(recording, wheels, recording.label<EncoderSample>(wheels.sensor), out);
   }
 }
 

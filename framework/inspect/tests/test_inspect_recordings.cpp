@@ -78,6 +78,13 @@ TEST(Inspection, FindsAnImuThatIsShakenAtRest) {
   EXPECT_NEAR(figure_of(finding_of(inspection, "imu0", "gravity"), "gravity"), 9.78, 0.02);
 }
 
+TEST(Inspection, FindsTheSteeringOfARealCarInDegrees) {
+  if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
+  const auto file = testing::configuration("runs/comma2k19_car.yaml");
+  EXPECT_THAT(faults_in(setup_of(file, {"sensors.wheels0.steer_scale=[57.29578]"})),
+              ElementsAre("wheels0 steering"));
+}
+
 TEST(Inspection, TellsTheJitterOfACanBus) {
   if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
   RunSetup setup = setup_of(testing::configuration("runs/comma2k19_car.yaml"));
