@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <string>
 
@@ -121,6 +122,19 @@ void check_tracks(const Recording& recording, const CameraTurns& camera, const s
                    "no two images share eight points for " + significant(blind_s, 2) + " s from " +
                        from(blind_from_ns) + " on",
                    {{"longest without points", blind_s, "s"}}});
+  }
+  const double points = std::accumulate(camera.points.begin(), camera.points.end(), 0.);
+  const double far = camera.far / points;
+  constexpr double kMostFar = 0.05;
+  if (far > kMostFar) {
+    out.push_back({label,
+                   Severity::kFault,
+                   "tracks",
+                   significant(100. * far, 2) +
+                       " % of the points are elsewhere in the next image, more than 14 deg from "
+                       "where the others say: wrong matches, numbers that are used again, or "
+                       "images of two cameras under one number",
+                   {{"elsewhere", far, ""}}});
   }
   const double same_s = 1e-9 * static_cast<double>(longest_ns);
   if (same_s > kLong_s && turns_meanwhile(recording, longest_from_ns, longest_ns)) {
@@ -288,9 +302,10 @@ void check_camera_clocks(const Recording& recording, Findings& out) {
                      "too little rotation to compare its clock with " + imu});
       continue;
     }
+    // It turned from one instant to another, however long that took.
     Finding clock =
         clock_finding(label, {"clock", "clock", "timeshift_cam_imu", imu, prior.camera.t_CtoI_s},
-                      *lag, prior.sigma_clock_s, std::max(period_of(gyro), period_of(turns)));
+                      *lag, prior.sigma_clock_s, period_of(gyro));
     clock.figures.push_back({"points in two images", eval::median(camera.points), ""});
     clock.figures.push_back({"angle to calibration", angle, "deg"});
     if (clock.severity == Severity::kFault) {

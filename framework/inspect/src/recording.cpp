@@ -38,8 +38,15 @@ class TurnFinder {
     if (!rays_.empty() && pairs.size() >= kFewest && dt_s > 0.) {
       const auto n = static_cast<double>(pairs.size());
       // The points stand still: they turn in C against the camera.
-      out.turns.push_back({t_ns_, sample.t_ns, -log_so3(rotation(pairs)) / dt_s});
+      const Eigen::Matrix3d R = rotation(pairs);
+      out.turns.push_back({t_ns_, sample.t_ns, -log_so3(R) / dt_s});
       out.points.push_back(n);
+      // Further than what is near moves from image to image.
+      constexpr double kFar = 0.25;
+      out.far +=
+          static_cast<double>(std::count_if(pairs.begin(), pairs.end(), [&R](const Pair& pair) {
+            return (pair.now - R * pair.before).squaredNorm() > kFar * kFar;
+          }));
     }
     rays_ = std::move(rays);
     t_ns_ = sample.t_ns;

@@ -38,6 +38,7 @@ struct CameraTurns {
   int camera = 0;
   std::vector<Turn> turns;
   std::vector<double> points;  ///< that two images share, for each turn
+  double far = 0.;  ///< of these, points that are nowhere near where that rotation has them
 };
 
 /// A wheel set and its samples.

@@ -152,6 +152,20 @@ TEST_F(InspectRealCamera, FindsThatItWasFrozen) {
   EXPECT_THAT(faults_of(frozen), Contains("images0, camera 0 tracks"));
 }
 
+TEST(InspectCameras, FindsPointsThatAreElsewhereInTheNextImage) {
+  EXPECT_NE(finding_of(inspected(swerve(), {}), "images0, camera 0", "tracks").severity,
+            Severity::kFault);
+  // A tenth of the numbers of an image are exchanged.
+  const Inspection exchanged = inspected(swerve(), {.images = [](FeatureSample& s) {
+                                           for (std::size_t i = 20; i < s.points.size(); i += 20) {
+                                             std::swap(s.points[i].id, s.points[i - 10].id);
+                                           }
+                                           return true;
+                                         }});
+  EXPECT_THAT(faults_of(exchanged),
+              ElementsAre("images0, camera 0 tracks", "images0, camera 1 tracks"));
+}
+
 TEST(InspectPoses, FindsTheLagOfAReferenceAndWritesIt) {
   const auto planar = [] { return setup_of(testing::configuration("runs/simulated_swerve.yaml")); };
   const Finding clean = finding_of(inspected(planar(), {}), "poses0", "clock");
