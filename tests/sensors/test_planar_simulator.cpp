@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "support.hpp"
-#include "viwo/log/asl.hpp"
+#include "viwo/asl/asl.hpp"
 
 namespace viwo {
 namespace {

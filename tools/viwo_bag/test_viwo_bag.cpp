@@ -11,8 +11,8 @@
 #include <yaml-cpp/yaml.h>
 
 #include "support.hpp"
+#include "viwo/asl/asl.hpp"
 #include "viwo/image/image_file.hpp"
-#include "viwo/log/asl.hpp"
 
 namespace viwo {
 namespace {

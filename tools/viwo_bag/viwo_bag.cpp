@@ -22,9 +22,9 @@
 #include "ros2_writer.hpp"
 #endif
 #include "viwo/api/status.hpp"
+#include "viwo/asl/asl.hpp"
+#include "viwo/asl/asl_columns.hpp"
 #include "viwo/image/image_file.hpp"
-#include "viwo/log/asl.hpp"
-#include "viwo/log/asl_columns.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"
 

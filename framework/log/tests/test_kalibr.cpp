@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
 
-#include "support.hpp"
+#include "log_files.hpp"
 #include "viwo/log/kalibr.hpp"
 
 namespace viwo::log {

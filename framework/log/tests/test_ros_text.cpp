@@ -1,7 +1,7 @@
 // Printed ROS messages.
 #include <gmock/gmock.h>
 
-#include "support.hpp"
+#include "log_files.hpp"
 #include "viwo/log/ros_text.hpp"
 
 namespace viwo::log {

@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "support.hpp"
+#include "log_files.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_reader.hpp"

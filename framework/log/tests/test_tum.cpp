@@ -1,7 +1,7 @@
 // Trajectories in the TUM format.
 #include <random>
 
-#include "support.hpp"
+#include "log_files.hpp"
 #include "viwo/log/tum.hpp"
 
 namespace viwo::log {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "inputs.hpp"
-#include "viwo/log/asl.hpp"
+#include "viwo/asl/asl.hpp"
 
 namespace viwo {
 

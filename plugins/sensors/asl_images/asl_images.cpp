@@ -1,5 +1,5 @@
 // Sensor asl_images: the images of a log folder (model.md).
-#include "viwo/log/asl_images.hpp"
+#include "viwo/asl/asl_images.hpp"
 
 #include <filesystem>
 #include <string>

@@ -1,7 +1,7 @@
 // Sensor asl_images as the host loads it; the reader has its own tests.
 #include "support.hpp"
+#include "viwo/asl/asl.hpp"
 #include "viwo/image/image_file.hpp"
-#include "viwo/log/asl.hpp"
 
 namespace viwo {
 namespace {

@@ -1,7 +1,7 @@
 // Sensor asl_pose: reference poses from a log folder (model.md).
 
 #include "viwo/api/plugin.hpp"
-#include "viwo/log/asl.hpp"
+#include "viwo/asl/asl.hpp"
 #include "viwo/log/sensor_params.hpp"
 
 namespace viwo {

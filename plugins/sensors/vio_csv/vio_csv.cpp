@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "viwo/api/plugin.hpp"
-#include "viwo/log/asl.hpp"
+#include "viwo/asl/asl.hpp"
 #include "viwo/log/sensor_params.hpp"
 #include "viwo/log/table_reader.hpp"
 

@@ -2,7 +2,7 @@
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/status.hpp"
-#include "viwo/log/asl.hpp"
+#include "viwo/asl/asl.hpp"
 #include "viwo/log/sensor_params.hpp"
 
 namespace viwo::bag {

@@ -1,4 +1,4 @@
-#include "viwo/log/asl_images.hpp"
+#include "viwo/asl/asl_images.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "viwo/api/status.hpp"
+#include "viwo/asl/asl_columns.hpp"
 #include "viwo/image/image_file.hpp"
-#include "viwo/log/asl_columns.hpp"
 #include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"

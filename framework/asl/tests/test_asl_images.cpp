@@ -4,10 +4,10 @@
 
 #include <gmock/gmock.h>
 
-#include "support.hpp"
+#include "log_files.hpp"
+#include "viwo/asl/asl.hpp"
+#include "viwo/asl/asl_images.hpp"
 #include "viwo/image/image_file.hpp"
-#include "viwo/log/asl.hpp"
-#include "viwo/log/asl_images.hpp"
 
 namespace viwo::log {
 namespace {

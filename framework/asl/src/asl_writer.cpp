@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "viwo/api/status.hpp"
+#include "viwo/asl/asl.hpp"
 #include "viwo/image/image_file.hpp"
-#include "viwo/log/asl.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_writer.hpp"

@@ -5,8 +5,8 @@
 
 #include <gmock/gmock.h>
 
-#include "support.hpp"
-#include "viwo/log/asl.hpp"
+#include "log_files.hpp"
+#include "viwo/asl/asl.hpp"
 
 namespace viwo::log {
 namespace {

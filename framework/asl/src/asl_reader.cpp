@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "viwo/log/asl.hpp"
-#include "viwo/log/asl_columns.hpp"
+#include "viwo/asl/asl.hpp"
+#include "viwo/asl/asl_columns.hpp"
 #include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"
