@@ -45,6 +45,7 @@ void ForecastOutput::look(double t_s, const Filter& filter) {
   std::vector<Eigen::Index> at;
   std::vector<double> sigmas;
   for (const CalibrationEntry& entry : file.intrinsics) {
+    if (entry.name.find('.') != std::string::npos) continue;  // of a further wheel set
     const auto& known = file.correlations.entries;
     const auto found = std::find(known.begin(), known.end(), entry.name);
     if (found == known.end()) continue;

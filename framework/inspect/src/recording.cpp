@@ -6,6 +6,8 @@
 #include <optional>
 #include <unordered_map>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
 #include "checks.hpp"
@@ -16,8 +18,9 @@
 namespace viwo::inspect {
 namespace {
 
-/// The rotation between two images of a camera from the points that they share. What is near moves
-/// otherwise: those that fit worst are left out, twice.
+/// The rotation between two images of a camera from the points that they share: that with which all
+/// of them may have moved in one direction, each as far as it is near (their epipolar planes have a
+/// line in common).
 class TurnFinder {
  public:
   explicit TurnFinder(const CameraView& camera) : camera_(camera) {}
@@ -67,7 +70,48 @@ class TurnFinder {
   }
 
   /// Takes the rays of before to those of now.
-  static Eigen::Matrix3d rotation(std::vector<Pair> pairs) {
+  static Eigen::Matrix3d rotation(const std::vector<Pair>& pairs) {
+    Eigen::Matrix3d R = rotation_of_far(pairs);
+    std::vector<Eigen::Vector3d> normals(pairs.size());
+    std::vector<double> sizes(pairs.size());
+    const auto median = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    Eigen::Vector3d t = Eigen::Vector3d::Zero();  // the direction in which all have moved
+    constexpr int kSteps = 10;
+    for (int step = 0; step < kSteps; ++step) {
+      Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        normals[i] = pairs[i].now.cross(R * pairs[i].before);
+        const double e = t.dot(normals[i]);
+        const double w = step == 0 ? 1. : 1. / (1. + e * e / (4. * *median * *median + 1e-20));
+        M += w * normals[i] * normals[i].transpose();
+      }
+      t = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(M).eigenvectors().col(0);
+      std::transform(normals.begin(), normals.end(), sizes.begin(),
+                     [&t](const Eigen::Vector3d& n) { return std::abs(t.dot(n)); });
+      std::nth_element(sizes.begin(), median, sizes.end());
+      // Unknown are a turn, and the two angles of t.
+      const Eigen::Vector3d across = t.unitOrthogonal(), other = t.cross(across);
+      Eigen::Matrix<double, 5, 5> N = Eigen::Matrix<double, 5, 5>::Zero();
+      Eigen::Matrix<double, 5, 1> h = Eigen::Matrix<double, 5, 1>::Zero(), J;
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        const double e = t.dot(normals[i]);
+        const double w = 1. / (1. + e * e / (4. * *median * *median + 1e-20));
+        J << (R * pairs[i].before).cross(t.cross(pairs[i].now)), across.dot(normals[i]),
+            other.dot(normals[i]);
+        N += w * J * J.transpose();
+        h += w * e * J;
+      }
+      N.diagonal().array() += 1e-9 * N.trace();
+      const Eigen::Vector3d turn = -N.ldlt().solve(h).head<3>();
+      if (!turn.allFinite()) break;
+      R = exp_so3(turn) * R;
+      if (turn.norm() < 1e-7) break;
+    }
+    return R;
+  }
+
+  /// As if none had moved. What is near did: those that fit worst are left out, twice.
+  static Eigen::Matrix3d rotation_of_far(std::vector<Pair> pairs) {
     Eigen::Matrix3d R = best(pairs);
     for (int round = 0; round < 2; ++round) {
       const auto off = [&](const Pair& pair) { return (pair.now - R * pair.before).squaredNorm(); };

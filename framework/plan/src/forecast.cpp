@@ -11,8 +11,8 @@ namespace {
 
 /// 0.0041 rad is 4.1 mrad.
 std::string small(double value, const std::string& unit) {
-  if (unit != "m" && unit != "rad") return significant(value, 2) + (unit.empty() ? "" : " " + unit);
-  return significant(1e3 * value, 2) + " m" + unit;
+  if (unit != "m" && unit != "rad") return significant(value, 3) + (unit.empty() ? "" : " " + unit);
+  return significant(1e3 * value, 3) + " m" + unit;
 }
 
 }  // namespace
