@@ -302,10 +302,9 @@ void check_camera_clocks(const Recording& recording, Findings& out) {
                      "too little rotation to compare its clock with " + imu});
       continue;
     }
-    // It turned from one instant to another, however long that took.
     Finding clock =
         clock_finding(label, {"clock", "clock", "timeshift_cam_imu", imu, prior.camera.t_CtoI_s},
-                      *lag, prior.sigma_clock_s, period_of(gyro));
+                      *lag, prior.sigma_clock_s, std::max(period_of(gyro), period_of(turns)));
     clock.figures.push_back({"points in two images", eval::median(camera.points), ""});
     clock.figures.push_back({"angle to calibration", angle, "deg"});
     if (clock.severity == Severity::kFault) {
