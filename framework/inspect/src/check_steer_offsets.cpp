@@ -20,6 +20,13 @@ namespace {
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
+bool moves(const EncoderSample& sample) {
+  constexpr double kMoves_rad_per_s = 0.1;
+  const auto& rates = sample.drive_rad_per_s;
+  return std::any_of(rates.begin(), rates.begin() + sample.n_drive,
+                     [](double r) { return std::abs(r) > kMoves_rad_per_s; });
+}
+
 /// The contradictions of the wheels as a function of constants that are added to their steering
 /// angles, of any kinematic model: its rows alone are asked.
 class Offsets {
@@ -30,15 +37,9 @@ class Offsets {
     solver_.set_intrinsics(wheels.prior.wheels.x_WI);
     // Those that move: a base at rest contradicts nothing.
     constexpr std::size_t kMost = 1500;
-    constexpr double kMoves_rad_per_s = 0.1;
     std::vector<const EncoderSample*> moving;
     for (const EncoderSample& sample : wheels.samples) {
-      const auto& rates = sample.drive_rad_per_s;
-      const auto end = rates.begin() + sample.n_drive;
-      if (std::any_of(rates.begin(), end,
-                      [](double r) { return std::abs(r) > kMoves_rad_per_s; })) {
-        moving.push_back(&sample);
-      }
+      if (moves(sample)) moving.push_back(&sample);
     }
     const std::size_t stride = std::max<std::size_t>(1, moving.size() / kMost);
     for (std::size_t i = 0; i < moving.size(); i += stride) {
@@ -210,20 +211,23 @@ double prior_of_angles(const Wheels& wheels) {
   return prior;
 }
 
-/// Whether the angles go from one to the next, as what is steered does, and noise does not.
+/// Whether the angles go from one to the next while the base moves, as what is steered does, and
+/// noise does not.
 bool go_on(const Wheels& wheels) {
   double steps = 0., varies = 0.;
-  const auto& samples = wheels.samples;
-  const auto n = static_cast<double>(samples.size());
   for (std::size_t i = 0; i < static_cast<std::size_t>(wheels.model->description().n_steer); ++i) {
-    double sum = 0., squares = 0.;
-    for (std::size_t k = 0; k < samples.size(); ++k) {
-      const double angle = samples[k].steer_rad[i];
+    double n = 0., sum = 0., squares = 0.;
+    const EncoderSample* before = nullptr;
+    for (const EncoderSample& sample : wheels.samples) {
+      if (!moves(sample)) continue;
+      const double angle = sample.steer_rad[i];
+      n += 1.;
       sum += angle;
       squares += angle * angle;
-      if (k > 0) steps += std::pow(angle - samples[k - 1].steer_rad[i], 2);
+      if (before != nullptr) steps += std::pow(angle - before->steer_rad[i], 2);
+      before = &sample;
     }
-    varies += squares - sum * sum / n;
+    if (n > 0.) varies += squares - sum * sum / n;
   }
   constexpr double kWhite = 2., kPart = 0.1;
   return steps < kPart * kWhite * varies;

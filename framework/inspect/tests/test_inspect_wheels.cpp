@@ -103,32 +103,6 @@ TEST(InspectWheels, FindsSmallSteeringAnglesInDegrees) {
   EXPECT_THAT(faults_of(car), ::testing::Not(IsEmpty()));
 }
 
-// Nearly straight on: no steering at all would fit as well as degrees do.
-TEST(InspectWheels, FindsSteeringInDegreesOfACarThatHardlySteers) {
-  const auto car = [] {
-    return simulated("viwo_ackermann",
-                     {"placeholders.motion=straight", "sensors.simulator0.duration_s=30"});
-  };
-  const auto swings = [](double unit) {
-    return [unit](EncoderSample& s) {
-      const double way = 0.002 * std::sin(1e-9 * static_cast<double>(s.t_ns));
-      for (double& angle : s.steer_rad) angle = unit * (angle + way);
-    };
-  };
-  EXPECT_THAT(faults_of(with_wheels(car(), swings(1.))), IsEmpty());
-  const Inspection degrees = with_wheels(car(), swings(180. / std::numbers::pi));
-  EXPECT_THAT(faults_of(degrees), ElementsAre("wheels0 steering"));
-  EXPECT_THAT(finding_of(degrees, "wheels0", "steering").what, HasSubstr("in degrees"));
-  // Noise is none.
-  std::mt19937 random(1);
-  std::normal_distribution<double> draw(0., 0.08);
-  const Inspection noisy = with_wheels(car(), [&](EncoderSample& s) {
-    for (double& angle : s.steer_rad) angle += draw(random);
-  });
-  EXPECT_THAT(faults_of(noisy), ::testing::Not(Contains("wheels0 steering")));
-  EXPECT_THAT(faults_of(noisy), Contains("wheels0 sigma_steer_rad"));
-}
-
 TEST(InspectWheels, TellsThatTheyContradictEachOtherWhereNothingMendsIt) {
   const Inspection swapped = with_wheels(swerve(), [](EncoderSample& s) {
     if (s.t_ns < 20'000'000'000) return;
