@@ -42,10 +42,8 @@ bool has_pixels(const CameraImage& camera);
 /// Of the image of a camera: that of its pixels, if there are any.
 cv::Size image_size(const CameraImage& camera);
 
-/// Of a point that has been seen in so many images in a row.
+/// Of a point that has been seen in so many images in a row; the last one from kLongTrack on.
 cv::Scalar track_colour(int images);
-/// Longer tracks have the last colour.
-inline constexpr int kLongTrack = 40;
 
 inline constexpr double kTextScale = 0.42;
 enum class TextAt { kLeft, kRight };  ///< end of the text that `x` is at

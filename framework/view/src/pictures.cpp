@@ -165,7 +165,7 @@ void RunPictures::see(std::span<const FeatureSample> images) {
     const auto index = static_cast<std::size_t>(image.camera);
     if (index >= cameras_.size()) continue;
     cameras_[index].t_ns = image.t_ns;
-    cameras_[index].tracks.add(image.points);
+    cameras_[index].seen.add(image.points);
     seen_ = true;
   }
 }
@@ -255,7 +255,7 @@ view::CameraImage RunPictures::camera_image(std::size_t index) {
   image.name = "cam" + std::to_string(index);
   image.width_px = model.width_px;
   image.height_px = model.height_px;
-  image.tracks = camera.tracks.tracks();
+  image.tracks = camera.seen.tracks().tracks();
   const auto source = source_of(index);
   if (source == nullptr) return image;
   try {
@@ -306,7 +306,7 @@ std::vector<view::Curve> RunPictures::curves_of(const RunResult& result) const {
 std::string RunPictures::status_of(const RunResult& result) const {
   const double t_s = result.epoch_t_s.back();
   std::size_t points = 0;
-  for (const Camera& camera : cameras_) points += camera.tracks.tracks().size();
+  for (const Camera& camera : cameras_) points += camera.seen.points().size();
   std::string text = significant(std::round(100. * t_s) / 100., 7) + " s, " +
                      std::to_string(points) + " points, position sigma " +
                      significant(1e3 * sigma_position_m_, 3) + " mm";

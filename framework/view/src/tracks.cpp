@@ -27,4 +27,21 @@ void Tracks::add(std::span<const FeaturePoint> points) {
   tracks_ = std::move(now);
 }
 
+void RecentImages::add(std::span<const FeaturePoint> points) {
+  images_[n_++ % images_.size()].assign(points.begin(), points.end());
+}
+
+std::span<const FeaturePoint> RecentImages::points() const {
+  if (n_ == 0) return {};
+  return images_[(n_ - 1) % images_.size()];
+}
+
+Tracks RecentImages::tracks() const {
+  Tracks tracks;
+  for (std::size_t i = n_ - std::min(n_, images_.size()); i < n_; ++i) {
+    tracks.add(images_[i % images_.size()]);
+  }
+  return tracks;
+}
+
 }  // namespace viwo::view

@@ -319,5 +319,33 @@ TEST(Tracks, CountImagesInARowAndKeepTheLastPlaces) {
   EXPECT_TRUE(tracks.tracks().empty());
 }
 
+TEST(RecentImages, MakeTheTracksOfAllImagesButForTheCountOfLongOnes) {
+  Tracks all;
+  RecentImages recent;
+  EXPECT_TRUE(recent.points().empty());
+  EXPECT_TRUE(recent.tracks().tracks().empty());
+  for (int i = 0; i < 100; ++i) {
+    // One is always there, others come for i, 7 or 50 images.
+    std::vector<FeaturePoint> points{{1000, 1. * i, 2. * i}, {2000 + i / 7, 3. * i, i % 5 * 1.}};
+    points.push_back({3000 + i / 50, 4. * i, 5.});
+    points.push_back({i, 5., 6.});
+    all.add(points);
+    recent.add(points);
+    EXPECT_EQ(recent.points().size(), points.size());
+    const Tracks made = recent.tracks();
+    ASSERT_EQ(made.tracks().size(), all.tracks().size());
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const Track &expected = all.tracks()[k], &track = made.tracks()[k];
+      EXPECT_EQ(track.id, expected.id);
+      EXPECT_EQ(track.images, std::min(expected.images, kLongTrack));
+      ASSERT_EQ(track.trail.size(), expected.trail.size());
+      for (std::size_t n = 0; n < track.trail.size(); ++n) {
+        EXPECT_EQ(track.trail[n].u_px, expected.trail[n].u_px);
+        EXPECT_EQ(track.trail[n].v_px, expected.trail[n].v_px);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace viwo::view

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <thread>
 #include <utility>
@@ -12,6 +13,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "allocations.hpp"
 #include "sensors_in_memory.hpp"
 #include "simulated.hpp"
 #include "viwo/results/run_output.hpp"
@@ -48,15 +50,15 @@ std::string late_camera() {
 }
 
 /// The simulated robot, which gives tracks; a sensor 'cameras' may give the images to them.
-RunSetup driving(const std::string& start = "reference") {
+RunSetup driving(const std::string& start = "reference", int duration_s = 4) {
   const std::string robot = std::string("{type: four_wis_wid, ") + testing::kSwerve + "}";
   const std::string cameras = late_camera();
   const config::Node run = config::parse(
-      "sensors: {sim: {type: simulator, motion: sweep_then_straight, duration_s: 4, features: 40, "
-      "cameras: " +
-          cameras + ", robot: " + robot + "}}\nkinematics: " + robot +
-          "\ncameras: {kalibr: " + cameras + "}\nestimator: {start: " + start +
-          "}\nupdates: {visual_features: {}, wheel_odometry: {}}\n",
+      "sensors: {sim: {type: simulator, motion: sweep_then_straight, features: 40, "
+      "duration_s: " +
+          std::to_string(duration_s) + ", cameras: " + cameras + ", robot: " + robot +
+          "}}\nkinematics: " + robot + "\ncameras: {kalibr: " + cameras + "}\nestimator: {start: " +
+          start + "}\nupdates: {visual_features: {}, wheel_odometry: {}}\n",
       "run.yaml");
   RunSetup setup = read_run(run, registry(), 1);
   setup.routes = testing::routes_for(setup, {{"sim", setup.sensors.front().sensor.object->yields()},
@@ -137,6 +139,42 @@ TEST(Pictures, ChangeNothingInTheResults) {
   ASSERT_EQ(with.result.status, RunStatus::kOk);
   EXPECT_GT(with.result.epochs, 30);
   EXPECT_TRUE(results_of(with.result) == results_of(without));
+}
+
+/// Counts what the pictures take from the heap within the epochs of a filter.
+class Counting final : public EstimatorObserver {
+ public:
+  explicit Counting(view::RunPictures& pictures) : pictures_(pictures) {}
+  void on_epoch(const Filter& filter, const EpochData& data) override {
+    const long before = testing::allocations();
+    pictures_.on_epoch(filter, data);
+    const long allocated = testing::allocations() - before;
+    allocations_.push_back(allocated);
+  }
+  const std::vector<long>& allocations() const { return allocations_; }
+
+ private:
+  view::RunPictures& pictures_;
+  std::vector<long> allocations_;
+};
+
+TEST(Pictures, TakeNothingFromTheHeapWithinAnEpochOfTheSteadyState) {
+  if (!testing::counts_allocations()) GTEST_SKIP() << "malloc belongs to the sanitizer";
+  RunSetup setup = driving("reference", 12);
+  const RunData data = collect(setup);
+  view::RunPictures pictures(setup, data, {});
+  Counting counting(pictures);
+  RunHooks hooks;
+  pictures.watch(hooks);
+  hooks.on_start = [&](const Estimator&) { return &counting; };
+  RunResult result = run_filter(setup, data, hooks);
+  EXPECT_EQ(pictures.finish(result), "");
+  EXPECT_EQ(result.pictures.size(), 3U);
+  // Forty images of each camera, then an image may have more points than all before it had.
+  const auto& counted = counting.allocations();
+  ASSERT_GT(counted.size(), 100U);
+  EXPECT_GT(std::accumulate(counted.begin(), counted.begin() + 40, 0L), 0);
+  EXPECT_LT(std::accumulate(counted.begin() + 50, counted.end(), 0L), 10);
 }
 
 TEST(Pictures, AreOfTheBeginningTheMiddleAndTheEnd) {

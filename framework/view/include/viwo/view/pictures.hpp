@@ -47,7 +47,7 @@ class RunPictures final : public EstimatorObserver {
   /// What one camera saw last.
   struct Camera {
     std::optional<std::int64_t> t_ns;  ///< in its clock; nothing: no image yet
-    view::Tracks tracks;
+    RecentImages seen;
     Image pixels;
     std::vector<ImageSample> images;  ///< of a recorded run, in time order
   };

@@ -1,6 +1,7 @@
 // The tracked points of one camera with the way that each has come in its image.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -12,6 +13,8 @@ namespace viwo::view {
 
 /// Images over which the trail of a point goes back.
 inline constexpr std::size_t kTrailImages = 10;
+/// Tracks of as many images, and longer ones, look the same.
+inline constexpr int kLongTrack = 40;
 
 struct TrailPoint {
   double u_px = 0.;
@@ -34,6 +37,24 @@ class Tracks {
 
  private:
   std::vector<Track> tracks_;
+};
+
+/// The points of the last images of one camera. Keeping them is all that is done for each image,
+/// and allocates nothing once there was room for as many points; tracks are made when they are
+/// wanted.
+class RecentImages {
+ public:
+  /// The points of the next image.
+  void add(std::span<const FeaturePoint> points);
+  /// Of the newest image.
+  std::span<const FeaturePoint> points() const;
+  /// Tracks of the newest image as Tracks makes them of all images, but for the count of images,
+  /// which goes to kLongTrack.
+  Tracks tracks() const;
+
+ private:
+  std::array<std::vector<FeaturePoint>, kLongTrack> images_;  ///< a ring
+  std::size_t n_ = 0;                                         ///< images so far
 };
 
 }  // namespace viwo::view
