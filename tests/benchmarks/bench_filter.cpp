@@ -16,7 +16,7 @@ namespace {
 
 const char* const kPerEpoch = "time_per_epoch";
 const std::string kReference = "reference: 512 x 512 matrix product";
-constexpr std::int64_t kWarmUpEpochs = 30;  // until the window is full
+constexpr std::int64_t kWarmUpEpochs = 100;  // until the window is full: it grows slowly
 
 /// What of the simulated robot is used.
 struct Variant {
@@ -25,12 +25,19 @@ struct Variant {
   int cameras;
   int max_features;  ///< tracks that are used in one epoch
   bool wheels;
+  bool calibrates = false;  ///< the cameras
+  int clones = 11;
 };
 // Few long tracks, as in an indoor scene; and images with more tracks that end than are used.
 constexpr Variant kVariants[] = {{"mono, about 23 features", 230, 1, 100, false},
                                  {"mono, 100 features", 1400, 1, 100, false},
                                  {"stereo, 100 features", 1400, 2, 100, false},
-                                 {"stereo, 100 features, wheels", 1400, 2, 100, true}};
+                                 {"stereo, 100 features, wheels", 1400, 2, 100, true},
+                                 {"mono, cameras calibrated", 230, 1, 100, false, true},
+                                 {"stereo, cameras calibrated", 230, 2, 100, false, true},
+                                 {"stereo, about 23 features", 230, 2, 100, false},
+                                 {"mono, 30 clones", 230, 1, 100, false, false, 30},
+                                 {"stereo, 30 clones", 230, 2, 100, false, false, 30}};
 
 /// A minute of measurements, and estimators that run over them.
 class Runs {
@@ -40,6 +47,8 @@ class Runs {
     assignments_ = {"sensors.simulator0.features=" + number(variant.features),
                     "sensors.simulator0.n_cameras=" + number(variant.cameras),
                     "cameras.use=" + number(variant.cameras),
+                    std::string("cameras.calibrate=") + (variant.calibrates ? "true" : "false"),
+                    "estimator.clones=" + number(variant.clones),
                     "updates.visual_features.max_features=" + number(variant.max_features)};
     if (!variant.wheels) {
       assignments_.emplace_back("updates.wheel_odometry.enabled=false");

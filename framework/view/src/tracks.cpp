@@ -28,6 +28,9 @@ void Tracks::add(std::span<const FeaturePoint> points) {
 }
 
 void RecentImages::add(std::span<const FeaturePoint> points) {
+  if (points.size() > images_.front().capacity()) {
+    for (auto& image : images_) image.reserve(2 * points.size());
+  }
   images_[n_++ % images_.size()].assign(points.begin(), points.end());
 }
 

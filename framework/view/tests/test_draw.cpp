@@ -1,4 +1,5 @@
 // What is drawn where, against places computed here.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>

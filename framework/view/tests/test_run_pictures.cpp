@@ -170,11 +170,10 @@ TEST(Pictures, TakeNothingFromTheHeapWithinAnEpochOfTheSteadyState) {
   RunResult result = run_filter(setup, data, hooks);
   EXPECT_EQ(pictures.finish(result), "");
   EXPECT_EQ(result.pictures.size(), 3U);
-  // Forty images of each camera, then an image may have more points than all before it had.
   const auto& counted = counting.allocations();
   ASSERT_GT(counted.size(), 100U);
-  EXPECT_GT(std::accumulate(counted.begin(), counted.begin() + 40, 0L), 0);
-  EXPECT_LT(std::accumulate(counted.begin() + 50, counted.end(), 0L), 10);
+  EXPECT_GT(counted.front(), 0) << "room for points";
+  EXPECT_EQ(std::accumulate(counted.begin() + 20, counted.end(), 0L), 0);
 }
 
 TEST(Pictures, AreOfTheBeginningTheMiddleAndTheEnd) {

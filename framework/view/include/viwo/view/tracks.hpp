@@ -39,9 +39,9 @@ class Tracks {
   std::vector<Track> tracks_;
 };
 
-/// The points of the last images of one camera. Keeping them is all that is done for each image,
-/// and allocates nothing once there was room for as many points; tracks are made when they are
-/// wanted.
+/// The points of the last images of one camera. Keeping them is all that is done for each image; it
+/// allocates nothing unless there are twice as many points as ever before. Tracks are made when
+/// they are wanted.
 class RecentImages {
  public:
   /// The points of the next image.
