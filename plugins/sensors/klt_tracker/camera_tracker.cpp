@@ -5,36 +5,27 @@
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
-#include <opencv2/video/tracking.hpp>
 
+#include "flow.hpp"
 #include "ray_ransac.hpp"
 #include "viwo/camera/camera_model.hpp"
 
 namespace viwo::klt {
 namespace {
 
-constexpr int kFlowSteps = 30;
-constexpr double kFlowStepPx = 0.01;
 /// A point that correlates less with what it was when it was found is another one, or hidden.
 constexpr float kMinAlike = 0.7F;
 constexpr float kMaxRefinePx = 3.F;
 
 }  // namespace
 
-void lucas_kanade(const Frame& from, const Frame& to, const TrackerOptions& options, int levels,
-                  const std::vector<cv::Point2f>& from_points, std::vector<cv::Point2f>& to_points,
-                  std::vector<std::uint8_t>& status, std::vector<float>& error) {
-  cv::calcOpticalFlowPyrLK(
-      from.pyramid, to.pyramid, from_points, to_points, status, error,
-      cv::Size(options.win_size, options.win_size), levels,
-      cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kFlowSteps, kFlowStepPx),
-      cv::OPTFLOW_USE_INITIAL_FLOW);
-}
-
-bool refine_point(const Patch& patch, const Frame& frame, cv::Point2f& uv, Eigen::Matrix2f& A) {
+bool find_track(const Track& track, const Frame& from, const Frame& to,
+                const TrackerOptions& options, int highest, cv::Point2f& uv, Eigen::Matrix2f& A) {
+  if (!follow_window(from, to, options, highest, track.uv, uv)) return false;
+  if (track.patch == nullptr) return true;
   const Eigen::Vector2f guess(uv.x, uv.y);
   PatchPose pose{guess, A};
-  const float alike = patch.fit(frame.image(), pose);
+  const float alike = track.patch->fit(to.image, pose);
   if (alike < kMinAlike || !((pose.u - guess).norm() < kMaxRefinePx)) return false;
   uv = cv::Point2f(pose.u.x(), pose.u.y());
   A = pose.A;
@@ -49,44 +40,25 @@ CameraTracker::CameraTracker(const CameraView& camera, const TrackerOptions& opt
       seed_(seed),
       focal_px_(focal_px(camera)) {}
 
-void CameraTracker::flow(const Frame& from, const Frame& to, double dt_s) {
-  const std::size_t n = tracks_.size();
-  old_.resize(n);
-  now_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    old_[i] = tracks_[i].uv;
+bool CameraTracker::find(const Frame& from, const Frame& to, double dt_s, std::size_t i) {
+  Track& track = tracks_[i];
+  const auto search = [&](const cv::Point2f& guess, int highest) {
+    now_[i] = guess;
+    Eigen::Matrix2f A = track.A;
+    if (!find_track(track, from, to, options_, highest, now_[i], A)) return false;
+    const auto ray = detector_.ray_at(now_[i]);
+    if (!ray) return false;
+    rays_[i] = *ray;
+    track.A = A;
+    return true;
+  };
+  if (track.has_velocity) {
     const cv::Point2f predicted =
-        old_[i] + tracks_[i].velocity_px_per_s * static_cast<float>(dt_s);  // (KLT-2)
-    now_[i] = tracks_[i].has_velocity && detector_.usable(predicted) ? predicted : old_[i];
+        track.uv + track.velocity_px_per_s * static_cast<float>(dt_s);  // (KLT-2)
+    if (detector_.inside(predicted) && search(predicted, kLevelOfGuess)) return true;
   }
-  lucas_kanade(from, to, options_, options_.pyr_levels, old_, now_, status_, error_);
-
-  // A camera that starts or stops turning: once more without prediction.
-  std::vector<std::size_t> again;
-  std::vector<cv::Point2f> starts;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (status_[i] != 0 || !tracks_[i].has_velocity) continue;
-    again.push_back(i);
-    starts.push_back(old_[i]);
-  }
-  if (again.empty()) return;
-  std::vector<cv::Point2f> ends = starts;
-  lucas_kanade(from, to, options_, options_.pyr_levels, starts, ends, step_status_, error_);
-  for (std::size_t k = 0; k < again.size(); ++k) {
-    status_[again[k]] = step_status_[k];
-    now_[again[k]] = ends[k];
-  }
-}
-
-void CameraTracker::refine(const Frame& to) {
-  const auto n = static_cast<int>(tracks_.size());
-  cv::parallel_for_(cv::Range(0, n), [&](const cv::Range& range) {
-    for (int k = range.start; k < range.end; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      if (status_[i] == 0 || tracks_[i].patch == nullptr) continue;
-      if (!refine_point(*tracks_[i].patch, to, now_[i], tracks_[i].A)) status_[i] = 0;
-    }
-  });
+  // New, or a camera that starts or stops turning.
+  return search(track.uv, options_.pyr_levels);
 }
 
 void CameraTracker::check_epipolar() {
@@ -110,12 +82,12 @@ void CameraTracker::keep(double dt_s) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     if (status_[i] == 0 || !spacing.add_if_free(now_[i])) continue;
-    Track track = tracks_[i];
-    track.velocity_px_per_s = (now_[i] - old_[i]) * static_cast<float>(1. / dt_s);
+    Track track = std::move(tracks_[i]);
+    track.velocity_px_per_s = (now_[i] - track.uv) * static_cast<float>(1. / dt_s);
     track.has_velocity = true;
     track.uv = now_[i];
     track.ray = rays_[i];
-    tracks_[kept++] = track;
+    tracks_[kept++] = std::move(track);
   }
   tracks_.resize(kept);
 }
@@ -123,17 +95,16 @@ void CameraTracker::keep(double dt_s) {
 void CameraTracker::follow(const Frame& from, const Frame& to, double dt_s) {
   ++images_;
   if (tracks_.empty()) return;
-  flow(from, to, dt_s);
-  if (options_.refine) refine(to);
-  rays_.resize(tracks_.size());
-  for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    if (status_[i] == 0) continue;
-    if (!detector_.usable(now_[i])) {
-      status_[i] = 0;
-      continue;
+  const std::size_t n = tracks_.size();
+  now_.resize(n);
+  rays_.resize(n);
+  status_.resize(n);
+  cv::parallel_for_(cv::Range(0, static_cast<int>(n)), [&](const cv::Range& range) {
+    for (int k = range.start; k < range.end; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      status_[i] = find(from, to, dt_s, i) ? 1 : 0;
     }
-    rays_[i] = unproject(camera_, Eigen::Vector2d(now_[i].x, now_[i].y)).value();
-  }
+  });
   if (options_.ransac) check_epipolar();
   keep(dt_s);
 }
@@ -148,8 +119,7 @@ void CameraTracker::refill(const Frame& frame) {
     track.uv = points[i];
     track.ray = unproject(camera_, Eigen::Vector2d(points[i].x, points[i].y)).value();
     if (options_.refine) {
-      track.patch =
-          std::make_shared<Patch>(frame.image(), Eigen::Vector2f(points[i].x, points[i].y));
+      track.patch = std::make_shared<Patch>(frame.image, Eigen::Vector2f(points[i].x, points[i].y));
     }
     tracks_.push_back(track);
   }

@@ -41,7 +41,7 @@ class CameraTracker {
                 std::uint64_t seed);
 
   /// Follows all points from one image to the next, `dt_s` later; what cannot be followed ends.
-  /// Both frames not blank, `from` with derivatives.
+  /// Both frames not blank.
   void follow(const Frame& from, const Frame& to, double dt_s);
   /// Adds new points (id -1) where there are too few.
   void refill(const Frame& frame);
@@ -51,10 +51,8 @@ class CameraTracker {
   std::vector<Track>& tracks() { return tracks_; }
 
  private:
-  /// Lucas-Kanade from `old_` to `now_`, first from the predicted place; fills `status_`.
-  void flow(const Frame& from, const Frame& to, double dt_s);
-  /// To where the points look as they did when they were found.
-  void refine(const Frame& to);
+  /// Where a point is in the next image, first near the predicted place; fills `status_`.
+  bool find(const Frame& from, const Frame& to, double dt_s, std::size_t track);
   void check_epipolar();
   /// The tracks that are left, at their new places.
   void keep(double dt_s);
@@ -67,20 +65,19 @@ class CameraTracker {
   double focal_px_;
   std::vector<Track> tracks_;
   // Per track, while it is followed; storage is used again.
-  std::vector<cv::Point2f> old_, now_;
-  std::vector<std::uint8_t> status_, step_status_;
-  std::vector<float> error_;
+  std::vector<cv::Point2f> now_;
+  std::vector<std::uint8_t> status_;
   std::vector<Eigen::Vector3d> rays_;
 };
 
-/// One call of OpenCV's Lucas-Kanade: `to_points` holds the first guesses and gets the results.
-void lucas_kanade(const Frame& from, const Frame& to, const TrackerOptions& options, int levels,
-                  const std::vector<cv::Point2f>& from_points, std::vector<cv::Point2f>& to_points,
-                  std::vector<std::uint8_t>& status, std::vector<float>& error);
+/// Looks for a track of `from` in another frame: Lucas-Kanade from level `highest` down, then, with
+/// refinement, to where the point looks as it did when it was found. `uv` and `A` are the first
+/// guesses and get the results; false when it is not there.
+bool find_track(const Track& track, const Frame& from, const Frame& to,
+                const TrackerOptions& options, int highest, cv::Point2f& uv, Eigen::Matrix2f& A);
 
-/// Moves a point from next to it to where it looks as it did when it was found. False when it does
-/// not look like that there.
-bool refine_point(const Patch& patch, const Frame& frame, cv::Point2f& uv, Eigen::Matrix2f& A);
+/// Level that is high enough where a place is expected to within a few pixels.
+inline constexpr int kLevelOfGuess = 2;
 
 /// What an angle next to the axis is in pixels.
 inline double focal_px(const CameraView& camera) {

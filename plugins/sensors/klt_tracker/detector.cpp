@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <tuple>
 #include <utility>
 
@@ -21,29 +22,33 @@ constexpr int kFastRadius = 3;
 constexpr int kCandidatesPerPoint = 8;
 /// Half of the side of the window that a corner is scored in, px.
 constexpr int kScoreRadius = 3;
-/// Gain of the derivatives in a pyramid: grey levels per pixel times this.
-constexpr float kDerivativeGain = 32.F;
+/// Points that may be missing, as one part of so many, before cells that lack few of them are
+/// looked at.
+constexpr int kMissingParts = 50;
 /// A corner has at least this mean square gradient in its weakest direction, (grey levels / px)^2:
 /// above the noise of usual images.
 constexpr float kMinScore = 4.F;
 constexpr int kRefineRadius = 3;
 
-/// Smaller eigenvalue of the mean structure tensor around a pixel, (KLT-1).
-float cornerness(const cv::Mat& derivatives, const cv::Point& at) {
-  float xx = 0.F, xy = 0.F, yy = 0.F;
+/// Smaller eigenvalue of the mean structure tensor around a pixel, (KLT-1); gradients by Scharr.
+float cornerness(const cv::Mat& image, const cv::Point& at) {
+  std::int64_t xx = 0, xy = 0, yy = 0;
   for (int y = at.y - kScoreRadius; y <= at.y + kScoreRadius; ++y) {
-    const auto* row = derivatives.ptr<cv::Vec2s>(y);
+    const std::uint8_t *above = image.ptr(y - 1), *row = image.ptr(y), *below = image.ptr(y + 1);
     for (int x = at.x - kScoreRadius; x <= at.x + kScoreRadius; ++x) {
-      const auto dx = static_cast<float>(row[x][0]), dy = static_cast<float>(row[x][1]);
+      const int falling = below[x + 1] - above[x - 1], rising = above[x + 1] - below[x - 1];
+      const int dx = 3 * (falling + rising) + 10 * (row[x + 1] - row[x - 1]);
+      const int dy = 3 * (falling - rising) + 10 * (below[x] - above[x]);
       xx += dx * dx;
       xy += dx * dy;
       yy += dy * dy;
     }
   }
-  constexpr float kSide = 2 * kScoreRadius + 1;
-  constexpr float kScale = 1.F / (kSide * kSide * kDerivativeGain * kDerivativeGain);
-  const float difference = xx - yy;
-  return 0.5F * kScale * (xx + yy - std::sqrt(difference * difference + 4.F * xy * xy));
+  constexpr float kSide = 2 * kScoreRadius + 1, kGain = 32.F;
+  constexpr float kScale = 1.F / (kSide * kSide * kGain * kGain);
+  const auto sum = static_cast<float>(xx + yy), difference = static_cast<float>(xx - yy);
+  const auto product = static_cast<float>(2 * xy);
+  return 0.5F * kScale * (sum - std::sqrt(difference * difference + product * product));
 }
 
 }  // namespace
@@ -52,23 +57,38 @@ Spacing::Spacing(cv::Size image, float distance_px)
     : distance_px_(std::max(distance_px, 1.F)),
       columns_(static_cast<int>(static_cast<float>(image.width) / distance_px_) + 1),
       rows_(static_cast<int>(static_cast<float>(image.height) / distance_px_) + 1),
-      buckets_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {}
+      first_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), kNone) {}
 
-bool Spacing::add_if_free(const cv::Point2f& uv) {
-  const int column = std::clamp(static_cast<int>(uv.x / distance_px_), 0, columns_ - 1);
-  const int row = std::clamp(static_cast<int>(uv.y / distance_px_), 0, rows_ - 1);
-  const auto bucket = [this](int r, int c) -> std::vector<cv::Point2f>& {
-    return buckets_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
-                    static_cast<std::size_t>(c)];
-  };
-  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r) {
-    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c) {
-      for (const cv::Point2f& other : bucket(r, c)) {
-        if ((other - uv).dot(other - uv) < distance_px_ * distance_px_) return false;
+cv::Point Spacing::bucket_of(const cv::Point2f& uv) const {
+  return {std::clamp(static_cast<int>(uv.x / distance_px_), 0, columns_ - 1),
+          std::clamp(static_cast<int>(uv.y / distance_px_), 0, rows_ - 1)};
+}
+
+int& Spacing::first_of(const cv::Point& bucket) {
+  return first_[static_cast<std::size_t>(bucket.y) * static_cast<std::size_t>(columns_) +
+                static_cast<std::size_t>(bucket.x)];
+}
+
+bool Spacing::is_free(const cv::Point2f& uv) const {
+  const cv::Point at = bucket_of(uv);
+  for (int r = std::max(at.y - 1, 0); r <= std::min(at.y + 1, rows_ - 1); ++r) {
+    for (int c = std::max(at.x - 1, 0); c <= std::min(at.x + 1, columns_ - 1); ++c) {
+      int i = first_[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
+                     static_cast<std::size_t>(c)];
+      for (; i != kNone; i = points_[static_cast<std::size_t>(i)].next) {
+        const cv::Point2f apart = points_[static_cast<std::size_t>(i)].uv - uv;
+        if (apart.dot(apart) < distance_px_ * distance_px_) return false;
       }
     }
   }
-  bucket(row, column).push_back(uv);
+  return true;
+}
+
+bool Spacing::add_if_free(const cv::Point2f& uv) {
+  if (!is_free(uv)) return false;
+  int& first = first_of(bucket_of(uv));
+  points_.push_back({uv, first});
+  first = static_cast<int>(points_.size()) - 1;
   return true;
 }
 
@@ -84,14 +104,15 @@ bool Detector::masked(const cv::Point& at) const {
   return !mask_.empty() && mask_.at<uchar>(at) != 0;
 }
 
-bool Detector::usable(const cv::Point2f& uv) const {
+bool Detector::inside(const cv::Point2f& uv) const {
   const auto border = static_cast<float>(border_px(options_));
-  if (!(uv.x >= border && uv.y >= border && uv.x <= static_cast<float>(size_.width - 1) - border &&
-        uv.y <= static_cast<float>(size_.height - 1) - border)) {
-    return false;
-  }
-  if (masked({cvRound(uv.x), cvRound(uv.y)})) return false;
-  return unproject(camera_, Eigen::Vector2d(uv.x, uv.y)).has_value();
+  return uv.x >= border && uv.y >= border && uv.x <= static_cast<float>(size_.width - 1) - border &&
+         uv.y <= static_cast<float>(size_.height - 1) - border;
+}
+
+std::optional<Eigen::Vector3d> Detector::ray_at(const cv::Point2f& uv) const {
+  if (!inside(uv) || masked({cvRound(uv.x), cvRound(uv.y)})) return std::nullopt;
+  return unproject(camera_, Eigen::Vector2d(uv.x, uv.y));
 }
 
 cv::Rect Detector::cell(int index) const {
@@ -110,13 +131,11 @@ int Detector::cell_of(const cv::Point2f& uv) const {
          part(uv.x, size_.width, options_.grid_x);
 }
 
-std::vector<Detector::Candidate> Detector::candidates(const Frame& frame,
-                                                      const cv::Rect& cell) const {
+void Detector::look_in(const Frame& frame, const Spacing& spacing, Lacking& lacking) const {
   const int border = std::max(border_px(options_), std::max(kFastRadius, kScoreRadius));
   const cv::Rect inner(border, border, size_.width - 2 * border, size_.height - 2 * border);
-  const cv::Rect wanted = cell & inner;
-  std::vector<Candidate> found;
-  if (wanted.empty()) return found;
+  const cv::Rect wanted = cell(lacking.cell) & inner;
+  if (wanted.empty()) return;
   // One pixel more than FAST needs, so that corners next to the edge of a cell have neighbours to
   // be compared with.
   const int margin = kFastRadius + 1;
@@ -124,16 +143,16 @@ std::vector<Detector::Candidate> Detector::candidates(const Frame& frame,
                                  wanted.height + 2 * margin) &
                         cv::Rect(cv::Point(), size_);
   std::vector<cv::KeyPoint> corners;
-  cv::FAST(frame.image()(seen), corners, options_.fast_threshold, /*nonmaxSuppression=*/true);
+  cv::FAST(frame.image(seen), corners, options_.fast_threshold, /*nonmaxSuppression=*/true);
   // First what is not wanted goes: it would take the places of weaker corners that are.
   const auto place = [&seen](const cv::KeyPoint& corner) {
     return cv::Point(cvRound(corner.pt.x) + seen.x, cvRound(corner.pt.y) + seen.y);
   };
   std::erase_if(corners, [&](const cv::KeyPoint& corner) {
     const cv::Point at = place(corner);
-    return !wanted.contains(at) || masked(at);
+    return !wanted.contains(at) || masked(at) || !spacing.is_free(cv::Point2f(at));
   });
-  const auto keep = static_cast<std::size_t>(kCandidatesPerPoint * per_cell_);
+  const auto keep = static_cast<std::size_t>(kCandidatesPerPoint * lacking.points);
   if (corners.size() > keep) {
     std::nth_element(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(keep),
                      corners.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
@@ -142,75 +161,88 @@ std::vector<Detector::Candidate> Detector::candidates(const Frame& frame,
                      });
     corners.resize(keep);
   }
+  std::vector<Candidate>& found = lacking.found;
   for (const cv::KeyPoint& corner : corners) {
     const cv::Point at = place(corner);
-    const Candidate candidate{cv::Point2f(at), cornerness(frame.pyramid[1], at)};
-    if (candidate.score >= kMinScore && usable(candidate.uv)) found.push_back(candidate);
+    const Candidate candidate{cv::Point2f(at), cornerness(frame.image, at)};
+    if (candidate.score >= kMinScore && ray_at(candidate.uv)) found.push_back(candidate);
   }
   std::sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) {
     return std::tuple(-a.score, a.uv.y, a.uv.x) < std::tuple(-b.score, b.uv.y, b.uv.x);
   });
-  return found;
 }
 
 void Detector::refine(const Frame& frame, std::vector<cv::Point2f>& points) const {
   if (points.empty() || !options_.subpixel) return;
   std::vector<cv::Point2f> refined = points;
-  cv::cornerSubPix(frame.image(), refined, cv::Size(kRefineRadius, kRefineRadius), cv::Size(-1, -1),
+  cv::cornerSubPix(frame.image, refined, cv::Size(kRefineRadius, kRefineRadius), cv::Size(-1, -1),
                    cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 10, 0.01));
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (usable(refined[i])) points[i] = refined[i];
+    if (ray_at(refined[i])) points[i] = refined[i];
   }
 }
 
-void Detector::detect(const Frame& frame, std::vector<cv::Point2f>& points) const {
-  const int n_cells = options_.grid_x * options_.grid_y;
-  Spacing spacing(size_, static_cast<float>(options_.min_px_dist));
-  std::vector<int> counts(static_cast<std::size_t>(n_cells), 0);
-  for (const cv::Point2f& uv : points) {
-    spacing.add_if_free(uv);
-    ++counts[static_cast<std::size_t>(cell_of(uv))];
+std::vector<Detector::Lacking> Detector::lacking_cells(
+    const std::vector<cv::Point2f>& points) const {
+  std::vector<int> counts(static_cast<std::size_t>(options_.grid_x * options_.grid_y), 0);
+  for (const cv::Point2f& uv : points) ++counts[static_cast<std::size_t>(cell_of(uv))];
+  std::vector<Lacking> cells;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    if (counts[i] < per_cell_) cells.push_back({static_cast<int>(i), per_cell_ - counts[i]});
   }
-  auto total = static_cast<int>(points.size());
-  struct Lacking {
-    int cell = 0;
-    std::vector<Candidate> found = {};
-    std::size_t next = 0;
-    float best() const { return found.empty() ? 0.F : found.front().score; }
-  };
-  std::vector<Lacking> lacking;
-  for (int i = 0; i < n_cells; ++i) {
-    if (counts[static_cast<std::size_t>(i)] < per_cell_) lacking.push_back({i});
-  }
-  if (lacking.empty() || total >= options_.num_pts) return;
+  std::stable_sort(cells.begin(), cells.end(),
+                   [](const Lacking& a, const Lacking& b) { return a.points > b.points; });
+  return cells;
+}
 
-  cv::parallel_for_(cv::Range(0, static_cast<int>(lacking.size())), [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i) {
-      Lacking& one = lacking[static_cast<std::size_t>(i)];
-      one.found = candidates(frame, cell(one.cell));
-    }
-  });
+std::vector<cv::Point2f> Detector::choose(std::span<Lacking> cells, int wanted, Spacing& spacing) {
   // One point of each cell after the other, beginning where the best ones are: the limit starves
   // the worst cells, and not the last ones of the image.
-  std::sort(lacking.begin(), lacking.end(), [](const Lacking& a, const Lacking& b) {
+  std::sort(cells.begin(), cells.end(), [](const Lacking& a, const Lacking& b) {
     return std::tuple(-a.best(), a.cell) < std::tuple(-b.best(), b.cell);
   });
-  std::vector<cv::Point2f> fresh;
-  for (bool progress = true; progress && total < options_.num_pts;) {
+  std::vector<cv::Point2f> chosen;
+  for (bool progress = true; progress;) {
     progress = false;
-    for (Lacking& one : lacking) {
-      int& count = counts[static_cast<std::size_t>(one.cell)];
-      if (total >= options_.num_pts) break;
-      if (count >= per_cell_) continue;
+    for (Lacking& one : cells) {
+      if (static_cast<int>(chosen.size()) == wanted) return chosen;
+      if (one.points == 0) continue;
       while (one.next < one.found.size() && !spacing.add_if_free(one.found[one.next].uv)) {
         ++one.next;
       }
       if (one.next == one.found.size()) continue;
-      fresh.push_back(one.found[one.next++].uv);
-      ++count;
-      ++total;
+      chosen.push_back(one.found[one.next++].uv);
+      --one.points;
       progress = true;
     }
+  }
+  return chosen;
+}
+
+void Detector::detect(const Frame& frame, std::vector<cv::Point2f>& points) const {
+  Spacing spacing(size_, static_cast<float>(options_.min_px_dist));
+  for (const cv::Point2f& uv : points) spacing.add_if_free(uv);
+  std::vector<Lacking> lacking = lacking_cells(points);
+  int missing = options_.num_pts - static_cast<int>(points.size());
+  std::vector<cv::Point2f> fresh;
+  // As many cells at a time as should do, those that lack as much as the last of them included.
+  for (std::span<Lacking> rest = lacking; !rest.empty() && missing > 0;) {
+    const int enough = missing - options_.num_pts / kMissingParts;
+    if (enough <= 0) break;
+    std::size_t n = 0;
+    for (int sum = 0; n < rest.size(); sum += rest[n++].points) {
+      if (sum >= enough && rest[n].points < rest[n - 1].points) break;
+    }
+    const std::span<Lacking> cells = rest.first(n);
+    rest = rest.subspan(n);
+    cv::parallel_for_(cv::Range(0, static_cast<int>(n)), [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) {
+        look_in(frame, spacing, cells[static_cast<std::size_t>(i)]);
+      }
+    });
+    const std::vector<cv::Point2f> chosen = choose(cells, missing, spacing);
+    missing -= static_cast<int>(chosen.size());
+    fresh.insert(fresh.end(), chosen.begin(), chosen.end());
   }
   refine(frame, fresh);
   points.insert(points.end(), fresh.begin(), fresh.end());

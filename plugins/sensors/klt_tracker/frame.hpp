@@ -1,4 +1,5 @@
-// An image made ready for tracking: equalised, with its pyramid.
+// An image made ready for tracking: equalised, with its pyramid. Detection, following and
+// refinement share it.
 #pragma once
 
 #include <vector>
@@ -11,28 +12,36 @@
 
 namespace viwo::klt {
 
-struct Frame {
-  /// As OpenCV's Lucas-Kanade takes it: level after level, each followed by its derivatives if
-  /// there are any. Level 0 is the image itself.
-  std::vector<cv::Mat> pyramid;
-  bool has_derivatives = false;
-  bool blank = true;  ///< too dark or too flat to see anything
+/// Grey levels as floating-point numbers, each level half as large as the one before.
+struct Level {
+  cv::Mat image;
+  int border = 0;   ///< pixels beyond each edge that are there, too: the image mirrored
+  cv::Mat storage;  ///< the image with its border
+};
 
-  const cv::Mat& image() const { return pyramid.front(); }
+struct Frame {
+  Image pixels;       ///< as they come
+  cv::Mat image;      ///< 8 bit, equalised; the pixels themselves if nothing is to be done
+  bool blank = true;  ///< too dark or too flat to see anything
+  /// By level. Level 0 is empty when nothing is followed there (lowest_level() in flow.hpp).
+  std::vector<Level> levels;
+
+  int highest_level() const { return static_cast<int>(levels.size()) - 1; }
 };
 
 /// Makes frames of one camera. One thread at a time; storage is used again.
 class FrameMaker {
  public:
   explicit FrameMaker(const TrackerOptions& options);
-  /// With derivatives, the frame can be tracked from; without, only into. A blank one gets no
-  /// pyramid.
-  void make(const Image& image, bool with_derivatives, Frame& out);
+  /// The rest of a frame whose pixels are there. A blank one gets no levels.
+  void make(Frame& frame);
 
  private:
+  void add_level(const cv::Mat& grey, Level& level) const;
+
   TrackerOptions options_;
   cv::Ptr<cv::CLAHE> clahe_;
-  cv::Mat equalised_;
+  std::vector<cv::Mat> smaller_;  ///< images of level 1 and above, 8 bit
 };
 
 /// Difference of the grey levels that 2 % of the pixels are below, and above.

@@ -100,17 +100,17 @@ void KltTracker::read_one(const ImageSource* source, std::size_t camera, Eye& ey
   eye.failure = nullptr;
   if (source == nullptr) return;
   try {
-    source->read(eye.image);
-    const auto pixels = static_cast<std::size_t>(std::max(eye.image.width_px, 0)) *
-                        static_cast<std::size_t>(std::max(eye.image.height_px, 0));
-    if (pixels == 0 || eye.image.pixels.size() != pixels) throw InputError("no pixels");
+    Image& image = eye.now.pixels;
+    source->read(image);
+    const auto pixels = static_cast<std::size_t>(std::max(image.width_px, 0)) *
+                        static_cast<std::size_t>(std::max(image.height_px, 0));
+    if (pixels == 0 || image.pixels.size() != pixels) throw InputError("no pixels");
     const CameraView& view = cameras_[camera];
-    if (eye.image.width_px != view.width_px || eye.image.height_px != view.height_px) {
-      eye.other_size = size_text(eye.image.width_px, eye.image.height_px);
+    if (image.width_px != view.width_px || image.height_px != view.height_px) {
+      eye.other_size = size_text(image.width_px, image.height_px);
       return;
     }
-    // Points are followed from the images of trackers; the right image of a pair is only searched.
-    eye.maker.make(eye.image, camera < trackers_.size(), eye.now);
+    eye.maker.make(eye.now);
     eye.is_read = true;
   } catch (const InputError& error) {
     eye.unreadable = error.what();

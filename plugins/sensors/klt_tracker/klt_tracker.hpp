@@ -34,7 +34,6 @@ class KltTracker final : public Sensor {
   struct Eye {
     explicit Eye(const TrackerOptions& options) : maker(options) {}
     FrameMaker maker;
-    Image image;
     Frame now, before;
     std::optional<std::int64_t> before_ns;  ///< none: nothing to follow points from
     bool is_read = false;                   ///< `now` is of this group

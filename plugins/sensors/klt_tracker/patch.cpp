@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -32,6 +33,15 @@ float interpolate(const cv::Mat& image, float x, float y) {
 
 }  // namespace
 
+Patch::Offsets Patch::offsets(bool along_x) {
+  Offsets out{};
+  for (int i = 0; i < kPixels; ++i) {
+    out[static_cast<std::size_t>(i)] =
+        static_cast<float>((along_x ? i % kSide : i / kSide) - kRadius);
+  }
+  return out;
+}
+
 bool Patch::sample(const cv::Mat& image, const PatchPose& pose, Pixels& out) {
   const Eigen::Vector2f reach = static_cast<float>(kRadius) * pose.A.cwiseAbs().rowwise().sum();
   const Eigen::Vector2f limit(static_cast<float>(image.cols - 2),
@@ -39,18 +49,39 @@ bool Patch::sample(const cv::Mat& image, const PatchPose& pose, Pixels& out) {
   if (!((pose.u - reach).minCoeff() >= 1.F && (limit - pose.u - reach).minCoeff() >= 0.F)) {
     return false;
   }
-  int i = 0;
-  for (int y = -kRadius; y <= kRadius; ++y) {
-    Eigen::Vector2f at = pose.u + pose.A * Eigen::Vector2f(-kRadius, static_cast<float>(y));
-    for (int x = -kRadius; x <= kRadius; ++x, ++i, at += pose.A.col(0)) {
-      out[i] = interpolate(image, at.x(), at.y());
-    }
+  static const Offsets x = offsets(true), y = offsets(false);
+  // In three loops, so that the compiler does the arithmetic of several pixels at once.
+  std::array<float, kFilled> a, b;
+  std::array<std::int32_t, kFilled> at;
+  const auto step = static_cast<std::int32_t>(image.step1());
+  const float ux = pose.u.x(), uy = pose.u.y();
+  const float xx = pose.A(0, 0), xy = pose.A(0, 1), yx = pose.A(1, 0), yy = pose.A(1, 1);
+  for (std::size_t i = 0; i < kFilled; ++i) {
+    const float px = ux + xx * x[i] + xy * y[i], py = uy + yx * x[i] + yy * y[i];
+    const auto column = static_cast<std::int32_t>(px), row = static_cast<std::int32_t>(py);
+    a[i] = px - static_cast<float>(column);
+    b[i] = py - static_cast<float>(row);
+    at[i] = row * step + column;
+  }
+  std::array<std::array<std::uint8_t, 2>, kFilled> above, below;
+  const std::uint8_t* grey = image.ptr<std::uint8_t>();
+  for (std::size_t i = 0; i < kFilled; ++i) {
+    std::memcpy(&above[i], grey + at[i], 2);
+    std::memcpy(&below[i], grey + at[i] + step, 2);
+  }
+  float* __restrict sampled = out.data();
+  for (std::size_t i = 0; i < kFilled; ++i) {
+    const auto p00 = static_cast<float>(above[i][0]), p01 = static_cast<float>(above[i][1]);
+    const auto p10 = static_cast<float>(below[i][0]), p11 = static_cast<float>(below[i][1]);
+    const float top = p00 + a[i] * (p01 - p00), bottom = p10 + a[i] * (p11 - p10);
+    sampled[i] = top + b[i] * (bottom - top);
   }
   return true;
 }
 
 Patch::Patch(const cv::Mat& image, const Eigen::Vector2f& u) {
-  Eigen::Matrix<float, kPixels, 6> J;
+  T_.setZero();
+  Eigen::Matrix<float, kFilled, 6> J = Eigen::Matrix<float, kFilled, 6>::Zero();
   int i = 0;
   for (int y = -kRadius; y <= kRadius; ++y) {
     for (int x = -kRadius; x <= kRadius; ++x, ++i) {
@@ -62,12 +93,13 @@ Patch::Patch(const cv::Mat& image, const Eigen::Vector2f& u) {
       J.row(i) << gx * fx, gx * fy, gy * fx, gy * fy, gx, gy;  // (KLT-3)
     }
   }
-  T_.array() -= T_.mean();
-  const float norm = std::max(T_.norm(), 1e-3F);
-  T_ /= norm;
+  auto T = T_.head<kPixels>();
+  T.array() -= T.mean();
+  const float norm = std::max(T.norm(), 1e-3F);
+  T /= norm;
   J /= norm;
   // Without what brightness and contrast explain, (KLT-4).
-  J.rowwise() -= J.colwise().mean().eval();
+  J.topRows<kPixels>().rowwise() -= J.topRows<kPixels>().colwise().mean().eval();
   J -= T_ * (T_.transpose() * J).eval();
   Eigen::Matrix<double, 6, 6> H = (J.transpose() * J).cast<double>();
   H.diagonal().head<4>().array() += kDamping * H.diagonal().head<4>().mean();
@@ -94,7 +126,8 @@ float Patch::fit(const cv::Mat& image, PatchPose& pose) const {
     const float scale = pose.A.norm() / std::sqrt(2.F);
     if (!(scale < kMaxScale && scale > 1.F / kMaxScale)) return -1.F;
     if (move.squaredNorm() > kStepPx * kStepPx) continue;
-    const float norm = (grey.array() - grey.mean()).matrix().norm();
+    const auto seen = grey.head<kPixels>();
+    const float norm = (seen.array() - seen.mean()).matrix().norm();
     return norm > 1e-3F ? gain / norm : -1.F;
   }
   return -1.F;

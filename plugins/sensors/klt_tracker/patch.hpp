@@ -2,6 +2,9 @@
 // deformation and to brightness: so that errors do not add up from image to image (model.md).
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
@@ -26,12 +29,17 @@ class Patch {
   static constexpr int kRadius = 6;
   static constexpr int kSide = 2 * kRadius + 1;
   static constexpr int kPixels = kSide * kSide;
-  using Pixels = Eigen::Matrix<float, kPixels, 1>;
+  /// Filled up with zeros to what a processor takes at once.
+  static constexpr int kFilled = (kPixels + 15) / 16 * 16;
+  using Pixels = Eigen::Matrix<float, kFilled, 1>;
+  using Offsets = std::array<float, static_cast<std::size_t>(kFilled)>;
 
+  /// Pixels row after row, as seen from the middle.
+  static Offsets offsets(bool along_x);
   static bool sample(const cv::Mat& image, const PatchPose& pose, Pixels& out);
 
   Pixels T_;                                ///< grey levels, mean 0 and norm 1
-  Eigen::Matrix<float, kPixels, 6> steps_;  ///< of the deformation and of the place, per grey level
+  Eigen::Matrix<float, kFilled, 6> steps_;  ///< of the deformation and of the place, per grey level
 };
 
 }  // namespace viwo::klt

@@ -32,17 +32,17 @@ class StereoMatcher {
                 cv::Mat mask);
 
   /// Appends the points that agree with the extrinsics, with the ids of `tracks`, and keeps their
-  /// distances there as first guesses for the next pair. `left` has derivatives; both not blank.
+  /// distances there as first guesses for the next pair. Both frames not blank.
   StereoCounts match(const Frame& left, const Frame& right, std::vector<Track>& tracks,
                      std::vector<FeaturePoint>& points);
 
  private:
   /// Where a point is expected in the right image; false when it is not in it.
   bool guess(const Track& track, cv::Point2f& uv) const;
-  /// To where the points look as they did when they were found.
-  void refine(const Frame& right, std::vector<Track>& tracks);
+  /// Where a point is in the right image, if it is.
+  bool find(const Frame& left, const Frame& right, const Track& track, cv::Point2f& uv) const;
   /// Inverse distance of a match, 1/m; false when the extrinsics contradict it.
-  bool inverse_distance(const Eigen::Vector3d& ray_left, const cv::Point2f& uv_right,
+  bool inverse_distance(const Eigen::Vector3d& ray_left, const Eigen::Vector3d& ray_right,
                         double& per_m) const;
 
   TrackerOptions options_;
@@ -52,10 +52,9 @@ class StereoMatcher {
   Eigen::Vector3d p_LinR_;
   RelativeMotion motion_;  ///< the same with a unit vector
   double focal_px_;
-  std::vector<std::size_t> which_;
-  std::vector<cv::Point2f> from_, to_;
-  std::vector<std::uint8_t> status_;
-  std::vector<float> error_;
+  // Per track; storage is used again.
+  std::vector<cv::Point2f> to_;
+  std::vector<std::uint8_t> found_;
 };
 
 }  // namespace viwo::klt

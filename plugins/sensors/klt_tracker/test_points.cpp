@@ -98,7 +98,8 @@ TEST(Patch, SaysWhenSomethingElseIsThere) {
 std::vector<cv::Point2f> detect(const CameraView& camera, const TrackerOptions& options,
                                 const Image& image, const cv::Mat& mask = {}) {
   Frame frame;
-  FrameMaker(options).make(image, true, frame);
+  frame.pixels = image;
+  FrameMaker(options).make(frame);
   std::vector<cv::Point2f> points;
   Detector(camera, options, mask).detect(frame, points);
   return points;
@@ -141,7 +142,8 @@ TEST(Detector, AddsToThePointsThatAreThereOnlyWhatIsLacking) {
   TrackerOptions options;
   options.num_pts = 60;
   Frame frame;
-  FrameMaker(options).make(squares(320, 240, 16, 8), true, frame);
+  frame.pixels = squares(320, 240, 16, 8);
+  FrameMaker(options).make(frame);
   const Detector detector(pinhole(320, 240), options, {});
   std::vector<cv::Point2f> points;
   detector.detect(frame, points);
@@ -202,13 +204,16 @@ TEST(Frame, IsBlankWhenDarkOrFlatButNotWhenDim) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> noise(0., 2.);
   const cv::Mat dark = draw(320, 240, [&](int, int) { return 3. + noise(random); });
-  maker.make(to_image(dark), true, frame);
+  frame.pixels = to_image(dark);
+  maker.make(frame);
   EXPECT_TRUE(frame.blank);
   const cv::Mat white = draw(320, 240, [&](int, int) { return 250. + noise(random); });
-  maker.make(to_image(white), true, frame);
+  frame.pixels = to_image(white);
+  maker.make(frame);
   EXPECT_TRUE(frame.blank);
   const cv::Mat dim = draw(320, 240, [](int x, int y) { return 0.1 * texture(x, y); });
-  maker.make(to_image(dim), true, frame);
+  frame.pixels = to_image(dim);
+  maker.make(frame);
   EXPECT_FALSE(frame.blank);
 }
 
