@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 
 #include "flow.hpp"
 
@@ -14,31 +15,48 @@ namespace {
 constexpr int kClaheTiles = 8;
 constexpr double kClaheLimit = 2.;
 
-/// A fraction of the pixels is enough for the contrast.
-constexpr std::size_t kContrastStride = 29;
+/// A fraction of the pixels is enough for contrast and equalisation.
+constexpr std::size_t kStride = 7;
 constexpr std::int64_t kPercentile = 2;
 
 /// Beyond the size of the window: what is sampled at once, and room to move.
 constexpr int kMargin = 16;
 
-}  // namespace
+/// Pixels of each grey level, of some of the image.
+std::array<std::int64_t, 256> histogram(const Image& image) {
+  std::array<std::int64_t, 256> counts{};
+  for (std::size_t i = 0; i < image.pixels.size(); i += kStride) ++counts[image.pixels[i]];
+  return counts;
+}
 
-int contrast(const Image& image) {
-  std::array<std::int64_t, 256> histogram{};
-  std::int64_t n = 0;
-  for (std::size_t i = 0; i < image.pixels.size(); i += kContrastStride, ++n) {
-    ++histogram[image.pixels[i]];
-  }
+/// Difference of the grey levels that 2 % of the pixels are below, and above.
+int contrast(const std::array<std::int64_t, 256>& counts) {
+  const std::int64_t n = std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
   const std::int64_t tail = n * kPercentile / 100;
   int low = 0, high = 255;
   for (std::int64_t sum = 0; low < 255; ++low) {
-    if ((sum += histogram[static_cast<std::size_t>(low)]) > tail) break;
+    if ((sum += counts[static_cast<std::size_t>(low)]) > tail) break;
   }
   for (std::int64_t sum = 0; high > low; --high) {
-    if ((sum += histogram[static_cast<std::size_t>(high)]) > tail) break;
+    if ((sum += counts[static_cast<std::size_t>(high)]) > tail) break;
   }
   return high - low;
 }
+
+/// Makes all grey levels equally frequent, from the darkest one, which becomes black.
+void equalise(const std::array<std::int64_t, 256>& counts, const cv::Mat& from, cv::Mat& to) {
+  const auto darkest = std::find_if(counts.begin(), counts.end(), [](auto n) { return n > 0; });
+  const std::int64_t n = std::accumulate(darkest + 1, counts.end(), std::int64_t{0});
+  cv::Mat table = cv::Mat::zeros(1, 256, CV_8UC1);
+  std::int64_t sum = 0;
+  for (auto one = darkest + 1; one != counts.end(); ++one) {
+    sum += *one;
+    table.data[one - counts.begin()] = static_cast<std::uint8_t>((255 * sum + n / 2) / n);
+  }
+  cv::LUT(from, table, to);
+}
+
+}  // namespace
 
 FrameMaker::FrameMaker(const TrackerOptions& options) : options_(options) {
   if (options.histogram_method == Histogram::kClahe) {
@@ -57,7 +75,8 @@ void FrameMaker::add_level(const cv::Mat& grey, Level& level) const {
 }
 
 void FrameMaker::make(Frame& frame) {
-  frame.blank = contrast(frame.pixels) < options_.min_contrast;
+  const auto counts = histogram(frame.pixels);
+  frame.blank = contrast(counts) < options_.min_contrast;
   if (frame.blank) return;
   const cv::Mat pixels(frame.pixels.height_px, frame.pixels.width_px, CV_8UC1,
                        frame.pixels.pixels.data());
@@ -66,7 +85,7 @@ void FrameMaker::make(Frame& frame) {
       frame.image = pixels;
       break;
     case Histogram::kEqualize:
-      cv::equalizeHist(pixels, frame.image);
+      equalise(counts, pixels, frame.image);
       break;
     case Histogram::kClahe:
       clahe_->apply(pixels, frame.image);

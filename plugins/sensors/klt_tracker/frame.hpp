@@ -44,7 +44,4 @@ class FrameMaker {
   std::vector<cv::Mat> smaller_;  ///< images of level 1 and above, 8 bit
 };
 
-/// Difference of the grey levels that 2 % of the pixels are below, and above.
-int contrast(const Image& image);
-
 }  // namespace viwo::klt

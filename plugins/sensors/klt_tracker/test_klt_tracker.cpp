@@ -65,7 +65,7 @@ TEST(KltTracker, StaysOnItsPointsToATenthOfAPixel) {
 }
 
 TEST(KltTracker, DriftsThreeTimesAsMuchWithoutRefinement) {
-  const std::vector<Measurement> images = drive(12, 1);
+  const std::vector<Measurement> images = drive(20, 1);
   const Errors with = errors_of(track(images, section({}, 1)), 0);
   const Errors without = errors_of(track(images, section("refine: false\n", 1)), 0);
   EXPECT_GT(without.rmse_px, 3. * with.rmse_px);
