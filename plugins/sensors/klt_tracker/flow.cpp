@@ -14,7 +14,7 @@ namespace {
 constexpr int kMaxSide = 64;
 /// What is only a first guess for something better does not need more.
 constexpr int kMaxGuessSteps = 8;
-constexpr float kGuessStepPx = 0.05F;
+constexpr float kGuessStepPx = 0.1F;
 constexpr int kMaxFlowSteps = 30;
 constexpr float kFlowStepPx = 0.01F;
 /// Of grey levels, their mean square; and of the gradient in its weakest direction, (grey levels /
