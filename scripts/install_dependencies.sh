@@ -43,12 +43,13 @@ for package in ca-certificates libeigen3-dev libboost-dev libboost-program-optio
   need_package "$package"
 done
 
-# What is left out where it is not to be had: bags and live topics of ROS, fixes of satellites.
+# What is left out where it is not to be had: bags and live topics of ROS, fixes of satellites, PNG
+# files read fast.
 required=("${missing[@]}")
 missing=()
 for package in librosbag-storage-dev libroscpp-dev libsensor-msgs-dev libnav-msgs-dev \
   libgeometry-msgs-dev libtf2-msgs-dev libdiagnostic-msgs-dev libsqlite3-dev libfastcdr-dev \
-  liblz4-dev libzstd-dev; do
+  liblz4-dev libzstd-dev libdeflate-dev; do
   need_package "$package"
 done
 # Ubuntu 22.04 has it by another name.

@@ -7,6 +7,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "grey_png.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo {
@@ -39,6 +40,9 @@ bool cut_short(std::span<const std::uint8_t> bytes) {
 void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out) {
   if (bytes.empty()) throw InputError(name + ": the image is empty");
   if (cut_short(bytes)) throw InputError(name + ": the image is cut short");
+#if VIWO_HAS_LIBDEFLATE
+  if (decode_grey_png(bytes, out)) return;
+#endif
   const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1,
                     const_cast<std::uint8_t*>(bytes.data()));
   cv::Mat grey;

@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -9,6 +11,7 @@
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <zlib.h>
 
 #include "viwo/api/status.hpp"
 #include "viwo/image/image_file.hpp"
@@ -145,6 +148,83 @@ TEST_F(ImageFileTest, ColoursAndSixteenBitsBecomeGrey) {
   read_image(folder_ / "white.png", image);
   EXPECT_EQ(image.width_px, 3);
   EXPECT_EQ(image.pixels, std::vector<std::uint8_t>(6, 255));
+}
+
+/// A grey PNG whose rows hold random differences, `filter(y)` says by which filter.
+template <class Filter>
+std::vector<std::uint8_t> filtered_png(std::uint32_t width, std::uint32_t height, Filter filter) {
+  std::vector<std::uint8_t> png{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  const auto add_number = [](std::vector<std::uint8_t>& to, std::uint32_t number) {
+    for (const int shift : {24, 16, 8, 0}) to.push_back(static_cast<std::uint8_t>(number >> shift));
+  };
+  const auto add_chunk = [&](std::string_view type, const std::vector<std::uint8_t>& data) {
+    add_number(png, static_cast<std::uint32_t>(data.size()));
+    const std::size_t begin = png.size();
+    png.insert(png.end(), type.begin(), type.end());
+    png.insert(png.end(), data.begin(), data.end());
+    add_number(png, static_cast<std::uint32_t>(
+                        crc32(0, png.data() + begin, static_cast<uInt>(png.size() - begin))));
+  };
+  std::vector<std::uint8_t> header;
+  add_number(header, width);
+  add_number(header, height);
+  header.insert(header.end(), {8, 0, 0, 0, 0});
+  std::mt19937 random(1);
+  std::vector<std::uint8_t> rows;
+  for (std::uint32_t y = 0; y < height; ++y) {
+    rows.push_back(filter(y));
+    for (std::uint32_t x = 0; x < width; ++x) rows.push_back(static_cast<std::uint8_t>(random()));
+  }
+  uLongf size = compressBound(rows.size());
+  std::vector<std::uint8_t> compressed(size);
+  compress(compressed.data(), &size, rows.data(), rows.size());
+  compressed.resize(size);
+  add_chunk("IHDR", header);
+  // In two pieces, with something else before them.
+  add_chunk("tEXt", {'a', 0, 'b'});
+  const auto middle = compressed.begin() + static_cast<std::ptrdiff_t>(size / 2);
+  add_chunk("IDAT", {compressed.begin(), middle});
+  add_chunk("IDAT", {middle, compressed.end()});
+  add_chunk("IEND", {});
+  return png;
+}
+
+TEST_F(ImageFileTest, EveryFilterOfAPngGivesThePixelsThatOpenCvReads) {
+  for (const std::uint32_t width : {1U, 2U, 37U, 848U}) {
+    const auto png =
+        filtered_png(width, 45, [](auto y) { return static_cast<std::uint8_t>(y % 5); });
+    Image image;
+    decode_image(png, "filters", image);
+    const cv::Mat expected = cv::imdecode(png, cv::IMREAD_GRAYSCALE);
+    ASSERT_EQ(image.width_px, expected.cols);
+    ASSERT_EQ(image.height_px, expected.rows);
+    EXPECT_TRUE(
+        std::equal(image.pixels.begin(), image.pixels.end(), expected.datastart, expected.dataend));
+  }
+}
+
+TEST_F(ImageFileTest, ABrokenPngGivesWhatOpenCvMakesOfIt) {
+  // GIVEN a PNG in which one byte after the other is wrong
+  const auto png = filtered_png(5, 4, [](auto y) { return static_cast<std::uint8_t>(y + 1); });
+  for (std::size_t i = 8; i < png.size(); ++i) {
+    auto broken = png;
+    broken[i] = static_cast<std::uint8_t>(broken[i] ^ 0x10);
+    cv::Mat expected;
+    try {
+      expected = cv::imdecode(broken, cv::IMREAD_GRAYSCALE);
+    } catch (const cv::Exception&) {  // a size that cannot be: no image
+    }
+    Image image;
+    try {
+      decode_image(broken, "broken", image);
+    } catch (const InputError&) {
+      // Without its end it is cut short, whatever OpenCV makes of it.
+      EXPECT_TRUE(expected.empty() || i + 12 >= png.size()) << i;
+      continue;
+    }
+    ASSERT_EQ(image.pixels.size(), expected.total()) << i;
+    EXPECT_TRUE(std::equal(image.pixels.begin(), image.pixels.end(), expected.datastart)) << i;
+  }
 }
 
 TEST_F(ImageFileTest, AFullDiskIsAnError) {
