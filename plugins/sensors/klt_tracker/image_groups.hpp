@@ -14,7 +14,7 @@
 
 namespace viwo::klt {
 
-inline constexpr int kMaxCameras = 2;
+inline constexpr int kMaxCameras = 4;
 
 /// "camera 0 at 1.050000000 s".
 std::string place(int camera, std::int64_t t_ns);

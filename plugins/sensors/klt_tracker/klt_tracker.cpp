@@ -40,17 +40,21 @@ std::vector<CameraView> read_cameras(const Params& params) {
                      "there are only " + std::to_string(cameras.size()) + " cameras in " + file);
   }
   cameras.resize(asked > 0 ? asked : std::min<std::size_t>(cameras.size(), kMaxCameras));
-  if (cameras.size() < 2) return cameras;
-  const double shift_s = std::abs(cameras[1].t_CtoI_s - cameras[0].t_CtoI_s);
-  if (shift_s > params.max_camera_dt_s) {
-    throw ParamError("max_camera_dt_s", "timeshift_cam_imu of cam0 and cam1 differ by " +
-                                            std::to_string(shift_s) + " s in " + file +
-                                            ": images of a pair must be taken at the same time");
-  }
-  const Eigen::Vector3d p_C0inC1 =
-      cameras[1].p_IinC - cameras[1].R_ItoC * cameras[0].R_ItoC.transpose() * cameras[0].p_IinC;
-  if (params.stereo && p_C0inC1.norm() < kMinBaseline) {
-    throw ParamError("stereo", "cam0 and cam1 are at the same place in " + file);
+  for (std::size_t i = 1; i < cameras.size(); ++i) {
+    const std::string names = "cam" + std::to_string(i - 1) + " and cam" + std::to_string(i);
+    const double shift_s = std::abs(cameras[i].t_CtoI_s - cameras[i - 1].t_CtoI_s);
+    if (shift_s > params.max_camera_dt_s) {
+      throw ParamError("max_camera_dt_s", "timeshift_cam_imu of " + names + " differ by " +
+                                              std::to_string(shift_s) + " s in " + file +
+                                              ": images of a pair must be taken at the same time");
+    }
+    if (!params.stereo || i % 2 == 0) continue;
+    const CameraView &left = cameras[i - 1], &right = cameras[i];
+    const Eigen::Vector3d p_LinR =
+        right.p_IinC - right.R_ItoC * left.R_ItoC.transpose() * left.p_IinC;
+    if (p_LinR.norm() < kMinBaseline) {
+      throw ParamError("stereo", names + " are at the same place in " + file);
+    }
   }
   return cameras;
 }
@@ -58,7 +62,7 @@ std::vector<CameraView> read_cameras(const Params& params) {
 /// Not 0 where no point may be; empty without a mask.
 cv::Mat read_mask(const Params& params, std::size_t camera, const CameraView& view) {
   const std::string name = "mask" + std::to_string(camera);
-  const std::filesystem::path& file = camera == 0 ? params.mask0 : params.mask1;
+  const std::filesystem::path& file = params.mask(camera);
   if (file.empty()) return {};
   Image image;
   read_image(file, image);
@@ -80,14 +84,14 @@ KltTracker::KltTracker(const Params& params, const HostServices& services)
       max_gap_s_(params.max_gap_s),
       max_camera_dt_s_(params.max_camera_dt_s),
       cameras_(read_cameras(params)) {
-  const bool stereo = cameras_.size() > 1 && params.stereo;
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    eyes_.emplace_back(options_);
+    Eye& eye = eyes_.emplace_back(options_);
     const cv::Mat mask = read_mask(params, i, cameras_[i]);
-    if (stereo && i == 1) {
-      matchers_.emplace_back(cameras_[0], cameras_[1], options_, mask);
+    if (params.stereo && i % 2 == 1) {
+      eye.matcher.emplace(cameras_[i - 1], cameras_[i], options_, mask);
     } else {
-      trackers_.emplace_back(cameras_[i], options_, mask, camera_seed(services.seed, i));
+      eye.tracker.emplace(cameras_[i], options_, mask, camera_seed(services.seed, i));
+      followed_.push_back(i);
     }
   }
   groups_.emplace(static_cast<int>(cameras_.size()), std::llround(max_camera_dt_s_ * 1e9));
@@ -137,11 +141,10 @@ void KltTracker::check(const ImageGroup& group) {
       rejections_.add("image that cannot be read", [&] { return where + ": " + eye.unreadable; });
     }
     check_size(i, where);
-  }
-  if (is_stereo() && !eyes_[0].is_read && eyes_[1].is_read) {
-    rejections_.add("right image without its left one",
-                    [&group] { return place(1, group.images[1].t_ns); });
-    eyes_[1].is_read = false;
+    if (eye.matcher && eye.is_read && !eyes_[i - 1].is_read) {
+      rejections_.add("right image without its left one", [&where] { return where; });
+      eye.is_read = false;
+    }
   }
 }
 
@@ -166,7 +169,7 @@ void KltTracker::check_size(std::size_t camera, const std::string& where) {
 
 void KltTracker::advance(std::size_t camera, std::int64_t t_ns) {
   Eye& eye = eyes_[camera];
-  CameraTracker& tracker = trackers_[camera];
+  CameraTracker& tracker = *eye.tracker;
   if (!eye.is_read) return;
   const double dt_s = eye.before_ns ? seconds_between(*eye.before_ns, t_ns) : 0.;
   if (eye.now.blank || !eye.before_ns || dt_s > max_gap_s_) {
@@ -186,33 +189,40 @@ void KltTracker::give_ids(std::vector<Track>& tracks) {
   }
 }
 
-void KltTracker::watch_stereo(const StereoCounts& counts, std::int64_t t_ns) {
+void KltTracker::watch_stereo(const StereoCounts& counts, std::size_t right, std::int64_t t_ns) {
   if (counts.found < kMinMatches) return;
+  Eye& eye = eyes_[right];
   const double share =
       static_cast<double>(counts.contradicting) / static_cast<double>(counts.found);
   if (share < kContradictingShare) {
-    contradicting_pairs_ = 0;
+    eye.contradicting_pairs = 0;
     return;
   }
-  rejections_.add("stereo pair that contradicts the extrinsics", [t_ns] { return place(0, t_ns); });
-  if (++contradicting_pairs_ < kContradictingPairs || told_contradiction_) return;
-  told_contradiction_ = true;
+  const std::string where = place(static_cast<int>(right) - 1, t_ns);
+  rejections_.add("stereo pair that contradicts the extrinsics", [&where] { return where; });
+  if (++eye.contradicting_pairs < kContradictingPairs || eye.told_contradiction) return;
+  eye.told_contradiction = true;
   services_.log(LogLevel::kWarning,
                 std::to_string(std::lround(100. * share)) + " % of the " +
-                    std::to_string(counts.found) + " stereo matches of " + place(0, t_ns) +
+                    std::to_string(counts.found) + " stereo matches of " + where +
                     ", and most of those of the " + std::to_string(kContradictingPairs - 1) +
                     " pairs before, contradict the extrinsics in " + chain_file_ +
                     ": the two cameras are probably swapped, or the calibration is of others. "
                     "Such matches are not used");
 }
 
-void KltTracker::watch_pairs(const ImageGroup& group) {
-  if (!is_stereo() || pair_seen_) return;
-  const bool left = group.images[0].source != nullptr, right = group.images[1].source != nullptr;
-  pair_seen_ = left && right;
-  if (pair_seen_ || ++groups_without_pair_ != kGroupsWithoutPair) return;
-  std::string why = std::string("only camera ") + (left ? "0" : "1") + " gives images";
-  if (const auto nearest_ns = groups_->nearest_ns()) {
+void KltTracker::watch_pair(const ImageGroup& group, std::size_t right) {
+  Eye& eye = eyes_[right];
+  if (!eye.matcher || eye.pair_seen) return;
+  const bool has_left = group.images[right - 1].source != nullptr;
+  const bool has_right = group.images[right].source != nullptr;
+  eye.pair_seen = has_left && has_right;
+  if (eye.pair_seen || ++eye.groups_without_pair != kGroupsWithoutPair) return;
+  std::string why = "only camera " + std::to_string(has_left ? right - 1 : right) + " gives images";
+  if (!has_left && !has_right) {
+    why = "cameras " + std::to_string(right - 1) + " and " + std::to_string(right) +
+          " give no images";
+  } else if (const auto nearest_ns = groups_->nearest_ns()) {
     std::array<char, 96> text{};
     std::snprintf(text.data(), text.size(),
                   "the nearest stamps differ by %.1f ms, max_camera_dt_s is %g",
@@ -224,34 +234,37 @@ void KltTracker::watch_pairs(const ImageGroup& group) {
 
 FeatureSample KltTracker::points_of(std::size_t camera, const ImageGroup& group) {
   FeatureSample sample{group.images[camera].t_ns, static_cast<int>(camera), {}};
-  if (camera < trackers_.size()) {
-    for (const Track& track : trackers_[camera].tracks()) {
+  Eye& eye = eyes_[camera];
+  if (eye.tracker) {
+    for (const Track& track : eye.tracker->tracks()) {
       sample.points.push_back({track.id, track.uv.x, track.uv.y});
     }
-  } else if (!eyes_[0].now.blank && !eyes_[1].now.blank) {
-    watch_stereo(
-        matchers_[0].match(eyes_[0].now, eyes_[1].now, trackers_[0].tracks(), sample.points),
-        group.images[0].t_ns);
+    return sample;
   }
+  Eye& left = eyes_[camera - 1];
+  if (left.now.blank || eye.now.blank) return sample;
+  const StereoCounts counts =
+      eye.matcher->match(left.now, eye.now, left.tracker->tracks(), sample.points);
+  watch_stereo(counts, camera, group.images[camera - 1].t_ns);
   return sample;
 }
 
 void KltTracker::process(const ImageGroup& group) {
-  watch_pairs(group);
+  for (std::size_t i = 0; i < eyes_.size(); ++i) watch_pair(group, i);
   read(group);
   check(group);
-  if (trackers_.size() == 1) {
-    advance(0, group.images[0].t_ns);  // parallel inside
+  const auto follow = [&](std::size_t camera) { advance(camera, group.images[camera].t_ns); };
+  if (followed_.size() == 1) {
+    follow(followed_.front());  // parallel inside
   } else {
-    cv::parallel_for_(cv::Range(0, static_cast<int>(trackers_.size())),
+    cv::parallel_for_(cv::Range(0, static_cast<int>(followed_.size())),
                       [&](const cv::Range& range) {
                         for (int i = range.start; i < range.end; ++i) {
-                          const auto camera = static_cast<std::size_t>(i);
-                          advance(camera, group.images[camera].t_ns);
+                          follow(followed_[static_cast<std::size_t>(i)]);
                         }
                       });
   }
-  for (CameraTracker& tracker : trackers_) give_ids(tracker.tracks());
+  for (const std::size_t camera : followed_) give_ids(eyes_[camera].tracker->tracks());
   for (std::size_t i = 0; i < eyes_.size(); ++i) {
     if (eyes_[i].is_read) ready_.push_back(points_of(i, group));
   }
@@ -263,10 +276,13 @@ void KltTracker::process(const ImageGroup& group) {
 }
 
 void KltTracker::check_end() const {
+  const std::size_t n = cameras_.size();
   if (groups_->images() == 0 && groups_->others() > 0) {
     throw InputError("klt_tracker: its input gives no image of " +
-                     std::string(cameras_.size() == 1 ? "camera 0" : "camera 0 or 1") + ", only " +
-                     std::to_string(groups_->others()) + " other measurements");
+                     (n == 1   ? "camera 0"
+                      : n == 2 ? "camera 0 or 1"
+                               : "cameras 0 to " + std::to_string(n - 1)) +
+                     ", only " + std::to_string(groups_->others()) + " other measurements");
   }
   for (const Eye& eye : eyes_) {
     if (!eye.has_fitted && eye.other_sizes > 0) throw InputError(eye.first_other_size);

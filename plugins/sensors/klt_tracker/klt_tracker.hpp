@@ -43,9 +43,17 @@ class KltTracker final : public Sensor {
     int other_sizes = 0;           ///< such images in a row
     std::string first_other_size;  ///< what there is to say about the first of them
     bool has_fitted = false;       ///< there was an image of the camera's size
+
+    /// Follows the points of this camera; or, for the right one of a pair, finds those of the
+    /// camera before it.
+    std::optional<CameraTracker> tracker;
+    std::optional<StereoMatcher> matcher;
+    int contradicting_pairs = 0;  ///< in a row
+    bool told_contradiction = false;
+    int groups_without_pair = 0;  ///< before the first pair
+    bool pair_seen = false;
   };
 
-  bool is_stereo() const { return !matchers_.empty(); }
   /// Reads and prepares the images of a group, at the same time.
   void read(const ImageGroup& group);
   void read_one(const ImageSource* source, std::size_t camera, Eye& eye) const;
@@ -57,9 +65,9 @@ class KltTracker final : public Sensor {
   void give_ids(std::vector<Track>& tracks);
   /// The points of one camera; those of the right one of a pair are looked for now.
   FeatureSample points_of(std::size_t camera, const ImageGroup& group);
-  void watch_stereo(const StereoCounts& counts, std::int64_t t_ns);
+  void watch_stereo(const StereoCounts& counts, std::size_t right, std::int64_t t_ns);
   /// Warns when left and right images do not come together.
-  void watch_pairs(const ImageGroup& group);
+  void watch_pair(const ImageGroup& group, std::size_t right);
   void process(const ImageGroup& group);
   /// At the end of the input: InputError when it had nothing that could be used.
   void check_end() const;
@@ -70,17 +78,12 @@ class KltTracker final : public Sensor {
   double max_gap_s_, max_camera_dt_s_;
   std::vector<CameraView> cameras_;
   std::vector<Eye> eyes_;
-  std::vector<CameraTracker> trackers_;  ///< of every camera, or of the left one of a pair
-  std::vector<StereoMatcher> matchers_;  ///< one or none
+  std::vector<std::size_t> followed_;  ///< the cameras with points of their own
   Sensor* input_ = nullptr;
   std::optional<ImageGroups> groups_;
   Rejections rejections_;
   std::int64_t next_id_ = 0;
   std::deque<FeatureSample> ready_;
-  int contradicting_pairs_ = 0;  ///< in a row
-  bool told_contradiction_ = false;
-  int groups_without_pair_ = 0;  ///< before the first pair
-  bool pair_seen_ = false;
 };
 
 }  // namespace viwo::klt

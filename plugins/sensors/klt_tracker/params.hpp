@@ -1,8 +1,11 @@
 // Parameters of the plugin, named as in OpenVINS and VINS-Fusion where these have them.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <filesystem>
 
+#include "image_groups.hpp"
 #include "tracker_options.hpp"
 #include "viwo/api/params.hpp"
 
@@ -14,19 +17,22 @@ struct Params : TrackerOptions {
   bool stereo = true;
   double max_camera_dt_s = 0.003;
   double max_gap_s = 0.5;
-  std::filesystem::path mask0;
-  std::filesystem::path mask1;
+  std::filesystem::path mask0, mask1, mask2, mask3;
+
+  const std::filesystem::path& mask(std::size_t camera) const {
+    return *std::array{&mask0, &mask1, &mask2, &mask3}[camera];
+  }
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(cameras),
       {.required = true, .help = "Kalibr camera chain of the cameras that the images are from"});
     b(VIWO_PARAM(n_cameras),
       {.min = 0.,
-       .max = 2.,
-       .help = "use images of the first n cameras; 0: all of the chain, at most two"});
+       .max = kMaxCameras,
+       .help = "use images of the first n cameras; 0: all of the chain, at most four"});
     b(VIWO_PARAM(stereo),
-      {.help = "with two cameras: points of camera 0 are looked for in camera 1, under the "
-               "same id; otherwise each camera has its own points"});
+      {.help = "cameras 0 and 1 are a pair, and so are 2 and 3: points of the first are looked for "
+               "in the second, under the same id; otherwise each camera has its own points"});
     b(VIWO_PARAM(max_camera_dt_s),
       {.unit = "s",
        .min = 0.,
@@ -38,6 +44,8 @@ struct Params : TrackerOptions {
     b(VIWO_PARAM(mask0),
       {.help = "image of the size of camera 0's: no points where it is white; '': none"});
     b(VIWO_PARAM(mask1), {.help = "the same for camera 1"});
+    b(VIWO_PARAM(mask2), {.help = "the same for camera 2"});
+    b(VIWO_PARAM(mask3), {.help = "the same for camera 3"});
   }
 };
 

@@ -103,11 +103,11 @@ inline std::filesystem::path temporary(const std::string& name) {
          ("viwo_klt_" + std::to_string(getpid()) + "_" + name);
 }
 
-/// A Kalibr file of the rig.
+/// A Kalibr file of the rig; cameras 2 and 3 are another such pair.
 inline std::string chain_file(int n_cameras = 2, double second_shift_s = 0.0045) {
   std::ostringstream text;
   for (int i = 0; i < n_cameras; ++i) {
-    const CameraView& camera = rig().cameras[static_cast<std::size_t>(i)];
+    const CameraView& camera = rig().cameras[static_cast<std::size_t>(i % 2)];
     const auto list = [&](int from) {
       std::ostringstream out;
       out.precision(17);

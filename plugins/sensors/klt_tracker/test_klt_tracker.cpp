@@ -112,6 +112,37 @@ TEST(KltTracker, GivesEachCameraItsOwnPointsWithoutStereo) {
   EXPECT_GT(common(played.samples[1], played.samples[7]), 150U);
 }
 
+TEST(KltTracker, FollowsTwoPairsAsItFollowsEachOfThem) {
+  // GIVEN two pairs that see different things
+  constexpr int kImages = 4, kElsewhere = 20;
+  std::vector<Measurement> input;
+  for (int i = 0; i < kImages; ++i) {
+    for (int camera = 0; camera < 4; ++camera) {
+      const int place = camera < 2 ? i : i + kElsewhere;
+      input.emplace_back(sample_of(rig().render(place, camera % 2), camera, stamp_of(i)));
+    }
+  }
+  const Played four = track(input, section({}, 4));
+  const Played two = track(drive(kImages, 2), section());
+  ASSERT_EQ(four.samples.size(), 4U * kImages);
+  for (std::size_t i = 0; i < kImages; ++i) {
+    const auto of = [i](const Played& played, int camera) { return played.of(camera)[i]; };
+    // THEN the first one is followed as if it was alone
+    for (const int camera : {0, 1}) {
+      const auto &points = of(four, camera).points, &alone = of(two, camera).points;
+      ASSERT_EQ(points.size(), alone.size());
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        EXPECT_EQ(points[k].u_px, alone[k].u_px);
+        EXPECT_EQ(points[k].v_px, alone[k].v_px);
+      }
+    }
+    // AND points are shared within a pair, and between pairs never
+    EXPECT_GT(common(of(four, 0), of(four, 1)), 180U);
+    EXPECT_GT(common(of(four, 2), of(four, 3)), 150U);
+    for (const int camera : {2, 3}) EXPECT_EQ(common(of(four, 0), of(four, camera)), 0U);
+  }
+}
+
 TEST(KltTracker, GivesTheSameBitsAtEveryRunAndForAnyNumberOfThreads) {
   const std::vector<Measurement> images = drive(5, 2);
   const int threads = cv::getNumThreads();
