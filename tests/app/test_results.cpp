@@ -270,6 +270,18 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationsWithTyres) {
   for (const auto& variant : variants) EXPECT_EQ(variant.at("runs"), 1);
 }
 
+TEST_F(ResultsTest, OfTheDeliveredExperimentWithTwoPairsOfCameras) {
+  expect_done({"experiment", kConfigFolder + "experiments/four_cameras.yaml", "--seeds", "1",
+               "--out", "cameras", "--set", "sensors.simulator0.duration_s=1.5", "--set",
+               "sensors.images0.texture_size_px=512"});
+  const nlohmann::json variants = summary("cameras").at("variants");
+  EXPECT_EQ(variants.size(), 2U);
+  for (const auto& variant : variants) {
+    EXPECT_EQ(variant.at("runs"), 1);
+    EXPECT_LT(variant.at("metrics").at("ate_m").at("mean").get<double>(), 0.01);
+  }
+}
+
 TEST_F(ResultsTest, OfTheDeliveredConfigurationForOpenVinsMeasurements) {
   const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/openvins_sim";
   if (!fs::exists(data)) GTEST_SKIP() << "the measurements are not here";
@@ -362,10 +374,11 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
       (std::set<std::string>{
           "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
           "calibrations/smoothed_swerve.yaml", "cameras/euroc.yaml", "cameras/kaist_urban.yaml",
-          "cameras/pinhole.yaml", "cameras/t265_like.yaml", "cluster/kubernetes.yaml",
-          "experiments/calibrate_ackermann.yaml", "experiments/calibrate_mecanum.yaml",
-          "experiments/calibrate_skid_steer.yaml", "experiments/calibrate_swerve.yaml",
-          "experiments/contact_physics.yaml", "experiments/drive_only_twist_full.yaml",
+          "cameras/pinhole.yaml", "cameras/t265_like.yaml", "cameras/two_pairs.yaml",
+          "cluster/kubernetes.yaml", "experiments/calibrate_ackermann.yaml",
+          "experiments/calibrate_mecanum.yaml", "experiments/calibrate_skid_steer.yaml",
+          "experiments/calibrate_swerve.yaml", "experiments/contact_physics.yaml",
+          "experiments/drive_only_twist_full.yaml", "experiments/four_cameras.yaml",
           "experiments/hybrid.yaml", "experiments/images.yaml", "experiments/long_runs.yaml",
           "experiments/nominal_dead_reckoning.yaml", "experiments/openvins_cameras.yaml",
           "experiments/paper_accuracy.yaml", "experiments/paper_exact.yaml",
