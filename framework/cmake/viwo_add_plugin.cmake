@@ -24,6 +24,8 @@ function(viwo_add_plugin kind name)
   if(NOT VIWO_SANITIZE)
     target_link_options(${target} PRIVATE -Wl,-z,defs)
   endif()
+  add_custom_command(TARGET ${target} POST_BUILD COMMAND viwo::seal $<TARGET_FILE:${target}>
+    VERBATIM)
   if(ARG_OUTPUT_DIR)
     set_target_properties(${target} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${ARG_OUTPUT_DIR})
     return()

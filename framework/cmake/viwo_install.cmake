@@ -35,6 +35,10 @@ install(FILES ${PROJECT_BINARY_DIR}/cmake/viwoConfig.cmake
               ${CMAKE_CURRENT_LIST_DIR}/viwo_add_plugin.cmake
   DESTINATION ${viwo_cmake_dir})
 
+# What viwo_add_plugin() runs after each link.
+set_target_properties(viwo_seal PROPERTIES EXPORT_NAME seal INSTALL_RPATH "$ORIGIN/../lib")
+install(TARGETS viwo_seal EXPORT viwoTargets RUNTIME DESTINATION bin)
+
 # Programs
 foreach(program viwo viwo_conformance_program)
   if(TARGET ${program})

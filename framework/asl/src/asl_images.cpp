@@ -50,8 +50,7 @@ class CameraTable {
     while (table.next()) {
       ++rows_;
       const std::int64_t t_ns = table.stamp_ns(stamp);
-      if (table.text(name).empty()) table.fail(name, "is empty");
-      const fs::path file = folder_ / "data" / table.text(name);
+      const fs::path file = folder_ / "data" / name_in(table, name);
       std::error_code ignored;
       if (!fs::is_regular_file(file, ignored)) {
         miss(file, table.reader());
@@ -65,6 +64,16 @@ class CameraTable {
   }
 
  private:
+  /// A recording names no files but its own.
+  static fs::path name_in(const TableReader& table, std::size_t column) {
+    if (table.text(column).empty()) table.fail(column, "is empty");
+    const fs::path name = table.text(column);
+    if (name.is_absolute() || std::find(name.begin(), name.end(), "..") != name.end()) {
+      table.fail(column, quoted(table.text(column)) + " leads out of the folder of the images");
+    }
+    return name;
+  }
+
   void miss(const fs::path& file, const TextReader& at) {
     filter_.reject(kNoImageFile, at);
     ++missing_;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -224,15 +225,22 @@ CalibrationRecording read_asl_calibration(const std::filesystem::path& path,
   const std::size_t value = table.column("value");
   StampFilter filter({std::numeric_limits<double>::infinity(), max_rejected_fraction});
   CalibrationRecording out;
+  std::set<std::string> names;  // of the last stamp
   read_rows(table, filter, [&] {
     const CalibrationSample sample{table.stamp_ns(stamp), std::string(table.text(name)),
                                    table.number(value)};
     if (sample.name.empty()) table.fail(name, "is empty");
     if (!std::isfinite(sample.value)) {
-      filter.reject(kNotFinite, table.reader());
-    } else if (filter.accept_or_same(sample.t_ns, table.reader())) {
-      out.samples.push_back(sample);
+      return filter.reject(kNotFinite, table.reader());
     }
+    const bool is_same = !out.samples.empty() && out.samples.back().t_ns == sample.t_ns;
+    if (is_same && names.contains(sample.name)) {
+      return filter.reject("name that the stamp already has", table.reader());
+    }
+    if (!filter.accept_or_same(sample.t_ns, table.reader())) return;
+    if (!is_same) names.clear();
+    names.insert(sample.name);
+    out.samples.push_back(sample);
   });
   filter.finish(table.reader());
   out.rejections = filter.counts();

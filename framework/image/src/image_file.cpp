@@ -8,10 +8,29 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "grey_png.hpp"
+#include "image_header.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo {
 namespace {
+
+/// Cameras have fewer: 7680 x 4320 fit. A file of some KB could ask for GB.
+constexpr std::uint64_t kMostPixels = 1ULL << 25, kLongestSide = 1ULL << 15;
+constexpr std::uint64_t kMostBytes = 1ULL << 28;
+
+/// What a few bytes ask for is known before a pixel is decoded.
+void check_header(std::span<const std::uint8_t> bytes, const std::string& name) {
+  const auto size = image_size(bytes);
+  if (!size) throw InputError(name + ": is no PNG, JPEG, BMP, PGM or PPM");
+  const auto [width, height] = *size;
+  if (width > 0 && height > 0 && width <= kLongestSide && height <= kLongestSide &&
+      width * height <= kMostPixels) {
+    return;
+  }
+  throw InputError(name + ": an image of " + std::to_string(width) + " x " +
+                   std::to_string(height) + " pixels, at most " +
+                   std::to_string(kMostPixels >> 20U) + " Mi are read");
+}
 
 /// OpenCV decodes what it finds of a file that was cut short and leaves the rest black: look at the
 /// end of the formats that have one.
@@ -40,6 +59,7 @@ bool cut_short(std::span<const std::uint8_t> bytes) {
 void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out) {
   if (bytes.empty()) throw InputError(name + ": the image is empty");
   if (cut_short(bytes)) throw InputError(name + ": the image is cut short");
+  check_header(bytes, name);
 #if VIWO_HAS_LIBDEFLATE
   if (decode_grey_png(bytes, out)) return;
 #endif
@@ -65,6 +85,7 @@ void read_image(const std::filesystem::path& file, Image& out) {
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);  // also refuses folders
   if (error) refuse();
+  if (size > kMostBytes) throw InputError(file.string() + ": is larger than an image is (256 MiB)");
   std::ifstream stream(file, std::ios::binary);
   std::vector<std::uint8_t> bytes(size);
   if (!stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size))) {

@@ -5,10 +5,13 @@
 #include <system_error>
 #include <utility>
 
+#include "viwo/api/stamp_order.hpp"
 #include "viwo/log/text.hpp"
 
 namespace viwo::log {
 namespace {
+
+constexpr std::size_t kMostColumns = 4096;
 
 /// Where the first field ends. With `quotes` not within them.
 std::size_t field_end(std::string_view line, char separator, bool quotes) {
@@ -66,6 +69,7 @@ TableReader::TableReader(const std::filesystem::path& file) : reader_(file) {
   const std::string_view header = first_line(0);
   if (header.find(';') != std::string_view::npos) separator_ = ';';
   split(header, separator_, false, fields_);
+  check_columns();
   for (const std::string_view name : fields_) {
     if (name.empty()) reader_.fail("the header has a column without a name");
     if (has_column(name)) reader_.fail("the header has the column " + quoted(name) + " twice");
@@ -83,9 +87,16 @@ TableReader::TableReader(const std::filesystem::path& file, const TableLayout& l
     }
   }
   split(line, separator_, true, fields_);
+  check_columns();
   for (std::size_t i = 0; i < fields_.size(); ++i) {
     columns_.push_back(has_row_ ? std::to_string(i + 1) : std::string(fields_[i]));
   }
+}
+
+void TableReader::check_columns() const {
+  if (fields_.size() <= kMostColumns) return;
+  reader_.fail(std::to_string(fields_.size()) + " columns, at most " +
+               std::to_string(kMostColumns) + " are read");
 }
 
 std::string_view TableReader::first_line(int skip) {
@@ -168,9 +179,8 @@ std::int64_t TableReader::integer(std::size_t column) const {
 }
 
 std::int64_t TableReader::stamp_ns(std::size_t column) const {
-  constexpr std::int64_t kMaxStamp = 4'000'000'000'000'000'000;
   const std::int64_t stamp = integer(column);
-  if (stamp < -kMaxStamp || stamp > kMaxStamp) {
+  if (stamp < -kMaxStampNs || stamp > kMaxStampNs) {
     fail(column, quoted(fields_[column]) + " is no stamp in nanoseconds");
   }
   return stamp;

@@ -7,10 +7,10 @@
 #include <numeric>
 #include <utility>
 
+#include "viwo/api/stamp_order.hpp"
+
 namespace viwo::log {
 namespace {
-
-constexpr std::int64_t kMaxStamp = 4'000'000'000'000'000'000;
 
 template <class T>
 std::optional<T> parse_whole(std::string_view text) {
@@ -158,7 +158,7 @@ std::optional<std::int64_t> parse_time_ns(std::string_view text, TimeUnit unit) 
   nanoseconds += decimal->digits.substr(0, kept);
   nanoseconds.resize(kept + 1, '0');
   const auto value = parse_integer(nanoseconds);
-  if (!value || *value > kMaxStamp) return std::nullopt;
+  if (!value || *value > kMaxStampNs) return std::nullopt;
   const bool round_up = decimal->digits.size() > kept && decimal->digits[kept] >= '5';
   const std::int64_t rounded = *value + (round_up ? 1 : 0);
   return decimal->negative ? -rounded : rounded;

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <utility>
 
-#include "plugin_file.hpp"
 #include "viwo/plugin_host/plugin_info.hpp"
 
 namespace viwo {
@@ -95,6 +94,7 @@ std::vector<std::string> find_build_records(std::string_view bytes) {
       std::string record{bytes.substr(at, kBuildRecordBegin.size() + size + 1)};
       if (std::find(records.begin(), records.end(), record) == records.end()) {
         records.push_back(std::move(record));
+        if (records.size() > 1) return records;
       }
     }
     at = begin;
@@ -102,8 +102,8 @@ std::vector<std::string> find_build_records(std::string_view bytes) {
   return records;
 }
 
-std::string read_build_record(const std::filesystem::path& file) {
-  std::vector<std::string> records = find_build_records(read_library_bytes(file));
+std::string build_record_in(std::string_view bytes, const std::filesystem::path& file) {
+  std::vector<std::string> records = find_build_records(bytes);
   if (records.empty()) {
     throw PluginRefused(file,
                         "has no build record, so it is not a plugin of viwo - register it with "
@@ -126,7 +126,7 @@ std::vector<RecordDifference> compare_build_records(std::string_view host,
   std::vector<RecordDifference> differences;
   for (const auto& [key, value] : host_fields) {
     const std::string* other = find_field(plugin_fields, key);
-    if (other != nullptr && *other == value) continue;
+    if (other != nullptr && (*other == value || key == kDigestField)) continue;
     differences.push_back({key, value, other != nullptr ? *other : kMissing});
   }
   for (const auto& [key, value] : plugin_fields) {

@@ -1,6 +1,7 @@
 #include "library.hpp"
 
 #include <cfenv>
+#include <cstdlib>
 #include <limits>
 #include <mutex>
 #include <string>
@@ -8,7 +9,10 @@
 #include <vector>
 
 #include <boost/dll/runtime_symbol_info.hpp>
+#include <dlfcn.h>
 
+#include "library_pages.hpp"
+#include "plugin_digest.hpp"
 #include "plugin_file.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
@@ -53,13 +57,45 @@ class KeepFloatingPointMode {
   FloatingPointMode mode_;
 };
 
+void check_bytes(const std::filesystem::path& file) {
+  const std::string bytes = read_library_bytes(file);
+  const std::string record = build_record_in(bytes, file);
+  const auto differences = compare_build_records(api_build_record(), record);
+  if (!differences.empty()) throw PluginRefused(file, explain(differences));
+  if (digest_in(record) == digest_in(api_build_record())) {
+    throw PluginRefused(file,
+                        "has no digest in its build record - build it with viwo_add_plugin(), or "
+                        "run viwo_seal FILE after the link");
+  }
+  if (digest_in(record) != plugin_digest(bytes)) {
+    throw PluginRefused(file,
+                        "is damaged, or was changed after it was linked: the digest in its build "
+                        "record is that of other bytes - copy or build it again");
+  }
+}
+
+bool is_loaded(const std::filesystem::path& file) {
+  void* const handle = ::dlopen(file.c_str(), RTLD_LAZY | RTLD_NOLOAD);
+  if (handle != nullptr) ::dlclose(handle);
+  return handle != nullptr;
+}
+
+/// Profilers know code by the file that it is mapped from (DEVELOPERS.md).
+bool stays_mapped() { return std::getenv("VIWO_PLUGINS_STAY_MAPPED") != nullptr; }
+
 }  // namespace
 
 Library::Library(const std::filesystem::path& file) {
-  const auto differences = compare_build_records(api_build_record(), read_build_record(file));
-  if (!differences.empty()) throw PluginRefused(file, explain(differences));
-  load(file);
-  find_descriptor(file);
+  check_bytes(file);
+  {
+    // Of two registries one loads it, and has copied it when the other one may run in it.
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    const bool is_first = !is_loaded(std::filesystem::canonical(file));
+    load(file);
+    find_descriptor(file);
+    if (is_first && !stays_mapped()) keep_pages(file);
+  }
   check_descriptor(file);
   const PluginDescriptor& d = *descriptor_;
   info_ = {d.kind, d.name, d.version, d.summary, d.license, file, d.params()};
@@ -94,6 +130,16 @@ void Library::find_descriptor(const std::filesystem::path& file) {
   throw PluginRefused(file, "registers no plugin: the symbol 'viwo_plugin' it sees is that of " +
                                 location.string() + remedy +
                                 ", and do not link one plugin to another");
+}
+
+void Library::keep_pages(const std::filesystem::path& file) const {
+  try {
+    keep_pages_of(descriptor_, file);
+  } catch (const std::system_error& error) {
+    throw PluginRefused(file, std::string("cannot be copied to memory: ") + error.what() +
+                                  "\n  -> with VIWO_PLUGINS_STAY_MAPPED=1 in the environment it "
+                                  "is not, and must not be overwritten while it is used");
+  }
 }
 
 void Library::check_descriptor(const std::filesystem::path& file) const {

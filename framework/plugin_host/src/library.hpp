@@ -13,7 +13,8 @@ namespace viwo {
 
 class Library {
  public:
-  /// Compares the build record, loads the file, checks its descriptor. Throws PluginRefused.
+  /// Compares build record and digest, loads the file, copies it to memory, checks its descriptor.
+  /// Throws PluginRefused.
   explicit Library(const std::filesystem::path& file);
 
   const PluginInfo& info() const { return info_; }
@@ -22,6 +23,7 @@ class Library {
  private:
   void load(const std::filesystem::path& file);
   void find_descriptor(const std::filesystem::path& file);
+  void keep_pages(const std::filesystem::path& file) const;
   void check_descriptor(const std::filesystem::path& file) const;
 
   boost::dll::shared_library library_;

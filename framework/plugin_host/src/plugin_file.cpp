@@ -4,12 +4,10 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <string_view>
 #include <system_error>
 
-#include <link.h>
-
+#include "elf.hpp"
 #include "viwo/plugin_host/plugin_info.hpp"
 
 /// Of what this code is linked into; by the linker.
@@ -22,22 +20,11 @@ namespace {
 constexpr std::string_view kPrefix = "libviwo_";
 constexpr std::string_view kSuffix = ".so";
 
-using ElfHeader = ElfW(Ehdr);
-using ElfSegment = ElfW(Phdr);
-
-template <class T>
-T copy_at(const std::string& bytes, std::size_t offset) {
-  T value;
-  std::memcpy(&value, bytes.data() + offset, sizeof(T));
-  return value;
-}
+/// A plugin has some MB, with debug information some hundred.
+constexpr std::uint64_t kLargest = 1ULL << 30;
 
 /// The machine that this program is built for.
 std::uint16_t own_machine() { return __ehdr_start.e_machine; }
-
-bool fits(std::uint64_t offset, std::uint64_t size, std::uint64_t total) {
-  return offset <= total && size <= total - offset;
-}
 
 void check_elf(const std::filesystem::path& file, const std::string& bytes) {
   if (bytes.size() < EI_NIDENT || std::memcmp(bytes.data(), ELFMAG, SELFMAG) != 0) {
@@ -48,8 +35,8 @@ void check_elf(const std::filesystem::path& file, const std::string& bytes) {
   if (bytes[EI_CLASS] != elf_class) {
     throw PluginRefused(file, "is built for another processor - rebuild it on this machine");
   }
-  if (bytes.size() < sizeof(ElfHeader)) throw PluginRefused(file, truncated);
-  const auto header = copy_at<ElfHeader>(bytes, 0);
+  if (bytes.size() < sizeof(elf::Header)) throw PluginRefused(file, truncated);
+  const auto header = elf::copy_at<elf::Header>(bytes, 0);
   if (header.e_machine != own_machine()) {
     throw PluginRefused(file, "is built for another processor - rebuild it on this machine");
   }
@@ -58,15 +45,22 @@ void check_elf(const std::filesystem::path& file, const std::string& bytes) {
                         "is not a shared library but an object file or a program - a plugin "
                         "is built with viwo_add_plugin()");
   }
-  if (header.e_phentsize != sizeof(ElfSegment) ||
-      !fits(header.e_phoff, std::uint64_t{header.e_phnum} * sizeof(ElfSegment), bytes.size())) {
+  if (header.e_phentsize != sizeof(elf::Segment) ||
+      !elf::fits(header.e_phoff, std::uint64_t{header.e_phnum} * sizeof(elf::Segment),
+                 bytes.size())) {
     throw PluginRefused(file, truncated);
   }
-  for (std::size_t i = 0; i < header.e_phnum; ++i) {
-    const auto segment = copy_at<ElfSegment>(bytes, header.e_phoff + i * sizeof(ElfSegment));
-    if (segment.p_type == PT_LOAD && !fits(segment.p_offset, segment.p_filesz, bytes.size())) {
+  std::uint64_t loaded = 0;
+  for (const elf::Segment& segment : elf::segments(bytes)) {
+    if (segment.p_type != PT_LOAD) continue;
+    if (!elf::fits(segment.p_offset, segment.p_filesz, bytes.size())) {
       throw PluginRefused(file, truncated);
     }
+    loaded += segment.p_filesz;
+  }
+  if (loaded > 2 * bytes.size()) {
+    throw PluginRefused(file,
+                        "is damaged: its segments lie over each other - copy or build it again");
   }
 }
 
@@ -105,7 +99,13 @@ std::string read_library_bytes(const std::filesystem::path& file) {
     throw PluginRefused(
         file, std::string("cannot be read: ") + std::strerror(errno) + " - check its permissions");
   }
-  std::string bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  const auto size = std::filesystem::file_size(file, error);
+  if (error || size > kLargest) {
+    throw PluginRefused(file, "is larger than 1 GiB, as no plugin is");
+  }
+  std::string bytes(size, '\0');
+  stream.read(bytes.data(), static_cast<std::streamsize>(size));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
   check_elf(file, bytes);
   return bytes;
 }

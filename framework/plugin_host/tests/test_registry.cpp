@@ -151,6 +151,7 @@ TEST_F(Registry, ListsEveryLibraryWithItsReason) {
     {"libviwo_kinematics_takes_type.so", "has a wrong parame"},
     {"libviwo_kinematics_undefined.so", "cannot be loaded: "},
     {"libviwo_kinematics_unregistered.so", "registers no plugi"},
+    {"libviwo_kinematics_unsealed.so", "has no digest in i"},
     {"libviwo_kinematics_wrong_api.so", "is for version 100"},
     {"libviwo_sensor_own_encoders.so", "ok own_encoders"},
     {"libviwo_sensor_range.so", "ok range"},

@@ -36,6 +36,7 @@ struct File {
   rosbag::Bag bag;
   mutable std::mutex mutex;  ///< of the bag, which has one file position and one open chunk
   std::int64_t begin_ns = 0;
+  std::uint64_t whole_bytes = 0;  ///< of its chunks, decompressed
 };
 
 std::int64_t to_ns(const ros::Time& time) {
@@ -59,7 +60,7 @@ void load(const rosbag::MessageInstance& message, Bytes& out) {
 std::unique_ptr<File> open_file(const fs::path& path) {
   auto file = std::make_unique<File>();
   file->name = path.string();
-  check_structure(file->name);
+  file->whole_bytes = check_structure(file->name);
   try {
     file->bag.open(file->name, rosbag::bagmode::Read);
     rosbag::View all(file->bag);
@@ -130,6 +131,7 @@ class Ros1Recording final : public Bag {
     // From the beginning, for the numbers: what is passed over is not loaded.
     rosbag::View view(file.bag, rosbag::TopicQuery(names), ros::TIME_MIN, to);
     Bytes bytes;
+    std::uint64_t read = 0;
     for (const rosbag::MessageInstance& instance : view) {
       Message message;
       message.topic = index.at(instance.getTopic());
@@ -139,6 +141,10 @@ class Ros1Recording final : public Bag {
       message.received_ns = to_ns(instance.getTime());
       message.file = &file.name;
       load(instance, bytes);
+      read += bytes.size();
+      if (read > file.whole_bytes) {  // an index may name one of them any number of times
+        throw InputError(file.name + "  is damaged: its messages have more bytes than its chunks");
+      }
       message.bytes = bytes;
       if (wanted[message.topic].large) {
         message.load = [&file, instance](Bytes& out) { load_again(file, instance, out); };

@@ -4,12 +4,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <exception>
 #include <set>
 #include <string_view>
 #include <vector>
 
+#include <rosbag/chunked_file.h>
+#include <rosbag/stream.h>
+
 #include "file_bytes.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/log/text.hpp"
 
 namespace viwo::bag {
 namespace {
@@ -19,6 +24,11 @@ constexpr char kMessage = 0x02, kFileHeader = 0x03, kIndex = 0x04, kChunk = 0x05
                kConnection = 0x07;
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 constexpr std::uint32_t kMaxHeader = 1U << 20;
+/// Of a compressed chunk, and of all of them: rosbag_storage takes memory as they say.
+constexpr std::uint64_t kMostChunk = 128U << 20, kFreeBytes = 64U << 20, kMostRatio = 300;
+/// Bytes that bz2 may give, if a chunk is decompressed whenever the next message is in another one;
+/// lz4 is that much faster.
+constexpr std::uint64_t kFreeWork = 4ULL << 30, kMostRepeated = 16, kLz4IsFaster = 16;
 
 std::uint32_t u32_at(std::string_view bytes) {
   std::uint32_t value = 0;  // little endian, as all that rosbag_storage runs on
@@ -30,7 +40,7 @@ class Structure {
  public:
   explicit Structure(const std::string& file) : file_(file), in_(file), size_(in_.size()) {}
 
-  void check() {
+  std::uint64_t check() {
     check_magic();
     std::uint64_t at = kMagic.size();
     while (at < size_) {
@@ -44,6 +54,8 @@ class Structure {
     for (const std::uint32_t connection : indexed_) {
       if (!connections_.contains(connection)) fail(size_, "a connection is missing");
     }
+    check_work();
+    return whole_bytes_;
   }
 
  private:
@@ -71,11 +83,18 @@ class Structure {
   }
 
   [[noreturn]] void fail(std::uint64_t at, const std::string& what) const {
-    throw InputError(file_ + "  is cut short or damaged: at byte " + std::to_string(at) + ", " +
-                     what + remedy());
+    const std::string in_chunk =
+        chunk_.empty() ? "" : "in the chunk at byte " + std::to_string(chunk_place_) + ", ";
+    throw InputError(file_ + "  is cut short or damaged: " + in_chunk + "at byte " +
+                     std::to_string(at) + ", " + what + remedy());
   }
 
+  /// Of the file, or of the chunk that is looked into.
   std::string read(std::uint64_t at, std::size_t n) const {
+    if (!chunk_.empty()) {
+      const auto from = chunk_.begin() + static_cast<std::ptrdiff_t>(at);
+      return {from, from + static_cast<std::ptrdiff_t>(n)};
+    }
     std::string bytes(n, '\0');
     in_.read(at, {reinterpret_cast<std::uint8_t*>(bytes.data()), n});
     return bytes;
@@ -178,20 +197,81 @@ class Structure {
 
   void check_chunk(const Record& chunk) {
     chunks_.insert(chunk.begin);
+    chunk_place_ = chunk.begin;
     messages_.clear();
     chunk_size_ = number(chunk, "size");
-    is_compressed_ = chunk.field("compression") != "none";
-    if (is_compressed_) return;
-    if (chunk.end - chunk.data != chunk_size_) fail(chunk.begin, "a chunk has another size");
-    for (std::uint64_t at = chunk.data; at < chunk.end;) {
-      const Record record = read_record(at, chunk.end);
+    whole_bytes_ += chunk_size_;
+    const std::string_view compression = chunk.field("compression");
+    is_compressed_ = compression != "none";
+    if (is_compressed_) {
+      add_compressed(chunk, compression == "lz4");
+      decompress(chunk, compression);
+      check_messages(0, chunk_size_);
+      chunk_.clear();
+    } else {
+      if (chunk.end - chunk.data != chunk_size_) fail(chunk.begin, "a chunk has another size");
+      check_messages(chunk.data, chunk.end);
+    }
+  }
+
+  /// The records of a chunk.
+  void check_messages(std::uint64_t begin, std::uint64_t end) {
+    for (std::uint64_t at = begin; at < end;) {
+      const Record record = read_record(at, end);
       if (record.op == kMessage) {
-        messages_.push_back(static_cast<std::uint32_t>(at - chunk.data));
+        messages_.push_back(static_cast<std::uint32_t>(at - begin));
       } else if (record.op != kConnection) {
         fail(at, "a record is of an unknown kind");
       }
       at = record.end;
     }
+  }
+
+  void decompress(const Record& chunk, std::string_view compression) {
+    if (compression != "lz4" && compression != "bz2") {
+      fail(chunk.begin, "a chunk is compressed by " + log::quoted(compression));
+    }
+    std::string from = read(chunk.data, chunk.end - chunk.data);
+    rosbag::ChunkedFile no_file;  // of which only writing has any use
+    rosbag::StreamFactory streams(&no_file);
+    const auto stream = streams.getStream(compression == "lz4" ? rosbag::compression::LZ4
+                                                               : rosbag::compression::BZ2);
+    chunk_.resize(chunk_size_);
+    try {
+      stream->decompress(chunk_.data(), chunk_size_, reinterpret_cast<std::uint8_t*>(from.data()),
+                         static_cast<unsigned>(from.size()));
+    } catch (const std::exception& broken) {
+      throw InputError(file_ + "  is damaged: the chunk at byte " + std::to_string(chunk.begin) +
+                       " cannot be decompressed: " + broken.what());
+    }
+  }
+
+  void add_compressed(const Record& chunk, bool is_lz4) {
+    if (chunk_size_ > kMostChunk) {
+      fail(chunk.begin, "a chunk says to become " + std::to_string(chunk_size_) +
+                            " bytes, at most " + std::to_string(kMostChunk) + " are read");
+    }
+    if (whole_bytes_ > kFreeBytes + kMostRatio * size_) {
+      fail(chunk.begin, "the chunks say to become more than " + std::to_string(kMostRatio) +
+                            " times as long as the file");
+    }
+    work_of_.push_back(is_lz4 ? chunk_size_ / kLz4IsFaster : chunk_size_);
+  }
+
+  /// Messages are read in the order of their times.
+  void check_work() {
+    std::stable_sort(entries_.begin(), entries_.end(),
+                     [](const Entry& a, const Entry& b) { return a.time < b.time; });
+    std::uint64_t work = 0;
+    for (std::size_t i = 1; i < entries_.size(); ++i) {
+      if (entries_[i].chunk != entries_[i - 1].chunk) work += work_of_[entries_[i].chunk];
+    }
+    if (work <= kFreeWork + kMostRepeated * whole_bytes_) return;
+    throw InputError(file_ + "  has messages whose chunks alternate, so that " +
+                     std::to_string(work >> 30U) +
+                     " GiB would be decompressed - `rosbag "
+                     "decompress " +
+                     file_ + "` makes it quick to read");
   }
 
   /// Of the messages of the chunk before it.
@@ -202,10 +282,13 @@ class Structure {
     const std::string data = read(record.data, record.end - record.data);
     for (std::size_t i = 0; i < data.size(); i += kEntry) {
       const std::uint32_t offset = u32_at(std::string_view(data).substr(i + 8));
-      const bool is_message = is_compressed_
-                                  ? std::uint64_t{offset} + 8 < chunk_size_
-                                  : std::binary_search(messages_.begin(), messages_.end(), offset);
+      const bool is_message = std::binary_search(messages_.begin(), messages_.end(), offset);
       if (!is_message) fail(record.begin, "there is no message where the index has one");
+      if (!is_compressed_) continue;
+      const auto seconds = u32_at(std::string_view(data).substr(i));
+      const auto nanoseconds = u32_at(std::string_view(data).substr(i + 4));
+      entries_.push_back({std::uint64_t{seconds} << 32U | nanoseconds,
+                          static_cast<std::uint32_t>(work_of_.size() - 1)});
     }
   }
 
@@ -214,14 +297,23 @@ class Structure {
   std::uint64_t size_;
   std::set<std::uint64_t> chunks_, wanted_chunks_;
   std::set<std::uint32_t> connections_, indexed_;
+  std::uint64_t whole_bytes_ = 0;  ///< of all chunks, decompressed
+  struct Entry {
+    std::uint64_t time;
+    std::uint32_t chunk;
+  };
+  std::vector<Entry> entries_;          ///< messages in compressed chunks
+  std::vector<std::uint64_t> work_of_;  ///< compressed chunks
   // Of the last chunk:
+  std::vector<std::uint8_t> chunk_;      ///< while a compressed one is looked into
   std::vector<std::uint32_t> messages_;  ///< where they are in it
+  std::uint64_t chunk_place_ = 0;
   std::uint32_t chunk_size_ = 0;
   bool is_compressed_ = false;
 };
 
 }  // namespace
 
-void check_structure(const std::string& file) { Structure(file).check(); }
+std::uint64_t check_structure(const std::string& file) { return Structure(file).check(); }
 
 }  // namespace viwo::bag

@@ -2,13 +2,16 @@
 // places in them, and ends the program where they are wrong.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 namespace viwo::bag {
 
-/// Follows all records of a bag of format 2.0, without reading what is in the messages. InputError
-/// for a file that is no such bag, that was cut short, has no index, or is damaged. In compressed
-/// chunks, whose own check sums are left to rosbag_storage, places are only known to be inside.
-void check_structure(const std::string& file);
+/// Follows all records of a bag of format 2.0, those in compressed chunks, too. InputError for a
+/// file that is no such bag, that was cut short, has no index, or is damaged; also where chunks
+/// become larger than those of recordings do (128 MiB each, 64 MiB and 100 times the file
+/// together), and where their messages alternate so that they would be decompressed for minutes.
+/// Returns how many bytes its chunks have, decompressed.
+std::uint64_t check_structure(const std::string& file);
 
 }  // namespace viwo::bag

@@ -181,6 +181,96 @@ TEST_F(Ros1Bag, SurvivesBytesThatAreWrongAnywhere) {
   }
 }
 
+/// A number as the format has it.
+template <class T>
+std::string raw(T value) {
+  return {reinterpret_cast<const char*>(&value), sizeof(value)};
+}
+
+std::string with_length(const std::string& text) {
+  return raw(static_cast<std::uint32_t>(text.size())) + text;
+}
+
+std::string record(const std::vector<std::string>& fields, const std::string& data) {
+  std::string header;
+  for (const std::string& field : fields) header += with_length(field);
+  return with_length(header) + with_length(data);
+}
+
+/// A bag of one message in each of its chunks, which say to become so long.
+std::string compressed_bag(const std::vector<std::uint32_t>& sizes, const std::string& bytes) {
+  std::string out = "#ROSBAG V2.0\n" + record({"op=\x03", "index_pos=" + raw(std::uint64_t{13}),
+                                               "conn_count=" + raw(std::uint32_t{1}),
+                                               "chunk_count=" + raw(std::uint32_t{1})},
+                                              "");
+  for (const std::uint32_t size : sizes) {
+    out += record({"op=\x05", "compression=bz2", "size=" + raw(size)}, bytes);
+    out += record({"op=\x04", "ver=" + raw(std::uint32_t{1}), "conn=" + raw(std::uint32_t{0}),
+                   "count=" + raw(std::uint32_t{1})},
+                  std::string(12, '\0'));
+  }
+  return out + record({"op=\x07", "conn=" + raw(std::uint32_t{0}), "topic=/imu0"}, "");
+}
+
+TEST_F(Ros1Bag, RefusesChunksThatTakeMoreThanARecordingDoes) {
+  const auto error = [this](const std::vector<std::uint32_t>& sizes, const std::string& bytes) {
+    std::ofstream(file(), std::ios::binary) << compressed_bag(sizes, bytes);
+    return error_of(section("imu_topic: /imu0"));
+  };
+  EXPECT_THAT(error({200'000'000}, "BZh91"),
+              HasSubstr("a chunk says to become 200000000 bytes, at most 134217728 are read"));
+  EXPECT_THAT(error({100 << 20}, "BZh91"),
+              HasSubstr("the chunks say to become more than 300 times as long as the file"));
+  EXPECT_THAT(error({100}, "BZh91"), HasSubstr("cannot be decompressed: "));
+  // 16 bytes: the length of a header, which is 2 GiB.
+  const std::string lies(
+      "\x42\x5a\x68\x39\x31\x41\x59\x26\x53\x59\x5e\x64\x96\x44\x00\x00\x04\x40"
+      "\x80\xc0\x40\x00\x00\x80\x00\xa0\x00\x21\x21\xa0\xcd\x34\xd4\x18\xf1\x77"
+      "\x24\x53\x85\x09\x05\xe6\x49\x64\x40",
+      45);
+  EXPECT_THAT(error({16}, lies), HasSubstr("at byte 0, a record goes beyond the end"));
+}
+
+TEST_F(Ros1Bag, RefusesMessagesThatAlternateBetweenLargeChunks) {
+  {
+    Ros1Writer out(file(), "bz2", 10'000'000);
+    constexpr std::uint32_t kSide = 141;  // 20 kB
+    for (int k = 0; k < 1000; ++k) {
+      const std::int64_t t_ns = kStart + (k < 500 ? 2 * k : 2 * (k - 500) + 1) * kMs;
+      out.write_image(
+          "/cam0", {t_ns, t_ns},
+          {kSide, kSide, "mono8", false, kSide, std::vector<std::uint8_t>(kSide * kSide)});
+    }
+    out.close();
+  }
+  EXPECT_THAT(error_of(section("image_topics: [/cam0]")),
+              HasSubstr(" GiB would be decompressed - `rosbag decompress " + file() +
+                        "` makes it quick to read"));
+}
+
+TEST_F(Ros1Bag, RefusesAnIndexThatNamesAMessageAgainAndAgain) {
+  {
+    Ros1Writer out(file());
+    for (int k = 0; k < 50; ++k) {
+      const std::uint32_t side = k == 0 ? 100 : 1;
+      out.write_image("/cam0", {kStart + k * kMs, kStart + k * kMs},
+                      {side, side, "mono8", false, side, std::vector<std::uint8_t>(side * side)});
+    }
+    out.close();
+  }
+  std::string content = read();
+  const auto entry = [&content](int k) {  // of the index, which stands behind the messages
+    const std::int64_t t_ns = kStart + k * kMs;
+    return content.rfind(raw(static_cast<std::uint32_t>(t_ns / 1'000'000'000)) +
+                         raw(static_cast<std::uint32_t>(t_ns % 1'000'000'000)));
+  };
+  const std::string first = content.substr(entry(1) - 4, 4);  // the offset of the large image
+  for (int k = 1; k < 49; ++k) content.replace(entry(k) + 8, 4, first);
+  std::ofstream(file(), std::ios::binary) << content;
+  EXPECT_THAT(error_of(section("image_topics: [/cam0]")),
+              HasSubstr("is damaged: its messages have more bytes than its chunks"));
+}
+
 TEST_F(Ros1Bag, RefusesAnotherDefinitionOfAMessage) {
   write_drive();
   std::string content = read();

@@ -16,6 +16,9 @@
 
 namespace viwo::bag {
 
+/// Opened so that nothing in the file decides what is run, how long, or for how much memory: real
+/// tables only, no trigger, no function of a schema; a query may take a number of steps in
+/// proportion to the file, and there are no more rows or bytes than its bytes can hold.
 class Database final : public BagFile {
  public:
   explicit Database(const std::filesystem::path& file);
@@ -45,6 +48,12 @@ class Database final : public BagFile {
   };
 
   [[noreturn]] void fail() const;
+  [[noreturn]] void damaged(const std::string& what) const;
+  void open(const std::filesystem::path& file);
+  /// InputError for a view, a virtual table, and one with columns that are computed.
+  void require_real_table(const std::string& table) const;
+  static int end_of_steps(void* self);
+  void allow_steps() const;
   Statement prepare(const std::string& sql) const;
   bool step(const Statement& statement) const;
   void read_topics();
@@ -53,6 +62,8 @@ class Database final : public BagFile {
   void load(std::int64_t id, std::size_t limit, Bytes& out) const;
 
   std::string name_;
+  std::uint64_t size_ = 0;                 ///< of the file and of the log beside it [bytes]
+  mutable std::uint64_t blocks_left_ = 0;  ///< of steps that the query may take
   std::unique_ptr<sqlite3, CloseDatabase> database_;
   mutable std::mutex mutex_;  ///< of the database
   std::vector<Topic> topics_;

@@ -15,7 +15,7 @@ std::uint32_t crc_of(std::span<const std::uint8_t> bytes) {
 
 /// Names are kept, and there may be 65535 of them.
 std::string name_of(Fields& in) {
-  constexpr std::size_t kMost = 4096;
+  constexpr std::size_t kMost = 1024;
   const std::string_view name = in.text();
   if (name.size() > kMost) {
     throw BrokenRecord("a name of " + std::to_string(name.size()) + " bytes");

@@ -9,8 +9,12 @@
 
 namespace viwo::bag::mcap {
 
-/// More is not held in memory: neither of a chunk nor of a message.
-inline constexpr std::uint64_t kMaxBytes = 256ULL << 20;
+/// More is not held in memory: neither of a chunk nor of a message. An image of 2^25 pixels in
+/// colours fits.
+inline constexpr std::uint64_t kMaxBytes = 128ULL << 20;
+/// Nor are chunks longer than this, all together and as many times as long as the file, when they
+/// are decompressed. Images of one grey level become 255 times as short by lz4.
+inline constexpr std::uint64_t kFreeBytes = 64ULL << 20, kMostRatio = 300;
 
 enum class Compression : std::uint8_t { kNone, kLz4, kZstd };
 

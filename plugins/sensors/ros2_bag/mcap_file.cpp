@@ -215,6 +215,7 @@ class McapFile::Reading {
       message.file = &file_.name();
       message.bytes = one.bytes;
       if (wanted_[one.topic].large) {
+        count_work(chunk);
         message.load = [&file = file_, chunk = chunk, offset = offset,
                         size = one.size](Bytes& out) { file.load(chunk, offset, size, out); };
       }
@@ -222,6 +223,20 @@ class McapFile::Reading {
       waiting_bytes_ -= one.bytes.size();
       waiting_.erase(waiting_.begin());
     }
+  }
+
+  /// Large messages are loaded again, one after the other: what alternates between chunks is
+  /// decompressed again and again.
+  void count_work(std::size_t chunk) {
+    constexpr std::uint64_t kFreeWork = 4ULL << 30, kMostRepeated = 16;
+    if (chunk == last_large_) return;
+    last_large_ = chunk;
+    work_ += file_.structure_.chunks[chunk].whole_bytes;
+    if (work_ <= kFreeWork + kMostRepeated * file_.structure_.whole_bytes) return;
+    throw InputError(file_.name() +
+                     "  has images whose chunks alternate, so that they would be "
+                     "decompressed " +
+                     std::to_string(kMostRepeated) + " times and more");
   }
 
   static double span_ns(const Chunk& chunk) {
@@ -275,6 +290,8 @@ class McapFile::Reading {
   std::map<Key, Waiting> waiting_;
   std::uint64_t waiting_bytes_ = 0;
   std::vector<Lost> lost_;
+  std::size_t last_large_ = std::numeric_limits<std::size_t>::max();  ///< its chunk
+  std::uint64_t work_ = 0;                    ///< bytes that loading large messages decompresses
   double read_messages_ = 0., read_ns_ = 0.;  ///< of the chunks that are as they were written
 };
 

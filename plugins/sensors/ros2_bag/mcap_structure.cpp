@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -11,6 +10,7 @@
 #include <zlib.h>
 
 #include "mcap_records.hpp"
+#include "viwo/api/stamp_order.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo::bag::mcap {
@@ -49,8 +49,7 @@ struct Head {
 };
 
 std::int64_t stamp_of(std::uint64_t t_ns) {
-  return static_cast<std::int64_t>(
-      std::min<std::uint64_t>(t_ns, std::numeric_limits<std::int64_t>::max()));
+  return static_cast<std::int64_t>(std::min<std::uint64_t>(t_ns, kMaxStampNs + 1));
 }
 
 class Follower {
@@ -183,6 +182,11 @@ class Follower {
     chunk.place = at;
     chunk.is_cut = is_cut;
     if (chunk.whole_bytes > kMaxBytes) throw BrokenRecord(too_large("chunk", chunk.whole_bytes));
+    out_.whole_bytes += chunk.whole_bytes;
+    if (out_.whole_bytes > kFreeBytes + kMostRatio * file_.size()) {
+      throw BrokenRecord("the chunks say to become more than " + std::to_string(kMostRatio) +
+                         " times as long as the file");
+    }
     if (is_cut) {
       chunk.bytes = std::min(chunk.bytes, file_.size() - chunk.at);
     } else if (chunk.bytes > record.end() - chunk.at) {

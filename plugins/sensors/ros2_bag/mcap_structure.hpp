@@ -19,6 +19,7 @@ struct Structure {
   bool has_wrong_summary = false;  ///< by its check sum; it is not used then
   bool has_end = true;             ///< false: the file was cut off, or its recording not ended
   std::uint64_t end = 0;           ///< of the last whole record
+  std::uint64_t whole_bytes = 0;   ///< of all chunks, decompressed
 };
 
 /// Reads no messages. InputError "file  what" for a file that is no MCAP, and for one that has its

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <system_error>
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
@@ -11,8 +12,17 @@ namespace {
 
 constexpr std::size_t kMostEntries = 65536;
 constexpr std::size_t kLongestName = 1024;
-/// Of all that is named: an hour of four modules at 250 Hz has 200 MB.
-constexpr std::size_t kMostKept = std::size_t{512} << 20;
+/// Of all that is named: an hour of four modules at 250 Hz has 200 MB. A record of one byte is kept
+/// in six times as many, and gzip makes it smaller.
+constexpr std::size_t kMostKept = std::size_t{512} << 20, kFreeKept = std::size_t{64} << 20;
+constexpr std::size_t kMostRatio = 32;
+
+std::size_t most_kept(const std::filesystem::path& file) {
+  std::error_code unknown;
+  const auto size = std::filesystem::file_size(file, unknown);
+  if (unknown || size > kMostKept / kMostRatio) return kMostKept;
+  return std::min(kMostKept, kFreeKept + kMostRatio * static_cast<std::size_t>(size));
+}
 constexpr std::string_view kSchema = ".schema/struct:";
 
 enum Control : char { kStart = 0, kFinish = 1, kSetMetadata = 2 };
@@ -36,7 +46,7 @@ bool is_wanted(const std::string& name, const std::vector<std::string>& wanted) 
 }  // namespace
 
 Contents::Contents(const std::filesystem::path& file, const std::vector<std::string>& wanted)
-    : file_(file) {
+    : file_(file), most_kept_(most_kept(file)) {
   for (Record record; file_.next(record);) {
     if (record.entry == 0) {
       take_control(record);
@@ -57,8 +67,8 @@ std::string Contents::damage() const {
 
 void Contents::keep(std::size_t bytes, const Record& record) {
   kept_ += bytes;
-  if (kept_ <= kMostKept) return;
-  throw InputError(file() + "  has more than " + std::to_string(kMostKept >> 20) +
+  if (kept_ <= most_kept_) return;
+  throw InputError(file() + "  has more than " + std::to_string(most_kept_ >> 20) +
                    " MiB of records of the entries that are named, up to byte " +
                    std::to_string(record.offset) + ": too much for a log of a robot");
 }

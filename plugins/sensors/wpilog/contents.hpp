@@ -71,6 +71,7 @@ class Contents {
   std::unordered_map<std::string, std::size_t> by_name_and_type_;
   std::unordered_map<std::uint32_t, std::size_t> by_id_;
   Schemas schemas_;
+  std::size_t most_kept_;
   std::size_t kept_ = 0;  ///< [bytes]
   Rejections rejections_;
 };

@@ -70,19 +70,30 @@ TEST_F(WpiLog, ANumberThatIsGivenToAnotherEntryIsCounted) {
 
 TEST_F(WpiLog, MoreThanALogCanHaveIsRefusedBeforeItFillsTheMemory) {
   const std::string file = (folder_ / "bomb.wpilog.gz").string();
-  gzFile out = gzopen(file.c_str(), "wb1");
-  Writer head;
-  head.start(1, "/d", "double[]");
-  gzwrite(out, head.bytes.data(), static_cast<unsigned>(head.bytes.size()));
-  Writer record;
-  const std::size_t begin = record.bytes.size();
-  record.record(1, 0, std::string(1U << 20, '\0'));
-  for (int k = 0; k < 520; ++k) {
-    gzwrite(out, &record.bytes[begin], static_cast<unsigned>(record.bytes.size() - begin));
-  }
-  gzclose(out);
-  EXPECT_THAT(error_of("{type: wpilog, path: " + file + ", " + kOneDrive + "}"),
-              HasSubstr("has more than 512 MiB of records of the entries that are named"));
+  const auto error_with = [&](const std::string& payload, int records, std::size_t noise) {
+    gzFile out = gzopen(file.c_str(), "wb1");
+    Writer head;
+    head.start(1, "/d", "double[]");
+    head.start(2, "/other", "raw");
+    gzwrite(out, head.bytes.data(), static_cast<unsigned>(head.bytes.size()));
+    std::mt19937 random(1);
+    for (int k = 0; k < 3000; ++k) {
+      Writer block;
+      const std::size_t begin = block.bytes.size();
+      for (int i = 0; i < records; ++i) block.record(1, 0, payload);
+      std::string other(noise, '\0');
+      for (char& byte : other) byte = static_cast<char>(random());
+      block.record(2, 0, other);
+      gzwrite(out, &block.bytes[begin], static_cast<unsigned>(block.bytes.size() - begin));
+    }
+    gzclose(out);
+    return error_of("{type: wpilog, path: " + file + ", " + kOneDrive + "}");
+  };
+  EXPECT_THAT(error_with(std::string(1U << 17, '\0'), 1, 1),
+              HasSubstr("the gzip data become more than 100 times as long"));
+  // 5 bytes each in the file, 33 in memory.
+  EXPECT_THAT(error_with("0", 1000, 100),
+              HasSubstr(" MiB of records of the entries that are named"));
 }
 
 TEST_F(WpiLog, WhatIsMissingInADamagedLogIsSaidWithTheDamage) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "field_reader.hpp"
@@ -21,8 +22,12 @@ struct Topic {
   std::string type;  ///< as the bag has it
 };
 
+/// InputError where a bag has more topics, `n_before` without this one, or longer names than a
+/// recording of a robot has: they are kept, searched and suggested.
+void check_topic(const std::string& bag, std::string_view name, std::size_t n_before);
+
 /// Adds a topic of the bag `bag` to `topics`, which stay in the order of their names; one that is
-/// there already must have the same type (InputError).
+/// there already must have the same type (InputError, also as for check_topic()).
 void add_topic(const std::string& bag, const Topic& topic, std::vector<Topic>& topics);
 
 /// A topic that is wanted.

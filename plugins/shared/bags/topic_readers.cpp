@@ -128,6 +128,7 @@ class JointReader final : public TopicReader {
     if (joints.names != names_) {
       names_ = std::move(joints.names);
       for (const std::string& name : names_) {
+        if (known_.size() >= kMostKnown) break;
         if (std::find(known_.begin(), known_.end(), name) == known_.end()) known_.push_back(name);
       }
     }
@@ -164,6 +165,9 @@ class JointReader final : public TopicReader {
     throw InputError("topic '" + filter_.topic() +
                      "' has too few messages without a gap for a rate");
   }
+
+  /// They are searched at each message, and suggested where a name is misspelt.
+  static constexpr std::size_t kMostKnown = 1000;
 
   BagOptions options_;
   Kind kind_;

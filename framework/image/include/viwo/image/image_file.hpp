@@ -12,12 +12,13 @@
 
 namespace viwo {
 
-/// Decodes a PNG, JPEG, ... that is in memory. Colours become grey, 16 bit become the upper 8; rows
-/// and columns stay as they are, whatever EXIF says of the orientation.
-/// InputError when it is none or is cut short; `name` says where it comes from.
+/// Decodes a PNG, JPEG, BMP, PGM or PPM that is in memory. Colours become grey, 16 bit become the
+/// upper 8; rows and columns stay as they are, whatever EXIF says of the orientation.
+/// InputError when it is none, is cut short, or says to have more than 2^25 pixels (then before any
+/// is decoded); `name` says where it comes from.
 void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out);
 
-/// Reads an image file. InputError when it is missing, no image, or cut short.
+/// Reads an image file of at most 256 MiB. InputError when it is missing, or as for decode_image().
 void read_image(const std::filesystem::path& file, Image& out);
 
 enum class PngColours { kGrey, kBgr };  ///< 1 byte a pixel, or 3: blue, green, red

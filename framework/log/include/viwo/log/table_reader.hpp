@@ -39,7 +39,8 @@ struct TableLayout {
 };
 
 /// Reads row by row. The header may begin with '#' as in EuRoC files; the separator is ';' if the
-/// header has one and ',' otherwise; empty lines are skipped. Wrong rows are a BadRow.
+/// header has one and ',' otherwise; empty lines are skipped. Wrong rows are a BadRow; more than
+/// 4096 columns are an InputError.
 class TableReader {
  public:
   explicit TableReader(const std::filesystem::path& file);
@@ -94,6 +95,7 @@ class TableReader {
   [[noreturn]] void refuse(const std::string& text) const;
   std::optional<std::size_t> find(std::string_view name) const;
 
+  void check_columns() const;
   /// The line behind `skip` others; without the '#' before a header.
   std::string_view first_line(int skip);
 

@@ -3,7 +3,8 @@
 //
 // In the record: what changes the layout or the allocation of types that cross the boundary, or the
 // state of the floating-point unit. Not in it: optimisation level, debug information, language
-// standard, NDEBUG.
+// standard, NDEBUG. Its last field has room for a digest of the file, which viwo_seal writes after
+// the link: a file that is damaged is refused before any of it is loaded.
 #pragma once
 
 #include <array>
@@ -22,6 +23,7 @@ inline constexpr int kApiVersion = 9;
 
 inline constexpr std::string_view kBuildRecordBegin = "viwo-build-record{";
 inline constexpr char kBuildRecordEnd = '}';
+inline constexpr std::string_view kDigestField = "digest";
 
 namespace detail {
 
@@ -134,6 +136,8 @@ constexpr RecordText make_build_record() {
   record.field("eigen_index_size", sizeof(Eigen::Index));
   record.field("eigen_vector4d_align", alignof(Eigen::Vector4d));
   record.field("fast_math", kFastMath);
+  record.add(kDigestField);
+  record.add("=--------;");
   record.text[record.size++] = kBuildRecordEnd;
   return record;
 }

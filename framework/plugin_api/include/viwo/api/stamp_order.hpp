@@ -15,6 +15,10 @@
 
 namespace viwo {
 
+/// No stamp is further from zero, which is 126 years: differences, and a few seconds more, stay
+/// within 64 bits.
+inline constexpr std::int64_t kMaxStampNs = 4'000'000'000'000'000'000;
+
 /// Says of increasing stamps which are not to be believed: one far ahead of the last, until another
 /// one is behind it. Taken as it comes, a single broken stamp would make all that follow late.
 class StampJump {
@@ -60,6 +64,7 @@ struct LogLimits {
 };
 
 inline constexpr const char* kStampNotAfter = "stamp not after the previous one";
+inline constexpr const char* kNoStamp = "stamp of another century";
 inline constexpr const char* kStampFarAhead = "stamp far ahead of the previous one";
 
 /// "gap longer than 0.2 s"
@@ -71,10 +76,15 @@ class VIWO_API StampOrder {
   /// `prefix` stands before all reasons.
   explicit StampOrder(const LogLimits& limits, std::string prefix = "");
 
-  /// True for a stamp after all stamps accepted before and not far ahead of them (StampJump);
-  /// otherwise it is rejected and counted. A gap before an accepted stamp is counted, too.
+  /// True for a stamp within +-kMaxStampNs, after all stamps accepted before and not far ahead of
+  /// them (StampJump); otherwise it is rejected and counted. A gap before an accepted stamp is
+  /// counted, too.
   template <class Where>
   bool accept(std::int64_t t_ns, const Where& where) {
+    if (t_ns < -kMaxStampNs || t_ns > kMaxStampNs) {
+      reject(kNoStamp, where);
+      return false;
+    }
     if (last_ns_ && t_ns <= *last_ns_) {
       reject(kStampNotAfter, where);
       return false;

@@ -11,13 +11,13 @@
 
 namespace viwo {
 
-/// All complete build records in `bytes`, without repetitions. A bare kBuildRecordBegin, as it is
-/// in the constants of this very program, is none.
+/// The complete build records in `bytes`, without repetitions, at most two: more than one is too
+/// many. A bare kBuildRecordBegin, as it is in the constants of this very program, is none.
 std::vector<std::string> find_build_records(std::string_view bytes);
 
-/// The build record of a plugin's file. Throws PluginRefused when the file is not a readable shared
-/// library of this platform, or has no record, or several that disagree.
-std::string read_build_record(const std::filesystem::path& file);
+/// The build record in the bytes of a plugin's file. Throws PluginRefused when it has none, or
+/// several that disagree.
+std::string build_record_in(std::string_view bytes, const std::filesystem::path& file);
 
 struct RecordDifference {
   std::string field;
@@ -27,7 +27,7 @@ struct RecordDifference {
 };
 
 /// The fields that differ, in the order of the host's record; "(missing)" where one has no such
-/// field.
+/// field. The digest is each file's own.
 std::vector<RecordDifference> compare_build_records(std::string_view host, std::string_view plugin);
 
 /// Reason of a refusal: every field, and what to do about it. `differences` must not be empty.

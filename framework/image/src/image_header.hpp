@@ -1,0 +1,18 @@
+// What the first bytes of an image file say, before any pixel is decoded.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace viwo {
+
+struct ImageSize {
+  std::uint64_t width_px = 0;
+  std::uint64_t height_px = 0;
+};
+
+/// Of a PNG, JPEG, BMP, PGM or PPM; nothing for other formats, and for a header that is broken.
+std::optional<ImageSize> image_size(std::span<const std::uint8_t> bytes);
+
+}  // namespace viwo
