@@ -17,6 +17,9 @@ namespace {
 
 constexpr std::size_t kFirstWindow = 3;
 constexpr std::size_t kEpochsPerClone = 3;
+/// Over which the filter goes on without the IMU. Whoever is silent for longer, or begins to speak
+/// so long after the start, leaves nothing that an estimate could be made of, epoch after epoch.
+constexpr double kLongestSilenceS = 60.;
 
 /// CPU time of this thread: what an epoch costs, however busy the machine is with other things.
 double thread_ms() {
@@ -148,6 +151,10 @@ bool Estimator::step() {
     return false;
   }
   if (!filter_.initialized() && !find_start()) return false;
+  if (const double silent_s = intake_.silent_s(filter_.t_ns()); silent_s > kLongestSilenceS) {
+    failure_ = "the IMU was silent for " + std::to_string(silent_s) + " s";
+    return false;
+  }
   const auto t_ns = intake_.next_epoch_ns(options_.schedule, filter_.t_ns(), filter_.blocks());
   if (!t_ns) return false;
   StageClock clock(stage_ms_);

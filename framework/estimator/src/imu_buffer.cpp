@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "viwo/filter/propagation.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo {
 namespace {
@@ -41,6 +42,10 @@ bool ImuBuffer::is_after_the_last(std::int64_t t_ns) {
 void ImuBuffer::add(const ImuSample& sample, Rejections& rejections) {
   if (const char* fault = sample.fault()) {
     rejections.add(std::string("imu: ") + fault, sample.t_ns);
+    return;
+  }
+  if (!is_stamp(sample.t_ns)) {
+    rejections.add("imu: stamp that is none", sample.t_ns);
     return;
   }
   if (!is_within(sample.gyro_rad_per_s, limits_.max_gyro_rad_per_s) ||
@@ -109,6 +114,14 @@ std::span<const ImuSample> ImuBuffer::cut(std::int64_t begin_ns, std::int64_t en
     break;
   }
   return cut_;
+}
+
+double ImuBuffer::silent_s(std::int64_t t_ns) const {
+  const auto all = samples();
+  const auto next =
+      std::upper_bound(all.begin(), all.end(), t_ns,
+                       [](std::int64_t t, const ImuSample& sample) { return t < sample.t_ns; });
+  return next == all.end() ? 0. : seconds_between(t_ns, next->t_ns);
 }
 
 void ImuBuffer::forget_before(std::int64_t t_ns) {

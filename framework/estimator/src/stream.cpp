@@ -5,6 +5,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "viwo/math/stamp.hpp"
+
 namespace viwo {
 namespace {
 
@@ -22,6 +24,15 @@ constexpr std::int64_t kMaxStartWindowNs = 60'000'000'000;
 /// watched.
 constexpr std::size_t kMostChannels = 64;
 
+/// Why no sample can have these times; nullptr: one can.
+const char* fault_of(const SampleExtent& extent) {
+  if (!is_stamp(extent.t_ns) || !is_stamp(extent.begin_ns) || !is_stamp(extent.end_ns)) {
+    return "stamp that is none";
+  }
+  const bool is_within = extent.begin_ns <= extent.t_ns && extent.t_ns <= extent.end_ns;
+  return is_within ? nullptr : "stamp outside of the time that it stands for";
+}
+
 }  // namespace
 
 Stream::Stream(SharedStream declared)
@@ -33,7 +44,10 @@ std::int64_t Stream::offset_ns(int channel, const StateBlocks& blocks) const {
   const auto last = static_cast<int>(clocks.size()) - 1;
   const auto& clock = clocks[static_cast<std::size_t>(std::clamp(channel, 0, last))];
   const double estimated_s = clock.block.index < 0 ? 0. : blocks.view(clock.block).numbers()[0];
-  return std::llround(1e9 * (clock.constant_s + estimated_s));
+  // An estimate that has gone wild is found out at the end of the epoch (failure_of()).
+  constexpr double kMostS = 1e8;
+  const double offset_s = clock.constant_s + estimated_s;
+  return std::llround(1e9 * (std::abs(offset_s) <= kMostS ? offset_s : 0.));
 }
 
 std::int64_t Stream::imu_time_ns(std::size_t i, const StateBlocks& blocks) const {
@@ -96,9 +110,13 @@ void Stream::add(SampleView sample, const StateBlocks& blocks, std::optional<std
   }
   if (imu_ns) forget_other_clock(*imu_ns, rejections);
   Arrival arrival{sample.extent(), sample.type().channel(sample.data())};
-  arrival.t_ns = arrival.extent.t_ns + offset_ns(arrival.channel, blocks);
+  const SampleExtent& extent = arrival.extent;
   const char* why = sample.type().fault(sample.data());
-  if (why == nullptr) why = objection(arrival, blocks, imu_ns);
+  if (why == nullptr) why = fault_of(extent);
+  if (why == nullptr) {
+    arrival.t_ns = extent.t_ns + offset_ns(arrival.channel, blocks);
+    why = objection(arrival, blocks, imu_ns);
+  }
   if (why != nullptr) return reject(why, arrival.extent.t_ns, rejections);
   buffer_->push(sample.data());
   last_ = arrival;

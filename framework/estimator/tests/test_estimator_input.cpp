@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "estimator_fixture.hpp"
 #include "viwo/estimator/estimator.hpp"
@@ -263,6 +263,45 @@ TEST(Estimator, CannotGoOnWhenTheClockOfTheImuWasSetBack) {
   bench.imu(-60'000, -59'800);
   EXPECT_EQ(bench.steps(), 0);
   EXPECT_EQ(bench.estimator.failure(), "the clock of the IMU was set back by 60.090000 s");
+}
+
+TEST(Estimator, CannotGoOnWhenTheImuWasSilentForAMinute) {
+  Bench bench = Bench::started();
+  bench.imu(-10, 100);
+  bench.imu(50'000, 50'200);
+  EXPECT_GT(bench.steps(), 190) << "half a minute is an uncertain one";
+  EXPECT_EQ(bench.estimator.failure(), "");
+  bench.imu(3'600'000, 3'600'200);
+  EXPECT_LT(bench.steps(), 3) << "not one epoch after the other for an hour";
+  EXPECT_THAT(bench.estimator.failure(), ::testing::StartsWith("the IMU was silent for 3549."));
+}
+
+TEST(Estimator, DoesNotMakeEpochsFromAStartInAnotherClockToTheFirstReading) {
+  Bench bench = Bench::started();
+  bench.imu(1'000'000'000, 1'000'000'200);
+  EXPECT_EQ(bench.steps(), 0);
+  EXPECT_EQ(bench.estimator.failure(), "the IMU was silent for 1000000.000000 s");
+}
+
+TEST(Estimator, RefusesStampsWhoseDifferencesOverflow) {
+  Bench bench = Bench::started({.cells = true});
+  bench.imu(-10, 100);
+  using Limits = std::numeric_limits<std::int64_t>;
+  for (const std::int64_t t_ns : {Limits::min(), Limits::max(), -4'000'000'000'000'000'001}) {
+    ImuSample sample = imu_at(kStart);
+    sample.t_ns = t_ns;
+    bench.estimator.add(sample);
+    CellSample cell = cell_at(kStart + 50 * kMs);
+    cell.begin_ns = t_ns;
+    bench.add(cell);
+  }
+  CellSample cell = cell_at(kStart + 50 * kMs);
+  cell.t_ns = cell.end_ns + 1;
+  bench.add(cell);
+  EXPECT_EQ(bench.rejected(), (Counts{{"imu: stamp that is none", 3},
+                                      {"cells: stamp that is none", 2},
+                                      {"cells: sample that ends before it begins", 1},
+                                      {"cells: stamp outside of the time that it stands for", 1}}));
 }
 
 TEST(Estimator, OfLiveMeasurementsWaitsForTheTickOfTheOtherChannel) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "viwo/math/significant.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
 
 namespace viwo {
@@ -36,8 +37,7 @@ bool StreamWatch::is_set_back(std::int64_t t_ns) {
 }
 
 void StreamWatch::add(std::int64_t stamp_ns, int number, std::int64_t now_ns) {
-  constexpr std::int64_t kMostStamp = 4'000'000'000'000'000'000;
-  if (stamp_ns > kMostStamp || stamp_ns < -kMostStamp) return;
+  if (!is_stamp(stamp_ns)) return;
   // A first stamp that the next one contradicts says nothing of the clock.
   if (n_samples_ == 1 && std::abs(now_ns - stamp_ns - offset_ns_) > kLongNs) {
     has_begun_ = false;

@@ -34,6 +34,8 @@ class ImuBuffer {
   /// By how much the clock of the IMU was set back, s: its readings follow each other, all of them
   /// long before one that came earlier. 0: it was not.
   double set_back_s() const { return n_behind_ < kMostBehind ? 0. : behind_s_; }
+  /// How long after `t_ns` the next reading is, s; 0 where there is none.
+  double silent_s(std::int64_t t_ns) const;
   bool empty() const { return buffer_.empty(); }
   std::int64_t newest_ns() const { return samples().back().t_ns; }
   std::span<const ImuSample> samples() const { return buffer_.samples(); }

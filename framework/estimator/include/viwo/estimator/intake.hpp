@@ -29,6 +29,8 @@ class Intake {
   void finish();
   /// ImuBuffer::set_back_s().
   double set_back_s() const { return imu_.set_back_s(); }
+  /// ImuBuffer::silent_s().
+  double silent_s(std::int64_t t_ns) const { return imu_.silent_s(t_ns); }
 
   /// Lets a search look at all that there is.
   std::optional<ImuPrior> find_start(StartSearch& search, const StateBlocks& blocks);

@@ -95,7 +95,7 @@ class Filter {
   FilterView view() const;
 
  private:
-  static constexpr std::int64_t kNever = -1;
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
   template <class Factor>
   FactorResult apply_factor(const Factor& factor);
   template <class Factor>
