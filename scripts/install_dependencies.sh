@@ -1,8 +1,8 @@
 #!/bin/bash
-# install_dependencies.sh [--tests | --engines]
+# install_dependencies.sh [--tests | --engines | --fuzz]
 # Installs with apt what building viwo needs and this machine lacks; nothing when all is there.
 # --tests adds what only the tests use, --engines also Slurm and Open MPI for the nightly tests of
-# campaigns. Never asks a question.
+# campaigns, --fuzz clang and its tools for scripts/fuzz.sh. Never asks a question.
 set -euo pipefail
 
 missing=()
@@ -32,6 +32,9 @@ fi
 need_command g++ c++
 need_command cmake cmake
 need_command git git
+if [ "${1:-}" = --fuzz ]; then
+  for package in clang llvm libclang-rt-dev; do need_package "$package"; done
+fi
 need_command ninja-build ninja
 need_command ccache ccache
 need_command python3 python3

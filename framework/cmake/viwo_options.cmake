@@ -6,6 +6,8 @@ set(VIWO_ARCH "native" CACHE STRING
     "Instruction set of host and plugins, as for -march (native, x86-64-v3, ...); empty: the compiler's default, for packages")
 set(VIWO_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize: address,undefined or thread")
 
+option(VIWO_FUZZ "Build what libFuzzer runs (clang; preset fuzz)" OFF)
+
 set(VIWO_ABI_FLAGS "")
 if(VIWO_ARCH)
   list(APPEND VIWO_ABI_FLAGS -march=${VIWO_ARCH})

@@ -1,0 +1,88 @@
+#include "target.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <stdexcept>
+
+#include <unistd.h>
+
+#include "viwo/api/status.hpp"
+
+namespace viwo::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Folder {
+ public:
+  Folder() : path_(fs::temp_directory_path() / ("viwo_fuzz_" + std::to_string(getpid()))) {
+    fs::remove_all(path_);
+    fs::copy(VIWO_FUZZ_FILES, path_, fs::copy_options::recursive);
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+std::vector<Target> all_targets() {
+  std::vector<Target> all;
+  for (auto&& some : {sensor_targets(), file_targets(), filter_targets()}) {
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
+}
+
+}  // namespace
+
+const std::vector<Target>& targets() {
+  static const std::vector<Target> all = all_targets();
+  return all;
+}
+
+const Target* find(const std::string& name) {
+  const auto& all = targets();
+  const auto found = std::find_if(all.begin(), all.end(),
+                                  [&name](const Target& target) { return target.name == name; });
+  return found != all.end() ? &*found : nullptr;
+}
+
+std::string run(const Target& target, Bytes bytes) {
+  try {
+    target.run(bytes);
+    return "";
+  } catch (const InputError& error) {
+    require(error.what()[0] != '\0', "an error without a text");
+    return error.what();
+  }
+}
+
+void require(bool holds, const std::string& what) {
+  if (!holds) throw std::logic_error(what);
+}
+
+const fs::path& folder() {
+  static const Folder own;
+  return own.path();
+}
+
+fs::path write(const std::string& name, Bytes bytes) {
+  const fs::path file = folder() / name;
+  fs::create_directories(file.parent_path());
+  std::ofstream out(file, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(bytes.data()),
+            static_cast<std::streamsize>(bytes.size()));
+  require(out.good(), "cannot write " + file.string());
+  return file;
+}
+
+PluginRegistry& registry() {
+  static PluginRegistry plugins({VIWO_TEST_PLUGIN_DIR}, [](auto&&...) {});
+  return plugins;
+}
+
+}  // namespace viwo::fuzz
