@@ -2,15 +2,17 @@
 // with all updates, as the configurations in tests/fuzz/files make it.
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "../support/sensors_in_memory.hpp"
 #include "target.hpp"
+#include "viwo/math/arrays.hpp"
 #include "viwo/run/run.hpp"
 #include "viwo/setup/configuration.hpp"
 
@@ -253,6 +255,20 @@ std::vector<Measurement> spoiled_drive(Choices& choices, bool rest_follows) {
   return out;
 }
 
+ImuPrior true_start() {
+  const auto first = std::find_if(drive().begin(), drive().end(), [](const Measurement& m) {
+    return m.get_if<StateSample>() != nullptr;
+  });
+  const StateSample& truth = *first->get_if<StateSample>();
+  ImuPrior prior;
+  prior.t_ns = truth.t_ns;
+  prior.state.R_GtoI = to_quaternion(truth.q_ItoG_xyzw).toRotationMatrix().transpose();
+  prior.state.p_IinG = to_vector(truth.p_IinG_m);
+  prior.state.v_IinG = to_vector(truth.v_IinG_m_per_s);
+  prior.P = 1e-4 * ImuMatrix::Identity();
+  return prior;
+}
+
 struct Robot {
   const char* file;
   StartMode start;
@@ -298,10 +314,7 @@ void estimator(Bytes bytes) {
   const std::size_t head = choices.raw<std::uint8_t>();
   const RunSetup setup = fresh_setup(head % 2 == 0 ? 0 : 3);
   Estimator estimator = make_estimator(*setup.filter, (head & 2) != 0);
-  ImuPrior prior;
-  prior.t_ns = drive().front().t_ns();
-  prior.P = 1e-4 * ImuMatrix::Identity();
-  estimator.start(prior);
+  estimator.start(true_start());
   std::int64_t steps = 0;
   const auto step = [&] {
     while (estimator.step()) {
