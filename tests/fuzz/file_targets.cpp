@@ -125,9 +125,9 @@ void plugin(Bytes bytes) {
 template <class Fields>
 void message(Bytes bytes) {
   if (bytes.empty()) return;
-  Fields in(bytes.subspan(1));
   Image pixels;
   try {
+    Fields in(bytes.subspan(1));
     switch (const auto kind = static_cast<bag::Kind>(bytes[0] % 9); kind) {
       case bag::Kind::kImu:
         bag::read_imu(in);

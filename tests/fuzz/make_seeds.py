@@ -188,7 +188,7 @@ def main():
     seed("kaist_images", "a", "1\n2\n")
     seed("kaist_poses", "a", "1,1,0,0,3e5,0,1,0,4e6,0,0,1,22\n2,0.8,-0.6,0,3e5,0.6,0.8,0,4e6,0,0,1,22\n")
     joints = "time;.header.stamp.secs;.header.stamp.nsecs;.name;.position;.velocity\n" + "".join(
-        f"2024/05/01/10:00:0{i}.5;{i};500000000;['a', 'b', 'c'];[{i}, 1.0, 0.1];(0.5, 1, 0)\n" for i in range(4))
+        f"2024/05/01/10:00:00.{i}5;0;{i}50000000;['a', 'b', 'c'];[{i}, 1.0, 0.1];(0.5, 1, 0)\n" for i in range(4))
     seed("ros_text_encoders", "a", joints)
     seed("ros_text_velocity", "a", joints)
     position, orientation = ".pose.position.", ".pose.orientation."
@@ -236,7 +236,7 @@ def main():
          "kinematics: {type: differential, radius_left_m: 0.05, radius_right_m: 0.05, baseline_m: 0.3}\n"
          "estimator: {start: moving, clones: 4}\nupdates: {wheel_odometry: {}}\n")
     seed("experiment", "a", "experiment: e\nbase: robot.yaml\nseeds: 2\nset: {odometry.twist: noise_weighted}\n"
-         "motions: [circle, line]\nreport_by: [motion]\nvariants:\n  a: {}\n  b: {estimator.clones: 5}\n")
+         "variants:\n  a: {}\n  b: {estimator.clones: 5}\n")
     calibrated = folder / "run"
     run(viwo, "run", FILES / "robot.yaml", "--set", "sensors.robot.duration_s=1", "--set", "updates.gnss.enabled=false",
         "--out", calibrated)

@@ -265,27 +265,35 @@ TEST(Estimator, CannotGoOnWhenTheClockOfTheImuWasSetBack) {
   EXPECT_EQ(bench.estimator.failure(), "the clock of the IMU was set back by 60.090000 s");
 }
 
+/// Of a base that stands, with some noise: every 10 ms.
+void rest(Bench& bench, std::int64_t from_ms, std::int64_t to_ms) {
+  for (std::int64_t t = from_ms + 10; t <= to_ms; t += 10) {
+    const double noise = 1e-4 * static_cast<double>(t / 10 % 3);
+    bench.estimator.add(ImuSample{kStart + t * kMs, {noise, 0., 0.}, {0., noise, 9.81}});
+  }
+}
+
 TEST(Estimator, CannotGoOnWhenTheImuWasSilentForAMinute) {
   Bench bench = Bench::started();
-  bench.imu(-10, 100);
-  bench.imu(50'000, 50'200);
-  EXPECT_GT(bench.steps(), 190) << "half a minute is an uncertain one";
+  rest(bench, -10, 1000);
+  rest(bench, 10'000, 11'000);
+  EXPECT_GT(bench.steps(), 30) << "over some seconds it goes on";
   EXPECT_EQ(bench.estimator.failure(), "");
-  bench.imu(3'600'000, 3'600'200);
+  rest(bench, 3'600'000, 3'601'000);
   EXPECT_LT(bench.steps(), 3) << "not one epoch after the other for an hour";
-  EXPECT_THAT(bench.estimator.failure(), ::testing::StartsWith("the IMU was silent for 3549."));
+  EXPECT_THAT(bench.estimator.failure(), ::testing::StartsWith("the IMU was silent for 35"));
 }
 
 TEST(Estimator, DoesNotMakeEpochsFromAStartInAnotherClockToTheFirstReading) {
   Bench bench = Bench::started();
-  bench.imu(1'000'000'000, 1'000'000'200);
+  rest(bench, 1'000'000'000, 1'000'000'200);
   EXPECT_EQ(bench.steps(), 0);
-  EXPECT_EQ(bench.estimator.failure(), "the IMU was silent for 1000000.000000 s");
+  EXPECT_THAT(bench.estimator.failure(), ::testing::StartsWith("the IMU was silent for 1000000."));
 }
 
 TEST(Estimator, RefusesStampsWhoseDifferencesOverflow) {
   Bench bench = Bench::started({.cells = true});
-  bench.imu(-10, 100);
+  rest(bench, -10, 100);
   using Limits = std::numeric_limits<std::int64_t>;
   for (const std::int64_t t_ns : {Limits::min(), Limits::max(), -4'000'000'000'000'000'001}) {
     ImuSample sample = imu_at(kStart);
