@@ -9,6 +9,7 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
+#include <nav_msgs/Path.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/Imu.h>
@@ -45,6 +46,7 @@ using JointState = sensor_msgs::JointState_<AnyAllocator>;
 using KeyValue = diagnostic_msgs::KeyValue_<AnyAllocator>;
 using NavSatFix = sensor_msgs::NavSatFix_<AnyAllocator>;
 using Odometry = nav_msgs::Odometry_<AnyAllocator>;
+using Path = nav_msgs::Path_<AnyAllocator>;
 using PoseStamped = geometry_msgs::PoseStamped_<AnyAllocator>;
 using PoseWithCovarianceStamped = geometry_msgs::PoseWithCovarianceStamped_<AnyAllocator>;
 using TFMessage = tf2_msgs::TFMessage_<AnyAllocator>;

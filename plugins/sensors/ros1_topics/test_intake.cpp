@@ -3,16 +3,18 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include <boost/make_shared.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "intake.hpp"
 #include "master.hpp"
+#include "ros1_fields.hpp"
 #include "ros_messages.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/image/image_file.hpp"
@@ -21,15 +23,15 @@ namespace viwo::ros1 {
 namespace {
 
 using bag::TopicOptions;
+using live::Intake;
+using live::LiveQueue;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 template <class Message>
-boost::shared_ptr<const RawMessage> raw(const Message& message) {
-  auto out = boost::make_shared<RawMessage>();
-  out->bytes.resize(ros::serialization::serializationLength(message));
-  ros::serialization::OStream stream(out->bytes.data(),
-                                     static_cast<std::uint32_t>(out->bytes.size()));
+std::shared_ptr<const bag::Bytes> raw(const Message& message) {
+  auto out = std::make_shared<bag::Bytes>(ros::serialization::serializationLength(message));
+  ros::serialization::OStream stream(out->data(), static_cast<std::uint32_t>(out->size()));
   ros::serialization::serialize(stream, message);
   return out;
 }
@@ -46,7 +48,12 @@ class IntakeTest : public ::testing::Test {
     static_cast<IntakeTest*>(host)->warnings_.emplace_back(text, size);
   }
 
-  Intake make(const TopicOptions& options) { return {options, services_, queue_}; }
+  Intake make(const TopicOptions& options) {
+    return {options, services_, queue_,
+            [](std::span<const std::uint8_t> message) -> std::unique_ptr<bag::FieldReader> {
+              return std::make_unique<bag::Ros1Fields>(message);
+            }};
+  }
 
   template <class Message>
   static void take(Intake& intake, std::size_t topic, const Message& message) {
@@ -124,8 +131,8 @@ TEST_F(IntakeTest, CountsWhatCannotBeUsedAndSaysItOnce) {
   take(intake, 0, imu_message(0));
   take(intake, 0, msg::Odometry());
   intake.take(0, "sensor_msgs/Imu", "00000000000000000000000000000000", raw(imu_message(7)));
-  auto cut = boost::make_shared<RawMessage>(*raw(imu_message(8 * kSecond)));
-  cut->bytes.resize(100);
+  auto cut = std::make_shared<bag::Bytes>(*raw(imu_message(8 * kSecond)));
+  cut->resize(100);
   intake.take(0, "sensor_msgs/Imu", "*", cut);
   take(intake, 0, imu_message(5 * kSecond + 100'000'000));
   take(intake, 0, imu_message(6 * kSecond));

@@ -1,17 +1,11 @@
-// Topics as names in ROS.
+// Topics as names in ROS 1.
 #pragma once
 
 #include <string>
 
-#include "topic_options.hpp"
-
 namespace viwo::ros1 {
 
-/// ParamError for what cannot be the name of a topic.
-void check_name(const std::string& key, const std::string& topic);
-
-/// `topics`; ParamError for names that are none in ROS, for topics that are wanted twice and for
-/// parameters that contradict each other.
-const bag::TopicOptions& checked(const bag::TopicOptions& topics);
+/// Why this cannot be the name of a topic; empty for one that can.
+std::string why_no_name(const std::string& topic);
 
 }  // namespace viwo::ros1

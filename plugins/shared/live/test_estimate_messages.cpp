@@ -9,9 +9,10 @@
 #include <gtest/gtest.h>
 
 #include "estimate_messages.hpp"
+#include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 
-namespace viwo::ros1 {
+namespace viwo::live {
 namespace {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
@@ -104,35 +105,30 @@ class EstimateMessages : public ::testing::Test {
 };
 
 TEST_F(EstimateMessages, OdometryHasThePoseAndTheTwistOfTheBody) {
-  const msg::Odometry message = odometry_message(estimate_, frames_, 0.01);
+  const Odometry message = odometry_of(estimate_, frames_, 0.01);
   const Body body = body_of(motion_, frames_);
-  EXPECT_EQ(message.header.stamp.sec, 1'700'000'000U);
-  EXPECT_EQ(message.header.stamp.nsec, 123'456'789U);
-  EXPECT_EQ(message.header.frame_id, "odom");
-  EXPECT_EQ(message.child_frame_id, "base_link");
-  const auto& p = message.pose.pose.position;
-  EXPECT_LT((Eigen::Vector3d(p.x, p.y, p.z) - body.p_BinG).norm(), 1e-12);
-  const auto& q = message.pose.pose.orientation;
-  const Eigen::Quaterniond q_BtoG(q.w, q.x, q.y, q.z);
+  EXPECT_EQ(message.pose.t_ns, 1'700'000'000'123'456'789);
+  EXPECT_EQ(message.world, "odom");
+  EXPECT_EQ(message.body, "base_link");
+  EXPECT_LT((to_vector(message.pose.p_BinG_m) - body.p_BinG).norm(), 1e-12);
+  const Eigen::Quaterniond q_BtoG = to_quaternion(message.pose.q_BtoG_xyzw);
   EXPECT_LT((q_BtoG.toRotationMatrix() - body.R_BtoG).norm(), 1e-12);
-  const auto& v = message.twist.twist.linear;
-  EXPECT_LT((Eigen::Vector3d(v.x, v.y, v.z) - body.v_inB).norm(), 1e-12);
-  const auto& w = message.twist.twist.angular;
-  EXPECT_LT((Eigen::Vector3d(w.x, w.y, w.z) - body.w_inB).norm(), 1e-12);
+  EXPECT_LT((to_vector(message.v_BinB_m_per_s) - body.v_inB).norm(), 1e-12);
+  EXPECT_LT((to_vector(message.w_BinB_rad_per_s) - body.w_inB).norm(), 1e-12);
 }
 
 TEST_F(EstimateMessages, CovariancesAreThoseOfNumericalDerivatives) {
   constexpr double kSigmaRate = 0.2;
-  const msg::Odometry message = odometry_message(estimate_, frames_, kSigmaRate);
+  const Odometry message = odometry_of(estimate_, frames_, kSigmaRate);
   const Eigen::Matrix<double, 12, 12> J = numerical_jacobian();
   Eigen::Matrix<double, 12, 12> P = Eigen::Matrix<double, 12, 12>::Zero();
   P.topLeftCorner<9, 9>() = P_;
   P.bottomRightCorner<3, 3>() = kSigmaRate * kSigmaRate * Eigen::Matrix3d::Identity();
   const Eigen::Matrix<double, 12, 12> expected = J * P * J.transpose();
   const Matrix6d pose = Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(
-      message.pose.covariance.data());
+      message.pose_covariance.data());
   const Matrix6d twist = Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(
-      message.twist.covariance.data());
+      message.twist_covariance.data());
   EXPECT_LT((pose - expected.topLeftCorner<6, 6>()).norm(), 1e-8 * expected.norm()) << pose;
   EXPECT_LT((twist - expected.bottomRightCorner<6, 6>()).norm(), 1e-8 * expected.norm()) << twist;
   EXPECT_EQ(pose, Matrix6d(pose.transpose()));
@@ -144,37 +140,22 @@ TEST_F(EstimateMessages, OfTheImuItselfTheCovarianceIsTurnedIntoTheWorld) {
   const OutputFrames imu;
   estimate_.covariance = {};
   estimate_.covariance[0] = 0.04;  // dtheta_x
-  const msg::Odometry message = odometry_message(estimate_, imu, 0.);
+  const Odometry message = odometry_of(estimate_, imu, 0.);
   const Eigen::Vector3d x_IinG = motion_.R_GtoI.transpose().col(0);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      EXPECT_NEAR(message.pose.covariance[static_cast<std::size_t>(6 * (3 + i) + 3 + j)],
+      EXPECT_NEAR(message.pose_covariance[static_cast<std::size_t>(6 * (3 + i) + 3 + j)],
                   0.04 * x_IinG[i] * x_IinG[j], 1e-15);
-      EXPECT_EQ(message.pose.covariance[static_cast<std::size_t>(6 * i + j)], 0.);
+      EXPECT_EQ(message.pose_covariance[static_cast<std::size_t>(6 * i + j)], 0.);
     }
   }
 }
 
-TEST_F(EstimateMessages, TfHasTheSamePose) {
-  const msg::Odometry odometry = odometry_message(estimate_, frames_, 0.01);
-  const msg::TFMessage message = tf_message(odometry);
-  ASSERT_EQ(message.transforms.size(), 1U);
-  const auto& transform = message.transforms[0];
-  EXPECT_EQ(transform.header.stamp, odometry.header.stamp);
-  EXPECT_EQ(transform.header.frame_id, "odom");
-  EXPECT_EQ(transform.child_frame_id, "base_link");
-  EXPECT_EQ(transform.transform.translation.x, odometry.pose.pose.position.x);
-  EXPECT_EQ(transform.transform.translation.y, odometry.pose.pose.position.y);
-  EXPECT_EQ(transform.transform.translation.z, odometry.pose.pose.position.z);
-  EXPECT_EQ(transform.transform.rotation.x, odometry.pose.pose.orientation.x);
-  EXPECT_EQ(transform.transform.rotation.w, odometry.pose.pose.orientation.w);
-}
-
-std::string value_of(const msg::DiagnosticArray& message, const std::string& key) {
-  for (const auto& pair : message.status.at(0).values) {
-    if (pair.key == key) return pair.value;
+std::string value_of(const Diagnostics& message, const std::string& wanted) {
+  for (const auto& [key, value] : message.values) {
+    if (key == wanted) return value;
   }
-  return "nothing of " + key;
+  return "nothing of " + wanted;
 }
 
 TEST_F(EstimateMessages, DiagnosticsTellLatencyAndCalibration) {
@@ -184,12 +165,10 @@ TEST_F(EstimateMessages, DiagnosticsTellLatencyAndCalibration) {
   estimate_.calibration_sigma = {1e-4, 2e-4};
   estimate_.covariance = {};
   for (const std::size_t i : {30U, 40U, 50U}) estimate_.covariance[i] = 0.03;  // position
-  const msg::DiagnosticArray message = diagnostics_message(estimate_, {});
-  ASSERT_EQ(message.status.size(), 1U);
-  EXPECT_EQ(message.header.stamp.nsec, 123'456'789U);
-  EXPECT_EQ(message.status[0].name, "viwo: odometry");
-  EXPECT_EQ(message.status[0].level, msg::DiagnosticStatus::OK);
-  EXPECT_EQ(message.status[0].message, "ok");
+  const Diagnostics message = diagnostics_of(estimate_, {});
+  EXPECT_EQ(message.t_ns, estimate_.t_ns);
+  EXPECT_FALSE(message.warns);
+  EXPECT_EQ(message.message, "ok");
   EXPECT_EQ(value_of(message, "latency_s"), "0.025");
   EXPECT_EQ(value_of(message, "r_1"), "0.0255");
   EXPECT_EQ(value_of(message, "sigma r_1"), "1e-04");
@@ -203,24 +182,37 @@ TEST_F(EstimateMessages, DiagnosticsWarnOfWhatIsOff) {
   Health health;
   health.silent_topics = {"/imu0", "/cam0/image_raw"};
   health.rejected = 3;
-  msg::DiagnosticArray message = diagnostics_message(estimate_, health);
-  EXPECT_EQ(message.status[0].level, msg::DiagnosticStatus::WARN);
-  EXPECT_EQ(message.status[0].message,
+  Diagnostics message = diagnostics_of(estimate_, health);
+  EXPECT_TRUE(message.warns);
+  EXPECT_EQ(message.message,
             "latency 0.3 s; nothing on topic '/imu0'; nothing on topic '/cam0/image_raw'");
   EXPECT_EQ(value_of(message, "rejections"), "3");
   estimate_.latency_s = 0.2;
   estimate_.covariance[7] = std::numeric_limits<double>::quiet_NaN();
-  message = diagnostics_message(estimate_, {});
-  EXPECT_EQ(message.status[0].level, msg::DiagnosticStatus::WARN);
-  EXPECT_EQ(message.status[0].message, "the estimate is not finite");
+  message = diagnostics_of(estimate_, {});
+  EXPECT_TRUE(message.warns);
+  EXPECT_EQ(message.message, "the estimate is not finite");
   estimate_.covariance[7] = 0.;
   estimate_.piece = 2;
   estimate_.warnings = {"imu0: no samples since t = 5.000 s", "drive 2 left out"};
-  message = diagnostics_message(estimate_, {});
-  EXPECT_EQ(message.status[0].level, msg::DiagnosticStatus::WARN);
-  EXPECT_EQ(message.status[0].message, "imu0: no samples since t = 5.000 s; drive 2 left out");
+  message = diagnostics_of(estimate_, {});
+  EXPECT_TRUE(message.warns);
+  EXPECT_EQ(message.message, "imu0: no samples since t = 5.000 s; drive 2 left out");
   EXPECT_EQ(value_of(message, "started anew"), "2");
 }
 
+TEST(Path, HasAPoseEachHalfSecondAndTheLastOfThem) {
+  Path path;
+  constexpr std::int64_t kStep = 100'000'000;
+  for (std::int64_t k = 0; k < 11'000; ++k) {
+    EXPECT_EQ(path.add({k * kStep, {}, {}}, 0), k % 5 == 0) << k;
+  }
+  ASSERT_EQ(path.poses().size(), Path::kMost);
+  EXPECT_EQ(path.poses().back().t_ns, 10'995 * kStep);
+  EXPECT_EQ(path.poses().front().t_ns, (10'995 - 5 * 1999) * kStep);
+  EXPECT_TRUE(path.add({0, {}, {}}, 1)) << "another piece";
+  EXPECT_EQ(path.poses().size(), 1U);
+}
+
 }  // namespace
-}  // namespace viwo::ros1
+}  // namespace viwo::live

@@ -17,7 +17,7 @@
 #include "viwo/api/rejections.hpp"
 #include "viwo/api/sensor.hpp"
 
-namespace viwo::ros1 {
+namespace viwo::live {
 
 /// Gives the images of all cameras in the order of their stamps (those of one instant by camera),
 /// whichever of their messages came first. An image waits until every camera has given one of its
@@ -47,10 +47,25 @@ class ImageOrder {
   std::optional<std::int64_t> released_ns_;
 };
 
-class LiveQueue {
+/// What stands between who receives and who takes.
+class MeasurementQueue {
  public:
   enum class Taken : std::uint8_t { kMeasurement, kNothing, kEnded };
 
+  virtual ~MeasurementQueue() = default;
+  /// `topic`: the one it came on, of Intake::topics(). After end() nothing is taken in.
+  virtual void push(Measurement measurement, std::size_t topic) = 0;
+  /// Waits for a measurement. kEnded: nothing will come any more.
+  virtual Taken pop(Measurement& out, std::chrono::milliseconds wait) = 0;
+  /// What is in the queue can still be taken.
+  virtual void end() = 0;
+  virtual bool ended() const = 0;
+  virtual void rejections(std::vector<RejectionCount>& out) const = 0;
+};
+
+/// In the order of arrival.
+class LiveQueue final : public MeasurementQueue {
+ public:
   /// A minute and a half of an IMU of 200 Hz: who is further behind is not going to catch up.
   static constexpr std::size_t kMaxOthers = 20'000;
 
@@ -59,15 +74,12 @@ class LiveQueue {
       : max_images_(max_images), max_others_(max_others) {}
 
   /// Where an image has no room, all images of the oldest instant go: one of a stereo pair alone is
-  /// of little use. Of other measurements the oldest goes. After end() nothing is taken in.
-  void push(Measurement measurement);
-  /// Waits for a measurement. kEnded: nothing will come any more.
-  Taken pop(Measurement& out, std::chrono::milliseconds wait);
-  /// What is in the queue can still be taken.
-  void end();
-  bool ended() const;
-
-  void rejections(std::vector<RejectionCount>& out) const;
+  /// of little use. Of other measurements the oldest goes.
+  void push(Measurement measurement, std::size_t topic = 0) override;
+  Taken pop(Measurement& out, std::chrono::milliseconds wait) override;
+  void end() override;
+  bool ended() const override;
+  void rejections(std::vector<RejectionCount>& out) const override;
 
  private:
   void drop_oldest_images();
@@ -82,4 +94,4 @@ class LiveQueue {
   Rejections rejections_;
 };
 
-}  // namespace viwo::ros1
+}  // namespace viwo::live

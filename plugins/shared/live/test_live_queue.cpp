@@ -8,7 +8,7 @@
 
 #include "live_queue.hpp"
 
-namespace viwo::ros1 {
+namespace viwo::live {
 namespace {
 
 using namespace std::chrono_literals;
@@ -170,4 +170,4 @@ TEST(LiveQueue, WakesWhoWaitsAtTheEnd) {
 }
 
 }  // namespace
-}  // namespace viwo::ros1
+}  // namespace viwo::live

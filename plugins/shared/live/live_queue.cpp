@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace viwo::ros1 {
+namespace viwo::live {
 
 ImageOrder::ImageOrder(std::size_t n_cameras) : cameras_(n_cameras) {}
 
@@ -40,7 +40,7 @@ bool ImageOrder::add(const ImageSample& image, std::vector<ImageSample>& out) {
   return true;
 }
 
-void LiveQueue::push(Measurement measurement) {
+void LiveQueue::push(Measurement measurement, std::size_t /*topic*/) {
   {
     const std::scoped_lock lock(mutex_);
     if (ended_) return;
@@ -107,4 +107,4 @@ void LiveQueue::rejections(std::vector<RejectionCount>& out) const {
   rejections_.append_to(out);
 }
 
-}  // namespace viwo::ros1
+}  // namespace viwo::live

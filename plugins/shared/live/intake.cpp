@@ -7,13 +7,12 @@
 
 #include "bag_image.hpp"
 #include "joint_reading.hpp"
-#include "ros1_fields.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/log/recording.hpp"
 #include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/text.hpp"
 
-namespace viwo::ros1 {
+namespace viwo::live {
 namespace {
 
 using bag::Kind;
@@ -21,20 +20,24 @@ using bag::Kind;
 /// The image in a message, decoded when it is needed.
 class MessageImage final : public ImageSource {
  public:
-  MessageImage(boost::shared_ptr<const RawMessage> message, bool is_compressed, std::string where)
-      : message_(std::move(message)), is_compressed_(is_compressed), where_(std::move(where)) {}
+  MessageImage(std::shared_ptr<const bag::Bytes> message, MakeFields make_fields,
+               bool is_compressed, std::string where)
+      : message_(std::move(message)),
+        make_fields_(make_fields),
+        is_compressed_(is_compressed),
+        where_(std::move(where)) {}
 
   void read(Image& out) const override {
-    bag::Ros1Fields in(message_->bytes);
     try {
-      bag::read_image(in, is_compressed_, where_, out);
+      bag::read_image(*make_fields_(*message_), is_compressed_, where_, out);
     } catch (const bag::BrokenMessage& broken) {
       throw InputError(where_ + ": " + broken.what());
     }
   }
 
  private:
-  boost::shared_ptr<const RawMessage> message_;
+  std::shared_ptr<const bag::Bytes> message_;
+  MakeFields make_fields_;
   bool is_compressed_;
   std::string where_;
 };
@@ -51,15 +54,10 @@ std::string reason_of(const bag::MissingJoint& missing, const bag::Joints& joint
 
 }  // namespace
 
-Intake::Intake(const bag::TopicOptions& options, const HostServices& services, LiveQueue& queue)
-    : options_(options),
-      services_(services),
-      queue_(queue),
-      joints_(options.joint_map()),
-      cells_(options.drive_is_angle(), options.max_gap_s),
-      image_order_(options.image_topics.size()) {
-  const auto want = [this](const std::string& name, std::vector<Kind> kinds, int camera = -1) {
-    if (!name.empty()) topics_.push_back({name, std::move(kinds), camera});
+std::vector<Topic> wanted_topics(const bag::TopicOptions& options) {
+  std::vector<Topic> topics;
+  const auto want = [&topics](const std::string& name, std::vector<Kind> kinds, int camera = -1) {
+    if (!name.empty()) topics.push_back({name, std::move(kinds), camera});
   };
   want(options.imu_topic, {Kind::kImu});
   want(options.joint_topic, {Kind::kJoints, Kind::kOdometry});
@@ -69,32 +67,48 @@ Intake::Intake(const bag::TopicOptions& options, const HostServices& services, L
   for (std::size_t i = 0; i < options.image_topics.size(); ++i) {
     want(options.image_topics[i], {Kind::kImage, Kind::kCompressedImage}, static_cast<int>(i));
   }
+  return topics;
+}
+
+Intake::Intake(const bag::TopicOptions& options, const HostServices& services,
+               MeasurementQueue& queue, MakeFields make_fields, Pace pace)
+    : options_(options),
+      services_(services),
+      queue_(queue),
+      make_fields_(make_fields),
+      pace_(pace),
+      topics_(wanted_topics(options)),
+      joints_(options.joint_map()),
+      cells_(options.drive_is_angle(), options.max_gap_s),
+      log_cells_(options.drive_is_angle(), options.max_gap_s),
+      image_order_(options.image_topics.size()) {
   for (const Topic& topic : topics_) states_.emplace_back().jump = jump_of(topic);
 }
 
 void Intake::take(std::size_t topic, const std::string& type, const std::string& md5,
-                  const boost::shared_ptr<const RawMessage>& message) {
+                  const std::shared_ptr<const bag::Bytes>& message) {
   const std::scoped_lock lock(mutex_);
   const auto kind = bag::kind_of(type);
   const auto& kinds = topics_[topic].kinds;
   if (!kind || std::find(kinds.begin(), kinds.end(), *kind) == kinds.end()) {
-    return reject(
+    return drop(
         topic, "a " + type + " where a " + std::string(bag::type_name(kinds.front())) + " must be",
         0);
   }
   if (md5 != "*" && md5 != bag::ros1_md5(*kind)) {
-    return reject(topic, "another definition of " + type + " (md5 " + md5 + ")", 0);
+    return drop(topic, "another definition of " + type + " (md5 " + md5 + ")", 0);
   }
   try {
     read(topic, *kind, message);
   } catch (const bag::BrokenMessage& broken) {
-    reject(topic, std::string("message that is broken: ") + broken.what(), 0);
+    drop(topic, std::string("message that is broken: ") + broken.what(), 0);
   }
 }
 
 void Intake::read(std::size_t topic, Kind kind,
-                  const boost::shared_ptr<const RawMessage>& message) {
-  bag::Ros1Fields in(message->bytes);
+                  const std::shared_ptr<const bag::Bytes>& message) {
+  const std::unique_ptr<bag::FieldReader> fields = make_fields_(*message);
+  bag::FieldReader& in = *fields;
   switch (kind) {
     case Kind::kImu:
       return take_imu(topic, bag::read_imu(in));
@@ -113,71 +127,80 @@ void Intake::read(std::size_t topic, Kind kind,
     case Kind::kImage: {
       const bag::ImageHead head = bag::read_image_head(in);
       if (!bag::is_known_encoding(head.encoding)) {
-        return reject(topic,
+        return drop(topic,
                       "image of encoding " + log::quoted(head.encoding) + ": what is read is " +
                           bag::known_encodings(),
                       head.t_ns);
       }
-      return take_image(
-          topic, {head.t_ns, topics_[topic].camera,
-                  std::make_shared<MessageImage>(message, false,
-                                                 "image on topic '" + topics_[topic].name +
-                                                     "' of " + std::to_string(head.t_ns) + " ns")});
+      return take_image(topic, image_of(topic, head.t_ns, message, false));
     }
     case Kind::kCompressedImage: {
       const std::int64_t t_ns = in.header();
       const std::string_view format = in.text();
       if (bag::is_depth(format)) {
-        return reject(
+        return drop(
             topic,
             "image of depth (format " + log::quoted(format) + "): grey or colour ones are needed",
             t_ns);
       }
-      return take_image(
-          topic, {t_ns, topics_[topic].camera,
-                  std::make_shared<MessageImage>(message, true,
-                                                 "image on topic '" + topics_[topic].name +
-                                                     "' of " + std::to_string(t_ns) + " ns")});
+      return take_image(topic, image_of(topic, t_ns, message, true));
     }
   }
 }
 
+ImageSample Intake::image_of(std::size_t topic, std::int64_t t_ns,
+                             const std::shared_ptr<const bag::Bytes>& message,
+                             bool is_compressed) const {
+  const std::string where =
+      "image on topic '" + topics_[topic].name + "' of " + std::to_string(t_ns) + " ns";
+  return {t_ns, topics_[topic].camera,
+          std::make_shared<MessageImage>(message, make_fields_, is_compressed, where)};
+}
+
 void Intake::take_imu(std::size_t topic, const ImuSample& imu) {
-  if (const char* const why = log::why_rejected(imu)) return reject(topic, why, imu.t_ns);
-  if (accept(topic, imu.t_ns)) queue_.push(imu);
+  if (const char* const why = log::why_rejected(imu)) return drop(topic, why, imu.t_ns);
+  if (accept(topic, imu.t_ns)) queue_.push(imu, topic);
 }
 
 void Intake::take_pose(std::size_t topic, PoseSample pose) {
-  if (const char* const why = log::why_rejected(pose)) return reject(topic, why, pose.t_ns);
-  if (accept(topic, pose.t_ns)) queue_.push(pose);
+  if (const char* const why = log::why_rejected(pose)) return drop(topic, why, pose.t_ns);
+  if (accept(topic, pose.t_ns)) queue_.push(pose, topic);
 }
 
 void Intake::take_fix(std::size_t topic, const std::optional<GnssSample>& fix) {
-  if (!fix) return reject(topic, "message without a fix", 0);
-  if (const char* const why = fix->fault()) return reject(topic, why, fix->t_ns);
-  if (accept(topic, fix->t_ns)) queue_.push(*fix);
+  if (!fix) return drop(topic, "message without a fix", 0);
+  if (const char* const why = fix->fault()) return drop(topic, why, fix->t_ns);
+  if (accept(topic, fix->t_ns)) queue_.push(*fix, topic);
 }
 
 void Intake::take_joints(std::size_t topic, const bag::Joints& joints) {
   log::EncoderReading reading;
   if (const auto missing = bag::joint_reading(joints, options_, reading)) {
-    return reject(topic, reason_of(*missing, joints), joints.t_ns);
+    return drop(topic, reason_of(*missing, joints), joints.t_ns);
   }
   if (log::why_rejected(reading) != nullptr) {
-    return reject(topic, bag::not_finite(reading, options_), joints.t_ns);
+    return drop(topic, bag::not_finite(reading, options_), joints.t_ns);
   }
   if (!accept(topic, reading.t_ns)) return;
-  if (const char* const why = joints_.convert(reading)) return reject(topic, why, reading.t_ns);
-  if (const auto cell = cells_.add(reading)) queue_.push(*cell);
+  if (const char* const why = joints_.convert(reading)) return drop(topic, why, reading.t_ns);
+  const auto cell = pace_ == Pace::kInStep ? log_cells_.add(reading) : cells_.add(reading);
+  if (cell) queue_.push(*cell, topic);
 }
 
 void Intake::take_image(std::size_t topic, const ImageSample& image) {
   if (!accept(topic, image.t_ns)) return;
+  if (pace_ == Pace::kInStep) return queue_.push(image, topic);
   ready_.clear();
   if (!image_order_.add(image, ready_)) {
-    return reject(topic, "image that came when later ones had been passed on", image.t_ns);
+    return drop(topic, "image that came when later ones had been passed on", image.t_ns);
   }
-  for (ImageSample& ready : ready_) queue_.push(std::move(ready));
+  for (ImageSample& ready : ready_) queue_.push(std::move(ready), topic);
+}
+
+void Intake::finish(std::size_t topic) {
+  const std::scoped_lock lock(mutex_);
+  if (pace_ != Pace::kInStep || topics_[topic].kinds.front() != Kind::kJoints) return;
+  if (const auto cell = log_cells_.finish()) queue_.push(*cell, topic);
 }
 
 /// Receivers of satellites give a fix in a second or so.
@@ -186,8 +209,9 @@ bool Intake::is_slow(std::size_t topic) const {
 }
 
 /// An IMU has no pauses of a second, and what images and joints have is soon seen. Poses and fixes
-/// may be seldom from the first on.
+/// may be seldom from the first on. In step it is as in a bag.
 StampJump Intake::jump_of(const Topic& topic) const {
+  if (pace_ == Pace::kInStep) return StampJump();
   switch (topic.kinds.front()) {
     case Kind::kImu:
       return StampJump(1., 0);
@@ -227,12 +251,12 @@ void Intake::begin_again(std::size_t topic) {
 bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
   State& state = states_[topic];
   if (t_ns == 0) {
-    reject(topic, "message without a stamp", t_ns);
+    drop(topic, "message without a stamp", t_ns);
     return false;
   }
   if (state.last_ns && t_ns <= *state.last_ns) {
-    if (!is_clock_set_back(state, t_ns)) {
-      reject(topic, kStampNotAfter, t_ns);
+    if (pace_ == Pace::kInStep || !is_clock_set_back(state, t_ns)) {
+      drop(topic, kStampNotAfter, t_ns);
       return false;
     }
     count(topic, "clock set back", t_ns, "its messages are taken from here on");
@@ -240,7 +264,7 @@ bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
   }
   state.n_behind = 0;
   if (!state.jump.is_believed(t_ns)) {
-    reject(topic, kStampFarAhead, t_ns);
+    drop(topic, kStampFarAhead, t_ns);
     return false;
   }
   if (state.last_ns && !is_slow(topic) &&
@@ -253,14 +277,24 @@ bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
   return true;
 }
 
-void Intake::reject(std::size_t topic, const std::string& reason, std::int64_t t_ns) {
-  count(topic, reason, t_ns, "it is dropped, and others like it are counted");
+void Intake::reject(std::size_t topic, const std::string& reason, std::int64_t t_ns,
+                    std::int64_t n) {
+  const std::scoped_lock lock(mutex_);
+  drop(topic, reason, t_ns, n);
+}
+
+void Intake::drop(std::size_t topic, const std::string& reason, std::int64_t t_ns,
+                  std::int64_t n) {
+  count(topic, reason, t_ns, "it is dropped, and others like it are counted", n);
 }
 
 void Intake::count(std::size_t topic, const std::string& reason, std::int64_t t_ns,
-                   const char* consequence) {
+                   const char* consequence, std::int64_t n) {
   const std::string full = topics_[topic].name + ": " + reason;
-  if (!counts_.add(full, t_ns)) return;
+  if (!counts_.add(
+          full, [t_ns] { return stamp_text(t_ns); }, n)) {
+    return;
+  }
   services_.log(LogLevel::kWarning, "topic " + full + "; " + consequence);
 }
 
@@ -284,4 +318,4 @@ void Intake::rejections(std::vector<RejectionCount>& out) const {
   counts_.append_to(out);
 }
 
-}  // namespace viwo::ros1
+}  // namespace viwo::live

@@ -11,26 +11,13 @@
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 
-namespace viwo::ros1 {
+namespace viwo::live {
 namespace {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Matrix9d = Eigen::Matrix<double, 9, 9, Eigen::RowMajor>;
 
-ros::Time time_of(std::int64_t t_ns) {
-  ros::Time time;
-  return time.fromNSec(static_cast<std::uint64_t>(t_ns));
-}
-
-template <class Message>
-void set_xyz(Message& to, const Eigen::Vector3d& from) {
-  to.x = from.x();
-  to.y = from.y();
-  to.z = from.z();
-}
-
-template <class Covariance>
-void set_covariance(Covariance& to, const Matrix6d& from) {
+void set_covariance(std::array<double, 36>& to, const Matrix6d& from) {
   for (Eigen::Index i = 0; i < 6; ++i) {
     for (Eigen::Index j = 0; j < 6; ++j) {
       to[static_cast<std::size_t>(6 * i + j)] = 0.5 * (from(i, j) + from(j, i));
@@ -38,17 +25,10 @@ void set_covariance(Covariance& to, const Matrix6d& from) {
   }
 }
 
-void add(msg::DiagnosticStatus& status, const std::string& key, double value) {
-  msg::KeyValue pair;
-  pair.key = key;
-  pair.value = log::number_text(value);
-  status.values.push_back(pair);
-}
-
 }  // namespace
 
-msg::Odometry odometry_message(const EstimateSample& estimate, const OutputFrames& frames,
-                               double sigma_rate_rad_per_s) {
+Odometry odometry_of(const EstimateSample& estimate, const OutputFrames& frames,
+                     double sigma_rate_rad_per_s) {
   const Eigen::Quaterniond q_ItoG = to_quaternion(estimate.q_ItoG_xyzw);
   const Eigen::Matrix3d R_ItoG = q_ItoG.toRotationMatrix();
   const Eigen::Matrix3d R_BtoG = R_ItoG * frames.R_ItoB.transpose();
@@ -57,25 +37,25 @@ msg::Odometry odometry_message(const EstimateSample& estimate, const OutputFrame
   const Eigen::Vector3d w_B = frames.R_ItoB * to_vector(estimate.w_IinI_rad_per_s);
   const Matrix9d P = Eigen::Map<const Matrix9d>(estimate.covariance.data());
 
-  msg::Odometry message;
-  message.header.stamp = time_of(estimate.t_ns);
-  message.header.frame_id = frames.world;
-  message.child_frame_id = frames.body;
+  Odometry message;
+  message.pose.t_ns = estimate.t_ns;
+  message.world = frames.world;
+  message.body = frames.body;
   // (LIV-4)
-  set_xyz(message.pose.pose.position, to_vector(estimate.p_IinG_m) - lever_G);
+  Eigen::Vector3d::Map(message.pose.p_BinG_m.data()) = to_vector(estimate.p_IinG_m) - lever_G;
   const Eigen::Quaterniond q_BtoG(R_BtoG);
-  set_xyz(message.pose.pose.orientation, q_BtoG.vec());
-  message.pose.pose.orientation.w = q_BtoG.w();
+  message.pose.q_BtoG_xyzw = {q_BtoG.x(), q_BtoG.y(), q_BtoG.z(), q_BtoG.w()};
   // (LIV-5)
-  set_xyz(message.twist.twist.linear, frames.R_ItoB * v_IinI - w_B.cross(frames.p_IinB));
-  set_xyz(message.twist.twist.angular, w_B);
+  Eigen::Vector3d::Map(message.v_BinB_m_per_s.data()) =
+      frames.R_ItoB * v_IinI - w_B.cross(frames.p_IinB);
+  Eigen::Vector3d::Map(message.w_BinB_rad_per_s.data()) = w_B;
 
   // (LIV-6), (LIV-7)
   Eigen::Matrix<double, 6, 9> J_pose = Eigen::Matrix<double, 6, 9>::Zero();
   J_pose.block<3, 3>(0, 0) = skew(lever_G) * R_ItoG;
   J_pose.block<3, 3>(0, 3).setIdentity();
   J_pose.block<3, 3>(3, 0) = R_ItoG;
-  set_covariance(message.pose.covariance, J_pose * P * J_pose.transpose());
+  set_covariance(message.pose_covariance, J_pose * P * J_pose.transpose());
 
   // (LIV-8)
   Eigen::Matrix<double, 3, 9> J_v = Eigen::Matrix<double, 3, 9>::Zero();
@@ -89,27 +69,11 @@ msg::Odometry odometry_message(const EstimateSample& estimate, const OutputFrame
   twist.topRightCorner<3, 3>() = rate_variance * J_v_w;
   twist.bottomLeftCorner<3, 3>() = rate_variance * J_v_w.transpose();
   twist.bottomRightCorner<3, 3>() = rate_variance * Eigen::Matrix3d::Identity();
-  set_covariance(message.twist.covariance, twist);
+  set_covariance(message.twist_covariance, twist);
   return message;
 }
 
-msg::TFMessage tf_message(const msg::Odometry& odometry) {
-  msg::TransformStamped transform;
-  transform.header = odometry.header;
-  transform.child_frame_id = odometry.child_frame_id;
-  transform.transform.translation.x = odometry.pose.pose.position.x;
-  transform.transform.translation.y = odometry.pose.pose.position.y;
-  transform.transform.translation.z = odometry.pose.pose.position.z;
-  transform.transform.rotation = odometry.pose.pose.orientation;
-  msg::TFMessage message;
-  message.transforms.push_back(transform);
-  return message;
-}
-
-msg::DiagnosticArray diagnostics_message(const EstimateSample& estimate, const Health& health) {
-  msg::DiagnosticStatus status;
-  status.name = "viwo: odometry";
-  status.hardware_id = "viwo";
+Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health) {
   std::string trouble;
   const auto warn = [&trouble](const std::string& text) {
     trouble += (trouble.empty() ? "" : "; ") + text;
@@ -124,28 +88,38 @@ msg::DiagnosticArray diagnostics_message(const EstimateSample& estimate, const H
     warn("the estimate is not finite");
   }
   for (const std::string& text : estimate.warnings) warn(text);
-  status.level = trouble.empty() ? msg::DiagnosticStatus::OK : msg::DiagnosticStatus::WARN;
-  status.message = trouble.empty() ? "ok" : trouble;
-
-  add(status, "latency_s", estimate.latency_s);
-  add(status, "started anew", estimate.piece);
-  add(status, "rejections", static_cast<double>(health.rejected));
+  Diagnostics message;
+  message.t_ns = estimate.t_ns;
+  message.warns = !trouble.empty();
+  message.message = trouble.empty() ? "ok" : trouble;
+  const auto add = [&message](const std::string& key, double value) {
+    message.values.emplace_back(key, log::number_text(value));
+  };
+  add("latency_s", estimate.latency_s);
+  add("started anew", estimate.piece);
+  add("rejections", static_cast<double>(health.rejected));
   const auto sigma = [&estimate](std::size_t first) {
     double variance = 0.;
     for (std::size_t i = first; i < first + 3; ++i) variance += estimate.covariance[10 * i];
     return std::sqrt(variance);
   };
-  add(status, "sigma orientation [rad]", sigma(0));
-  add(status, "sigma position [m]", sigma(3));
-  add(status, "sigma velocity [m/s]", sigma(6));
+  add("sigma orientation [rad]", sigma(0));
+  add("sigma position [m]", sigma(3));
+  add("sigma velocity [m/s]", sigma(6));
   for (std::size_t i = 0; i < estimate.calibration_names.size(); ++i) {
-    add(status, estimate.calibration_names[i], estimate.calibration.at(i));
-    add(status, "sigma " + estimate.calibration_names[i], estimate.calibration_sigma.at(i));
+    add(estimate.calibration_names[i], estimate.calibration.at(i));
+    add("sigma " + estimate.calibration_names[i], estimate.calibration_sigma.at(i));
   }
-  msg::DiagnosticArray message;
-  message.header.stamp = time_of(estimate.t_ns);
-  message.status.push_back(status);
   return message;
 }
 
-}  // namespace viwo::ros1
+bool Path::add(const Pose& pose, int piece) {
+  if (piece != piece_) poses_.clear();
+  piece_ = piece;
+  if (!poses_.empty() && seconds_between(poses_.back().t_ns, pose.t_ns) < kPeriodS) return false;
+  if (poses_.size() == kMost) poses_.erase(poses_.begin());
+  poses_.push_back(pose);
+  return true;
+}
+
+}  // namespace viwo::live

@@ -1,0 +1,59 @@
+#include "dds_settings.hpp"
+
+#include <cstdlib>
+#include <string_view>
+
+#include <arpa/inet.h>
+
+#include "viwo/api/status.hpp"
+#include "viwo/log/text.hpp"
+
+namespace viwo::ros2 {
+namespace {
+
+constexpr std::int64_t kMaxDomain = 232;
+
+std::string_view environment(const char* name) {
+  const char* const value = std::getenv(name);
+  return value == nullptr ? std::string_view() : std::string_view(value);
+}
+
+void check_addresses(const char* key, const std::vector<std::string>& addresses) {
+  for (const std::string& address : addresses) {
+    in_addr ignored{};
+    if (inet_pton(AF_INET, address.c_str(), &ignored) == 1) continue;
+    throw ParamError(key, log::quoted(address) + " is no address such as 192.168.1.7");
+  }
+}
+
+std::uint32_t domain_of_environment() {
+  const std::string_view text = environment("ROS_DOMAIN_ID");
+  if (text.empty()) return 0;
+  const auto domain = log::parse_integer(text);
+  if (!domain || *domain < 0 || *domain > kMaxDomain) {
+    throw InputError("the environment's ROS_DOMAIN_ID is " + log::quoted(text) +
+                     ": expected a number from 0 to " + std::to_string(kMaxDomain));
+  }
+  return static_cast<std::uint32_t>(*domain);
+}
+
+bool is_only_this_machine() {
+  return environment("ROS_LOCALHOST_ONLY") == "1" ||
+         environment("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST";
+}
+
+}  // namespace
+
+DdsSettings DdsParams::settings() const {
+  check_addresses("interfaces", interfaces);
+  check_addresses("peers", peers);
+  DdsSettings settings;
+  settings.domain =
+      domain_id < 0 ? domain_of_environment() : static_cast<std::uint32_t>(domain_id);
+  settings.interfaces = interfaces;
+  if (interfaces.empty() && is_only_this_machine()) settings.interfaces = {"127.0.0.1"};
+  settings.peers = peers;
+  return settings;
+}
+
+}  // namespace viwo::ros2

@@ -1,0 +1,83 @@
+#include "live_params.hpp"
+
+#include <set>
+
+#include <Eigen/Geometry>
+
+#include "viwo/api/status.hpp"
+
+namespace viwo::live {
+
+void LiveParams::bind(ParamBinder& b) {
+  bag::TopicOptions::bind(b);
+  b(VIWO_PARAM(idle_timeout_s),
+    {.unit = "s",
+     .min = 0.,
+     .max = 1e6,
+     .help = "the run ends when nothing has come for this long; 0: it goes on"});
+  b(VIWO_PARAM(max_waiting_images),
+    {.min = 2.,
+     .max = 10000.,
+     .help = "images that are held until they are taken; then the oldest are dropped"});
+  b(VIWO_PARAM(publish),
+    {.help = "whether the estimate is published: odometry, path, tf and diagnostics"});
+  b(VIWO_PARAM(odometry_topic_out), {.help = "nav_msgs/Odometry"});
+  b(VIWO_PARAM(path_topic_out),
+    {.help = "nav_msgs/Path: the way so far, a pose each half second; empty: not published"});
+  b(VIWO_PARAM(publish_tf), {.help = "whether the pose is on /tf, too"});
+  b(VIWO_PARAM(world_frame), {.help = "frame of the poses"});
+  b(VIWO_PARAM(body_frame), {.help = "frame whose pose is published"});
+  b(VIWO_PARAM(p_IinB_m), {.unit = "m", .help = "origin of the IMU in body_frame"});
+  b(VIWO_PARAM(rpy_ItoB_rad),
+    {.unit = "rad", .help = "roll, pitch, yaw of the IMU in body_frame, R_ItoB = Rz Ry Rx"});
+  b(VIWO_PARAM(sigma_rate_rad_per_s),
+    {.unit = "rad/s", .min = 0., .help = "of the angular rate in the published twist"});
+  b(VIWO_PARAM(warn_latency_s),
+    {.unit = "s",
+     .min = 0.,
+     .help = "a longer time from image to pose is a warning in the diagnostics"});
+}
+
+OutputFrames LiveParams::frames() const {
+  OutputFrames frames;
+  frames.world = world_frame;
+  frames.body = body_frame;
+  if (frames.world.empty()) throw ParamError("world_frame", "a frame needs a name");
+  if (frames.body.empty()) throw ParamError("body_frame", "a frame needs a name");
+  if (frames.world == frames.body) {
+    throw ParamError("body_frame", "'" + frames.body + "' is the world_frame, too");
+  }
+  const Eigen::Vector3d rpy = rpy_ItoB_rad;
+  frames.R_ItoB = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
+                   Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+                   Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
+                      .toRotationMatrix();
+  frames.p_IinB = p_IinB_m;
+  return frames;
+}
+
+const LiveParams& LiveParams::checked(std::string (*why_no_name)(const std::string& topic)) const {
+  check("imu_topic", "listen to");
+  const auto check_name = [&](const std::string& key, const std::string& topic) {
+    if (const std::string why = why_no_name(topic); !why.empty()) {
+      throw ParamError(key, "'" + topic + "' cannot be the name of a topic: " + why);
+    }
+  };
+  std::set<std::string> seen;
+  const auto check_topic = [&](const std::string& key, const std::string& topic) {
+    if (topic.empty()) return;
+    check_name(key, topic);
+    if (!seen.insert(topic).second) throw ParamError(key, "'" + topic + "' is wanted twice");
+  };
+  check_topic("imu_topic", imu_topic);
+  for (const std::string& topic : image_topics) check_topic("image_topics", topic);
+  check_topic("joint_topic", joint_topic);
+  check_topic("pose_topic", pose_topic);
+  check_topic("odometry_topic", odometry_topic);
+  check_topic("gnss_topic", gnss_topic);
+  check_name("odometry_topic_out", odometry_topic_out);
+  if (!path_topic_out.empty()) check_name("path_topic_out", path_topic_out);
+  return *this;
+}
+
+}  // namespace viwo::live

@@ -1,0 +1,116 @@
+#include "topic_sensor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "viwo/api/status.hpp"
+#include "viwo/log/text.hpp"
+
+namespace viwo::live {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kPoll = 100ms;           ///< how late an end that nobody signals is seen
+constexpr auto kTopicSilence = 1000ms;  ///< of one topic: worth a warning
+constexpr auto kPublisherWait = 3s;     ///< before topics without publisher are named
+
+std::unique_ptr<MeasurementQueue> make_queue(const LiveParams& params, Pace pace) {
+  const auto max_images = static_cast<std::size_t>(params.max_waiting_images);
+  if (pace == Pace::kLive) return std::make_unique<LiveQueue>(max_images);
+  return std::make_unique<StepQueue>(wanted_topics(params), max_images);
+}
+
+}  // namespace
+
+TopicSensor::TopicSensor(const LiveParams& params, const HostServices& services,
+                         MakeFields make_fields, Pace pace)
+    : services_(services),
+      options_(params),
+      frames_(params.frames()),
+      publish_(params.publish),
+      sigma_rate_(params.sigma_rate_rad_per_s),
+      warn_latency_s_(params.warn_latency_s),
+      idle_timeout_(std::llround(1e3 * params.idle_timeout_s)),
+      queue_(make_queue(params, pace)),
+      steps_(dynamic_cast<StepQueue*>(queue_.get())),
+      intake_(options_, services_, *queue_, make_fields, pace) {}
+
+Status TopicSensor::next(Measurement& out) {
+  const auto since = Clock::now();
+  while (true) {
+    switch (queue_->pop(out, kPoll)) {
+      case MeasurementQueue::Taken::kMeasurement:
+        return Status::kOk;
+      case MeasurementQueue::Taken::kEnded: {
+        const std::scoped_lock lock(failure_mutex_);
+        if (!failure_.empty()) throw InputError(failure_);
+        return Status::kEnd;
+      }
+      case MeasurementQueue::Taken::kNothing:
+        break;
+    }
+    if (const std::string why = gone(); !why.empty()) {
+      end(LogLevel::kWarning, why);
+      continue;
+    }
+    const auto last = std::max(since, intake_.last_use().value_or(since));
+    if (idle_timeout_ > 0ms && Clock::now() - last > idle_timeout_) {
+      end(LogLevel::kInfo, "nothing has come for " +
+                               log::number_text(1e-3 * double(idle_timeout_.count())) +
+                               " s (idle_timeout_s)");
+    }
+  }
+}
+
+void TopicSensor::rejections(std::vector<RejectionCount>& out) const {
+  intake_.rejections(out);
+  queue_->rejections(out);
+}
+
+void TopicSensor::estimate(const EstimateSample& estimate) {
+  if (!publish_) return;
+  const Odometry odometry = odometry_of(estimate, frames_, sigma_rate_);
+  Health health;
+  health.silent_topics = intake_.silent_topics(kTopicSilence);
+  std::vector<RejectionCount> rejected;
+  rejections(rejected);
+  for (const RejectionCount& r : rejected) health.rejected += r.count;
+  health.warn_latency_s = warn_latency_s_;
+  const bool is_new = path_.add(odometry.pose, estimate.piece);
+  publish(odometry, is_new ? &path_ : nullptr, diagnostics_of(estimate, health));
+}
+
+void TopicSensor::end(LogLevel level, const std::string& why) {
+  if (queue_->ended()) return;
+  services_.log(level, why + ": no further measurements");
+  queue_->end();
+}
+
+void TopicSensor::fail(const std::string& why) {
+  {
+    const std::scoped_lock lock(failure_mutex_);
+    if (failure_.empty()) failure_ = why;
+  }
+  queue_->end();
+}
+
+bool TopicSensor::is_idle(Clock::duration longer_than) const {
+  return Clock::now() - intake_.last_use().value_or(begin_) > longer_than;
+}
+
+bool TopicSensor::is_time_to_name_missing() {
+  if (named_missing_ || Clock::now() - begin_ < kPublisherWait) return false;
+  named_missing_ = true;
+  return true;
+}
+
+void TopicSensor::name_missing(const std::string& topic,
+                               const std::vector<std::string>& there) const {
+  services_.log(LogLevel::kWarning,
+                "nobody publishes topic '" + topic + "'" +
+                    (there.empty() ? " (nor any other)" : log::did_you_mean(topic, there)));
+}
+
+}  // namespace viwo::live

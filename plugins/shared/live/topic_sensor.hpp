@@ -1,0 +1,77 @@
+// A sensor that listens to the topics of a running system, whichever ROS it is of: what is done
+// with messages that have come, and with estimates that are to go.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "estimate_messages.hpp"
+#include "intake.hpp"
+#include "live_params.hpp"
+#include "live_queue.hpp"
+#include "step_queue.hpp"
+#include "viwo/api/host_services.hpp"
+#include "viwo/api/sensor.hpp"
+
+namespace viwo::live {
+
+class TopicSensor : public Sensor {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  SampleTypes yields() const final { return bag::kinds_of(options_); }
+  bool live() const final { return true; }
+  void stop() final { queue_->end(); }
+  Status next(Measurement& out) final;
+  void rejections(std::vector<RejectionCount>& out) const final;
+  void estimate(const EstimateSample& estimate) final;
+
+ protected:
+  TopicSensor(const LiveParams& params, const HostServices& services, MakeFields make_fields,
+              Pace pace = Pace::kLive);
+
+  /// Why nothing will come any more, although nobody has said so; empty while it may.
+  virtual std::string gone() const { return {}; }
+  /// `path`: null where it is the same as before.
+  virtual void publish(const Odometry& odometry, const Path* path,
+                       const Diagnostics& diagnostics) = 0;
+
+  /// Ends the sensor, and says why.
+  void end(LogLevel level, const std::string& why);
+  /// Ends it with an InputError of next(): what it has given is not what it should have.
+  void fail(const std::string& why);
+  /// Whether nothing that could be used has come for this long.
+  bool is_idle(Clock::duration longer_than) const;
+  /// Once, some seconds after the start: whether topics without publisher are to be named now.
+  bool is_time_to_name_missing();
+  /// `there`: the topics that are published.
+  void name_missing(const std::string& topic, const std::vector<std::string>& there) const;
+
+  const HostServices& services() const { return services_; }
+  Intake& intake() { return intake_; }
+  const Intake& intake() const { return intake_; }
+  /// Of a sensor that is played in step; null of others.
+  StepQueue* steps() { return steps_; }
+
+ private:
+  HostServices services_;
+  bag::TopicOptions options_;
+  OutputFrames frames_;
+  bool publish_;
+  double sigma_rate_;
+  double warn_latency_s_;
+  std::chrono::milliseconds idle_timeout_;
+  Path path_;
+  Clock::time_point begin_ = Clock::now();
+  bool named_missing_ = false;
+  std::unique_ptr<MeasurementQueue> queue_;
+  StepQueue* steps_ = nullptr;
+  Intake intake_;
+  std::mutex failure_mutex_;
+  std::string failure_;
+};
+
+}  // namespace viwo::live
