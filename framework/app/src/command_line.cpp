@@ -58,6 +58,10 @@ void add_option(const std::string& name, po::options_description& options) {
     add("plan", po::value<std::string>()->value_name("PLAN"),
         "a plan file of this base (viwo plan): which piece of motion the calibration lacks most, "
         "and what it would tell; said at the end, of live sensors also when it changes");
+  } else if (name == "lockstep") {
+    add("lockstep",
+        "live sensors that can (ros2_topics) are played: the run waits for what comes, nothing is "
+        "dropped, and the results are those of the same messages in a bag");
   } else if (name == "show") {
     add("show", "a window with the tracks in the images, the trajectory and the calibration");
   } else if (name == "video") {
@@ -177,6 +181,7 @@ Arguments arguments_of(const po::variables_map& values) {
   arguments.resume = values.contains("resume");
   if (values.contains("shard")) arguments.shard = text("shard");
   arguments.collect = values.contains("collect");
+  arguments.lockstep = values.contains("lockstep");
   arguments.show = values.contains("show");
   arguments.video = text("video");
   arguments.figures = text("figures");

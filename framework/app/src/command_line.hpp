@@ -25,6 +25,7 @@ struct Arguments {
   bool resume = false;
   std::optional<std::string> shard;  ///< "I/N"
   bool collect = false;
+  bool lockstep = false;
   bool show = false;
   std::filesystem::path video;  ///< none if empty
   std::string figures;          ///< "svg", "pdf" or none

@@ -1,7 +1,9 @@
 // The commands that run something.
+#include <algorithm>
 #include <iostream>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "command_line.hpp"
@@ -89,9 +91,39 @@ class LiveOutput {
   RunStream stream_;
 };
 
+/// Whether the sensor of a section has a parameter `lockstep`. What is wrong with the section is
+/// said by who reads it.
+bool can_be_played(const config::Node& section, PluginRegistry& plugins) {
+  const config::Node* const type = section.find("type");
+  if (type == nullptr || !type->is_scalar()) return false;
+  try {
+    const auto params = plugins.find("sensor", type->scalar()).params;
+    return std::any_of(params.begin(), params.end(), [](const ParamSpec& param) {
+      return std::string_view(param.name) == "lockstep";
+    });
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+/// --lockstep: sets that parameter wherever there is one.
+void play_in_step(config::Node& configuration, PluginRegistry& plugins) {
+  config::Node* const sensors = configuration.find("sensors");
+  bool any = false;
+  if (sensors != nullptr) {
+    for (config::Node::Entry& entry : sensors->entries()) {
+      if (!can_be_played(entry.value, plugins)) continue;
+      any = true;
+      entry.value.set("lockstep", config::Node::scalar_of("true"));
+    }
+  }
+  if (!any) throw InputError("--lockstep: no sensor of this run can be played in step");
+}
+
 RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
-  const config::Node configuration =
+  config::Node configuration =
       resolve_placeholders(load_run_configuration(arguments.positional[0], arguments.assignments));
+  if (arguments.lockstep) play_in_step(configuration, plugins);
   return read_run(configuration, plugins, arguments.seed);
 }
 
@@ -153,8 +185,8 @@ int run_command(const Arguments& arguments) {
     pictures.watch(hooks);
     hooks.progress = [&](double fraction) { progress.at(fraction); };
     hooks.interrupted = [&] { return interrupt && interrupt->raised(); };
-    if (!data.live.empty()) output.emplace(setup, folder, hooks);
-    if (forecast) forecast->watch(hooks, !data.live.empty());
+    if (data.is_live()) output.emplace(setup, folder, hooks);
+    if (forecast) forecast->watch(hooks, data.is_live());
     result = viwo::run(setup, data, hooks);
     if (output) output->finish(result);
   }

@@ -90,6 +90,12 @@ bool gives_only_streams(const RunSetup& setup, const SensorEntry& entry) {
   });
 }
 
+/// Sensors that can be played have a parameter of this name.
+bool is_played(const SensorEntry& entry) {
+  const config::Node* const lockstep = entry.sensor.resolved.find("lockstep");
+  return lockstep != nullptr && lockstep->is_scalar() && lockstep->scalar() == "true";
+}
+
 /// The live sensors of a run and those that work on them, unread.
 RunData listen(const RunSetup& setup) {
   RunData data;
@@ -97,6 +103,12 @@ RunData listen(const RunSetup& setup) {
     const Loaded<Sensor>& sensor = entry.sensor;
     const SensorStream stream{entry.name, sensor.info, sensor.object, entry.input, nullptr};
     if (is_live(entry)) {
+      if (!data.live.empty() && is_played(entry) != data.lockstep) {
+        config::fail(setup.sensors_mark, "sensor '" + entry.name + "' and '" +
+                                             data.live.front().name +
+                                             "': lockstep is for all live sensors or for none");
+      }
+      data.lockstep = is_played(entry);
       data.live.push_back(stream);
       continue;
     }

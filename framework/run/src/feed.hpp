@@ -18,7 +18,7 @@ class Feed {
   virtual bool next(Estimator& estimator) = 0;
   /// Whether what has been given is not to be waited for any more.
   virtual bool is_over() { return false; }
-  /// An epoch of piece 0, 1, ... of a live run is done, and what is wrong by now.
+  /// An epoch of piece 0, 1, ... of live sensors is done, and what is wrong by now.
   virtual void on_epoch(const Estimator& /*estimator*/, int /*piece*/,
                         const std::vector<std::string>& /*warnings*/) {}
   /// Ends what still runs, and records what the sensors took, dropped and gave as reference.
@@ -28,6 +28,11 @@ class Feed {
 /// All measurements in the order of their stamps: the same in every run.
 std::unique_ptr<Feed> feed_recorded(const RunSetup& setup, const RunData& data,
                                     Plausibility& plausibility);
+
+/// Measurements of live sensors that are played, in the order in which the same recorded ones would
+/// be given: the run waits for them, and they for the run. hooks.interrupted as below.
+std::unique_ptr<Feed> feed_in_step(const RunSetup& setup, const RunData& data,
+                                   const RunHooks& hooks, Plausibility& plausibility);
 
 /// Measurements as they come. hooks.interrupted is asked now and then whether that is to end.
 std::unique_ptr<Feed> feed_live(const RunSetup& setup, const RunData& data, const RunHooks& hooks,

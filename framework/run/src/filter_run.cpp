@@ -109,7 +109,7 @@ class FilterRun {
       : setup_(setup),
         data_(data),
         hooks_(hooks),
-        live_(!data.live.empty()),
+        live_(data.is_live()),
         warnings_(hooks),
         plausibility_(setup, live_) {
     result_.rejections = data.rejections;
@@ -122,8 +122,9 @@ class FilterRun {
     estimator_->observe(observer_);
     recorder_.emplace(setup, data, estimator_->filter(), result_);
     if (restarts()) healthy_.emplace(estimator_->filter());
-    feed_ = live_ ? feed_live(setup, data, hooks, plausibility_)
-                  : feed_recorded(setup, data, plausibility_);
+    feed_ = live_             ? feed_live(setup, data, hooks, plausibility_)
+            : data.lockstep ? feed_in_step(setup, data, hooks, plausibility_)
+                            : feed_recorded(setup, data, plausibility_);
   }
 
   RunResult run() {
@@ -183,7 +184,7 @@ class FilterRun {
       if (healthy_) healthy_->epoch(*estimator_);
       if (result_.epochs == 1) plausibility_.begin_at(result_.pieces.front().begin_ns);
       warnings_.epoch(result_, *estimator_);
-      if (live_) {
+      if (live_ || data_.lockstep) {
         const int piece = static_cast<int>(result_.pieces.size()) - 1;
         feed_->on_epoch(*estimator_, piece, warnings_.now(now_s()));
       }
@@ -194,7 +195,7 @@ class FilterRun {
   }
 
   void tell_progress() {
-    if (!hooks_.progress || live_) return;
+    if (!hooks_.progress || live_ || data_.lockstep) return;
     const auto imu = data_.imu();
     const double log_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
     if (!(log_s > 0.)) return;

@@ -25,6 +25,7 @@
 #include "begin_thread.hpp"
 #include "bounded_series.hpp"
 #include "channels.hpp"
+#include "estimate_sample.hpp"
 #include "feed.hpp"
 #include "live_input.hpp"
 #include "viwo/math/arrays.hpp"
@@ -116,15 +117,8 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
 
   void on_epoch(const Estimator& estimator, int piece, const std::vector<std::string>& warnings) {
     const Filter& filter = estimator.filter();
-    EstimateSample sample = sample_of(filter);
-    sample.calibration_names = calibration_names(filter);
-    for (const BlockEstimate& estimate : calibration_of(filter)) {
-      sample.calibration.push_back(estimate.value);
-      sample.calibration_sigma.push_back(estimate.sigma);
-    }
+    EstimateSample sample = estimate_sample(filter, piece, warnings);
     sample.latency_s = latency_s(filter.t_ns());
-    sample.piece = piece;
-    sample.warnings = warnings;
     if (sample.latency_s > 0.) latency_ms_.add(1e3 * sample.latency_s);
     for (const SensorStream& stream : live_) {
       guarded(stream.info, "estimate", [&] { stream.sensor->estimate(sample); });
@@ -346,22 +340,6 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   void add_reference(const PoseSample& pose) {
     reference_.add(
         {pose.t_ns, to_vector(pose.p_BinW_m), to_quaternion(pose.q_BtoW_xyzw).normalized()});
-  }
-
-  static EstimateSample sample_of(const Filter& filter) {
-    const ImuState& imu = filter.imu();
-    EstimateSample sample;
-    sample.t_ns = filter.t_ns();
-    const Eigen::Quaterniond q_ItoG(imu.R_GtoI.transpose());
-    sample.q_ItoG_xyzw = {q_ItoG.x(), q_ItoG.y(), q_ItoG.z(), q_ItoG.w()};
-    Eigen::Vector3d::Map(sample.p_IinG_m.data()) = imu.p_IinG;
-    Eigen::Vector3d::Map(sample.v_IinG_m_per_s.data()) = imu.v_IinG;
-    if (!filter.clones().empty()) {
-      Eigen::Vector3d::Map(sample.w_IinI_rad_per_s.data()) = filter.clones().back().w_IinI;
-    }
-    Eigen::Map<Eigen::Matrix<double, 9, 9, Eigen::RowMajor>>(sample.covariance.data()) =
-        filter.imu_covariance().topLeftCorner<9, 9>();
-    return sample;
   }
 
   /// Since the arrival of the newest image of an epoch; 0 without one.

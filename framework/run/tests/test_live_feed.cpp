@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "live_device.hpp"
+#include "pictures_of_points.hpp"
 #include "sensors_in_memory.hpp"
 #include "simulated.hpp"
 #include "viwo/results/run_output.hpp"
@@ -24,57 +25,15 @@ namespace {
 
 using testing::Device;
 using testing::in_time_order;
+using testing::Points;
 using testing::registry;
 using testing::routes_for;
 using testing::routes_of_device;
+using testing::routes_of_pictures;
 using testing::standing_then_driving;
 using testing::stream;
-
-/// A picture without pixels: what is behind it are the points of an image.
-struct Points final : ImageSource {
-  explicit Points(FeatureSample sample) : points(std::move(sample)) {}
-  void read(Image& /*out*/) const override {}
-  FeatureSample points;
-};
-
-/// Finds in a picture the points that are behind it.
-class Tracker final : public Sensor {
- public:
-  SampleTypes yields() const override { return sample_types<FeatureSample>(); }
-  bool takes_input() const override { return true; }
-  void connect(Sensor& input) override { input_ = &input; }
-  Status next(Measurement& out) override {
-    Measurement in;
-    while (input_->next(in) == Status::kOk) {
-      const auto* image = in.get_if<ImageSample>();
-      if (image == nullptr) continue;
-      out = static_cast<const Points&>(*image->source).points;
-      return Status::kOk;
-    }
-    return Status::kEnd;
-  }
-
- private:
-  Sensor* input_ = nullptr;
-};
-
-/// What a filter takes of a recorded run as one sensor would give it, with pictures in the place of
-/// tracks.
-std::vector<Measurement> with_pictures(const RunData& data) {
-  std::vector<Measurement> all = in_time_order(data.recorded);
-  for (Measurement& measurement : all) {
-    const auto* image = measurement.get_if<FeatureSample>();
-    if (image == nullptr) continue;
-    measurement = ImageSample{image->t_ns, image->camera, std::make_shared<Points>(*image)};
-  }
-  return all;
-}
-
-/// The same of one that gives pictures, and of the sensor 'tracks' that works on them.
-Routes routes_of_pictures(const RunSetup& setup) {
-  return routes_for(setup, {{"device", sample_types<ImuSample, EncoderSample, ImageSample>()},
-                            {"tracks", sample_types<FeatureSample>()}});
-}
+using testing::Tracker;
+using testing::with_pictures;
 
 double distance(const RunResult& a, const RunResult& b) {
   double largest = 0.;

@@ -42,7 +42,8 @@ namespace rtps = eprosima::fastdds::rtps;
 inline bool is_ok(dds::ReturnCode_t code) { return code == dds::RETCODE_OK; }
 #else
 namespace rtps = eprosima::fastrtps::rtps;
-inline bool is_ok(dds::ReturnCode_t code) { return code == dds::ReturnCode_t::RETCODE_OK; }
+using eprosima::fastrtps::types::ReturnCode_t;
+inline bool is_ok(const ReturnCode_t& code) { return code == ReturnCode_t::RETCODE_OK; }
 #endif
 
 /// What is left unread of a message that is longer.

@@ -30,6 +30,7 @@ struct RunData {
   Trajectory reference;                       ///< planar; empty if there is none
   std::vector<SensorStream> streams;          ///< not read yet
   std::vector<SensorStream> live;             ///< measurements that are still to happen
+  bool lockstep = false;                      ///< these are played: the run waits for them
   std::map<std::string, double> calibration;  ///< true values, if known
   std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor
 
@@ -39,6 +40,8 @@ struct RunData {
   std::span<const EncoderSample> wheels() const { return recorded.of<EncoderSample>(wheels_name); }
   /// Truth of the inertial state, if there is one.
   std::span<const StateSample> states() const { return recorded.of<StateSample>(); }
+  /// Whether measurements come in their own time, which does not wait for the run.
+  bool is_live() const { return !live.empty() && !lockstep; }
   /// For pictures: what has not been read by a tracker while it ran.
   std::span<const ImageSample> images() const { return recorded.of<ImageSample>(); }
 };

@@ -1,0 +1,87 @@
+// Names, addresses and the environment.
+#include <cstdlib>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "dds_names.hpp"
+#include "dds_settings.hpp"
+#include "viwo/api/status.hpp"
+
+namespace viwo::ros2 {
+namespace {
+
+TEST(DdsNames, AreThoseThatRos2Makes) {
+  EXPECT_EQ(dds_topic("/imu0"), "rt/imu0");
+  EXPECT_EQ(dds_topic("viwo/odometry"), "rt/viwo/odometry");
+  EXPECT_EQ(ros_topic("rt/cam0/image_raw"), "/cam0/image_raw");
+  EXPECT_EQ(ros_topic("rq/service"), std::nullopt);
+  EXPECT_EQ(dds_type("sensor_msgs/Imu"), "sensor_msgs::msg::dds_::Imu_");
+  EXPECT_EQ(ros_type("sensor_msgs::msg::dds_::Imu_"), "sensor_msgs/Imu");
+  EXPECT_EQ(ros_type("Imu"), "Imu");
+  EXPECT_EQ(ros_type("sensor_msgs::msg::dds_::Imu"), "sensor_msgs::msg::dds_::Imu");
+}
+
+TEST(DdsNames, SayWhatIsNoTopic) {
+  for (const char* good : {"/imu", "imu", "/robot_1/cam0/image_raw", "_hidden"}) {
+    EXPECT_EQ(why_no_name(good), "") << good;
+  }
+  for (const char* bad : {"", "/", "/1st", "a b", "/a//b", "/a/", "/a-b", "~/x"}) {
+    EXPECT_NE(why_no_name(bad), "") << bad;
+  }
+}
+
+class Settings : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (const char* name :
+         {"ROS_DOMAIN_ID", "ROS_LOCALHOST_ONLY", "ROS_AUTOMATIC_DISCOVERY_RANGE"}) {
+      unsetenv(name);
+    }
+  }
+  static std::string error_of(const DdsParams& params) {
+    try {
+      params.settings();
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+};
+
+TEST_F(Settings, TakeTheDomainOfTheEnvironmentWhereNoneIsGiven) {
+  EXPECT_EQ(DdsParams().settings().domain, 0U);
+  setenv("ROS_DOMAIN_ID", "42", 1);
+  EXPECT_EQ(DdsParams().settings().domain, 42U);
+  DdsParams given;
+  given.domain_id = 7;
+  EXPECT_EQ(given.settings().domain, 7U);
+  for (const char* wrong : {"-1", "233", "four", "4.5"}) {
+    setenv("ROS_DOMAIN_ID", wrong, 1);
+    EXPECT_EQ(error_of({}), "the environment's ROS_DOMAIN_ID is '" + std::string(wrong) +
+                                "': expected a number from 0 to 232");
+  }
+}
+
+TEST_F(Settings, StayOnThisMachineWhereTheEnvironmentSaysSo) {
+  EXPECT_TRUE(DdsParams().settings().interfaces.empty());
+  setenv("ROS_LOCALHOST_ONLY", "0", 1);
+  EXPECT_TRUE(DdsParams().settings().interfaces.empty());
+  setenv("ROS_LOCALHOST_ONLY", "1", 1);
+  EXPECT_EQ(DdsParams().settings().interfaces, std::vector<std::string>{"127.0.0.1"});
+  unsetenv("ROS_LOCALHOST_ONLY");
+  setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST", 1);
+  EXPECT_EQ(DdsParams().settings().interfaces, std::vector<std::string>{"127.0.0.1"});
+  DdsParams given;
+  given.interfaces = {"10.0.0.1"};
+  EXPECT_EQ(given.settings().interfaces, given.interfaces);
+}
+
+TEST_F(Settings, RefuseWhatIsNoAddress) {
+  DdsParams params;
+  params.peers = {"robot"};
+  EXPECT_EQ(error_of(params), "'robot' is no address such as 192.168.1.7");
+}
+
+}  // namespace
+}  // namespace viwo::ros2
