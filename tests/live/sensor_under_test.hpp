@@ -1,4 +1,4 @@
-// The sensor ros1_topics as the host loads it, with what it says.
+// A sensor of a running system as the host loads it, with what it says.
 #pragma once
 
 #include <algorithm>
@@ -40,15 +40,19 @@ inline Said& said() {
 }
 
 /// `rest`: further parameters, ", key: value". Throws InputError with what the host would print.
-inline std::shared_ptr<Sensor> make_ros1_topics(const std::string& rest) {
+inline std::shared_ptr<Sensor> make_sensor(const std::string& type, const std::string& rest) {
   static PluginRegistry registry(
       {VIWO_TEST_PLUGIN_DIR},
       [](const PluginInfo&, LogLevel, std::string_view text) { said().add(text); });
   config::Errors errors;
   const auto loaded = registry.make_sensor(
-      config::parse("{type: ros1_topics" + rest + "}", "test.yaml"), "sensor", 1, errors);
+      config::parse("{type: " + type + rest + "}", "test.yaml"), "sensor", 1, errors);
   errors.throw_if_any();
   return loaded.object;
+}
+
+inline std::shared_ptr<Sensor> make_ros1_topics(const std::string& rest) {
+  return make_sensor("ros1_topics", rest);
 }
 
 }  // namespace viwo::testing

@@ -1,0 +1,211 @@
+// The sensor ros2_topics with another DDS on loopback.
+#include <chrono>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dds_system.hpp"
+#include "sensor_under_test.hpp"
+#include "viwo/api/status.hpp"
+
+namespace viwo {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+using testing::Child;
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
+using testing::make_sensor;
+using testing::said;
+
+constexpr const char* kAllTopics =
+    ", imu_topic: /imu0, joint_topic: /joint_states, drive_joints: [drive_1, drive_2], "
+    "steer_joints: [steer_1], image_topics: [/cam0/image_raw, /cam1/image_raw/compressed]";
+constexpr std::int64_t kStart = 1'700'000'000'000'000'000;
+constexpr std::int64_t kPeriod = 5'000'000;
+
+class Ros2Topics : public testing::DdsTest {
+ protected:
+  static std::shared_ptr<Sensor> make(const std::string& rest) {
+    return make_sensor("ros2_topics", ", " + dds_->parameters() + rest);
+  }
+  static std::string error_of(const std::string& rest) {
+    try {
+      make(rest);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+  static bool wait_until_said(const std::string& text) {
+    const auto deadline = steady_clock::now() + 20s;
+    while (!said().has(text) && steady_clock::now() < deadline) std::this_thread::sleep_for(20ms);
+    return said().has(text);
+  }
+  /// All that it gives until nothing comes any more.
+  struct Given {
+    std::vector<ImuSample> imu;
+    std::vector<EncoderSample> encoders;
+    std::vector<ImageSample> images;
+  };
+  static Given all_of(Sensor& sensor) {
+    Given given;
+    Measurement measurement;
+    while (sensor.next(measurement) == Status::kOk) {
+      if (const auto* i = measurement.get_if<ImuSample>()) given.imu.push_back(*i);
+      if (const auto* e = measurement.get_if<EncoderSample>()) given.encoders.push_back(*e);
+      if (const auto* p = measurement.get_if<ImageSample>()) given.images.push_back(*p);
+    }
+    return given;
+  }
+};
+
+TEST_F(Ros2Topics, GivesAllThatIsPublishedInOrderAndEndsWhenNothingComes) {
+  const auto sensor = make(std::string(kAllTopics) + ", idle_timeout_s: 4");
+  EXPECT_TRUE(sensor->live());
+  Child publisher(dds_->node("publish", "400"), dds_->file("publisher.log"));
+  const Given given = all_of(*sensor);
+  EXPECT_EQ(publisher.wait(20s), 0) << dds_->text_of("publisher.log");
+  EXPECT_TRUE(said().has("nothing has come for 4 s (idle_timeout_s): no further measurements"))
+      << said().all();
+  ASSERT_EQ(given.imu.size(), 400U) << said().all() << dds_->text_of("publisher.log");
+  for (std::size_t k = 0; k < given.imu.size(); ++k) {
+    EXPECT_EQ(given.imu[k].t_ns, kStart + static_cast<std::int64_t>(k) * kPeriod);
+    EXPECT_EQ(given.imu[k].gyro_rad_per_s[0], static_cast<double>(k));
+    EXPECT_EQ(given.imu[k].accel_m_per_s2[2], 9.81);
+  }
+  ASSERT_EQ(given.encoders.size(), 399U);
+  for (std::size_t k = 0; k < given.encoders.size(); ++k) {
+    EXPECT_EQ(given.encoders[k].begin_ns, given.imu[k].t_ns);
+    EXPECT_EQ(given.encoders[k].drive_rad_per_s[1], static_cast<double>(2 * k) + 1.);
+    EXPECT_NEAR(given.encoders[k].steer_rad[0], 0.001 * (static_cast<double>(k) + 0.5), 1e-12);
+  }
+  ASSERT_EQ(given.images.size(), 40U);
+  for (std::size_t k = 0; k < given.images.size(); ++k) {
+    EXPECT_EQ(given.images[k].camera, static_cast<int>(k % 2));
+    EXPECT_EQ(given.images[k].t_ns, kStart + static_cast<std::int64_t>(k / 2) * 20 * kPeriod);
+    Image image;
+    given.images[k].source->read(image);
+    EXPECT_EQ(image.width_px, 8);
+    const auto level = static_cast<std::uint8_t>(k / 2 + (k % 2 == 0 ? 100 : 0));
+    EXPECT_EQ(image.pixels, std::vector<std::uint8_t>(32, level));
+  }
+  std::vector<RejectionCount> rejections;
+  sensor->rejections(rejections);
+  for (const RejectionCount& r : rejections) ADD_FAILURE() << r.reason << " " << r.count;
+}
+
+TEST_F(Ros2Topics, GoesOnWithAPublisherThatLeavesAndReturns) {
+  const auto sensor = make(std::string(kAllTopics) + ", idle_timeout_s: 8");
+  for (int part = 0; part < 2; ++part) {
+    Child publisher(dds_->node("publish", "100"), dds_->file("publisher.log"));
+    EXPECT_EQ(publisher.wait(30s), 0) << dds_->text_of("publisher.log");
+  }
+  const Given given = all_of(*sensor);
+  // The second has the stamps of the first, long before the last: a clock that was set back.
+  EXPECT_GE(given.imu.size(), 100U);
+  EXPECT_TRUE(said().has("topic '/imu0' has no publisher any more")) << said().all();
+  EXPECT_TRUE(said().has("topic '/imu0' has a publisher again")) << said().all();
+}
+
+TEST_F(Ros2Topics, CountsWhatCannotBeUsed) {
+  const auto sensor = make(std::string(kAllTopics) + ", idle_timeout_s: 6");
+  Child publisher(dds_->node("wrong", "40"), dds_->file("publisher.log"));
+  EXPECT_EQ(publisher.wait(30s), 0) << dds_->text_of("publisher.log");
+  sensor->stop();
+  const Given given = all_of(*sensor);
+  EXPECT_TRUE(given.imu.empty());
+  std::vector<RejectionCount> rejections;
+  sensor->rejections(rejections);
+  std::string all;
+  for (const RejectionCount& r : rejections) all += r.reason + " | " + std::to_string(r.count) + "\n";
+  EXPECT_THAT(all, HasSubstr("/imu0: a publisher of geometry_msgs/PoseStamped where a "
+                             "sensor_msgs/Imu must be | 1\n"));
+  EXPECT_THAT(all, HasSubstr("/joint_states: no joint 'drive_1'"));
+  EXPECT_THAT(all, HasSubstr(" | 40\n"));
+}
+
+TEST_F(Ros2Topics, SaysWhoIsTwoAndWhoIsBestEffort) {
+  const auto sensor = make(", imu_topic: /imu0");
+  const auto strict = make(std::string(kAllTopics) + ", reliable: true");
+  const auto all = make(kAllTopics);  // who waits for what is published
+  Child one(dds_->node("publish", "600"), dds_->file("one.log"));
+  Child two(dds_->node("publish", "600"), dds_->file("two.log"));
+  EXPECT_TRUE(wait_until_said(
+      "topic '/imu0' has 2 publishers: their messages are taken as those of one"))
+      << said().all();
+  EXPECT_TRUE(wait_until_said("topic '/imu0' has a publisher that is best effort: it is not heard "
+                              "while `reliable` or `lockstep` asks for more"))
+      << said().all();
+}
+
+TEST_F(Ros2Topics, SaysWhichTopicNobodyPublishesAndWhatIsThereInstead) {
+  const auto published = make(kAllTopics);
+  Child publisher(dds_->node("publish", "1600"), dds_->file("publisher.log"));
+  const auto sensor = make(", imu_topic: /imu1");
+  EXPECT_TRUE(wait_until_said("nobody publishes topic '/imu1' - did you mean '/imu0'?"))
+      << said().all();
+}
+
+TEST_F(Ros2Topics, EndsSoonAfterStop) {
+  const auto sensor = make(", imu_topic: /imu0");
+  std::thread stopper([&sensor] {
+    std::this_thread::sleep_for(300ms);
+    sensor->stop();
+  });
+  Measurement out;
+  EXPECT_EQ(sensor->next(out), Status::kEnd);
+  stopper.join();
+  EXPECT_EQ(sensor->next(out), Status::kEnd);
+}
+
+TEST_F(Ros2Topics, RefusesParametersThatContradictEachOther) {
+  EXPECT_THAT(error_of(""), HasSubstr("sensor.imu_topic: nothing to listen to: give one of "));
+  EXPECT_THAT(error_of(", imu_topic: /a b"),
+              HasSubstr("sensor.imu_topic: '/a b' cannot be the name of a topic: "));
+  EXPECT_THAT(error_of(", imu_topic: /i, image_topics: [/c, /i]"),
+              HasSubstr("sensor.image_topics: '/i' is wanted twice"));
+  EXPECT_THAT(error_of(", imu_topic: /i, body_frame: odom"),
+              HasSubstr("sensor.body_frame: 'odom' is the world_frame, too"));
+}
+
+TEST_F(Ros2Topics, PublishesTheEstimate) {
+  const auto sensor = make(
+      ", imu_topic: /imu0, world_frame: map, body_frame: base_link, p_IinB_m: [0.5, 0, 0], "
+      "warn_latency_s: 10, sigma_rate_rad_per_s: 0.5");
+  Child recorder(dds_->node("record", dds_->file("heard.txt")), dds_->file("recorder.log"));
+  EstimateSample estimate;
+  estimate.p_IinG_m = {1., 2., 3.};
+  estimate.covariance[40] = 0.25;  // of the position along y
+  estimate.latency_s = 0.0125;
+  estimate.calibration_names = {"r_1"};
+  estimate.calibration = {0.0255};
+  estimate.calibration_sigma = {0.25};
+  const auto deadline = steady_clock::now() + 20s;
+  std::string heard;
+  const auto complete = [&heard] {
+    for (const char* line : {"odometry ", "tf ", "path ", "diagnostics "}) {
+      if (heard.find(line) == std::string::npos) return false;
+    }
+    return true;
+  };
+  for (std::int64_t k = 0; !complete() && steady_clock::now() < deadline; ++k) {
+    estimate.t_ns = kStart + k * 50'000'000;
+    sensor->estimate(estimate);
+    std::this_thread::sleep_for(50ms);
+    heard = dds_->text_of("heard.txt");
+  }
+  EXPECT_THAT(heard, ContainsRegex("odometry 170000000[0-9]+ map base_link 0.5 2 3 0.25 0.25"))
+      << dds_->text_of("recorder.log");
+  EXPECT_THAT(heard, ContainsRegex("tf 170000000[0-9]+ map base_link 0.5"));
+  EXPECT_THAT(heard, ContainsRegex("path map [0-9]+ 0.5"));
+  EXPECT_THAT(heard, ContainsRegex("diagnostics 170000000[0-9]+ level 0 latency_s=0.0125 "));
+  EXPECT_THAT(heard, HasSubstr(" r_1=0.0255 sigma r_1=0.25"));
+}
+
+}  // namespace
+}  // namespace viwo
