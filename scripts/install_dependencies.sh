@@ -55,6 +55,10 @@ for package in librosbag-storage-dev libroscpp-dev libsensor-msgs-dev libnav-msg
   liblz4-dev libzstd-dev libdeflate-dev; do
   need_package "$package"
 done
+# DDS, by its name in Debian 13 or else in Debian 12.
+if ! dpkg-query -W -f '${db:Status-Status}' libfastdds-dev 2> /dev/null | grep -qx installed; then
+  need_package libfastrtps-dev
+fi
 # Ubuntu 22.04 has it by another name.
 if ! dpkg-query -W -f '${db:Status-Status}' libgeographic-dev 2> /dev/null | grep -qx installed; then
   need_package libgeographiclib-dev
@@ -70,7 +74,7 @@ if [ "${1:-}" = --tests ] || [ "${1:-}" = --engines ]; then
     need_command chromium chromium chromium-browser google-chrome
   fi
   for package in python3-rosmaster python3-rosbag librosbag-dev python3-jsonschema python3-yaml xvfb \
-    liburdfdom-dev pkg-config; do
+    liburdfdom-dev pkg-config cyclonedds-dev cyclonedds-tools; do
     need_package "$package"
   done
 fi
@@ -100,6 +104,9 @@ echo "Installing with apt: ${missing[*]} ${optional[*]}"
 for package in "${optional[@]}"; do
   if [ "$package" = libgeographiclib-dev ] && ! apt-cache show "$package" > /dev/null 2>&1; then
     package=libgeographic-dev
+  fi
+  if [ "$package" = libfastrtps-dev ] && apt-cache show libfastdds-dev > /dev/null 2>&1; then
+    package=libfastdds-dev
   fi
   if apt-cache show "$package" > /dev/null 2>&1; then
     missing+=("$package")
