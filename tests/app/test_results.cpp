@@ -399,8 +399,8 @@ TEST_F(ResultsTest, AllDeliveredConfigurationsAreTriedHere) {
           "runs/simulated_swerve.yaml", "runs/tum_vi.yaml", "runs/ucsd_skid_steer.yaml",
           "runs/viwo_ackermann.yaml", "runs/viwo_bag.yaml", "runs/viwo_contact.yaml",
           "runs/viwo_gnss.yaml", "runs/viwo_images.yaml", "runs/viwo_images_log.yaml",
-          "runs/viwo_live.yaml", "runs/viwo_log.yaml", "runs/viwo_mecanum.yaml",
-          "runs/viwo_skid_steer.yaml", "runs/viwo_swerve.yaml"}))
+          "runs/viwo_live.yaml", "runs/viwo_live_ros2.yaml", "runs/viwo_log.yaml",
+          "runs/viwo_mecanum.yaml", "runs/viwo_skid_steer.yaml", "runs/viwo_swerve.yaml"}))
       << "name the new file in a test above";
 }
 

@@ -122,7 +122,7 @@ class FilterRun {
     estimator_->observe(observer_);
     recorder_.emplace(setup, data, estimator_->filter(), result_);
     if (restarts()) healthy_.emplace(estimator_->filter());
-    feed_ = live_             ? feed_live(setup, data, hooks, plausibility_)
+    feed_ = live_           ? feed_live(setup, data, hooks, plausibility_)
             : data.lockstep ? feed_in_step(setup, data, hooks, plausibility_)
                             : feed_recorded(setup, data, plausibility_);
   }

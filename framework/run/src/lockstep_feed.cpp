@@ -34,7 +34,8 @@ class LockstepFeed final : public Feed {
 
   bool next(Estimator& estimator) override {
     const bool any = !instant_.empty() || read_instant();
-    const auto instant_ns = any ? std::optional(stamp_ns(instant_.front().measurement)) : std::nullopt;
+    const auto instant_ns =
+        any ? std::optional(stamp_ns(instant_.front().measurement)) : std::nullopt;
     if (streams_->give_before(instant_ns, estimator)) return true;
     // An interruption is for the run to say.
     if (!any) return hooks_.interrupted && hooks_.interrupted();

@@ -80,7 +80,8 @@ bool PlayedSensor::has_room() const {
   const auto is_empty = [](const auto& images) { return images->waiting_.empty(); };
   const auto is_full = [](const auto& images) { return images->waiting_.size() >= kImagesAhead; };
   if (ahead_.empty() || std::any_of(images_.begin(), images_.end(), is_empty)) return true;
-  return ahead_.size() < kMeasurementsAhead && std::none_of(images_.begin(), images_.end(), is_full);
+  return ahead_.size() < kMeasurementsAhead &&
+         std::none_of(images_.begin(), images_.end(), is_full);
 }
 
 bool PlayedSensor::is_wanted(const SampleType& type) const {

@@ -126,9 +126,8 @@ dds::Topic& DdsNode::topic_of(const std::string& topic, const std::string& type)
 dds::DataReader& DdsNode::make_reader(const std::string& topic, const std::string& type,
                                       Delivery delivery, int most) {
   dds::DataReaderQos qos = dds::DATAREADER_QOS_DEFAULT;
-  qos.reliability().kind = delivery == Delivery::kBestEffort
-                               ? dds::BEST_EFFORT_RELIABILITY_QOS
-                               : dds::RELIABLE_RELIABILITY_QOS;
+  qos.reliability().kind = delivery == Delivery::kBestEffort ? dds::BEST_EFFORT_RELIABILITY_QOS
+                                                             : dds::RELIABLE_RELIABILITY_QOS;
   qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind =
       delivery == Delivery::kEverything ? dds::KEEP_ALL_HISTORY_QOS : dds::KEEP_LAST_HISTORY_QOS;

@@ -37,8 +37,8 @@ class DdsNode final : private dds::DomainParticipantListener {
   std::vector<Published> published() const;
   /// They live as long as the node. InputError when they cannot be made. `most`: messages that wait
   /// to be read.
-  dds::DataReader& make_reader(const std::string& topic, const std::string& type,
-                               Delivery delivery, int most);
+  dds::DataReader& make_reader(const std::string& topic, const std::string& type, Delivery delivery,
+                               int most);
   /// Reliable; late readers get nothing of before. `most`: messages that wait to be sent.
   dds::DataWriter& make_writer(const std::string& topic, const std::string& type, int most);
 

@@ -48,8 +48,7 @@ DdsSettings DdsParams::settings() const {
   check_addresses("interfaces", interfaces);
   check_addresses("peers", peers);
   DdsSettings settings;
-  settings.domain =
-      domain_id < 0 ? domain_of_environment() : static_cast<std::uint32_t>(domain_id);
+  settings.domain = domain_id < 0 ? domain_of_environment() : static_cast<std::uint32_t>(domain_id);
   settings.interfaces = interfaces;
   if (interfaces.empty() && is_only_this_machine()) settings.interfaces = {"127.0.0.1"};
   settings.peers = peers;

@@ -1,4 +1,5 @@
-// Where on the network a ROS 2 system is: from parameters, and from the environment as ROS 2 has it.
+// Where on the network a ROS 2 system is: from parameters, and from the environment as ROS 2 has
+// it.
 #pragma once
 
 #include <cstdint>
@@ -22,13 +23,12 @@ struct DdsParams {
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(domain_id),
-      {.min = -1.,
-       .max = 232.,
-       .help = "of DDS; -1: the environment's ROS_DOMAIN_ID, or else 0"});
+      {.min = -1., .max = 232., .help = "of DDS; -1: the environment's ROS_DOMAIN_ID, or else 0"});
     b(VIWO_PARAM(interfaces),
-      {.help = "addresses (IPv4) of this machine that are used; none: all, or 127.0.0.1 alone where "
-               "the environment has ROS_LOCALHOST_ONLY=1 or "
-               "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"});
+      {.help =
+           "addresses (IPv4) of this machine that are used; none: all, or 127.0.0.1 alone where "
+           "the environment has ROS_LOCALHOST_ONLY=1 or "
+           "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"});
     b(VIWO_PARAM(peers),
       {.help = "addresses (IPv4) of machines that are asked for topics, instead of by multicast"});
   }

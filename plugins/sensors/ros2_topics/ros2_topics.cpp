@@ -88,7 +88,7 @@ class Ros2Topics final : public live::TopicSensor {
   /// What is known of a topic that is wanted.
   struct Inlet {
     dds::DataReader* reader = nullptr;
-    std::string type;                        ///< "sensor_msgs/Imu"
+    std::string type;                           ///< "sensor_msgs/Imu"
     std::map<rtps::GUID_t, std::int64_t> last;  ///< numbers of messages, by publisher
     int publishers = 0;
     bool finished = false;
@@ -213,8 +213,9 @@ class Ros2Topics final : public live::TopicSensor {
     if (now == before) return now;
     const std::string topic = "topic '" + intake().topics()[i].name + "'";
     if (now > 1) {
-      services().log(LogLevel::kWarning, topic + " has " + std::to_string(now) +
-                                             " publishers: their messages are taken as those of one");
+      services().log(LogLevel::kWarning,
+                     topic + " has " + std::to_string(now) +
+                         " publishers: their messages are taken as those of one");
     } else if (now == 0) {
       services().log(LogLevel::kInfo, topic + " has no publisher any more");
     } else if (before == 0 && !inlet.last.empty()) {

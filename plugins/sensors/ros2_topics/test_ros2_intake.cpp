@@ -232,8 +232,11 @@ TEST_F(Ros2Intake, CountsHostileMessagesAndGoesOn) {
 
 TEST_F(Ros2Intake, SurvivesMessagesOfRandomBytes) {
   std::mt19937_64 random(18);
-  const std::vector<std::pair<std::size_t, Bytes>> good{
-      {0, imu(kTime)}, {1, joints(kTime)}, {2, odometry(kTime)}, {3, fix(kTime)}, {4, image(kTime)}};
+  const std::vector<std::pair<std::size_t, Bytes>> good{{0, imu(kTime)},
+                                                        {1, joints(kTime)},
+                                                        {2, odometry(kTime)},
+                                                        {3, fix(kTime)},
+                                                        {4, image(kTime)}};
   for (int k = 0; k < 20'000; ++k) {
     auto [topic, bytes] = good[random() % good.size()];
     for (std::uint64_t n = random() % 8; n > 0; --n) {

@@ -17,8 +17,8 @@ class Ros2Fields final : public FieldReader {
       // A buffer has no constant form; reading does not write.
       : buffer_(reinterpret_cast<char*>(const_cast<std::uint8_t*>(message.data())), message.size()),
         in_(buffer_, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, kDdsCdr) {
-    // Of the encodings of DDS the one that ROS 2 writes, in either byte order: others are aligned in
-    // another way, or have lists of parameters.
+    // Of the encodings of DDS the one that ROS 2 writes, in either byte order: others are aligned
+    // in another way, or have lists of parameters.
     if (message.size() < 4 || message[0] != 0 || message[1] > 1) {
       throw BrokenMessage("it does not begin like CDR");
     }

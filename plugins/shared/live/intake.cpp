@@ -91,9 +91,9 @@ void Intake::take(std::size_t topic, const std::string& type, const std::string&
   const auto kind = bag::kind_of(type);
   const auto& kinds = topics_[topic].kinds;
   if (!kind || std::find(kinds.begin(), kinds.end(), *kind) == kinds.end()) {
-    return drop(
-        topic, "a " + type + " where a " + std::string(bag::type_name(kinds.front())) + " must be",
-        0);
+    return drop(topic,
+                "a " + type + " where a " + std::string(bag::type_name(kinds.front())) + " must be",
+                0);
   }
   if (md5 != "*" && md5 != bag::ros1_md5(*kind)) {
     return drop(topic, "another definition of " + type + " (md5 " + md5 + ")", 0);
@@ -105,8 +105,7 @@ void Intake::take(std::size_t topic, const std::string& type, const std::string&
   }
 }
 
-void Intake::read(std::size_t topic, Kind kind,
-                  const std::shared_ptr<const bag::Bytes>& message) {
+void Intake::read(std::size_t topic, Kind kind, const std::shared_ptr<const bag::Bytes>& message) {
   const std::unique_ptr<bag::FieldReader> fields = make_fields_(*message);
   bag::FieldReader& in = *fields;
   switch (kind) {
@@ -128,9 +127,9 @@ void Intake::read(std::size_t topic, Kind kind,
       const bag::ImageHead head = bag::read_image_head(in);
       if (!bag::is_known_encoding(head.encoding)) {
         return drop(topic,
-                      "image of encoding " + log::quoted(head.encoding) + ": what is read is " +
-                          bag::known_encodings(),
-                      head.t_ns);
+                    "image of encoding " + log::quoted(head.encoding) + ": what is read is " +
+                        bag::known_encodings(),
+                    head.t_ns);
       }
       return take_image(topic, image_of(topic, head.t_ns, message, false));
     }
@@ -283,8 +282,7 @@ void Intake::reject(std::size_t topic, const std::string& reason, std::int64_t t
   drop(topic, reason, t_ns, n);
 }
 
-void Intake::drop(std::size_t topic, const std::string& reason, std::int64_t t_ns,
-                  std::int64_t n) {
+void Intake::drop(std::size_t topic, const std::string& reason, std::int64_t t_ns, std::int64_t n) {
   count(topic, reason, t_ns, "it is dropped, and others like it are counted", n);
 }
 

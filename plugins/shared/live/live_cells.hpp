@@ -41,8 +41,8 @@ class LogCells {
  private:
   bool drive_is_angle_;
   double max_gap_s_;
-  std::optional<log::EncoderReading> last_;     ///< of angles
-  std::optional<EncoderSample> open_;           ///< of rates: the cell whose end is not known
+  std::optional<log::EncoderReading> last_;  ///< of angles
+  std::optional<EncoderSample> open_;        ///< of rates: the cell whose end is not known
   std::int64_t spacing_ns_ = 0;
 };
 

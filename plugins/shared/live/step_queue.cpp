@@ -27,8 +27,11 @@ int rank_of(bag::Kind kind) {
 
 StepQueue::StepQueue(const std::vector<Topic>& topics, std::size_t max_images) {
   for (const Topic& topic : topics) {
-    waiting_.push_back({topic.name, rank_of(topic.kinds.front()),
-                        topic.camera < 0 ? kMaxOthers : max_images, {}, false});
+    waiting_.push_back({topic.name,
+                        rank_of(topic.kinds.front()),
+                        topic.camera < 0 ? kMaxOthers : max_images,
+                        {},
+                        false});
   }
 }
 

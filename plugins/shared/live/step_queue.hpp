@@ -16,7 +16,8 @@
 namespace viwo::live {
 
 /// A measurement is given when every topic has one that is not earlier, or is finished; nothing is
-/// dropped. So who receives must stop when there is no room(), which lets a reliable publisher wait.
+/// dropped. So who receives must stop when there is no room(), which lets a reliable publisher
+/// wait.
 class StepQueue final : public MeasurementQueue {
  public:
   /// Measurements of a topic that may wait, of images `max_images`. Where one topic waits for

@@ -22,8 +22,8 @@
 
 namespace viwo::testing {
 
-/// Takes a domain that no other test of this machine has, a temporary folder, and the environment in
-/// which Cyclone DDS stays on 127.0.0.1.
+/// Takes a domain that no other test of this machine has, a temporary folder, and the environment
+/// in which Cyclone DDS stays on 127.0.0.1.
 class DdsSystem {
  public:
   DdsSystem() {

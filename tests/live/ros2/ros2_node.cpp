@@ -6,7 +6,8 @@
 //                                 /cam1/image_raw/compressed; best effort, as drivers are
 //   ros2_node wrong DOMAIN N      what must not be: /imu0 of another type, and N messages of joints
 //                                 whose names are missing
-//   ros2_node record DOMAIN FILE  viwo/odometry, viwo/path, /tf and /diagnostics, a line each, until
+//   ros2_node record DOMAIN FILE  viwo/odometry, viwo/path, /tf and /diagnostics, a line each,
+//   until
 //                                 SIGTERM
 //   ros2_node play DOMAIN BAG     a ROS 2 bag in its own time, best effort
 //   ros2_node step DOMAIN BAG     as fast as it is taken: reliable, keeping all
@@ -285,8 +286,8 @@ void write_message(const Writer& writer, bag::Kind kind, bag::FieldReader& in) {
     }
     case bag::Kind::kJoints: {
       bag::Joints joints = bag::read_joints(in);
-      return write_joints(writer, joints.t_ns, std::move(joints.names),
-                          std::move(joints.positions), std::move(joints.velocities));
+      return write_joints(writer, joints.t_ns, std::move(joints.names), std::move(joints.positions),
+                          std::move(joints.velocities));
     }
     case bag::Kind::kImage: {
       const bag::ImageHead head = bag::read_image_head(in);
@@ -332,8 +333,7 @@ int play(dds_entity_t node, const std::string& file, Delivery delivery) {
     if (!kind) continue;
     kinds.push_back(*kind);
     wanted.push_back({topic.name, *kind == bag::Kind::kImage});
-    writers.push_back(
-        std::make_unique<Writer>(node, descriptor_of(*kind), topic.name, delivery));
+    writers.push_back(std::make_unique<Writer>(node, descriptor_of(*kind), topic.name, delivery));
   }
   for (const auto& writer : writers) writer->wait_for_reader();
   dds_sleepfor(DDS_MSECS(500));  // the other side is to know it, too

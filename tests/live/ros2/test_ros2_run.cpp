@@ -141,9 +141,9 @@ TEST_F(Ros2Run, InStepGivesTheBitsOfTheBagAndInItsOwnTimeNearlySo) {
 TEST_F(Ros2Run, InStepIsAnErrorWhereMessagesAreLost) {
   make_bag();
   if (HasFatalFailure()) return;
-  Child viwo(run_words("lossy", dds_words({"--lockstep", "--set",
-                                           "sensors.ros0.max_waiting_images=2"})),
-             dds_->file("lossy.log"));
+  Child viwo(
+      run_words("lossy", dds_words({"--lockstep", "--set", "sensors.ros0.max_waiting_images=2"})),
+      dds_->file("lossy.log"));
   Child play(dds_->node("lossy", dds_->file("robot")), dds_->file("play.log"));
   play.wait(100s);
   EXPECT_NE(viwo.wait(100s), 0);

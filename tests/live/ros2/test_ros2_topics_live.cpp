@@ -122,7 +122,8 @@ TEST_F(Ros2Topics, CountsWhatCannotBeUsed) {
   std::vector<RejectionCount> rejections;
   sensor->rejections(rejections);
   std::string all;
-  for (const RejectionCount& r : rejections) all += r.reason + " | " + std::to_string(r.count) + "\n";
+  for (const RejectionCount& r : rejections)
+    all += r.reason + " | " + std::to_string(r.count) + "\n";
   EXPECT_THAT(all, HasSubstr("/imu0: a publisher of geometry_msgs/PoseStamped where a "
                              "sensor_msgs/Imu must be | 1\n"));
   EXPECT_THAT(all, HasSubstr("/joint_states: no joint 'drive_1'"));
@@ -135,11 +136,12 @@ TEST_F(Ros2Topics, SaysWhoIsTwoAndWhoIsBestEffort) {
   const auto all = make(kAllTopics);  // who waits for what is published
   Child one(dds_->node("publish", "600"), dds_->file("one.log"));
   Child two(dds_->node("publish", "600"), dds_->file("two.log"));
-  EXPECT_TRUE(wait_until_said(
-      "topic '/imu0' has 2 publishers: their messages are taken as those of one"))
+  EXPECT_TRUE(
+      wait_until_said("topic '/imu0' has 2 publishers: their messages are taken as those of one"))
       << said().all();
-  EXPECT_TRUE(wait_until_said("topic '/imu0' has a publisher that is best effort: it is not heard "
-                              "while `reliable` or `lockstep` asks for more"))
+  EXPECT_TRUE(
+      wait_until_said("topic '/imu0' has a publisher that is best effort: it is not heard "
+                      "while `reliable` or `lockstep` asks for more"))
       << said().all();
 }
 
