@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "viwo/api/sensor.hpp"
-#include "viwo/filter/filter.hpp"
+#include "viwo/estimator/estimator.hpp"
 
 namespace viwo {
 

@@ -103,6 +103,7 @@ void DdsNode::note(const rtps::GUID_t& writer, bool is_there, const Published& p
     } else {
       published_.erase(writer);
     }
+    ++generation_;
   }
   on_change_();
 }
@@ -132,6 +133,7 @@ dds::DataReader& DdsNode::make_reader(const std::string& topic, const std::strin
   qos.history().kind =
       delivery == Delivery::kEverything ? dds::KEEP_ALL_HISTORY_QOS : dds::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = most;
+  qos.resource_limits().max_instances = 1;
   qos.resource_limits().max_samples = most;
   qos.resource_limits().max_samples_per_instance = most;
   qos.resource_limits().allocated_samples = 0;
@@ -147,6 +149,7 @@ dds::DataWriter& DdsNode::make_writer(const std::string& topic, const std::strin
   qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = most;
+  qos.resource_limits().max_instances = 1;
   qos.resource_limits().max_samples = most;
   qos.resource_limits().max_samples_per_instance = most;
   qos.resource_limits().allocated_samples = 0;

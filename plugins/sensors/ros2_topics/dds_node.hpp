@@ -1,6 +1,7 @@
 // A participant of DDS: what is published by others, readers and writers of CDR.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -35,6 +36,8 @@ class DdsNode final : private dds::DomainParticipantListener {
   DdsNode& operator=(const DdsNode&) = delete;
 
   std::vector<Published> published() const;
+  /// Another number whenever published() is another.
+  int generation() const { return generation_; }
   /// They live as long as the node. InputError when they cannot be made. `most`: messages that wait
   /// to be read.
   dds::DataReader& make_reader(const std::string& topic, const std::string& type, Delivery delivery,
@@ -59,6 +62,7 @@ class DdsNode final : private dds::DomainParticipantListener {
   std::function<void()> on_change_;
   mutable std::mutex mutex_;
   std::map<rtps::GUID_t, Published> published_;
+  std::atomic<int> generation_ = 0;
   dds::DomainParticipant* participant_ = nullptr;
   dds::Subscriber* subscriber_ = nullptr;
   dds::Publisher* publisher_ = nullptr;

@@ -91,6 +91,7 @@ class Ros2Topics final : public live::TopicSensor {
     std::string type;                           ///< "sensor_msgs/Imu"
     std::map<rtps::GUID_t, std::int64_t> last;  ///< numbers of messages, by publisher
     int publishers = 0;
+    bool met = false;  ///< a publisher
     bool finished = false;
     std::set<std::string> refused;  ///< types that were said
   };
@@ -149,6 +150,8 @@ class Ros2Topics final : public live::TopicSensor {
 
   /// A reader has a type, which is that of the first publisher whose type is taken.
   void make_readers() {
+    const int generation = node_.generation();
+    if (std::exchange(generation_, generation) == generation) return;
     for (const DdsNode::Published& there : node_.published()) {
       for (std::size_t i = 0; i < inlets_.size(); ++i) {
         if (there.topic == dds_topic(intake().topics()[i].name)) meet(i, there);
@@ -195,7 +198,7 @@ class Ros2Topics final : public live::TopicSensor {
       bool is_empty = false;
       while (!is_empty && (steps() == nullptr || steps()->has_room(i))) is_empty = !take_one(i);
       is_all = is_all && is_empty;
-      if (steps() != nullptr && is_empty && before == 0 && !inlet.last.empty() &&
+      if (steps() != nullptr && is_empty && before == 0 && inlet.met &&
           !std::exchange(inlet.finished, true)) {
         intake().finish(i);
         steps()->finish(i);
@@ -210,6 +213,7 @@ class Ros2Topics final : public live::TopicSensor {
     dds::SubscriptionMatchedStatus status;
     inlet.reader->get_subscription_matched_status(status);
     const int now = status.current_count, before = std::exchange(inlet.publishers, now);
+    inlet.met = inlet.met || status.total_count > 0;
     if (now == before) return now;
     const std::string topic = "topic '" + intake().topics()[i].name + "'";
     if (now > 1) {
@@ -231,6 +235,10 @@ class Ros2Topics final : public live::TopicSensor {
     if (!take(*inlet.reader, *message, info)) return false;
     if (!info.valid_data) return true;
     count_lost(i, info);
+    if (inlet.finished) {
+      intake().reject(i, "message of a publisher that came when the topic had ended", 0);
+      return true;
+    }
     intake().take(i, inlet.type, "*", message);
     return true;
   }
@@ -276,6 +284,7 @@ class Ros2Topics final : public live::TopicSensor {
   std::vector<Inlet> inlets_;  ///< of intake().topics(); only the thread has them
   std::mutex mutex_;
   std::condition_variable changed_;
+  int generation_ = 0;  ///< of what is published, as it was looked at last
   bool woken_ = false;
   bool stopping_ = false;
   DdsNode node_;  ///< behind what its threads use

@@ -63,7 +63,7 @@ class Writer {
     dds_qos_t* const qos = dds_create_qos();
     const bool reliable = delivery != Delivery::kBestEffort;
     dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
-                         DDS_SECS(60));
+                         DDS_SECS(600));
     const bool all = delivery == Delivery::kKeepAll;
     dds_qset_history(qos, all ? DDS_HISTORY_KEEP_ALL : DDS_HISTORY_KEEP_LAST, all ? 0 : 1);
     writer_ = dds_create_writer(participant, made, qos, nullptr);
