@@ -19,7 +19,7 @@ struct Points final : ImageSource {
 };
 
 /// Finds in a picture the points that are behind it.
-class Tracker final : public Sensor {
+class Tracker : public Sensor {
  public:
   SampleTypes yields() const override { return sample_types<FeatureSample>(); }
   bool takes_input() const override { return true; }
