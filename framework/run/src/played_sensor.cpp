@@ -7,7 +7,7 @@
 namespace viwo {
 namespace {
 
-constexpr std::chrono::milliseconds kPollPeriod(50);
+constexpr std::chrono::milliseconds kPlayedPollPeriod(50);
 /// What is read ahead of the run, and of who works on images.
 constexpr std::size_t kMeasurementsAhead = 256, kImagesAhead = 8;
 
@@ -37,7 +37,7 @@ void PlayedSensor::stop() {
 
 template <class Condition>
 bool PlayedSensor::wait(std::unique_lock<std::mutex>& lock, Condition&& condition) {
-  while (!changed_.wait_for(lock, kPollPeriod, [&] { return stop_ || condition(); })) {
+  while (!changed_.wait_for(lock, kPlayedPollPeriod, [&] { return stop_ || condition(); })) {
     if (hooks_.interrupted && hooks_.interrupted()) return false;
   }
   return !stop_;

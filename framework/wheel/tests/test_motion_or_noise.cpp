@@ -1,5 +1,6 @@
 // What noise teaches about the intrinsics where there is no motion: nothing.
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <string>
 
@@ -15,7 +16,7 @@ using testing::load_model;
 using testing::sample_motion;
 using testing::swerve;
 
-constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kDurationNs = 10'000'000'000;
 
 /// What noisy encoders of a base that moves so say about the intrinsics in ten seconds.
 PreintegratedPose with_noise_of(const Twist& xi, double motion_sigmas) {
@@ -38,7 +39,7 @@ PreintegratedPose with_noise_of(const Twist& xi, double motion_sigmas) {
   options.twist = {.noise_weighted = true, .fitted_jacobian = true, .motion_sigmas = motion_sigmas};
   Preintegrator preintegrator(model, options);
   PreintegratedPose pose;
-  EXPECT_TRUE(preintegrator.integrate(samples, 0, 10 * kSecond, pose));
+  EXPECT_TRUE(preintegrator.integrate(samples, 0, kDurationNs, pose));
   return pose;
 }
 
