@@ -91,8 +91,7 @@ Library::Library(const std::filesystem::path& file) {
     // Of two registries one loads it, and has copied it when the other one may run in it.
     static std::mutex mutex;
     const std::lock_guard lock(mutex);
-    const bool is_first = !is_loaded(std::filesystem::canonical(file));
-    load(file);
+    const bool is_first = load(file);
     find_descriptor(file);
     if (is_first && !stays_mapped()) keep_pages(file);
   }
@@ -101,11 +100,13 @@ Library::Library(const std::filesystem::path& file) {
   info_ = {d.kind, d.name, d.version, d.summary, d.license, file, d.params()};
 }
 
-void Library::load(const std::filesystem::path& file) {
+bool Library::load(const std::filesystem::path& file) {
   const KeepFloatingPointMode keep;
+  bool is_first = false;
   try {
-    library_.load(std::filesystem::canonical(file),
-                  boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local);
+    const std::filesystem::path real = std::filesystem::canonical(file);
+    is_first = !is_loaded(real);
+    library_.load(real, boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local);
   } catch (const std::system_error& error) {
     throw PluginRefused(file, std::string("cannot be loaded: ") + error.what() +
                                   "\n  -> link what is missing; viwo_add_plugin() shows undefined "
@@ -116,6 +117,7 @@ void Library::load(const std::filesystem::path& file) {
                         "changes the floating-point mode of the process when it is loaded - link "
                         "it without -ffast-math and -Ofast");
   }
+  return is_first;
 }
 
 void Library::find_descriptor(const std::filesystem::path& file) {

@@ -21,7 +21,8 @@ class Library {
   const PluginDescriptor& descriptor() const { return *descriptor_; }
 
  private:
-  void load(const std::filesystem::path& file);
+  /// Whether nothing else in this process has loaded it before.
+  bool load(const std::filesystem::path& file);
   void find_descriptor(const std::filesystem::path& file);
   void keep_pages(const std::filesystem::path& file) const;
   void check_descriptor(const std::filesystem::path& file) const;

@@ -71,7 +71,7 @@ TEST_F(DamagedFile, IsRefusedForAnotherDigest) {
   EXPECT_EQ(refusal(bytes), kDamaged);
 }
 
-// Of these mutations 19 of 100 ended the program with a signal, and 4 with an exit by the loader.
+// Without a digest one of four such files ended the program.
 TEST_F(DamagedFile, NeverReachesTheLoaderWhateverIsWrongWithIt) {
   const std::string whole = read_bytes(kMoody);
   std::mt19937 random(7);

@@ -1,5 +1,6 @@
 #include "row_reader.hpp"
 
+#include "viwo/api/stamp_order.hpp"
 #include "viwo/log/text.hpp"
 
 namespace viwo::kaist {
@@ -25,9 +26,8 @@ void RowReader::require_size(std::size_t n) const {
 }
 
 std::int64_t RowReader::stamp_ns(std::size_t field) const {
-  constexpr std::int64_t kMaxStamp = 4'000'000'000'000'000'000;
   const std::int64_t stamp = integer(field);
-  if (stamp < -kMaxStamp || stamp > kMaxStamp) {
+  if (stamp < -kMaxStampNs || stamp > kMaxStampNs) {
     fail(field, log::quoted(fields_[field]) + " is no stamp in nanoseconds");
   }
   return stamp;

@@ -3,13 +3,14 @@
 
 #include <cstdint>
 
+#include "viwo/api/stamp_order.hpp"
+
 namespace viwo {
 
-/// Within +-4e18 ns, which is 127 years: then differences of two do not overflow, also with a clock
-/// that is some years off. What is beyond is no time of any clock.
+/// Within +-kMaxStampNs, as the readers of recordings have it: differences of two do not overflow,
+/// also with a clock that is some years off. What is beyond is no time of any clock.
 inline constexpr bool is_stamp(std::int64_t t_ns) {
-  constexpr std::int64_t kMostNs = 4'000'000'000'000'000'000;
-  return t_ns >= -kMostNs && t_ns <= kMostNs;
+  return t_ns >= -kMaxStampNs && t_ns <= kMaxStampNs;
 }
 
 }  // namespace viwo
