@@ -5,9 +5,8 @@
 #include <charconv>
 #include <cmath>
 
-#include "viwo/math/utf8.hpp"
-
 #include "viwo/math/text_stream.hpp"
+#include "viwo/math/utf8.hpp"
 
 namespace viwo::report {
 namespace {
