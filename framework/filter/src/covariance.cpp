@@ -6,7 +6,6 @@
 #include <Eigen/Cholesky>
 
 #include "viwo/math/chi2.hpp"
-#include "viwo/math/cholesky.hpp"
 
 namespace viwo {
 namespace {
@@ -16,6 +15,7 @@ using Eigen::Index;
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor,
                                   kMaxFactorRows, kMaxFactorRows>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxFactorRows, 1>;
+using InPlaceCholesky = Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>;
 
 /// A residual, and the noise that it is weighed with.
 class Innovation {
@@ -232,73 +232,61 @@ FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd&
   const auto at = [](const std::vector<int>& list, Index i) {
     return list[static_cast<std::size_t>(i)];
   };
-  const Index k = n - m;  // others
+  auto C = C_.topLeftCorner(m, m);
   auto Lambda = W_.topLeftCorner(m, m);
   for (Index j = 0; j < m; ++j) {
     for (Index i = j; i < m; ++i) {
-      Lambda(i, j) = factor.Lambda(at(factor_index_, i), at(factor_index_, j));
+      const int row = at(factor_index_, i), col = at(factor_index_, j);
+      Lambda(i, j) = row >= col ? factor.Lambda(row, col) : factor.Lambda(col, row);
       Lambda(j, i) = Lambda(i, j);
+      C(i, j) = P_(at(order_, i), at(order_, j));
     }
   }
-  for (Index i = 0; i < m; ++i) y_[i] = factor.eta[at(factor_index_, i)];
-  if (!Lambda.allFinite() || !y_.head(m).allFinite()) return FactorResult::kRejected;
+  auto y = y_.head(m);
+  for (Index i = 0; i < m; ++i) y[i] = factor.eta[at(factor_index_, i)];
+  if (!Lambda.allFinite() || !y.allFinite()) return FactorResult::kRejected;
 
-  // P_cc = C C^T with C upper triangular, and Y^T = P_oc C^-T: Cholesky backwards (F-8).
-  auto C = C_.topLeftCorner(m, m);
-  auto Y = Y_.topLeftCorner(k, m);  // transposed
-  for (const Run& cols : runs_) {
-    for (const Run& rows : runs_) {
-      if (cols.start >= m) continue;
-      const auto P_block = P_.block(rows.column, cols.column, rows.count, cols.count);
-      auto& gathered = rows.start < m ? C_ : Y_;
-      const Index row = rows.start < m ? rows.start : rows.start - m;
-      gathered.block(row, cols.start, rows.count, cols.count) = P_block;
-    }
-  }
-  auto T = T_.topLeftCorner(m, m);
-  auto Z = Z_.topLeftCorner(k, m);  // transposed
-  T = C.reverse();
-  Z = Y.rowwise().reverse();
-  const auto none = C_.topLeftCorner(0, m);
-  if (!cholesky(T, none, Z)) return FactorResult::kFailed;
-  T.triangularView<Eigen::StrictlyUpper>().setZero();
-  C = T.reverse();
-  Y = Z.rowwise().reverse();
-
-  // T = I + C^T Lambda C = L L^T. Below it: C L^-T, Y^T L^-T and eta^T C L^-T.
+  // P_cc = C C^T; T = I + C^T Lambda C = L L^T; Z = L^-1 C^-1 P_c: (F-8).
+  Eigen::Ref<Eigen::MatrixXd> C_ref(C);
+  if (InPlaceCholesky(C_ref).info() != Eigen::Success) return FactorResult::kFailed;
+  C.triangularView<Eigen::StrictlyUpper>().setZero();
   auto LambdaC = G_.topLeftCorner(m, m);
-  for_panels(m, [&](Index first, Index count) {  // its upper triangle
-    const Index end = first + count;
-    LambdaC.block(0, first, end, count).noalias() =
-        Lambda.topLeftCorner(end, end) * C.block(0, first, end, count);
-    return true;
-  });
-  for_panels(m, [&](Index first, Index count) {
-    const Index end = first + count;
-    T.block(first, first, m - first, count).noalias() =
-        LambdaC.block(0, first, end, m - first).transpose() * C.block(0, first, end, count);
-    return true;
-  });
+  LambdaC.noalias() = Lambda * C.triangularView<Eigen::Lower>();
+  auto T = T_.topLeftCorner(m, m);
+  T.noalias() = C.transpose().triangularView<Eigen::Upper>() * LambdaC;
   T.diagonal().array() += 1.;
-  auto below = Z_.topLeftCorner(k + 1, m);
-  auto y = below.row(k);
-  Z = Y;
-  y.noalias() = y_.head(m).transpose() * C;
-  if (!cholesky(T, C, below)) return FactorResult::kRejected;
+  Eigen::Ref<Eigen::MatrixXd> T_ref(T);
+  if (InPlaceCholesky(T_ref).info() != Eigen::Success) return FactorResult::kRejected;
 
+  auto Y = Y_.topLeftCorner(m, n);
+  Y.leftCols(m) = C.transpose();
+  for (const Run& rows : runs_) {
+    for (const Run& cols : runs_) {
+      if (rows.start >= m || cols.start < m) continue;
+      Y.block(rows.start, cols.start, rows.count, cols.count) =
+          P_.block(rows.column, cols.column, rows.count, cols.count);
+    }
+  }
+  auto Y_others = Y.rightCols(n - m);
+  C.triangularView<Eigen::Lower>().solveInPlace(Y_others);
+  auto Z = Z_.topLeftCorner(m, n);
+  Z = Y;
+  T.triangularView<Eigen::Lower>().solveInPlace(Z);
+
+  // dx = P_:c (I + Lambda P_cc)^-1 eta = Z^T L^-1 C^T eta.
+  auto product = G_.col(0).head(m);  // y cannot be both sides, and a temporary would be allocated
+  product.noalias() = C.transpose().triangularView<Eigen::Upper>() * y;
+  y = product;
+  T.triangularView<Eigen::Lower>().solveInPlace(y);
   auto G = G_.topLeftCorner(n, n);
-  square_of_upper(C, G.topLeftCorner(m, m));
-  G.bottomLeftCorner(k, m).noalias() = Z * C.transpose();
+  G.triangularView<Eigen::Lower>().setZero();
+  G.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose());
   // What the factor does not see directly: P_oo - Y_o^T Y_o + Z_o^T Z_o.
-  auto G_others = G.bottomRightCorner(k, k);
-  G_others.triangularView<Eigen::Lower>().setZero();
-  G_others.selfadjointView<Eigen::Lower>().rankUpdate(Z);
-  G_others.selfadjointView<Eigen::Lower>().rankUpdate(Y, -1.);
-  G.triangularView<Eigen::StrictlyUpper>() = G.transpose();
-  // dx = P_:c (I + Lambda P_cc)^-1 eta
+  auto G_others = G.bottomRightCorner(n - m, n - m);
+  G_others.selfadjointView<Eigen::Lower>().rankUpdate(Y_others.transpose(), -1.);
   auto correction = W_.col(0).head(n);
-  correction.head(m).noalias() = C * y.transpose();
-  correction.tail(k).noalias() = Z * y.transpose();
+  correction.noalias() = Z.transpose() * y;
+  G.triangularView<Eigen::StrictlyUpper>() = G.transpose();
   // Back into the order of the state, run by run.
   for (const Run& cols : runs_) {
     dx.segment(cols.column, cols.count) = correction.segment(cols.start, cols.count);

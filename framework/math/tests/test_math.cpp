@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "viwo/math/chi2.hpp"
-#include "viwo/math/cholesky.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/math/trajectory.hpp"
@@ -164,51 +163,6 @@ TEST(Utf8, KeepsCharactersAndReplacesEachOtherByte) {
   expect("\xed\xa0\x80", no + no + no);           // half of a pair
   expect("\xf4\x90\x80\x80", no + no + no + no);  // beyond the last
   expect("\xf5\xff\xfe", no + no + no);           // in no text at all
-}
-
-/// As many rows as columns, of a normal distribution.
-Eigen::MatrixXd random_matrix(Eigen::Index rows, Eigen::Index columns) {
-  std::mt19937_64 random(11);
-  std::normal_distribution<double> gaussian;
-  return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return gaussian(random); });
-}
-
-TEST(Cholesky, TakesAlongWhatStandsBelowTheMatrix) {
-  for (const Eigen::Index n : {1, 5, 23, 24, 25, 48, 70, 131}) {  // around whole panels
-    for (const bool with_upper : {true, false}) {
-      for (const Eigen::Index k : {0, 1, 7}) {
-        const Eigen::MatrixXd B = random_matrix(n, n);
-        const Eigen::MatrixXd A = B * B.transpose() + Eigen::MatrixXd::Identity(n, n);
-        const Eigen::MatrixXd U = random_matrix(n, n).triangularView<Eigen::Upper>();
-        const Eigen::MatrixXd R = random_matrix(k, n);
-        const Eigen::MatrixXd L = A.llt().matrixL();
-        Eigen::MatrixXd in_place = A, upper = U.topRows(with_upper ? n : 0), rows = R;
-        in_place.triangularView<Eigen::StrictlyUpper>().setConstant(1e9);  // not to be read
-        ASSERT_TRUE(cholesky(in_place, upper, rows));
-        const Eigen::MatrixXd lower = in_place.triangularView<Eigen::Lower>();
-        EXPECT_LT((lower - L).norm(), 1e-11 * L.norm()) << n;
-        EXPECT_LE((rows * L.transpose() - R).norm(), 1e-9 * R.norm()) << n;
-        if (!with_upper) continue;
-        EXPECT_LT((upper * L.transpose() - U).norm(), 1e-9 * U.norm()) << n;
-        EXPECT_TRUE(upper.isUpperTriangular(0.));
-        Eigen::MatrixXd square = Eigen::MatrixXd::Zero(n, n);
-        square_of_upper(upper, square);
-        const Eigen::MatrixXd difference = square - upper * upper.transpose();
-        EXPECT_LT(Eigen::MatrixXd(difference.triangularView<Eigen::Lower>()).norm(),
-                  1e-12 * square.norm());
-      }
-    }
-  }
-}
-
-TEST(Cholesky, RefusesWhatIsNotPositiveDefinite) {
-  for (const Eigen::Index at : {0, 30, 69}) {  // in each panel
-    Eigen::MatrixXd A = Eigen::MatrixXd::Identity(70, 70), none(0, 70);
-    Eigen::MatrixXd definite = A;
-    EXPECT_TRUE(cholesky(definite, none, none));
-    A(at, at) = -1e-3;
-    EXPECT_FALSE(cholesky(A, none, none));
-  }
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "viwo/math/cholesky.hpp"
+#include <Eigen/Cholesky>
 
 namespace viwo::visual {
 
@@ -19,14 +19,14 @@ void Chi2Gate::start(int max_clones, int n_cameras) {
   for (auto& P : P_xk_) P.setZero(kPoseSize * max_clones, kCalibrationRows);
   S_.setZero(2 * max_sights, 2 * max_sights);
   T_.setZero(2 * max_clones, kCalibrationRows);
-  M_.setZero(2 * max_sights, 2 * max_sights);
-  rows_.setZero(7, 2 * max_sights);
-  U_.setZero(2 * max_sights, 2 * max_sights);
-  S_inverse_rows_.setZero(2 * max_sights, 7);
+  M_.setZero(2 * max_clones, 2 * max_clones);
+  rhs_.setZero(2 * max_sights, 7);
+  L_inverse_.setZero(2 * max_sights, 2 * max_sights);
+  S_inverse_.setZero(2 * max_sights, 2 * max_sights);
   PHt_.setZero(kPoseSize * max_clones, 2);
 }
 
-double Chi2Gate::chi2(const Feature& feature, Window& window, bool tells_noise) {
+double Chi2Gate::chi2(const Feature& feature, Window& window) {
   const auto& sights = feature.linear();
   const int n = static_cast<int>(sights.size());
   add_poses(feature, window);
@@ -36,44 +36,43 @@ double Chi2Gate::chi2(const Feature& feature, Window& window, bool tells_noise) 
   }
   for (int i = 0; i < n; ++i) {
     const LinearSight& sight = sights[static_cast<std::size_t>(i)];
-    rows_.block<3, 2>(0, 2 * i) = sight.H_f.transpose();
-    rows_.block<3, 2>(3, 2 * i) = sight.t_s * sight.H_f.transpose();
-    rows_.block<1, 2>(6, 2 * i) = sight.residual.transpose();
+    rhs_.block<2, 3>(2 * i, 0) = sight.H_f;
+    rhs_.block<2, 3>(2 * i, 3) = sight.t_s * sight.H_f;
+    rhs_.block<2, 1>(2 * i, 6) = sight.residual;
   }
-  n_rows_ = 2 * n;
-  auto rows = rows_.leftCols(n_rows_);
-  auto U = U_.topLeftCorner(tells_noise ? n_rows_ : 0, n_rows_);
-  U.setIdentity();
-  if (!cholesky(S_.topLeftCorner(n_rows_, n_rows_), U, rows)) {
-    return std::numeric_limits<double>::infinity();
-  }
+  auto S = S_.topLeftCorner(2 * n, 2 * n);
+  Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);
+  if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+  auto rhs = rhs_.topRows(2 * n);
+  llt.matrixL().solveInPlace(rhs);
   // (VF-9), minimised as (VF-10)
-  const TrackSums sums = rows.lazyProduct(rows.transpose());
+  const TrackSums sums = rhs.transpose().lazyProduct(rhs);
+  n_rows_ = 2 * n;
   return fit_.solve(sums) ? fit_.chi2 : std::numeric_limits<double>::infinity();
 }
 
 void Chi2Gate::tell(NoiseScale& noise) {
   constexpr int kExplained = 6;  // by the point and its velocity
-  const auto U = U_.topLeftCorner(n_rows_, n_rows_);
-  auto S_inverse_rows = S_inverse_rows_.topRows(n_rows_);
-  S_inverse_rows.noalias() = U * rows_.leftCols(n_rows_).transpose();
+  const auto L = S_.topLeftCorner(n_rows_, n_rows_).triangularView<Eigen::Lower>();
+  auto rhs = rhs_.topRows(n_rows_);
   // M = S^-1 - Q Q^T, what is outside of that: M r, tr M and tr M^2. Columns of Q one after the
   // other, each taken off the residual.
-  auto Q = S_inverse_rows.leftCols<kExplained>();
-  auto r = S_inverse_rows.col(kExplained);
+  L.transpose().solveInPlace(rhs);
+  auto Q = rhs.leftCols<kExplained>();
   for (int k = 0; k < kExplained; ++k) {
     for (int i = 0; i < k; ++i) Q.col(k) -= fit_.L(k, i) * Q.col(i);
     Q.col(k) /= fit_.L(k, k);
-    r -= fit_.L(kExplained, k) * Q.col(k);
+    rhs.col(kExplained) -= fit_.L(kExplained, k) * Q.col(k);
   }
-  auto M = M_.topLeftCorner(n_rows_, n_rows_);  // its lower triangle
-  square_of_upper(U, M);
-  M.noalias() -= Q * Q.transpose();
-  double information = M.diagonal().squaredNorm();
-  for (int j = 0; j < n_rows_; ++j)
-    information += 2. * M.col(j).tail(n_rows_ - 1 - j).squaredNorm();
+  auto L_inverse = L_inverse_.topLeftCorner(n_rows_, n_rows_);
+  L_inverse.setIdentity();
+  L.solveInPlace(L_inverse);
+  auto M = S_inverse_.topLeftCorner(n_rows_, n_rows_);
+  M.noalias() = L_inverse.transpose().lazyProduct(L_inverse);
+  M.noalias() -= Q.lazyProduct(Q.transpose());
+  const double information = M.squaredNorm();
   const double variance = noise.variance();
-  noise.add(variance * (1. + (r.squaredNorm() - M.trace()) / information),
+  noise.add(variance * (1. + (rhs.col(kExplained).squaredNorm() - M.trace()) / information),
             information / static_cast<double>(n_rows_ - kExplained));
 }
 

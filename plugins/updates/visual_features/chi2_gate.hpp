@@ -21,8 +21,8 @@ class Chi2Gate {
   void begin() { has_covariance_ = false; }
 
   /// Of the residual of a linearised feature outside of what its point explains. Infinity when the
-  /// covariance is not positive definite. `tells_noise`: tell() may be asked for it.
-  double chi2(const Feature& feature, Window& window, bool tells_noise);
+  /// covariance is not positive definite.
+  double chi2(const Feature& feature, Window& window);
   /// The part of it that a velocity of the point explains. After chi2(), when that was finite.
   double chi2_of_motion() const { return fit_.chi2_of_motion; }
   /// Tells what the residual of a feature, that chi2() was asked for last and was finite, says of
@@ -51,11 +51,10 @@ class Chi2Gate {
   bool has_covariance_ = false;
   Eigen::Matrix<double, Eigen::Dynamic, kCalibrationRows> T_;
   Eigen::MatrixXd S_, M_;
-  Eigen::Matrix<double, 7, Eigen::Dynamic> rows_;  ///< [H_f, t H_f, residual]^T L^-T, S = L L^T
-  int n_rows_ = 0;                                 ///< of the feature asked for last
-  PointFit fit_;                                   ///< of the same
-  Eigen::MatrixXd U_;                              ///< L^-T
-  Eigen::Matrix<double, Eigen::Dynamic, 7> S_inverse_rows_;
+  Eigen::Matrix<double, Eigen::Dynamic, 7> rhs_;  ///< H_f, t H_f, residual, whitened
+  int n_rows_ = 0;                                ///< of the feature asked for last
+  PointFit fit_;                                  ///< of the same
+  Eigen::MatrixXd L_inverse_, S_inverse_;
   Eigen::Matrix<double, Eigen::Dynamic, 2> PHt_;
 };
 

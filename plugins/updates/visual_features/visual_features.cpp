@@ -241,7 +241,7 @@ bool VisualFeatures::passes_gate() {
   const bool tells_noise = noise_.enabled() && weighed_ < kTracksThatTellNoise && dof_of_noise > 0;
   const bool may_move = equations_.motion_bound() > threshold(kMotionDof);
   if (!tells_noise && !may_move && equations_.chi2_bound() <= threshold(dof)) return true;
-  const double chi2 = gate_.chi2(feature_, window_, tells_noise);
+  const double chi2 = gate_.chi2(feature_, window_);
   if (!std::isfinite(chi2)) return false;
   moves_ = may_move && gate_.chi2_of_motion() > threshold(kMotionDof);
   if (tells_noise) {
