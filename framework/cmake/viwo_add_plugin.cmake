@@ -30,10 +30,9 @@ function(viwo_add_plugin kind name)
     set_target_properties(${target} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${ARG_OUTPUT_DIR})
     return()
   endif()
-  # The library is in lib, three folders up, wherever the prefix is moved. In the build folder, too:
-  # CMake fills up what is shorter there with empty entries, which are the current folder.
+  # The library is in lib, three folders up, wherever the prefix is moved; in the build folder, too.
   set_target_properties(${target} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${VIWO_PLUGIN_OUTPUT_DIR}
-    BUILD_RPATH "$ORIGIN/../../.." INSTALL_RPATH "$ORIGIN/../../..")
+    INSTALL_RPATH "$ORIGIN/../../.." BUILD_WITH_INSTALL_RPATH ON)
   install(TARGETS ${target} LIBRARY DESTINATION ${VIWO_PLUGIN_DIR})
   if(NOT TARGET viwo_plugins)
     add_custom_target(viwo_plugins)

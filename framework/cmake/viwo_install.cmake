@@ -3,6 +3,8 @@
 # Everything below the prefix finds everything else by relative paths, so that an installation can
 # be moved: programs their library by $ORIGIN, the program viwo its plugins and templates from the
 # folder it is in. That fixes the folder lib, also where CMAKE_INSTALL_LIBDIR would be another.
+# The build folder is laid out alike, so they have these paths from the beginning: where CMake has to
+# replace them it leaves room by empty entries, which are the current folder.
 include(CMakePackageConfigHelpers)
 
 set(viwo_cmake_dir lib/cmake/viwo)
@@ -11,7 +13,7 @@ set(viwo_framework ${PROJECT_SOURCE_DIR}/framework)
 
 # The library and what a plugin compiles and links with.
 set_target_properties(viwo_api PROPERTIES EXPORT_NAME api INSTALL_RPATH "$ORIGIN"
-  SOVERSION ${VIWO_API_VERSION} VERSION ${VIWO_API_VERSION}.${PROJECT_VERSION})
+  BUILD_WITH_INSTALL_RPATH ON SOVERSION ${VIWO_API_VERSION} VERSION ${VIWO_API_VERSION}.${PROJECT_VERSION})
 target_compile_features(viwo_api PUBLIC cxx_std_20)
 if(VIWO_SANITIZE)
   target_link_options(viwo_api INTERFACE $<INSTALL_INTERFACE:-fsanitize=${VIWO_SANITIZE}>)
@@ -36,13 +38,15 @@ install(FILES ${PROJECT_BINARY_DIR}/cmake/viwoConfig.cmake
   DESTINATION ${viwo_cmake_dir})
 
 # What viwo_add_plugin() runs after each link.
-set_target_properties(viwo_seal PROPERTIES EXPORT_NAME seal INSTALL_RPATH "$ORIGIN/../lib")
+set_target_properties(viwo_seal PROPERTIES EXPORT_NAME seal INSTALL_RPATH "$ORIGIN/../lib"
+  BUILD_WITH_INSTALL_RPATH ON)
 install(TARGETS viwo_seal EXPORT viwoTargets RUNTIME DESTINATION bin)
 
 # Programs
 foreach(program viwo viwo_conformance_program)
   if(TARGET ${program})
-    set_target_properties(${program} PROPERTIES INSTALL_RPATH "$ORIGIN/../lib")
+    set_target_properties(${program} PROPERTIES INSTALL_RPATH "$ORIGIN/../lib"
+      BUILD_WITH_INSTALL_RPATH ON)
     install(TARGETS ${program} RUNTIME DESTINATION bin)
   endif()
 endforeach()

@@ -23,12 +23,12 @@ bag::TopicOptions topics() {
 }
 constexpr std::size_t kImu = 0, kPose = 1, kCam0 = 2, kCam1 = 3;
 
-ImuSample imu(std::int64_t t_ns) {
+ImuSample imu_at(std::int64_t t_ns) {
   ImuSample sample;
   sample.t_ns = t_ns;
   return sample;
 }
-PoseSample pose(std::int64_t t_ns) {
+PoseSample pose_at(std::int64_t t_ns) {
   PoseSample sample;
   sample.t_ns = t_ns;
   return sample;
@@ -59,13 +59,13 @@ std::string taken(StepQueue& queue) {
 TEST(StepQueue, GivesTheOrderOfABagWhateverCameFirst) {
   StepQueue queue(wanted_topics(topics()), 4);
   queue.push(ImageSample{5, 1, nullptr}, kCam1);
-  queue.push(imu(4), kImu);
-  queue.push(imu(5), kImu);
+  queue.push(imu_at(4), kImu);
+  queue.push(imu_at(5), kImu);
   EXPECT_EQ(taken(queue), "waits");
-  queue.push(pose(5), kPose);
+  queue.push(pose_at(5), kPose);
   queue.push(ImageSample{5, 0, nullptr}, kCam0);
   EXPECT_EQ(taken(queue), "i4 p5 waits") << "a pose may come that is of 5, too";
-  queue.push(pose(9), kPose);
+  queue.push(pose_at(9), kPose);
   EXPECT_EQ(taken(queue), "i5 waits");
   queue.finish(kImu);
   EXPECT_EQ(taken(queue), "c0@5 waits");
@@ -79,9 +79,9 @@ TEST(StepQueue, GivesTheOrderOfABagWhateverCameFirst) {
 
 TEST(StepQueue, GivesWhatIsThereWhenItIsEnded) {
   StepQueue queue(wanted_topics(topics()), 4);
-  queue.push(imu(4), kImu);
+  queue.push(imu_at(4), kImu);
   queue.end();
-  queue.push(imu(5), kImu);
+  queue.push(imu_at(5), kImu);
   EXPECT_EQ(taken(queue), "i4 ended");
 }
 
@@ -93,7 +93,7 @@ TEST(StepQueue, HasRoomAsFarAsNothingWaits) {
   queue.push(ImageSample{40, 0, nullptr}, kCam0);
   EXPECT_FALSE(queue.has_room(kCam0));
   EXPECT_EQ(queue.deadlock(), "topic '/cam0' waits for '/imu'");
-  queue.push(imu(1), kImu);
+  queue.push(imu_at(1), kImu);
   queue.finish(kPose);
   queue.finish(kCam1);
   EXPECT_EQ(queue.deadlock(), "");
