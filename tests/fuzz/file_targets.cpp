@@ -7,6 +7,8 @@
 
 #include <zlib.h>
 
+#include "plugin_digest.hpp"
+#include "plugin_file.hpp"
 #include "run_journal.hpp"
 #include "target.hpp"
 #include "viwo/config/yaml.hpp"
@@ -115,9 +117,12 @@ void journal(Bytes bytes) {
 
 /// Nothing of it is loaded: what is wrong with it must be seen before.
 void plugin(Bytes bytes) {
-  const std::string record = read_build_record(write("libviwo_sensor_fuzz.so", bytes));
+  const auto file = write("libviwo_sensor_fuzz.so", bytes);
+  const std::string library = read_library_bytes(file);
+  const std::string record = build_record_in(library, file);
   const auto differences = compare_build_records(api_build_record(), record);
   if (!differences.empty()) require(!explain(differences).empty(), "a refusal without a reason");
+  require(plugin_digest(library).size() == digest_in(api_build_record()).size(), "no digest");
 }
 
 #if defined(VIWO_FUZZ_ROS1) || defined(VIWO_FUZZ_ROS2)
@@ -172,7 +177,7 @@ std::vector<Target> file_targets() {
        "framework/experiment/src/run_journal.cpp framework/results/src/run_record.cpp"},
       {"plugin", plugin,
        "framework/plugin_host/src/build_record_check.cpp "
-       "framework/plugin_host/src/plugin_file.cpp"},
+       "framework/plugin_host/src/plugin_digest.cpp framework/plugin_host/src/plugin_file.cpp"},
 #ifdef VIWO_FUZZ_ROS1
       {"ros1_message", message<bag::Ros1Fields>,
        "plugins/shared/bags/messages.cpp "
