@@ -57,7 +57,12 @@ TEST_F(HostileTest, BytesThatAreNoTextLoseNoResults) {
   write("c.yaml", "calibration: \"" + kLatin + "\"\nbase: run.yaml\nsegment_s: 0.5\n");
   expect_done({"calibrate", "c.yaml", "--out", "calibrated"});
   expect_readable("calibrated");
-  write("p.yaml", "plan: " + kLatin + "\nbase: run.yaml\ngoals: {r_1: 0.1}\n");
+  write("p.yaml",
+        "plan: " + kLatin +
+            "\nkinematics: {type: four_wis_wid, x_m: [0.1, -0.1, -0.1, 0.1],"
+            " y_m: [0.1, 0.1, -0.1, -0.1], radius_m: 0.03}\nbase_radius_m: 0.2\nfloor_x_m: 3\n"
+            "floor_y_m: 3\nmax_speed_m_per_s: 0.5\nmax_yaw_rate_rad_per_s: 1.5\n"
+            "max_acceleration_m_per_s2: 0.5\ngoals: {delta_o: 0.005}\n");
   const Outcome plan = viwo({"plan", "p.yaml", "--out", "planned"});
   EXPECT_LE(plan.code, 1) << plan.err;
   expect_readable("planned");
@@ -142,7 +147,8 @@ TEST_F(HostileTest, WhatAConfigurationNamesIsAFile) {
        {"kinematics.calibration=PIPE", "calibration=PIPE", "cameras.kalibr=PIPE",
         "imu={kalibr: PIPE}", "sensors.simulator0.cameras=PIPE",
         "sensors={imu0: {type: asl_imu, path: PIPE}}",
-        "sensors={wheels0: {type: csv_table, path: PIPE, encoders: {drive: [a]}}}"}) {
+        "sensors={wheels0: {type: csv_table, path: PIPE, time_column: t, time_unit: s,"
+        " drive_columns: [a], drive_unit: rad}}"}) {
     SCOPED_TRACE(set);
     const Outcome outcome =
         viwo({"run", swerve, "--out", "out", "--set", replaced(set, "PIPE", at("pipe").string())});

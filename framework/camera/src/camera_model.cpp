@@ -98,7 +98,7 @@ bool distort(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& ou
 }
 
 /// A step of Newton's method this small leaves an error of about its square: rounding.
-constexpr double kStepTolerance = 1e-8;
+constexpr double kStepTolerance = 1e-9;
 
 Eigen::Vector3d direction_of(const Eigen::Vector2d& point) {
   return Eigen::Vector3d(point.x(), point.y(), 1.).normalized();

@@ -16,7 +16,9 @@ constexpr int kDenseSize = 40;
 
 MatrixXd random_covariance(Random& random) {
   const MatrixXd A = random.matrix(kDenseSize, kDenseSize);
-  return A * A.transpose() + 0.1 * MatrixXd::Identity(kDenseSize, kDenseSize);
+  MatrixXd P = 0.1 * MatrixXd::Identity(kDenseSize, kDenseSize);
+  P.selfadjointView<Eigen::Lower>().rankUpdate(A);
+  return P.selfadjointView<Eigen::Lower>();  // symmetric to the bit, which a product need not be
 }
 
 /// K = P H^T (H P H^T + R)^-1 with dense matrices.

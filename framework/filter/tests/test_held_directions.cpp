@@ -25,7 +25,9 @@ constexpr int kGauge = 30;  // held altogether, without variance
 
 MatrixXd covariance_with_gauge(Random& random) {
   const MatrixXd A = random.matrix(kHeldStateSize, kHeldStateSize);
-  MatrixXd P = A * A.transpose() + 0.1 * MatrixXd::Identity(kHeldStateSize, kHeldStateSize);
+  MatrixXd P = 0.1 * MatrixXd::Identity(kHeldStateSize, kHeldStateSize);
+  P.selfadjointView<Eigen::Lower>().rankUpdate(A);
+  P = P.selfadjointView<Eigen::Lower>();  // symmetric to the bit, which a product need not be
   P.row(kGauge).setZero();
   P.col(kGauge).setZero();
   return P;

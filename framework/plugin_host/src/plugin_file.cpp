@@ -94,17 +94,18 @@ std::string read_library_bytes(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(status)) {
     throw PluginRefused(file, "is not a regular file");
   }
+  const auto unreadable = [&file](const char* remedy) {
+    return PluginRefused(file, std::string("cannot be read: ") + std::strerror(errno) + remedy);
+  };
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) {
-    throw PluginRefused(
-        file, std::string("cannot be read: ") + std::strerror(errno) + " - check its permissions");
-  }
+  if (!stream) throw unreadable(" - check its permissions");
   const auto size = std::filesystem::file_size(file, error);
   if (error || size > kLargest) {
     throw PluginRefused(file, "is larger than 1 GiB, as no plugin is");
   }
   std::string bytes(size, '\0');
   stream.read(bytes.data(), static_cast<std::streamsize>(size));
+  if (stream.bad()) throw unreadable("");
   bytes.resize(static_cast<std::size_t>(stream.gcount()));
   check_elf(file, bytes);
   return bytes;

@@ -216,10 +216,9 @@ Normal sum(std::vector<Recording>& recordings, const Shared& shared) {
   return sum;
 }
 
-/// Moves the estimate of a recording by a part of the step.
-void move(Recording& recording, const VectorXd& step, double part) {
-  const VectorXd dx_shared = part * step;
-  const VectorXd own = part * recording.factors->system().own(step);
+/// Moves the estimate of a recording.
+void move(Recording& recording, const VectorXd& dx_shared) {
+  const VectorXd own = recording.factors->system().own(dx_shared);
   retract(own.head<kImuSize>(), recording.start);
   auto path = std::make_shared<GivenPath>(recording.factors->path());
   for (std::size_t k = 0; k < path->epochs.size(); ++k) {
@@ -296,7 +295,6 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
   for (Recording& recording : recordings) recording.blocks = recordings.front().blocks;
   Smoothed out;
   MatrixXd covariance;
-  double part = 1.;
   while (!out.converged && out.iterations < kMostPasses) {
     for_each([&](Recording& recording) { collect_factors(recording, shared.size(), plugins); });
     const Normal normal = sum(recordings, shared);
@@ -304,11 +302,8 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
     if (llt.info() != Eigen::Success) fail(recordings.front(), "the calibration is not determined");
     covariance = llt.solve(MatrixXd::Identity(shared.size(), shared.size()));
     const VectorXd dx = llt.solve(normal.eta);
-    const double before = std::exchange(out.left, normal.eta.dot(dx));
-    // Steps that do not become shorter go to and fro.
-    constexpr double kShorter = 0.5, kLeastPart = 0.125;
-    if (out.iterations > 1 && out.left > kShorter * before) part = std::max(kLeastPart, part / 2.);
-    for (Recording& recording : recordings) move(recording, dx, part);
+    out.left = normal.eta.dot(dx);
+    for (Recording& recording : recordings) move(recording, dx);
     ++out.iterations;
     out.converged = out.left < kConverged;
     progress.note("smoother, pass " + std::to_string(out.iterations) +

@@ -116,9 +116,9 @@ TEST(LogCells, AreThoseOfALogOfTheSameReadingsToTheBit) {
     std::int64_t t_ms = 100;
     for (int k = 0; k < 50; ++k) {
       t_ms += 9 + k % 3;  // the usual spacing, 10 ms, is also that before the gap
-      if (k == 25) t_ms += 400;
+      if (k == 26) t_ms += 400;
       readings.push_back(reading(t_ms, 1. / (3. + k)));
-      readings.back().is_start = k == 25;
+      readings.back().is_start = k == 26;
     }
     const auto expected = log::samples_from(readings, is_angle, 0.2, 1);
     LogCells cells(is_angle, 0.2);
