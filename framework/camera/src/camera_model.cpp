@@ -97,8 +97,8 @@ bool distort(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& ou
              : distort_equidistant(camera, p_C, out, J_coefficients);
 }
 
-/// A step of Newton's method this small leaves an error of about its square: rounding.
-constexpr double kStepTolerance = 1e-9;
+/// A step of Newton's method this small leaves an error of about its square.
+constexpr double kStepTolerance = 1e-13;
 
 Eigen::Vector3d direction_of(const Eigen::Vector2d& point) {
   return Eigen::Vector3d(point.x(), point.y(), 1.).normalized();
@@ -152,8 +152,8 @@ std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::
       if (!(slope > 0.) || !(theta >= 0.) || theta > 3.14) return std::nullopt;
       const double step = (value - d) / slope;
       theta -= step;
-      if (std::abs(step) < kStepTolerance) break;
-      if (i == 19) return std::nullopt;
+      if (std::abs(step) < 1e-14) break;
+      if (i == 19 && std::abs(step) > 1e-9) return std::nullopt;
     }
     const double s = std::sin(theta) / d;
     return Eigen::Vector3d(s * target.x(), s * target.y(), std::cos(theta));

@@ -178,11 +178,11 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   return covered && reached_ns >= end_ns;
 }
 
-/// (W-16): what motion the mean of the samples before end_ns shows.
+/// (W-16): whether the mean of the samples before end_ns shows a motion.
 void Preintegrator::find_motion(std::span<const EncoderSample> samples, std::int64_t end_ns) {
   const double sigmas = options_.twist.motion_sigmas;
   if (sigmas <= 0.) return;
-  Twist common = Twist::Zero();
+  bool moves = false;
   const auto end = std::find_if(samples.begin(), samples.end(),
                                 [end_ns](const EncoderSample& y) { return y.begin_ns >= end_ns; });
   if (end != samples.begin()) {
@@ -192,11 +192,11 @@ void Preintegrator::find_motion(std::span<const EncoderSample> samples, std::int
     TwistSolution& solution = solutions_[1 - believed_];
     if (solver_.solve(mean, solution) == Status::kOk) {
       for (int i = 0; i < 3; ++i) {
-        if (!is_noise(solution.xi[i], solution.P_xi(i, i) / n, sigmas)) common[i] = solution.xi[i];
+        moves |= !is_noise(solution.xi[i], solution.P_xi(i, i) / n, sigmas);
       }
     }
   }
-  solver_.set_common_motion(common);
+  solver_.set_moving(moves);
 }
 
 void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise noise,

@@ -27,7 +27,7 @@ TwistSolver::Parity TwistSolver::parity() {
 
 void TwistSolver::add_parity(const Parity& parity, double weight, ParityInformation& out) {
   const Fit& fit = parity.fit_;
-  differentiate_fitted(moving_part(fit.xi, fit.M_inv.topRows<3>()), fit.e);
+  differentiate_fitted(fit.xi, fit.M_inv.topRows<3>(), fit.e);
   with_block_size(model_->description().noise_block, [&](auto size) {
     constexpr int kSize = decltype(size)::value;
     weigh_jacobian<kSize>();

@@ -149,8 +149,7 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   }
   // With weights, W e takes the place of e in (W-4).
   if (options_.fitted_jacobian) {
-    const bool moves = !moving_part(fit.xi, out.P_xi).isZero(0.);
-    differentiate_fitted(moves ? fit.xi : Twist::Zero(), no_residual_);
+    differentiate_fitted(fit.xi, out.P_xi, no_residual_);
   } else {
     model.intrinsic_derivatives(y, x_WI_, rows_, rows_.b, fit.xi,
                                 options_.noise_weighted ? We_ : fit.e, by_x_);
@@ -165,18 +164,13 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   return Status::kOk;
 }
 
-/// Of a fitted twist what is not noise: component by component its own value, or where its noise P
-/// alone explains that, what the samples around it have in common (W-16).
-Twist TwistSolver::moving_part(const Twist& xi, const Eigen::Matrix3d& P) const {
-  Twist moving = common_motion_;
-  for (int i = 0; i < 3; ++i) {
-    if (!is_noise(xi[i], P(i, i), options_.motion_sigmas)) moving[i] = xi[i];
-  }
-  return moving;
-}
-
-/// Derivatives by the intrinsics at what the rows would read at a twist.
-void TwistSolver::differentiate_fitted(const Twist& moving, const RowVector& e) {
+/// Derivatives by the intrinsics at what the rows would read at a twist, or at rest if its noise P
+/// alone explains it (W-16).
+void TwistSolver::differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P,
+                                       const RowVector& e) {
+  bool moves = moves_;
+  for (int i = 0; i < 3; ++i) moves |= !is_noise(xi[i], P(i, i), options_.motion_sigmas);
+  const Twist moving = moves ? xi : Twist::Zero();
   const RowVector b = rows_.A * moving;
   model_->model().intrinsic_derivatives(*y_, x_WI_, rows_, b, moving, e, by_x_);
   clear_left_out(by_x_.J);

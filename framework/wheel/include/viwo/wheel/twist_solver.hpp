@@ -26,8 +26,7 @@ struct TwistOptions {
   /// cannot show.
   bool fitted_jacobian = false;
   /// A twist whose components are all within so many of their own sigmas counts as rest in the
-  /// sensitivities at the fitted signal; in those of the parity residual each component by itself
-  /// (W-16). 0: all that is measured is motion.
+  /// sensitivities at the fitted signal (W-16). 0: all that is measured is motion.
   double motion_sigmas = 0.;
   /// Smallest ratio of the singular values of A (yaw rate scaled to the size of the velocities)
   /// that counts as full rank. For rolling rows it is about the spread of the wheel directions in
@@ -81,9 +80,9 @@ class TwistSolver {
   /// weights is not what the rows say.
   void set_weights_at(const Intrinsics& x_WI);
 
-  /// What motion the samples that follow have in common, as far as it is beyond noise (W-16): a
-  /// sample alone may not show it. Components that are noise are zero.
-  void set_common_motion(const Twist& xi) { common_motion_ = xi; }
+  /// Whether the base moves for sure in the samples that follow (W-16), although a sample alone may
+  /// not show it.
+  void set_moving(bool moves) { moves_ = moves; }
 
   /// Twist, residual, sensitivity and covariance. kRejected: the model refuses the sample or the
   /// result is not finite. Channels that `y` calls bad are left out, with all rows of their noise
@@ -115,8 +114,7 @@ class TwistSolver {
     void resize(int n_rows);
   };
 
-  Twist moving_part(const Twist& xi, const Eigen::Matrix3d& P) const;
-  void differentiate_fitted(const Twist& moving, const RowVector& e);
+  void differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P, const RowVector& e);
   void find_left_out(const EncoderSample& y);
   template <class Rows>
   void clear_left_out(Rows& rows) const;
@@ -168,7 +166,7 @@ class TwistSolver {
   Intrinsics weights_at_;
   bool weight_A_is_current_ = false;  // A in weight_rows_ is that of weights_at_
 
-  Twist common_motion_ = Twist::Zero();
+  bool moves_ = false;
   std::array<bool, kMaxRows> left_out_{};  // rows of the sample at hand
   int n_left_out_ = 0;
 
