@@ -87,7 +87,8 @@ TEST(Simulator, FeatureDirectionsAndTrueStatesAgreeOnStaticLandmarks) {
   const auto all = play(*make_sensor(
       section_of("duration_s: 5, noise: false, n_cameras: 2, features: 40, ground: uneven, "
                  "camera_phase_s: 0.0137, rpy_ItoO_rad: [0.02, 0.05, -0.1]")));
-  EXPECT_LT(largest_miss(all, file_cameras()), 1e-11);  // rounding, which is another on each machine
+  EXPECT_LT(largest_miss(all, file_cameras()),
+            1e-11);  // rounding, which is another on each machine
 }
 
 TEST(Simulator, TracksAndStampsAreThoseOfTheTrueCameras) {
