@@ -37,7 +37,7 @@ class DdsSystem {
            "<CycloneDDS><Domain Id='any'><General><Interfaces>"
            "<NetworkInterface address='127.0.0.1' multicast='false'/></Interfaces>"
            "<AllowMulticast>false</AllowMulticast></General>"
-           "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+           "<Discovery><LeaseDuration>2s</LeaseDuration><ParticipantIndex>auto</ParticipantIndex>"
            "<MaxAutoParticipantIndex>20</MaxAutoParticipantIndex>"
            "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>",
            1);

@@ -40,9 +40,9 @@ class Ros2Run : public testing::DdsTest {
   }
 
   /// What a robot would give, in a bag of ROS 2.
-  static void make_bag() {
-    run({VIWO_TEST_PROGRAM, "simulate", VIWO_TEST_SOURCE_DIR "/tests/live/simulate.yaml", "--out",
-         dds_->file("log")},
+  static void make_bag(const std::string& duration_s) {
+    run({VIWO_TEST_PROGRAM, "simulate", VIWO_TEST_SOURCE_DIR "/tests/live/simulate.yaml", "--set",
+         "sensors.simulator0.duration_s=" + duration_s, "--out", dds_->file("log")},
         "simulate.log");
     if (HasFatalFailure()) return;
     run({VIWO_TEST_BAG_PROGRAM, dds_->file("log"), dds_->file("robot")}, "bag.log");
@@ -95,7 +95,7 @@ class Ros2Run : public testing::DdsTest {
 };
 
 TEST_F(Ros2Run, InStepGivesTheBitsOfTheBagAndInItsOwnTimeNearlySo) {
-  make_bag();
+  make_bag("10");
   if (HasFatalFailure()) return;
   run_on_bag();
   if (HasFatalFailure()) return;
@@ -139,11 +139,9 @@ TEST_F(Ros2Run, InStepGivesTheBitsOfTheBagAndInItsOwnTimeNearlySo) {
 }
 
 TEST_F(Ros2Run, InStepIsAnErrorWhereMessagesAreLost) {
-  make_bag();
+  make_bag("3");
   if (HasFatalFailure()) return;
-  Child viwo(
-      run_words("lossy", dds_words({"--lockstep", "--set", "sensors.ros0.max_waiting_images=2"})),
-      dds_->file("lossy.log"));
+  Child viwo(run_words("lossy", dds_words({"--lockstep"})), dds_->file("lossy.log"));
   Child play(dds_->node("lossy", dds_->file("robot")), dds_->file("play.log"));
   play.wait(100s);
   EXPECT_NE(viwo.wait(100s), 0);
