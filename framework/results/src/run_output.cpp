@@ -30,7 +30,8 @@ double peak_rss_mb() {
 }
 
 nlohmann::json stage_json(const StageTime& stage) {
-  return {{"mean", stage.mean_ms}, {"p95", stage.p95_ms}, {"max", stage.max_ms}};
+  return {
+      {"mean", stage.mean_ms}, {"p95", stage.p95_ms}, {"p99", stage.p99_ms}, {"max", stage.max_ms}};
 }
 
 void write_calibration(const std::filesystem::path& file, const RunResult& result) {

@@ -337,6 +337,7 @@ TEST(TimeStatistics, KnowsMeanAndLargestOfAllAndThePercentileOfMany) {
   EXPECT_NEAR(stage.mean_ms, (49.5e5 + 1000.) / 100'001., 1e-9);
   EXPECT_EQ(stage.max_ms, 1000.);
   EXPECT_NEAR(stage.p95_ms, 94., 2.);
+  EXPECT_NEAR(stage.p99_ms, 98., 1.5);
 }
 
 TEST(RunRecord, CanTakeOutTheNewestPointOfARunWithoutLosingCounts) {

@@ -20,6 +20,7 @@ namespace viwo {
 struct StageTime {
   double mean_ms = 0.;
   double p95_ms = 0.;
+  double p99_ms = 0.;
   double max_ms = 0.;
 };
 
