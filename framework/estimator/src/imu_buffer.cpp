@@ -25,18 +25,9 @@ double ImuBuffer::gap_s(const ImuSample& before, const ImuSample& after) const {
 }
 
 bool ImuBuffer::is_after_the_last(std::int64_t t_ns) {
-  constexpr double kLongS = 1.;
   const std::int64_t last_ns = in_doubt_ ? in_doubt_->t_ns : empty() ? t_ns - 1 : newest_ns();
-  if (t_ns > last_ns) {
-    n_behind_ = 0;
-    return true;
-  }
-  const double behind_s = seconds_between(t_ns, last_ns);
-  const bool follows = n_behind_ == 0 || t_ns > last_behind_ns_;
-  n_behind_ = behind_s <= kLongS ? 0 : follows ? n_behind_ + 1 : 1;
-  last_behind_ns_ = t_ns;
-  if (n_behind_ == 1) behind_s_ = behind_s;
-  return false;
+  clock_.see(t_ns, last_ns);
+  return t_ns > last_ns;
 }
 
 void ImuBuffer::add(const ImuSample& sample, Rejections& rejections) {

@@ -24,6 +24,14 @@ void ImageGroups::note_distance(const ImageSample& image) {
   }
 }
 
+/// Forgets which images there were.
+void ImageGroups::begin_again() {
+  last_ns_.fill(kNever);
+  clocks_.fill(SetBackClock(kMostBehind));
+  newest_ns_.reset();
+  group_ns_.reset();
+}
+
 std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& rejections) {
   Measurement measurement;
   while (!ended_) {
@@ -44,7 +52,12 @@ std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& re
       continue;
     }
     note_distance(*image);
-    std::int64_t& last_ns = last_ns_[static_cast<std::size_t>(image->camera)];
+    const auto camera = static_cast<std::size_t>(image->camera);
+    if (last_ns_[camera] != kNever && clocks_[camera].see(image->t_ns, last_ns_[camera])) {
+      rejections.add("clock of the images set back: they are taken from here on", where);
+      begin_again();
+    }
+    std::int64_t& last_ns = last_ns_[camera];
     if (image->t_ns <= last_ns || (group_ns_ && image->t_ns <= *group_ns_) ||
         (newest_ns_ && image->t_ns < *newest_ns_ - tolerance_ns_)) {
       rejections.add("image whose stamp is not after the previous one", where);

@@ -11,6 +11,7 @@
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/rejections.hpp"
 #include "viwo/api/sensor.hpp"
+#include "viwo/math/set_back_clock.hpp"
 
 namespace viwo::klt {
 
@@ -33,7 +34,7 @@ class ImageGroups {
  public:
   ImageGroups(int n_cameras, std::int64_t tolerance_ns)
       : n_cameras_(n_cameras), tolerance_ns_(tolerance_ns) {
-    last_ns_.fill(kNever);
+    begin_again();
   }
 
   /// False at the end.
@@ -45,6 +46,10 @@ class ImageGroups {
 
  private:
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+  /// Images of a camera that say that its clock was set back.
+  static constexpr int kMostBehind = 3;
+
+  void begin_again();
 
   /// The next image of one of the cameras whose stamp can be.
   std::optional<ImageSample> next_image(Sensor& input, Rejections& rejections);
@@ -54,6 +59,9 @@ class ImageGroups {
   std::int64_t tolerance_ns_;
   std::optional<ImageSample> ahead_;  ///< the first image of the next group
   std::array<std::int64_t, kMaxCameras> last_ns_{};
+  std::array<SetBackClock, kMaxCameras> clocks_{
+      SetBackClock(kMostBehind), SetBackClock(kMostBehind), SetBackClock(kMostBehind),
+      SetBackClock(kMostBehind)};
   std::optional<std::int64_t> newest_ns_;
   std::optional<std::int64_t> group_ns_;  ///< newest of the last group
   std::optional<std::int64_t> nearest_ns_;

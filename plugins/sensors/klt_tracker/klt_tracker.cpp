@@ -172,7 +172,7 @@ void KltTracker::advance(std::size_t camera, std::int64_t t_ns) {
   CameraTracker& tracker = *eye.tracker;
   if (!eye.is_read) return;
   const double dt_s = eye.before_ns ? seconds_between(*eye.before_ns, t_ns) : 0.;
-  if (eye.now.blank || !eye.before_ns || dt_s > max_gap_s_) {
+  if (eye.now.blank || !eye.before_ns || dt_s > max_gap_s_ || dt_s <= 0.) {
     tracker.drop_all();
   } else {
     tracker.follow(eye.before, eye.now, dt_s);

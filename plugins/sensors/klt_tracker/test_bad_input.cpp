@@ -87,6 +87,28 @@ TEST(KltTracker, CountsImagesWhoseStampsGoBack) {
   EXPECT_EQ(count.first, "camera 0 at 5.000000000 s");
 }
 
+TEST(KltTracker, GoesOnWithAClockThatIsSetBack) {
+  // GIVEN four pairs of images, and six more of a clock that was set back by two seconds
+  std::vector<Measurement> input = drive(10, 2);
+  for (int i = 4; i < 10; ++i) {
+    for (const int camera : {0, 1}) {
+      input[static_cast<std::size_t>(2 * i + camera)] =
+          sample_of(rig().render(i, camera), camera, stamp_of(i) - 2'000'000'000);
+    }
+  }
+  const Played played = track(input, section({}, 2), /*is_set_back=*/true);
+  // THEN the third of them says so, and points are followed from there on
+  EXPECT_EQ(played.rejections.at("image whose stamp is not after the previous one").count, 4);
+  EXPECT_EQ(played.rejections.at("clock of the images set back: they are taken from here on").count,
+            1);
+  const auto left = played.of(0), right = played.of(1);
+  ASSERT_EQ(left.size(), 8U);
+  ASSERT_EQ(right.size(), 8U);
+  EXPECT_EQ(common(left[3], left[4]), 0U);
+  EXPECT_GT(common(left[4], left[5]), 180U);
+  EXPECT_EQ(left[7].t_ns, stamp_of(9) - 2'000'000'000);
+}
+
 /// `n` images of camera 0, those of [from, to) of another size.
 std::vector<Measurement> drive_with_small_images(int n, int from, int to) {
   std::vector<Measurement> input = drive(n, 1);

@@ -143,13 +143,14 @@ struct Played {
   }
 };
 
-inline Played track(std::vector<Measurement> measurements, const std::string& yaml) {
+inline Played track(std::vector<Measurement> measurements, const std::string& yaml,
+                    bool is_set_back = false) {
   FakeInput input(std::move(measurements));
   const auto sensor = make_sensor(yaml);
   EXPECT_TRUE(sensor->takes_input());
   sensor->connect(input);
   Played played;
-  played.samples = only<FeatureSample>(play(*sensor));
+  played.samples = only<FeatureSample>(play(*sensor, is_set_back));
   std::vector<RejectionCount> rejections;
   sensor->rejections(rejections);
   for (const RejectionCount& rejection : rejections) {

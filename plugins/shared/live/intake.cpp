@@ -222,22 +222,11 @@ StampJump Intake::jump_of(const Topic& topic) const {
   }
 }
 
-/// Whether a stamp that is not after the last is one of many: their clock was set back, or the one
-/// that they are compared with was broken.
-bool Intake::is_clock_set_back(State& state, std::int64_t t_ns) const {
-  constexpr int kMany = 10;
-  constexpr double kLongS = 1.;
-  const bool is_long = seconds_between(t_ns, *state.last_ns) > kLongS;
-  const bool follows = state.n_behind == 0 || t_ns > state.behind_ns;
-  state.n_behind = !is_long ? 0 : follows ? state.n_behind + 1 : 1;
-  state.behind_ns = t_ns;
-  return state.n_behind >= kMany;
-}
-
 /// Forgets what came on a topic before.
 void Intake::begin_again(std::size_t topic) {
   State& state = states_[topic];
   state.last_ns.reset();
+  state.clock = State().clock;
   state.jump = jump_of(topics_[topic]);
   const Kind kind = topics_[topic].kinds.front();
   if (kind == Kind::kJoints) {
@@ -253,15 +242,16 @@ bool Intake::accept(std::size_t topic, std::int64_t t_ns) {
     drop(topic, "message without a stamp", t_ns);
     return false;
   }
+  // It was set back, or the stamp that the others are compared with was broken.
+  const bool is_set_back = state.last_ns && state.clock.see(t_ns, *state.last_ns);
   if (state.last_ns && t_ns <= *state.last_ns) {
-    if (pace_ == Pace::kInStep || !is_clock_set_back(state, t_ns)) {
+    if (pace_ == Pace::kInStep || !is_set_back) {
       drop(topic, kStampNotAfter, t_ns);
       return false;
     }
     count(topic, "clock set back", t_ns, "its messages are taken from here on");
     begin_again(topic);
   }
-  state.n_behind = 0;
   if (!state.jump.is_believed(t_ns)) {
     drop(topic, kStampFarAhead, t_ns);
     return false;

@@ -20,6 +20,7 @@
 #include "viwo/api/host_services.hpp"
 #include "viwo/api/rejections.hpp"
 #include "viwo/api/stamp_order.hpp"
+#include "viwo/math/set_back_clock.hpp"
 
 namespace viwo::live {
 
@@ -68,8 +69,7 @@ class Intake {
   struct State {
     std::optional<std::int64_t> last_ns;
     StampJump jump;
-    std::int64_t behind_ns = 0;
-    int n_behind = 0;  ///< messages without a break, in their order, that are long before last_ns
+    SetBackClock clock{10};
     Clock::time_point last_use = Clock::now();
   };
 
@@ -83,7 +83,6 @@ class Intake {
   void take_image(std::size_t topic, const ImageSample& image);
   bool is_slow(std::size_t topic) const;
   StampJump jump_of(const Topic& topic) const;
-  bool is_clock_set_back(State& state, std::int64_t t_ns) const;
   void begin_again(std::size_t topic);
   bool accept(std::size_t topic, std::int64_t t_ns);
   void drop(std::size_t topic, const std::string& reason, std::int64_t t_ns, std::int64_t n = 1);

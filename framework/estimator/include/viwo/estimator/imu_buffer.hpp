@@ -10,6 +10,7 @@
 #include "viwo/api/rejections.hpp"
 #include "viwo/api/stamp_order.hpp"
 #include "viwo/estimator/imu_watch.hpp"
+#include "viwo/math/set_back_clock.hpp"
 
 namespace viwo {
 
@@ -31,9 +32,8 @@ class ImuBuffer {
   void add(const ImuSample& sample, Rejections& rejections);
   /// Nothing more is to come: what is held back has not been confirmed.
   void finish(Rejections& rejections);
-  /// By how much the clock of the IMU was set back, s: its readings follow each other, all of them
-  /// long before one that came earlier. 0: it was not.
-  double set_back_s() const { return n_behind_ < kMostBehind ? 0. : behind_s_; }
+  /// By how much the clock of the IMU was set back, s; 0: it was not.
+  double set_back_s() const { return clock_.set_back_s(); }
   /// How long after `t_ns` the next reading is, s; 0 where there is none.
   double silent_s(std::int64_t t_ns) const;
   bool empty() const { return buffer_.empty(); }
@@ -51,8 +51,6 @@ class ImuBuffer {
   void forget_before_start();
 
  private:
-  static constexpr int kMostBehind = 20;
-
   double gap_s(const ImuSample& before, const ImuSample& after) const;
   bool is_after_the_last(std::int64_t t_ns);
   void push(const ImuSample& sample, Rejections& rejections);
@@ -60,9 +58,7 @@ class ImuBuffer {
   ImuLimits limits_;
   // An IMU has no pauses of a second; that one is in doubt costs one reading more.
   StampJump jump_{1., 0};
-  std::int64_t last_behind_ns_ = 0;
-  int n_behind_ = 0;  ///< readings without a break that are long before the newest
-  double behind_s_ = 0.;
+  SetBackClock clock_{20};
   ImuWatch watch_;
   std::optional<ImuSample> in_doubt_;
   TypedBuffer<ImuSample> buffer_;
