@@ -18,7 +18,8 @@ namespace {
 
 /// FAST looks at a circle of this radius.
 constexpr int kFastRadius = 3;
-/// Corners of a cell that are looked at more closely, per point that may be taken.
+/// Corners of a cell that are looked at more closely, per point that it may have: weaker ones are
+/// soon lost.
 constexpr int kCandidatesPerPoint = 8;
 /// Half of the side of the window that a corner is scored in, px.
 constexpr int kScoreRadius = 3;
@@ -131,7 +132,7 @@ int Detector::cell_of(const cv::Point2f& uv) const {
          part(uv.x, size_.width, options_.grid_x);
 }
 
-void Detector::look_in(const Frame& frame, const Spacing& spacing, Lacking& lacking) const {
+void Detector::look_in(const Frame& frame, Lacking& lacking) const {
   const int border = std::max(border_px(options_), std::max(kFastRadius, kScoreRadius));
   const cv::Rect inner(border, border, size_.width - 2 * border, size_.height - 2 * border);
   const cv::Rect wanted = cell(lacking.cell) & inner;
@@ -150,9 +151,9 @@ void Detector::look_in(const Frame& frame, const Spacing& spacing, Lacking& lack
   };
   std::erase_if(corners, [&](const cv::KeyPoint& corner) {
     const cv::Point at = place(corner);
-    return !wanted.contains(at) || masked(at) || !spacing.is_free(cv::Point2f(at));
+    return !wanted.contains(at) || masked(at);
   });
-  const auto keep = static_cast<std::size_t>(kCandidatesPerPoint * lacking.points);
+  const auto keep = static_cast<std::size_t>(kCandidatesPerPoint * per_cell_);
   if (corners.size() > keep) {
     std::nth_element(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(keep),
                      corners.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
@@ -237,7 +238,7 @@ void Detector::detect(const Frame& frame, std::vector<cv::Point2f>& points) cons
     rest = rest.subspan(n);
     cv::parallel_for_(cv::Range(0, static_cast<int>(n)), [&](const cv::Range& range) {
       for (int i = range.start; i < range.end; ++i) {
-        look_in(frame, spacing, cells[static_cast<std::size_t>(i)]);
+        look_in(frame, cells[static_cast<std::size_t>(i)]);
       }
     });
     const std::vector<cv::Point2f> chosen = choose(cells, missing, spacing);

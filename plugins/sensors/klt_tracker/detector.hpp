@@ -73,8 +73,8 @@ class Detector {
   int cell_of(const cv::Point2f& uv) const;
   /// Cells that lack points, those that lack the most first.
   std::vector<Lacking> lacking_cells(const std::vector<cv::Point2f>& points) const;
-  /// Corners of a cell that are away from other points.
-  void look_in(const Frame& frame, const Spacing& spacing, Lacking& cell) const;
+  /// The best corners of a cell.
+  void look_in(const Frame& frame, Lacking& lacking) const;
   /// Up to `wanted` of the corners that were found in some cells.
   static std::vector<cv::Point2f> choose(std::span<Lacking> cells, int wanted, Spacing& spacing);
   void refine(const Frame& frame, std::vector<cv::Point2f>& points) const;

@@ -12,7 +12,7 @@ namespace viwo::klt {
 namespace {
 
 constexpr int kMaxSteps = 12;
-constexpr float kStepPx = 0.02F;
+constexpr float kStepPx = 0.005F;
 /// Holds the deformation where it is in directions that the patch does not tell it, as a part of
 /// the mean diagonal of the normal equations.
 constexpr double kDamping = 1e-3;
