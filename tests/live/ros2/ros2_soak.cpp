@@ -5,7 +5,7 @@
 //   ros2_soak DOMAIN BAG SECONDS SPEED SEED
 //
 // BAG is of a motion that ends as it begins. SECONDS are of the wall, SPEED is how much faster than
-// that the robot drives.
+// that the robot drives. Faults go to stderr, with the stamps of the messages.
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -113,7 +113,10 @@ class Soak {
   std::size_t one_of(std::size_t n) {
     return std::uniform_int_distribution<std::size_t>(0, n - 1)(random_);
   }
-  void count(const char* fault) { ++faults_[fault]; }
+  void count(const char* fault, const std::string& of = "robot") {
+    ++faults_[fault];
+    std::cerr << 1e-9 * static_cast<double>(newest_ns_) << " s: " << of << ": " << fault << "\n";
+  }
 
   /// What happens to the robot by now.
   void happen() {
@@ -130,11 +133,11 @@ class Soak {
     Outlet& outlet = outlets_[one_of(outlets_.size())];
     switch (one_of(4)) {
       case 0:
-        count("topic silent");
+        count("topic silent", outlet.topic.name);
         outlet.silent_until_ns = now_ns_ + between(0.1, 20.);
         break;
       case 1:
-        count("publisher gone");
+        count("publisher gone", outlet.topic.name);
         outlet.writer.reset();
         outlet.gone_until_ns = now_ns_ + between(0.5, 10.);
         break;
@@ -170,30 +173,30 @@ class Soak {
   bool break_it(Outlet& outlet, Message& message) {
     switch (one_of(7)) {
       case 0:
-        count("message lost");
+        count("message lost", outlet.topic.name);
         return true;
       case 1:
-        count("message late");
+        count("message late", outlet.topic.name);
         outlet.held = std::make_unique<Message>(message);
         return true;
       case 2:
-        count("message twice");
+        count("message twice", outlet.topic.name);
         write(*outlet.writer, message);
         break;
       case 3:
-        count("stamp in the future");
+        count("stamp in the future", outlet.topic.name);
         stamp_ns(message) += 3600 * kSecond;
         break;
       case 4:
-        count("no stamp");
+        count("no stamp", outlet.topic.name);
         stamp_ns(message) = 0;
         break;
       case 5:
-        count("not a number");
+        count("not a number", outlet.topic.name);
         spoil(message, std::numeric_limits<double>::quiet_NaN());
         break;
       default:
-        count("absurd value");
+        count("absurd value", outlet.topic.name);
         spoil(message, 1e6);
     }
     return false;

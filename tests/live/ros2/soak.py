@@ -29,7 +29,7 @@ CYCLONE = """<CycloneDDS><Domain Id='any'><General><Interfaces>
 MOST_MB_PER_HOUR = 1.0
 LEAST_HOURS_TO_FIT = 4.0  # of data: before, what a run gets once is most of what grows
 MOST_MB_ONCE = 40.0
-WARM_UP_S = 60.0
+WARM_UP = 0.3  # part of the run: buffers, pieces and thinned series grow until they are full
 
 
 def free_domain():
@@ -88,23 +88,28 @@ def live_run(args, out, domain):
         watcher = threading.Thread(target=watch, args=(viwo, samples, end))
         watcher.start()
         try:
-            robot = subprocess.run(
-                [args.ros2_soak, str(domain), str(out / "lap"), str(60 * args.minutes),
-                 str(args.speed), str(args.seed)], env={**os.environ, "CYCLONEDDS_URI": CYCLONE},
-                capture_output=True, text=True, timeout=60 * args.minutes + 120)
+            with open(out / "faults.log", "w") as faults:
+                robot = subprocess.run(
+                    [args.ros2_soak, str(domain), str(out / "lap"), str(60 * args.minutes),
+                     str(args.speed), str(args.seed)],
+                    env={**os.environ, "CYCLONEDDS_URI": CYCLONE}, stdout=subprocess.PIPE,
+                    stderr=faults, text=True, timeout=60 * args.minutes + 120)
         finally:
             end.set()
             watcher.join()
             viwo.send_signal(signal.SIGINT)
             code = viwo.wait(60)
     if robot.returncode != 0:
-        raise SystemExit(f"{robot.stderr}\n{(out / 'live.log').read_text()[-4000:]}")
+        raise SystemExit("\n".join((out / name).read_text()[-4000:]
+                                   for name in ("faults.log", "live.log")))
+    (out / "memory.csv").write_text("wall_s,mb\n" + "".join(f"{x:.1f},{y:.2f}\n"
+                                                           for x, y in samples))
     return json.loads(robot.stdout), code, samples
 
 
 def problems(heard, summary, samples, speed):
     """What is not as it must be."""
-    warm = [(x, y) for x, y in samples if x > WARM_UP_S] or samples[len(samples) // 2:]
+    warm = samples[int(WARM_UP * len(samples)):]
     hours = speed * (warm[-1][0] - warm[0][0]) / 3600
     mb_per_hour = slope(warm) * 3600 / speed
     print(f"memory: {samples[-1][1]:.1f} MB at the end, {mb_per_hour:+.2f} MB per hour of data "
