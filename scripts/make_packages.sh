@@ -4,7 +4,7 @@
 # for any machine of the architecture, packs. docs/packages.md says what they are.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-scripts/install_dependencies.sh
+scripts/install_dependencies.sh --packages
 cmake --preset package
 cmake --build --preset package
 cd build-package

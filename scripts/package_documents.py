@@ -25,9 +25,13 @@ http://www.apache.org/licenses/LICENSE-2.0, or, on a Debian system, read it in
 /usr/share/common-licenses/Apache-2.0. The software is distributed on an "AS IS" basis,
 WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 '''
-OVERRIDES = '''# An installation can be moved: each file finds the library relative to where it is itself.
+OVERRIDES = {'': '''# An installation can be moved: each file finds the library relative to where it is itself.
 {package}: custom-library-search-path RUNPATH $ORIGIN*
-'''
+''', 'viwo': '''# The name of the package is that of the program; only its own programs and plugins link the library.
+{package}: package-name-doesnt-match-sonames
+# A script beside the configuration whose log it writes: an example.
+{package}: python3-script-but-no-python3-dep
+'''}
 
 
 def time_of_source(source):
@@ -73,7 +77,8 @@ def main(package, version, root, build, maintainer):
     if any(sbom.is_elf(file) for file in sbom.regular_files(root)):
         overrides = root / 'usr/share/lintian/overrides' / package
         overrides.parent.mkdir(parents=True, exist_ok=True)
-        overrides.write_text(OVERRIDES.format(package=package), encoding='utf-8')
+        text = OVERRIDES[''] + OVERRIDES.get(package, '')
+        overrides.write_text(text.format(package=package), encoding='utf-8')
     described = sbom.document(package, version, root, build, when)
     (root / sbom.document_file(package)).write_text(json.dumps(described, indent=1) + '\n',
                                                    encoding='utf-8')

@@ -2,7 +2,7 @@
 """fresh_machine.py SOURCE BUILD WORK CMAKE: makes the packages of BUILD, compares each with its SBOM, and
 installs them on a minimal Debian of this machine's release, by ../shared/tools/fresh_machine.sh.
 
-The steps are those of the Containerfile (scripts/install_packages.sh), without a container."""
+They are installed as the Containerfile does it (scripts/install_packages.sh), without a container."""
 
 import json
 import os

@@ -21,8 +21,10 @@ cd "$work"
 say "viwo alone"
 "$here/install_packages.sh" "$1" viwo > install.log 2>&1 || { cat install.log; exit 1; }
 echo "$(dpkg-query -W | wc -l) packages on the system"
-if dpkg-query -W -f '${Package}\n' | grep -E '^(lib|ros-)?(ros|fastrtps|fastdds|fastcdr|dds)'; then
-  fail "the package viwo brings ROS or DDS"
+needs=(apt-cache depends --recurse --installed --no-recommends --no-suggests --no-conflicts
+  --no-breaks --no-replaces --no-enhances)
+if "${needs[@]}" viwo | grep -E '^(lib)?(ros|fastrtps|fastdds|fastcdr|dds|opencv-(imgcodecs|highgui))'; then
+  fail "the package viwo brings ROS, DDS, image files or a toolkit"
 fi
 says "viwo " 0 viwo --version
 viwo plugins list > plugins.txt
