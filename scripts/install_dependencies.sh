@@ -1,8 +1,9 @@
 #!/bin/bash
-# install_dependencies.sh [--tests | --engines | --fuzz]
+# install_dependencies.sh [--tests | --engines | --fuzz | --packages]
 # Installs with apt what building viwo needs and this machine lacks; nothing when all is there.
 # --tests adds what only the tests use, --engines also Slurm and Open MPI for the nightly tests of
-# campaigns, --fuzz clang and its tools for scripts/fuzz.sh. Never asks a question.
+# campaigns, --fuzz clang and its tools for scripts/fuzz.sh, --packages what cpack needs. Never asks a
+# question.
 set -euo pipefail
 
 missing=()
@@ -34,6 +35,10 @@ need_command cmake cmake
 need_command git git
 if [ "${1:-}" = --fuzz ]; then
   for package in clang llvm libclang-rt-dev; do need_package "$package"; done
+fi
+if [ "${1:-}" = --packages ]; then
+  need_command dpkg-dev dpkg-shlibdeps
+  need_command file file
 fi
 need_command ninja-build ninja
 need_command ccache ccache

@@ -74,7 +74,7 @@ fs::path template_folder() {
   const fs::path folder = program.parent_path().parent_path() / "share/viwo/templates";
   if (!fs::is_directory(folder, error)) {
     throw InputError("viwo plugins new: no templates in " + folder.string() +
-                     " - this viwo is not completely installed");
+                     " - they come with the Debian package viwo-dev");
   }
   return folder;
 }

@@ -38,6 +38,19 @@ fs::path canonical_or_same(const fs::path& file) {
   return error ? file : canonical;
 }
 
+/// The Debian package of a plugin of viwo that the package viwo leaves to others, for what it links;
+/// empty for any other (framework/cmake/viwo_packages.cmake; packages.check compares).
+std::string_view package_of(std::string_view kind, std::string_view name) {
+  if (kind != "sensor") return {};
+  for (const char* const own : {"ros1_bag", "ros1_topics", "ros2_bag", "ros2_topics"}) {
+    if (name == own) return "viwo-ros";
+  }
+  for (const char* const own : {"asl_images", "kaist_urban", "klt_tracker"}) {
+    if (name == own) return "viwo-images";
+  }
+  return {};
+}
+
 }  // namespace
 
 PluginRegistry::PluginRegistry(std::vector<fs::path> folders, PluginLog log)
@@ -121,6 +134,11 @@ std::shared_ptr<const Library> PluginRegistry::load(std::string_view kind, std::
     }
   }
   if (found.empty()) {
+    if (const std::string_view package = package_of(kind, name); !package.empty()) {
+      throw InputError("no " + what + " - it comes with the Debian package " +
+                       std::string(package) + "; a build without its libraries leaves it out" +
+                       searched_text());
+    }
     throw InputError("no " + what + config::did_you_mean(name, names(kind)) + searched_text());
   }
   return load_file(found);

@@ -88,6 +88,19 @@ TEST_F(Registry, SuggestsTheNearestName) {
             "no update plugin 'x' (no folder to search)");
 }
 
+TEST_F(Registry, NamesThePackageOfAPluginThatIsElsewhere) {
+  PluginRegistry registry({folder_});
+  write("libviwo_sensor_ros2_topic.so", "");  // near, but not what is meant
+  const auto message = [this](const std::string& name, const std::string& package) {
+    return "no sensor plugin '" + name + "' - it comes with the Debian package " + package +
+           "; a build without its libraries leaves it out (searched " + folder_.string() + ")";
+  };
+  EXPECT_EQ(error_of([&] { registry.find("sensor", "ros2_topics"); }),
+            message("ros2_topics", "viwo-ros"));
+  EXPECT_EQ(error_of([&] { registry.find("sensor", "klt_tracker"); }),
+            message("klt_tracker", "viwo-images"));
+}
+
 TEST_F(Registry, RefusesTwoFilesForOnePlugin) {
   const auto a = write("a/libviwo_kinematics_moody.so", read_bytes(bad("moody")));
   const auto b = write("b/libviwo_kinematics_moody.so", "not even a library");

@@ -26,7 +26,8 @@ const ShowLibrary& library() {
     void* handle = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
     void* entry = handle != nullptr ? dlsym(handle, kShowLibraryEntry) : nullptr;
     if (entry == nullptr) {
-      throw std::runtime_error(std::string("window and video cannot be had: ") + dlerror());
+      throw std::runtime_error(std::string("window and video cannot be had: ") + dlerror() +
+                               " (it comes with the Debian package viwo-show)");
     }
     return reinterpret_cast<const ShowLibrary* (*)()>(entry)();
   }();
