@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "channels.hpp"
-#include "estimate_sample.hpp"
+#include "viwo/run/estimate_sample.hpp"
 #include "feed.hpp"
 #include "in_order.hpp"
 #include "played_sensor.hpp"
