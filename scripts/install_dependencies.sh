@@ -8,6 +8,12 @@ set -euo pipefail
 
 missing=()
 
+# Readers of MCAP by others, for tests/mcap; without network those tests are skipped.
+if [ "${1:-}" = --tests ] && command -v npm > /dev/null; then
+  npm ci --silent --no-audit --no-fund --prefix "$(dirname "$0")/../tests/mcap" < /dev/null ||
+    echo "npm packages of tests/mcap cannot be had: these tests are skipped."
+fi
+
 # need_command PACKAGE COMMAND...: one of the commands must be there, wherever it comes from.
 need_command() {
   local package=$1 command

@@ -77,7 +77,7 @@ TEST_F(CommandLineTest, SuggestsTheNearestOption) {
                  "--help)");
   expect_refused({"run", "run.yaml", "--frobnicate"},
                  "viwo run: unrecognised option '--frobnicate' - known: --out, --seed, --set, "
-                 "--figures, --show, --video, --plan, --lockstep, --plugin-path, "
+                 "--figures, --show, --video, --mcap, --plan, --lockstep, --plugin-path, "
                  "--help (see viwo run --help)");
 }
 

@@ -67,6 +67,10 @@ void add_option(const std::string& name, po::options_description& options) {
   } else if (name == "video") {
     add("video", po::value<std::string>()->value_name("FILE"),
         "the same pictures, one for each epoch, as a video file: .mp4 or .avi");
+  } else if (name == "mcap") {
+    add("mcap", po::value<std::string>()->value_name("FILE"),
+        "while the run goes on: odometry, path, tf, tracks, calibration and diagnostics as ROS 2 "
+        "messages in an MCAP file, for Foxglove, PlotJuggler and RViz");
   } else if (name == "reference") {
     add("reference", po::value<std::string>()->value_name("A.tum")->required(), "true trajectory");
   } else if (name == "estimate") {
@@ -138,6 +142,9 @@ void check_ranges(const Command& command, const po::variables_map& values) {
   if (values.contains("fix") && values["fix"].as<std::string>().empty()) {
     refuse(command, "--fix needs the name of a file");
   }
+  if (values.contains("mcap") && values["mcap"].as<std::string>().empty()) {
+    refuse(command, "--mcap needs the name of a file");
+  }
   if (values.contains("video") && values["video"].as<std::string>().empty()) {
     refuse(command, "--video needs the name of a file");
   }
@@ -184,6 +191,7 @@ Arguments arguments_of(const po::variables_map& values) {
   arguments.lockstep = values.contains("lockstep");
   arguments.show = values.contains("show");
   arguments.video = text("video");
+  arguments.mcap = text("mcap");
   arguments.figures = text("figures");
   arguments.fix = text("fix");
   arguments.plan = text("plan");

@@ -28,6 +28,7 @@ struct Arguments {
   bool lockstep = false;
   bool show = false;
   std::filesystem::path video;  ///< none if empty
+  std::filesystem::path mcap;   ///< none if empty
   std::string figures;          ///< "svg", "pdf" or none
   std::filesystem::path fix;    ///< none if empty
   std::string reference, estimate, align;

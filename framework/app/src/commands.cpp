@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "command_line.hpp"
+#include "estimate_output.hpp"
 #include "forecast_output.hpp"
 #include "interrupt.hpp"
 #include "progress.hpp"
@@ -168,6 +169,8 @@ int run_command(const Arguments& arguments) {
   std::optional<ForecastOutput> forecast;
   if (!arguments.plan.empty()) forecast.emplace(arguments.plan, setup, plugins);
   view::PictureSinks sinks = view::open_sinks(setup, arguments.show, arguments.video);
+  std::optional<EstimateOutput> mcap;
+  if (!arguments.mcap.empty()) mcap.emplace(arguments.mcap, setup);
   const RunData data = collect(setup, LiveSensors::kAllowed);
   view::RunPictures pictures(setup, data, std::move(sinks));
   const auto folder = out_folder(arguments);
@@ -187,16 +190,19 @@ int run_command(const Arguments& arguments) {
     hooks.interrupted = [&] { return interrupt && interrupt->raised(); };
     if (data.is_live()) output.emplace(setup, folder, hooks);
     if (forecast) forecast->watch(hooks, data.is_live());
+    if (mcap) mcap->watch(hooks);
     result = viwo::run(setup, data, hooks);
     if (output) output->finish(result);
   }
   const std::string picture_failure = pictures.finish(result);
+  const std::string mcap_failure = mcap ? mcap->finish(result) : "";
   write_run(folder, setup, result);
   std::cout << describe(result);
   if (forecast) std::cout << "forecast: " << forecast->text() << "\n";
   std::cout << "report: " << (folder / "report.html").string() << std::endl;
   figures.write(report_of(setup, result));
   if (!picture_failure.empty()) throw std::runtime_error(picture_failure);
+  if (!mcap_failure.empty()) throw std::runtime_error(mcap_failure);
   return result.status == RunStatus::kOk ? 0 : 1;
 }
 

@@ -21,7 +21,7 @@ constexpr Command kCommands[] = {
     {"run", "run CONFIG [--out DIR] [--seed N] [--set KEY=VALUE]...",
      "Runs one configuration, the filter or wheel odometry alone; writes trajectory, summary.json "
      "and report.html.",
-     "out seed set figures show video plan lockstep", 1, run_command},
+     "out seed set figures show video mcap plan lockstep", 1, run_command},
     {"inspect", "inspect CONFIG [--out DIR] [--set KEY=VALUE]... [--fix FILE]",
      "Looks at what the sensors of a run configuration gave, before any filter: rates and gaps, "
      "units, signs, axes, noises, order of the joints, clocks. Says what is wrong and what to "

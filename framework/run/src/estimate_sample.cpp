@@ -1,4 +1,4 @@
-#include "estimate_sample.hpp"
+#include "viwo/run/estimate_sample.hpp"
 
 #include <Eigen/Geometry>
 

@@ -25,10 +25,10 @@
 #include "begin_thread.hpp"
 #include "bounded_series.hpp"
 #include "channels.hpp"
-#include "estimate_sample.hpp"
 #include "feed.hpp"
 #include "live_input.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/run/estimate_sample.hpp"
 
 namespace viwo {
 namespace {

@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "channels.hpp"
-#include "estimate_sample.hpp"
 #include "feed.hpp"
 #include "in_order.hpp"
 #include "played_sensor.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/run/estimate_sample.hpp"
 
 namespace viwo {
 namespace {

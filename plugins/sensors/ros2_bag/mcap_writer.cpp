@@ -55,7 +55,7 @@ Writer::Writer(const std::string& file, Compression compression, std::size_t chu
       chunk_bytes_(chunk_bytes) {
   if (fd_ < 0) fail(std::strerror(errno));
   try {
-    put(Buffer().raw(kMagic).record(kHeader, Buffer().text("ros2").text("viwo_bag")));
+    put(Buffer().raw(kMagic).record(kHeader, Buffer().text("ros2").text("viwo")));
   } catch (...) {
     ::close(fd_);
     throw;
@@ -204,6 +204,8 @@ void Writer::close() {
   Buffer crc;
   put(Buffer().record(kDataEnd, crc.number(crc_)));
   write_summary();
+  // What is no file (a pipe, a device) has nothing to bring to the disk.
+  if (::fsync(fd_) != 0 && errno != EINVAL && errno != EROFS) fail(std::strerror(errno));
   if (::close(std::exchange(fd_, -1)) != 0) fail(std::strerror(errno));
 }
 

@@ -54,7 +54,64 @@ const std::vector<Definition>& definitions() {
        "uint8 COVARIANCE_TYPE_UNKNOWN=0\nuint8 COVARIANCE_TYPE_APPROXIMATED=1\n"
        "uint8 COVARIANCE_TYPE_DIAGONAL_KNOWN=2\nuint8 COVARIANCE_TYPE_KNOWN=3\n"
        "uint8 position_covariance_type\n",
-       {"std_msgs/Header", "sensor_msgs/NavSatStatus"}}};
+       {"std_msgs/Header", "sensor_msgs/NavSatStatus"}},
+      {"geometry_msgs/PoseWithCovariance",
+       "geometry_msgs/Pose pose\nfloat64[36] covariance\n",
+       {"geometry_msgs/Pose"}},
+      {"geometry_msgs/Twist",
+       "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
+       {"geometry_msgs/Vector3"}},
+      {"geometry_msgs/TwistWithCovariance",
+       "geometry_msgs/Twist twist\nfloat64[36] covariance\n",
+       {"geometry_msgs/Twist"}},
+      {"nav_msgs/Odometry",
+       "std_msgs/Header header\nstring child_frame_id\n"
+       "geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n",
+       {"std_msgs/Header", "geometry_msgs/PoseWithCovariance",
+        "geometry_msgs/TwistWithCovariance"}},
+      {"nav_msgs/Path",
+       "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n",
+       {"std_msgs/Header", "geometry_msgs/PoseStamped"}},
+      {"geometry_msgs/Transform",
+       "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
+       {"geometry_msgs/Vector3", "geometry_msgs/Quaternion"}},
+      {"geometry_msgs/TransformStamped",
+       "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n",
+       {"std_msgs/Header", "geometry_msgs/Transform"}},
+      {"tf2_msgs/TFMessage",
+       "geometry_msgs/TransformStamped[] transforms\n",
+       {"geometry_msgs/TransformStamped"}},
+      {"diagnostic_msgs/KeyValue", "string key\nstring value\n", {}},
+      {"diagnostic_msgs/DiagnosticStatus",
+       "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\n"
+       "byte level\nstring name\nstring message\nstring hardware_id\n"
+       "diagnostic_msgs/KeyValue[] values\n",
+       {"diagnostic_msgs/KeyValue"}},
+      {"diagnostic_msgs/DiagnosticArray",
+       "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n",
+       {"std_msgs/Header", "diagnostic_msgs/DiagnosticStatus"}},
+      {"foxglove_msgs/Point2", "float64 x\nfloat64 y\n", {}},
+      {"foxglove_msgs/Color", "float64 r\nfloat64 g\nfloat64 b\nfloat64 a\n", {}},
+      {"foxglove_msgs/CircleAnnotation",
+       "builtin_interfaces/Time timestamp\nfoxglove_msgs/Point2 position\nfloat64 diameter\n"
+       "float64 thickness\nfoxglove_msgs/Color fill_color\nfoxglove_msgs/Color outline_color\n",
+       {"builtin_interfaces/Time", "foxglove_msgs/Point2", "foxglove_msgs/Color"}},
+      {"foxglove_msgs/PointsAnnotation",
+       "builtin_interfaces/Time timestamp\nuint8 UNKNOWN=0\nuint8 POINTS=1\nuint8 LINE_LOOP=2\n"
+       "uint8 LINE_STRIP=3\nuint8 LINE_LIST=4\nuint8 type\nfoxglove_msgs/Point2[] points\n"
+       "foxglove_msgs/Color outline_color\nfoxglove_msgs/Color[] outline_colors\n"
+       "foxglove_msgs/Color fill_color\nfloat64 thickness\n",
+       {"builtin_interfaces/Time", "foxglove_msgs/Point2", "foxglove_msgs/Color"}},
+      {"foxglove_msgs/TextAnnotation",
+       "builtin_interfaces/Time timestamp\nfoxglove_msgs/Point2 position\nstring text\n"
+       "float64 font_size\nfoxglove_msgs/Color text_color\n"
+       "foxglove_msgs/Color background_color\n",
+       {"builtin_interfaces/Time", "foxglove_msgs/Point2", "foxglove_msgs/Color"}},
+      {"foxglove_msgs/ImageAnnotations",
+       "foxglove_msgs/CircleAnnotation[] circles\nfoxglove_msgs/PointsAnnotation[] points\n"
+       "foxglove_msgs/TextAnnotation[] texts\n",
+       {"foxglove_msgs/CircleAnnotation", "foxglove_msgs/PointsAnnotation",
+        "foxglove_msgs/TextAnnotation"}}};
   return all;
 }
 

@@ -5,7 +5,7 @@
 
 namespace viwo::bag {
 
-/// Of "sensor_msgs/msg/Imu" and the other types that Ros2Writer writes: its fields, then those of
+/// Of "sensor_msgs/msg/Imu" and the other types that are written: its fields, then those of
 /// all types that are used in it.
 std::string ros2_definition(const std::string& type);
 

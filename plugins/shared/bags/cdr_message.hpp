@@ -24,9 +24,13 @@ class CdrMessage {
   }
   /// std_msgs/Header.
   CdrMessage& header(std::int64_t t_ns, const std::string& frame = "f") {
+    return stamp(t_ns) << frame;
+  }
+  /// builtin_interfaces/Time.
+  CdrMessage& stamp(std::int64_t t_ns) {
     constexpr std::int64_t kSecond = 1'000'000'000;
     return *this << static_cast<std::int32_t>(t_ns / kSecond)
-                 << static_cast<std::uint32_t>(t_ns % kSecond) << frame;
+                 << static_cast<std::uint32_t>(t_ns % kSecond);
   }
   std::span<const std::uint8_t> bytes() {
     return {reinterpret_cast<const std::uint8_t*>(buffer_.getBuffer()), written(out_)};

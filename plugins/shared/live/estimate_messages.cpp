@@ -95,9 +95,9 @@ Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health)
   const auto add = [&message](const std::string& key, double value) {
     message.values.emplace_back(key, log::number_text(value));
   };
-  add("latency_s", estimate.latency_s);
+  if (std::isfinite(estimate.latency_s)) add("latency_s", estimate.latency_s);
   add("started anew", estimate.piece);
-  add("rejections", static_cast<double>(health.rejected));
+  if (health.rejected >= 0) add("rejections", static_cast<double>(health.rejected));
   const auto sigma = [&estimate](std::size_t first) {
     double variance = 0.;
     for (std::size_t i = first; i < first + 3; ++i) variance += estimate.covariance[10 * i];

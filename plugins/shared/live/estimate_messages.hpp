@@ -47,7 +47,8 @@ Odometry odometry_of(const EstimateSample& estimate, const OutputFrames& frames,
 /// What the estimate does not tell of how things are going.
 struct Health {
   std::vector<std::string> silent_topics;
-  std::int64_t rejected = 0;     ///< what was counted so far: messages that could not be used, gaps
+  /// What was counted so far: messages that could not be used, gaps. Negative: nobody counts.
+  std::int64_t rejected = 0;
   double warn_latency_s = 0.25;  ///< more than this is worth a warning
 };
 
@@ -57,6 +58,7 @@ struct Diagnostics {
   static constexpr const char* kHardware = "viwo";
   std::int64_t t_ns = 0;
   bool warns = false;
+  bool fails = false;  ///< the run has failed or diverged
   std::string message;
   std::vector<std::pair<std::string, std::string>> values;
 };

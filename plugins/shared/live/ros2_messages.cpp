@@ -1,6 +1,8 @@
 #include "ros2_messages.hpp"
 
+#include <array>
 #include <cstdint>
+#include <vector>
 
 #include "cdr_message.hpp"
 
@@ -44,13 +46,40 @@ bag::Bytes path_message(const live::Path& path, const std::string& world) {
 }
 
 bag::Bytes diagnostics_message(const live::Diagnostics& diagnostics) {
-  constexpr std::uint8_t kOk = 0, kWarn = 1;  // of the message's definition
+  constexpr std::uint8_t kOk = 0, kWarn = 1, kError = 2;  // of the message's definition
   CdrMessage message;
   message.header(diagnostics.t_ns, "") << std::uint32_t{1};
-  message << (diagnostics.warns ? kWarn : kOk) << std::string(live::Diagnostics::kName)
-          << diagnostics.message << std::string(live::Diagnostics::kHardware)
+  message << (diagnostics.fails   ? kError
+              : diagnostics.warns ? kWarn
+                                  : kOk)
+          << std::string(live::Diagnostics::kName) << diagnostics.message
+          << std::string(live::Diagnostics::kHardware)
           << static_cast<std::uint32_t>(diagnostics.values.size());
   for (const auto& [key, value] : diagnostics.values) message << key << value;
+  return bytes_of(message);
+}
+
+bag::Bytes calibration_message(const EstimateSample& estimate) {
+  CdrMessage message;
+  message.header(estimate.t_ns, "") << estimate.calibration_names << estimate.calibration
+                                    << std::vector<double>{} << estimate.calibration_sigma;
+  return bytes_of(message);
+}
+
+bag::Bytes tracks_message(const log::SeenImage& image) {
+  constexpr std::uint8_t kPoints = 1;  // of the message's definition
+  constexpr double kThickness_px = 4.;
+  constexpr std::array<double, 4> kNone{}, kWhite{1., 1., 1., 1.};
+  const auto n = static_cast<std::uint32_t>(image.points.size());
+  CdrMessage message;
+  message << std::uint32_t{0} << std::uint32_t{1};  // circles, then point sets
+  message.stamp(image.t_ns) << kPoints << n;
+  for (const log::SeenPoint& point : image.points) message << point.u_px << point.v_px;
+  message << kWhite << n;
+  for (const log::SeenPoint& point : image.points) {
+    message << std::array{1. - point.age, point.age, 0., 1.};
+  }
+  message << kNone << kThickness_px << std::uint32_t{0};  // texts
   return bytes_of(message);
 }
 

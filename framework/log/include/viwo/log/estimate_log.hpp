@@ -1,0 +1,49 @@
+// The estimate of a run as a file that others show while and after it is written. What writes it
+// (CDR, compression) is a library that is loaded when a file is opened.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "viwo/api/sensor.hpp"
+
+namespace viwo::log {
+
+/// A tracked point of an image.
+struct SeenPoint {
+  double u_px = 0.;
+  double v_px = 0.;
+  double age = 0.;  ///< 0: first seen in this image, 1: seen for long
+};
+
+/// What one camera saw in an epoch.
+struct SeenImage {
+  int camera = 0;
+  std::int64_t t_ns = 0;  ///< in the clock of the camera
+  std::vector<SeenPoint> points;
+};
+
+class EstimateLog {
+ public:
+  virtual ~EstimateLog() = default;
+  /// The next epoch. std::runtime_error when it cannot be written.
+  virtual void write(const EstimateSample& estimate, std::span<const SeenImage> images) = 0;
+  /// Ends the file: the last state, and why the run failed ("" if it did not). std::runtime_error
+  /// when not all of it could be written; what has been stays readable.
+  virtual void close(const std::string& failure) = 0;
+};
+
+/// An MCAP file of ROS 2 messages; its folder is made if need be. InputError when this build has no
+/// library for it, and when the file cannot be written.
+std::unique_ptr<EstimateLog> open_mcap(const std::filesystem::path& file);
+
+/// The one name that the library exports, an EstimateLogMaker. Program and library are of one
+/// build.
+inline constexpr const char* kMcapLibraryEntry = "viwo_mcap_library";
+using EstimateLogMaker = EstimateLog* (*)(const std::filesystem::path& file);
+
+}  // namespace viwo::log
