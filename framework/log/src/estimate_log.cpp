@@ -23,9 +23,9 @@ EstimateLogMaker mcap_library() {
   void* entry = handle != nullptr ? dlsym(handle, kMcapLibraryEntry) : nullptr;
   if (entry == nullptr) {
     throw InputError(
-        "--mcap: this build cannot write MCAP (it needs libsqlite3-dev, "
-        "libfastcdr-dev, liblz4-dev and libzstd-dev): " +
-        std::string(dlerror()));
+        std::string("--mcap: MCAP cannot be written: ") + dlerror() +
+        " (it comes with the Debian package viwo-ros; a build of one's own needs libsqlite3-dev, "
+        "libfastcdr-dev, liblz4-dev and libzstd-dev)");
   }
   return reinterpret_cast<EstimateLogMaker>(entry);
 }
