@@ -66,7 +66,7 @@ TEST(Ros1Messages, APathHasItsPosesInTheWorld) {
 }
 
 TEST(Ros1Messages, DiagnosticsAreOneStatus) {
-  live::Diagnostics diagnostics{1'000'000'007, true, "latency 0.3 s", {{"r_1", "0.0255"}}};
+  live::Diagnostics diagnostics{1'000'000'007, true, false, "latency 0.3 s", {{"r_1", "0.0255"}}};
   msg::DiagnosticArray message = diagnostics_message(diagnostics);
   EXPECT_EQ(message.header.stamp.nsec, 7U);
   ASSERT_EQ(message.status.size(), 1U);
