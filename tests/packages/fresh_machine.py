@@ -52,6 +52,7 @@ def main():
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
     packages = make_packages(work / 'packed')
+    (work / 'unpacked').mkdir()
     for package in packages:
         check_sbom(package, work / 'unpacked' / package.name)
     repository = work / 'repository'

@@ -38,8 +38,8 @@ fs::path canonical_or_same(const fs::path& file) {
   return error ? file : canonical;
 }
 
-/// The Debian package of a plugin of viwo that the package viwo leaves to others, for what it links;
-/// empty for any other (framework/cmake/viwo_packages.cmake; packages.check compares).
+/// The Debian package of a plugin of viwo that the package viwo leaves to others, for what it
+/// links; empty for any other (framework/cmake/viwo_packages.cmake; packages.check compares).
 std::string_view package_of(std::string_view kind, std::string_view name) {
   if (kind != "sensor") return {};
   for (const char* const own : {"ros1_bag", "ros1_topics", "ros2_bag", "ros2_topics"}) {
