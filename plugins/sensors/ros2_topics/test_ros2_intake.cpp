@@ -283,7 +283,7 @@ TEST(Ros2Messages, HaveEachNumberAtItsPlace) {
   EXPECT_EQ(poses.left(), 0U);
 
   const Bytes status =
-      diagnostics_message({kTime, true, "latency 0.3 s", {{"r_1", "0.0255"}, {"a", "b"}}});
+      diagnostics_message({kTime, true, false, "latency 0.3 s", {{"r_1", "0.0255"}, {"a", "b"}}});
   bag::Ros2Fields values(status);
   EXPECT_EQ(values.header(), kTime);
   EXPECT_EQ(values.u32(), 1U);
