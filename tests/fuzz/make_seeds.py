@@ -148,6 +148,8 @@ def library(build):
 
 
 def main():
+    if len(sys.argv) != 3 or sys.argv[1] == "--help":
+        sys.exit(__doc__)
     build, corpus = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
     folder = Path(tempfile.mkdtemp(prefix="viwo_seeds_"))
     viwo = build / "bin" / "viwo"
