@@ -107,8 +107,9 @@ class McapFile::Reading {
         damage_(damage),
         numbers_(wanted.size(), 0) {
     for (const auto& [id, channel] : file.channels_) {
-      const auto found = std::find_if(wanted.begin(), wanted.end(),
-                                      [&](const Wanted& one) { return one.name == channel.topic; });
+      const auto found =
+          std::find_if(wanted.begin(), wanted.end(),
+                       [&topic = channel.topic](const Wanted& one) { return one.name == topic; });
       topics_[id] = static_cast<std::size_t>(found - wanted.begin());
       if (found == wanted.end() || channel.encoding == "cdr") continue;
       throw InputError(file.name() + "  topic '" + channel.topic + "' is serialised as '" +
