@@ -23,7 +23,7 @@ build() {
 
 # Inputs that need more than this are findings. To look for leaks after each takes longer than the input.
 limits=(-rss_limit_mb=1024 -malloc_limit_mb=512 -timeout=20 -detect_leaks=0)
-options=(-max_len=16384 -print_final_stats=1 -use_value_profile=1)
+options=(-max_len=16384 -print_final_stats=1 -print_funcs=0 -use_value_profile=1)
 
 fuzz() {  # TARGET SECONDS
   local corpus=build-fuzz/corpus/$1 log=build-fuzz/fuzz_$1.log status=0
