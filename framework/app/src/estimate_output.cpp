@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <exception>
 #include <limits>
+#include <stdexcept>
 
+#include "viwo/log/files.hpp"
+#include "viwo/plugin_host/part.hpp"
 #include "viwo/run/estimate_sample.hpp"
 
 namespace viwo::app {
@@ -21,6 +24,19 @@ log::SeenImage seen_image(const FeatureSample& image, const view::Tracks& tracks
   return seen;
 }
 
+std::unique_ptr<log::EstimateLog> open_mcap(const std::filesystem::path& file) {
+  try {
+    void* const make = load_part(
+        "libviwo_mcap.so", log::kMcapLibraryEntry, "MCAP cannot be written",
+        "it comes with the Debian package viwo-ros; a build of one's own needs libsqlite3-dev, "
+        "libfastcdr-dev, liblz4-dev and libzstd-dev");
+    if (file.has_parent_path()) log::make_folder(file.parent_path());
+    return std::unique_ptr<log::EstimateLog>(reinterpret_cast<log::EstimateLogMaker>(make)(file));
+  } catch (const std::runtime_error& error) {
+    throw InputError(std::string("--mcap: ") + error.what());
+  }
+}
+
 }  // namespace
 
 EstimateOutput::EstimateOutput(const std::filesystem::path& file, const RunSetup& setup) {
@@ -29,7 +45,7 @@ EstimateOutput::EstimateOutput(const std::filesystem::path& file, const RunSetup
         "--mcap has what the filter does, but this run has none (a section 'updates')");
   }
   tracks_.resize(setup.filter->cameras.size());
-  out_ = log::open_mcap(file);
+  out_ = open_mcap(file);
 }
 
 void EstimateOutput::watch(RunHooks& hooks) {

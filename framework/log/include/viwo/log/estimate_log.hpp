@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -36,10 +35,6 @@ class EstimateLog {
   /// when not all of it could be written; what has been stays readable.
   virtual void close(const std::string& failure) = 0;
 };
-
-/// An MCAP file of ROS 2 messages; its folder is made if need be. InputError when this build has no
-/// library for it, and when the file cannot be written.
-std::unique_ptr<EstimateLog> open_mcap(const std::filesystem::path& file);
 
 /// The one name that the library exports, an EstimateLogMaker. Program and library are of one
 /// build.
