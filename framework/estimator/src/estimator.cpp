@@ -20,6 +20,8 @@ constexpr std::size_t kEpochsPerClone = 3;
 /// Over which the filter goes on without the IMU. Whoever is silent for longer, or begins to speak
 /// so long after the start, leaves nothing that an estimate could be made of, epoch after epoch.
 constexpr double kLongestSilenceS = 60.;
+/// A failure soon after a silence of the IMU that was bridged is most likely its consequence.
+constexpr double kSilenceToNameS = 1., kSoonAfterS = 10.;
 
 /// CPU time of this thread: what an epoch costs, however busy the machine is with other things.
 double thread_ms() {
@@ -151,9 +153,13 @@ bool Estimator::step() {
     return false;
   }
   if (!filter_.initialized() && !find_start()) return false;
-  if (const double silent_s = intake_.silent_s(filter_.t_ns()); silent_s > kLongestSilenceS) {
+  const double silent_s = intake_.silent_s(filter_.t_ns());
+  if (silent_s > kLongestSilenceS) {
     failure_ = "the IMU was silent for " + std::to_string(silent_s) + " s";
     return false;
+  }
+  if (silent_s > kSilenceToNameS && filter_.t_ns() >= silence_.end_ns) {
+    silence_ = {silent_s, filter_.t_ns() + std::llround(1e9 * silent_s)};
   }
   const auto t_ns = intake_.next_epoch_ns(options_.schedule, filter_.t_ns(), filter_.blocks());
   if (!t_ns) return false;
@@ -172,9 +178,17 @@ bool Estimator::step() {
                  filter_.blocks());
   failure_ = failure_of(filter_, options_.health);
   if (failure_.empty()) failure_ = contact_.epoch(runner_.counts(), filter_);
+  if (!failure_.empty()) failure_ += cause_of_failure();
   ++epochs_;
   clock.done();
   return true;
+}
+
+std::string Estimator::cause_of_failure() const {
+  const bool soon =
+      silence_.duration_s > 0. && seconds_between(silence_.end_ns, filter_.t_ns()) < kSoonAfterS;
+  if (!soon) return "";
+  return ": the IMU had been silent for " + std::to_string(silence_.duration_s) + " s";
 }
 
 void Estimator::propagate(const EpochData& data) {

@@ -284,6 +284,26 @@ TEST(Estimator, CannotGoOnWhenTheImuWasSilentForAMinute) {
   EXPECT_THAT(bench.estimator.failure(), ::testing::StartsWith("the IMU was silent for 35"));
 }
 
+TEST(Estimator, NamesTheSilenceOfTheImuAfterWhichItFailed) {
+  EstimatorOptions options = testing::any_motion();
+  options.health.max_speed_m_per_s = 100.;
+  for (const bool silent : {true, false}) {
+    Bench bench = Bench::started({}, {}, options);
+    rest(bench, -10, 1000);
+    const std::int64_t begin_ms = silent ? 21'000 : 1010;
+    for (std::int64_t t = begin_ms; t < begin_ms + 5000; t += 10) {
+      const double noise = 1e-4 * static_cast<double>(t / 10 % 3);
+      bench.estimator.add(ImuSample{kStart + t * kMs, {noise, 0., 0.}, {50., noise, 9.81}});
+      bench.steps();
+    }
+    EXPECT_THAT(bench.estimator.failure(), ::testing::StartsWith("the speed is 1"));
+    EXPECT_EQ(
+        bench.estimator.failure().find(": the IMU had been silent for 20.0") != std::string::npos,
+        silent)
+        << bench.estimator.failure();
+  }
+}
+
 TEST(Estimator, DoesNotMakeEpochsFromAStartInAnotherClockToTheFirstReading) {
   Bench bench = Bench::started();
   rest(bench, 1'000'000'000, 1'000'000'200);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -132,7 +133,14 @@ class Estimator {
  private:
   Estimator(const EstimatorOptions& options, std::vector<UpdateEntry> updates, std::size_t n_extra,
             DeclarationTable declared);
+  /// The last one of more than a second that was bridged.
+  struct Silence {
+    double duration_s = 0.;
+    std::int64_t end_ns = std::numeric_limits<std::int64_t>::min();
+  };
+
   bool find_start();
+  std::string cause_of_failure() const;
   void propagate(const EpochData& data);
   void follow(const GivenPath& path, const ImuSample& sample);
   void watch(const EpochData& data);
@@ -147,6 +155,7 @@ class Estimator {
   std::vector<ExcitationMonitor> monitors_;
   Contact contact_;
   std::string failure_;
+  Silence silence_;
   std::int64_t epochs_ = 0;
   std::vector<double> stage_ms_;
 };
