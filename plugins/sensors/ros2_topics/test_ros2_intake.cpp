@@ -259,6 +259,29 @@ TEST_F(Ros2Intake, SurvivesMessagesOfRandomBytes) {
   EXPECT_GT(n, 1000);
 }
 
+TEST(CdrMessage, HasZerosBetweenItsNumbersHoweverLongItIs) {
+  std::vector<double> numbers(5000);
+  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<double>(i);
+  // Memory as others leave it.
+  for (const std::size_t n : {64U, 1024U, 4096U, 65536U}) Bytes(n, 0xaa).shrink_to_fit();
+  CdrMessage out;
+  out << std::uint8_t{1} << numbers << std::uint8_t{2} << std::uint32_t{3};
+  const auto bytes = out.bytes();
+  ASSERT_EQ(bytes.size(), 4 + 8 + 5000 * 8 + 8U);
+  EXPECT_EQ(bytes[4], 1);
+  for (const std::size_t i : {5U, 6U, 7U}) EXPECT_EQ(bytes[i], 0) << i;
+  const std::size_t end = bytes.size() - 8;
+  EXPECT_EQ(bytes[end], 2);
+  for (const std::size_t i : {1U, 2U, 3U}) EXPECT_EQ(bytes[end + i], 0) << i;
+  EXPECT_EQ(bytes[end + 4], 3);
+  bag::Ros2Fields in(bytes);
+  EXPECT_EQ(in.u8(), 1);
+  ASSERT_EQ(in.count(8), numbers.size());
+  for (const double number : numbers) ASSERT_EQ(in.f64(), number);
+  EXPECT_EQ(in.u8(), 2);
+  EXPECT_EQ(in.u32(), 3U);
+}
+
 TEST(Ros2Messages, HaveEachNumberAtItsPlace) {
   live::Odometry odometry;
   odometry.pose = {kTime, {1., 2., 3.}, {0.1, 0.2, 0.3, 0.9}};

@@ -7,6 +7,7 @@
 #include <fastcdr/FastBuffer.h>
 #include <fastcdr/config.h>
 #include <fastcdr/exceptions/Exception.h>
+#include <fastcdr/exceptions/NotEnoughMemoryException.h>
 
 namespace viwo::bag {
 

@@ -66,12 +66,13 @@ class Ros2Run : public testing::DdsTest {
 
   /// The same run on the bag itself.
   static void run_on_bag() {
-    run(run_words("of_bag",
-                  {"--set", "sensors.ros0={type: ros2_bag, path: " + dds_->file("robot") +
-                                ", imu_topic: /imu0, image_topics: [/cam0/image_raw, "
-                                "/cam1/image_raw], joint_topic: /joint_states, drive_joints: "
-                                "[drive_1, drive_2, drive_3, drive_4], steer_joints: [steer_1, "
-                                "steer_2, steer_3, steer_4], drive_input: velocity}"}),
+    run(run_words("of_bag", {"--set",
+                             "sensors.ros0={type: ros2_bag, path: " + dds_->file("robot") +
+                                 ", imu_topic: /imu0, image_topics: [/cam0/image_raw, "
+                                 "/cam1/image_raw], joint_topic: /joint_states, drive_joints: "
+                                 "[drive_1, drive_2, drive_3, drive_4], steer_joints: [steer_1, "
+                                 "steer_2, steer_3, steer_4], drive_input: velocity}",
+                             "--mcap", dds_->file("of_bag.mcap")}),
         "of_bag.log");
   }
 
@@ -103,17 +104,23 @@ TEST_F(Ros2Run, InStepGivesTheBitsOfTheBagAndInItsOwnTimeNearlySo) {
   ASSERT_GT(expected.size(), 5000U);
 
   {  // in step
-    Child viwo(run_words("in_step", dds_words({"--lockstep"})), dds_->file("in_step.log"));
+    Child viwo(
+        run_words("in_step", dds_words({"--lockstep", "--mcap", dds_->file("in_step.mcap")})),
+        dds_->file("in_step.log"));
     Child play(dds_->node("step", dds_->file("robot")), dds_->file("play.log"));
     EXPECT_EQ(play.wait(200s), 0) << dds_->text_of("play.log");
     ASSERT_EQ(viwo.wait(200s), 0) << dds_->text_of("in_step.log");
   }
   EXPECT_TRUE(dds_->text_of("in_step/trajectory.tum") == expected) << "other bits";
   EXPECT_TRUE(dds_->text_of("in_step/calibration.csv") == dds_->text_of("of_bag/calibration.csv"));
+  const std::string seen = dds_->text_of("of_bag.mcap");
+  EXPECT_GT(seen.size(), expected.size());
+  EXPECT_TRUE(dds_->text_of("in_step.mcap") == seen) << "viewers are shown something else";
 
   {  // in its own time
     Child recorder(dds_->node("record", dds_->file("heard.txt")), dds_->file("recorder.log"));
-    Child viwo(run_words("live", dds_words({})), dds_->file("live.log"));
+    Child viwo(run_words("live", dds_words({"--mcap", dds_->file("live.mcap")})),
+               dds_->file("live.log"));
     ASSERT_TRUE(wait_for("listening", "live.log")) << dds_->text_of("live.log");
     run(dds_->node("play", dds_->file("robot")), "play.log");
     std::this_thread::sleep_for(1s);
@@ -124,6 +131,7 @@ TEST_F(Ros2Run, InStepGivesTheBitsOfTheBagAndInItsOwnTimeNearlySo) {
   EXPECT_EQ(summary.at("status"), "ok");
   const auto epochs = summary.at("epochs").get<std::size_t>();
   EXPECT_GT(epochs, 80U);
+  EXPECT_THAT(dds_->text_of("live.mcap"), ::testing::EndsWith("\x89MCAP0\r\n")) << "not closed";
   const double ate_m = ate_to_bag("live/trajectory.tum");
   EXPECT_LT(ate_m, 0.005) << "cells that look back, and what was lost on the way";
   // What the robot was told.
