@@ -63,7 +63,7 @@ required=("${missing[@]}")
 missing=()
 for package in librosbag-storage-dev libroscpp-dev libsensor-msgs-dev libnav-msgs-dev \
   libgeometry-msgs-dev libtf2-msgs-dev libdiagnostic-msgs-dev libsqlite3-dev libfastcdr-dev \
-  liblz4-dev libzstd-dev libdeflate-dev; do
+  liblz4-dev libzstd-dev libdeflate-dev libtinyxml2-dev; do
   need_package "$package"
 done
 # DDS, by its name in Debian 13 or else in Debian 12.

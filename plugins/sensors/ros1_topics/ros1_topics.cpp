@@ -43,6 +43,8 @@ struct Params : live::LiveParams {
   }
 };
 
+/// Of tf2_msgs/TFMessage.
+constexpr const char* kTransformsMd5 = "94810edda583a504dfda3829e70d7eec";
 constexpr auto kSilence = 2s;  ///< without any message the master is asked for
 constexpr auto kProbe = 1000ms;
 
@@ -58,12 +60,14 @@ class Ros1Topics final : public live::TopicSensor {
  public:
   Ros1Topics(const Params& params, const HostServices& services)
       : TopicSensor(params.checked(), services, fields_of),
-        master_(master_address(params.master_uri)) {
+        master_(master_address(params.master_uri)),
+        description_(params.description_topic) {
     join(master_, milliseconds(params.connect_timeout_s));
     node_ = std::make_unique<ros::NodeHandle>();
     node_->setCallbackQueue(&callbacks_);
     subscribe();
     if (params.publish) advertise(params);
+    if (asks_for_mount()) ask_for_mount();
     watch_ = node_->createWallTimer(ros::WallDuration(1.),
                                     [this](const ros::WallTimerEvent&) { watch(); });
     // Two threads: watch() may wait for the master, messages must not.
@@ -76,6 +80,7 @@ class Ros1Topics final : public live::TopicSensor {
     spinner_->stop();
     watch_.stop();
     subscribers_.clear();
+    tf_static_.shutdown();
     callbacks_.disable();
     callbacks_.clear();
   }
@@ -85,11 +90,11 @@ class Ros1Topics final : public live::TopicSensor {
     return ros::ok() ? std::string() : "ROS has shut this node down";
   }
 
-  void publish(const live::Odometry& odometry, const live::Path* path,
+  void publish(const live::Odometry* odometry, const live::Path* path,
                const live::Diagnostics& diagnostics) override {
-    odometry_.publish(odometry_message(odometry));
-    if (tf_) tf_.publish(tf_message(odometry));
-    if (path_ && path != nullptr) path_.publish(path_message(*path, odometry.world));
+    if (odometry != nullptr) odometry_.publish(odometry_message(*odometry));
+    if (tf_ && odometry != nullptr) tf_.publish(tf_message(*odometry));
+    if (path_ && path != nullptr) path_.publish(path_message(*path, odometry->world));
     diagnostics_.publish(diagnostics_message(diagnostics));
   }
 
@@ -97,20 +102,26 @@ class Ros1Topics final : public live::TopicSensor {
     // Messages that are received and not looked at yet. Looking at one takes microseconds, and the
     // queue behind it has limits of its own and counts: these are never reached.
     constexpr std::uint32_t kMostImages = 100, kMostOthers = 10'000;
-    const auto hints = ros::TransportHints().tcpNoDelay();
     for (std::size_t i = 0; i < intake().topics().size(); ++i) {
-      ros::SubscribeOptions wanted;
-      wanted.template initByFullCallbackType<const ros::MessageEvent<const RawMessage>&>(
-          intake().topics()[i].name, intake().topics()[i].camera < 0 ? kMostOthers : kMostImages,
-          [this, i](const ros::MessageEvent<const RawMessage>& event) {
-            const ros::M_string& connection = event.getConnectionHeader();
-            const auto message = event.getMessage();
-            intake().take(i, connection.at("type"), connection.at("md5sum"),
-                          {&message->bytes, [message](const bag::Bytes*) {}});
-          });
-      wanted.transport_hints = hints;
-      subscribers_.push_back(node_->subscribe(wanted));
+      const live::Topic& topic = intake().topics()[i];
+      subscribers_.push_back(
+          subscribe(topic.name, topic.camera < 0 ? kMostOthers : kMostImages,
+                    [this, i](const ros::MessageEvent<const RawMessage>& event) {
+                      const ros::M_string& connection = event.getConnectionHeader();
+                      const auto message = event.getMessage();
+                      intake().take(i, connection.at("type"), connection.at("md5sum"),
+                                    {&message->bytes, [message](const bag::Bytes*) {}});
+                    }));
     }
+  }
+
+  template <class Callback>
+  ros::Subscriber subscribe(const std::string& topic, std::uint32_t most, Callback callback) {
+    ros::SubscribeOptions wanted;
+    wanted.template initByFullCallbackType<const ros::MessageEvent<const RawMessage>&>(topic, most,
+                                                                                       callback);
+    wanted.transport_hints = ros::TransportHints().tcpNoDelay();
+    return node_->subscribe(wanted);
   }
 
   void advertise(const Params& params) {
@@ -122,8 +133,22 @@ class Ros1Topics final : public live::TopicSensor {
     diagnostics_ = node_->advertise<msg::DiagnosticArray>("/diagnostics", 10);
   }
 
+  void ask_for_mount() {
+    tf_static_ =
+        subscribe("/tf_static", 100, [this](const ros::MessageEvent<const RawMessage>& event) {
+          if (event.getConnectionHeader().at("md5sum") != kTransformsMd5) return;
+          take_transforms(event.getMessage()->bytes);
+        });
+  }
+
   /// Every second.
   void watch() {
+    std::string urdf;
+    if (asks_for_mount() && !has_mount() && !description_.empty() &&
+        node_->getParam(description_, urdf)) {
+      take_description(urdf);
+      description_.clear();
+    }
     if (is_time_to_name_missing()) name_missing_topics();
     if (is_idle(kSilence) && !is_reachable(master_, kProbe)) {
       end(LogLevel::kWarning, "the ROS master at " + master_.uri + " is gone and nothing comes");
@@ -153,9 +178,11 @@ class Ros1Topics final : public live::TopicSensor {
   }
 
   MasterAddress master_;
+  std::string description_;  ///< name of a parameter; empty when it is not asked for any more
   ros::CallbackQueue callbacks_;
   std::unique_ptr<ros::NodeHandle> node_;
   std::vector<ros::Subscriber> subscribers_;
+  ros::Subscriber tf_static_;
   ros::Publisher odometry_, path_, tf_, diagnostics_;
   ros::WallTimer watch_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;

@@ -129,7 +129,8 @@ dds::DataReader& DdsNode::make_reader(const std::string& topic, const std::strin
   dds::DataReaderQos qos = dds::DATAREADER_QOS_DEFAULT;
   qos.reliability().kind = delivery == Delivery::kBestEffort ? dds::BEST_EFFORT_RELIABILITY_QOS
                                                              : dds::RELIABLE_RELIABILITY_QOS;
-  qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;
+  qos.durability().kind = delivery == Delivery::kLatched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS
+                                                         : dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind =
       delivery == Delivery::kEverything ? dds::KEEP_ALL_HISTORY_QOS : dds::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = most;

@@ -25,6 +25,7 @@ class DdsNode final : private dds::DomainParticipantListener {
   enum class Delivery {
     kBestEffort,  ///< from any publisher
     kReliable,    ///< what is lost is sent again; only from publishers that do
+    kLatched,     ///< reliable, with what was sent before there was a reader
     kEverything,  ///< reliable, and publishers wait that are made to
   };
 

@@ -55,7 +55,7 @@ struct Params : live::LiveParams, DdsParams {
 };
 
 /// Messages that DDS holds for the thread that takes them at once.
-constexpr int kMostImages = 100, kMostOthers = 2000;
+constexpr int kMostImages = 100, kMostOthers = 2000, kMostLatched = 100;
 constexpr auto kPoll = 100ms, kPollFull = 2ms, kWatchPeriod = 1000ms;
 
 std::unique_ptr<bag::FieldReader> fields_of(std::span<const std::uint8_t> message) {
@@ -71,6 +71,7 @@ class Ros2Topics final : public live::TopicSensor {
         inlets_(intake().topics().size()),
         node_(params.settings(), [this] { wake(); }) {
     if (params.publish) advertise(params);
+    if (asks_for_mount()) ask_for_mount(params);
     thread_ = std::thread([this] { receive(); });
   }
 
@@ -106,12 +107,40 @@ class Ros2Topics final : public live::TopicSensor {
     return node_.make_writer(dds_topic(topic), dds_type(type), most);
   }
 
-  void publish(const live::Odometry& odometry, const live::Path* path,
+  void publish(const live::Odometry* odometry, const live::Path* path,
                const live::Diagnostics& diagnostics) override {
-    write(*odometry_, odometry_message(odometry));
-    if (tf_ != nullptr) write(*tf_, tf_message(odometry));
-    if (path_ != nullptr && path != nullptr) write(*path_, path_message(*path, odometry.world));
+    if (odometry != nullptr) write(*odometry_, odometry_message(*odometry));
+    if (tf_ != nullptr && odometry != nullptr) write(*tf_, tf_message(*odometry));
+    if (path_ != nullptr && path != nullptr) write(*path_, path_message(*path, odometry->world));
     write(*diagnostics_, diagnostics_message(diagnostics));
+  }
+
+  void ask_for_mount(const Params& params) {
+    const auto latched = [this](const std::string& topic, const std::string& type) {
+      return &node_.make_reader(dds_topic(topic), dds_type(type), DdsNode::Delivery::kLatched,
+                                kMostLatched);
+    };
+    tf_static_ = latched("/tf_static", "tf2_msgs/TFMessage");
+    if (params.description_topic.empty()) return;
+    description_ = latched(params.description_topic, "std_msgs/String");
+  }
+
+  void take_frames() {
+    bag::Bytes message;
+    dds::SampleInfo info;
+    while (tf_static_ != nullptr && take(*tf_static_, message, info)) {
+      if (info.valid_data) take_transforms(message);
+    }
+    while (description_ != nullptr && take(*description_, message, info)) {
+      if (!info.valid_data) continue;
+      try {
+        take_description(std::string(fields_of(message)->text()));
+      } catch (const bag::BrokenMessage& broken) {
+        services().log(
+            LogLevel::kWarning,
+            std::string("the robot's description is a message that is broken: ") + broken.what());
+      }
+    }
   }
 
   void wake() {
@@ -135,6 +164,7 @@ class Ros2Topics final : public live::TopicSensor {
         woken_ = false;
       }
       try {
+        take_frames();
         make_readers();
         is_full = !take_all();
       } catch (const std::exception& error) {
@@ -288,6 +318,8 @@ class Ros2Topics final : public live::TopicSensor {
   bool woken_ = false;
   bool stopping_ = false;
   DdsNode node_;  ///< behind what its threads use
+  dds::DataReader* tf_static_ = nullptr;
+  dds::DataReader* description_ = nullptr;
   dds::DataWriter* odometry_ = nullptr;
   dds::DataWriter* tf_ = nullptr;
   dds::DataWriter* path_ = nullptr;

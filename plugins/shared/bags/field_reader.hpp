@@ -20,8 +20,8 @@ class BrokenMessage : public std::runtime_error {
 class FieldReader {
  public:
   virtual ~FieldReader() = default;
-  /// std_msgs/Header: its stamp [ns].
-  virtual std::int64_t header() = 0;
+  /// std_msgs/Header up to its frame: its stamp [ns].
+  virtual std::int64_t stamp() = 0;
   virtual std::uint8_t u8() = 0;
   virtual std::uint16_t u16() = 0;
   virtual std::uint32_t u32() = 0;
@@ -31,6 +31,13 @@ class FieldReader {
   virtual std::span<const std::uint8_t> bytes() = 0;
   /// Bytes behind the fields that have been read.
   virtual std::size_t left() const = 0;
+
+  /// std_msgs/Header: its stamp [ns].
+  std::int64_t header() {
+    const std::int64_t t_ns = stamp();
+    text();  // frame
+    return t_ns;
+  }
 
   /// The length of a list whose items take at least `item_bytes` each: never more than there can
   /// be.

@@ -182,6 +182,19 @@ std::optional<GnssSample> read_fix(FieldReader& in) {
   return fix;
 }
 
+std::vector<Transform> read_transforms(FieldReader& in) {
+  constexpr std::size_t kLeastBytes = 76;  // of one whose frames have no names
+  std::vector<Transform> transforms(in.count(kLeastBytes));
+  for (Transform& transform : transforms) {
+    in.stamp();
+    transform.parent = in.text();
+    transform.child = in.text();
+    transform.p_m = read_vector(in);
+    for (double& value : transform.q_xyzw) value = in.f64();
+  }
+  return transforms;
+}
+
 ImageHead read_image_head(FieldReader& in) {
   ImageHead head;
   head.t_ns = in.header();

@@ -1,6 +1,7 @@
 // The messages that are read from bags, whichever ROS wrote them: their fields are the same.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -42,6 +43,13 @@ struct Joints {
   std::vector<double> velocities;
 };
 
+/// One of a tf2_msgs/TFMessage: pose of the frame `child` in `parent`.
+struct Transform {
+  std::string parent, child;
+  std::array<double, 3> p_m{};
+  std::array<double, 4> q_xyzw{};
+};
+
 /// What stands before the pixels of a sensor_msgs/Image.
 struct ImageHead {
   std::int64_t t_ns = 0;
@@ -63,6 +71,7 @@ PoseSample read_pose(Kind kind, FieldReader& in);
 /// sensor_msgs/NavSatFix. Nothing when it says that there is no fix. A covariance that is said to
 /// be unknown is zero, one of which the diagonal is known has no more.
 std::optional<GnssSample> read_fix(FieldReader& in);
+std::vector<Transform> read_transforms(FieldReader& in);
 /// Leaves `in` at the pixels.
 ImageHead read_image_head(FieldReader& in);
 

@@ -19,11 +19,10 @@ class Ros1Fields final : public FieldReader {
       : in_(const_cast<std::uint8_t*>(message.data()), static_cast<std::uint32_t>(message.size())) {
   }
 
-  std::int64_t header() override {
+  std::int64_t stamp() override {
     u32();  // sequence number
     const std::int64_t seconds = u32();
     const std::int64_t nanoseconds = u32();
-    text();  // frame
     return seconds * 1'000'000'000 + nanoseconds;
   }
   std::uint8_t u8() override { return read<std::uint8_t>(); }

@@ -29,10 +29,9 @@ class Ros2Fields final : public FieldReader {
     }
   }
 
-  std::int64_t header() override {
+  std::int64_t stamp() override {
     const std::int64_t seconds = read<std::int32_t>();
     const std::int64_t nanoseconds = u32();
-    text();  // frame
     return seconds * 1'000'000'000 + nanoseconds;
   }
   std::uint8_t u8() override { return read<std::uint8_t>(); }

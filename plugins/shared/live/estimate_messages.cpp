@@ -81,6 +81,7 @@ Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health)
   if (estimate.latency_s > health.warn_latency_s) {
     warn("latency " + log::number_text(std::round(estimate.latency_s * 1e3) * 1e-3) + " s");
   }
+  if (!health.trouble.empty()) warn(health.trouble);
   for (const std::string& topic : health.silent_topics) warn("nothing on topic '" + topic + "'");
   const auto is_finite = [](double value) { return std::isfinite(value); };
   if (!std::all_of(estimate.covariance.begin(), estimate.covariance.end(), is_finite) ||

@@ -47,6 +47,7 @@ Odometry odometry_of(const EstimateSample& estimate, const OutputFrames& frames,
 /// What the estimate does not tell of how things are going.
 struct Health {
   std::vector<std::string> silent_topics;
+  std::string trouble;  ///< of the sensor itself; empty: none
   /// What was counted so far: messages that could not be used, gaps. Negative: nobody counts.
   std::int64_t rejected = 0;
   double warn_latency_s = 0.25;  ///< more than this is worth a warning

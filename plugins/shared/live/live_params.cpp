@@ -2,8 +2,7 @@
 
 #include <set>
 
-#include <Eigen/Geometry>
-
+#include "frame_tree.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo::live {
@@ -27,6 +26,12 @@ void LiveParams::bind(ParamBinder& b) {
   b(VIWO_PARAM(publish_tf), {.help = "whether the pose is on /tf, too"});
   b(VIWO_PARAM(world_frame), {.help = "frame of the poses"});
   b(VIWO_PARAM(body_frame), {.help = "frame whose pose is published"});
+  b(VIWO_PARAM(imu_frame),
+    {.help = "frame of the IMU: where it sits on body_frame is then what /tf_static and the "
+             "robot's description say, instead of p_IinB_m and rpy_ItoB_rad"});
+  b(VIWO_PARAM(description_topic),
+    {.help = "the robot's description (URDF): std_msgs/String of ROS 2, parameter of ROS 1; empty: "
+             "/tf_static alone is asked"});
   b(VIWO_PARAM(p_IinB_m), {.unit = "m", .help = "origin of the IMU in body_frame"});
   b(VIWO_PARAM(rpy_ItoB_rad),
     {.unit = "rad", .help = "roll, pitch, yaw of the IMU in body_frame, R_ItoB = Rz Ry Rx"});
@@ -47,11 +52,11 @@ OutputFrames LiveParams::frames() const {
   if (frames.world == frames.body) {
     throw ParamError("body_frame", "'" + frames.body + "' is the world_frame, too");
   }
-  const Eigen::Vector3d rpy = rpy_ItoB_rad;
-  frames.R_ItoB = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-                   Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-                   Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-                      .toRotationMatrix();
+  if (!imu_frame.empty() && !(p_IinB_m.isZero(0.) && rpy_ItoB_rad.isZero(0.))) {
+    throw ParamError("imu_frame",
+                     "p_IinB_m and rpy_ItoB_rad say where '" + imu_frame + "' sits: give either");
+  }
+  frames.R_ItoB = rotation_of_rpy(rpy_ItoB_rad);
   frames.p_IinB = p_IinB_m;
   return frames;
 }
@@ -77,6 +82,7 @@ const LiveParams& LiveParams::checked(std::string (*why_no_name)(const std::stri
   check_topic("gnss_topic", gnss_topic);
   check_name("odometry_topic_out", odometry_topic_out);
   if (!path_topic_out.empty()) check_name("path_topic_out", path_topic_out);
+  if (!description_topic.empty()) check_name("description_topic", description_topic);
   return *this;
 }
 

@@ -20,6 +20,8 @@ struct LiveParams : bag::TopicOptions {
   bool publish_tf = true;
   std::string world_frame = "odom";
   std::string body_frame = "imu";
+  std::string imu_frame;
+  std::string description_topic = "/robot_description";
   Eigen::Vector3d p_IinB_m{0., 0., 0.};
   Eigen::Vector3d rpy_ItoB_rad{0., 0., 0.};
   double sigma_rate_rad_per_s = 0.01;

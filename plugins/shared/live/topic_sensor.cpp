@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
+
+#include <Eigen/Geometry>
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
@@ -28,7 +31,10 @@ TopicSensor::TopicSensor(const LiveParams& params, const HostServices& services,
                          MakeFields make_fields, Pace pace)
     : services_(services),
       options_(params),
+      make_fields_(make_fields),
+      imu_frame_(params.imu_frame),
       frames_(params.frames()),
+      has_mount_(params.imu_frame.empty()),
       publish_(params.publish),
       sigma_rate_(params.sigma_rate_rad_per_s),
       warn_latency_s_(params.warn_latency_s),
@@ -71,15 +77,23 @@ void TopicSensor::rejections(std::vector<RejectionCount>& out) const {
 
 void TopicSensor::estimate(const EstimateSample& estimate) {
   if (!publish_) return;
-  const Odometry odometry = odometry_of(estimate, frames_, sigma_rate_);
   Health health;
+  std::optional<Odometry> odometry;
+  {
+    const std::scoped_lock lock(mount_mutex_);
+    if (has_mount_) odometry = odometry_of(estimate, frames_, sigma_rate_);
+  }
+  if (!odometry) {
+    health.trouble = "nothing says where frame '" + imu_frame_ + "' is in '" + frames_.body + "'";
+  }
   health.silent_topics = intake_.silent_topics(kTopicSilence);
   std::vector<RejectionCount> rejected;
   rejections(rejected);
   for (const RejectionCount& r : rejected) health.rejected += r.count;
   health.warn_latency_s = warn_latency_s_;
-  const bool is_new = path_.add(odometry.pose, estimate.piece);
-  publish(odometry, is_new ? &path_ : nullptr, diagnostics_of(estimate, health));
+  const bool is_new = odometry && path_.add(odometry->pose, estimate.piece);
+  publish(odometry ? &*odometry : nullptr, is_new ? &path_ : nullptr,
+          diagnostics_of(estimate, health));
 }
 
 void TopicSensor::end(LogLevel level, const std::string& why) {
@@ -103,7 +117,74 @@ bool TopicSensor::is_idle(Clock::duration longer_than) const {
 bool TopicSensor::is_time_to_name_missing() {
   if (named_missing_ || Clock::now() - begin_ < kPublisherWait) return false;
   named_missing_ = true;
+  if (asks_for_mount()) say_missing_mount();
   return true;
+}
+
+bool TopicSensor::has_mount() const {
+  const std::scoped_lock lock(mount_mutex_);
+  return has_mount_;
+}
+
+void TopicSensor::take_transforms(std::span<const std::uint8_t> message) {
+  std::string why;
+  try {
+    for (const bag::Transform& transform : bag::read_transforms(*make_fields_(message))) {
+      const std::scoped_lock lock(mount_mutex_);
+      if (const std::string no = tree_.add(transform); !no.empty()) why = no;
+    }
+  } catch (const bag::BrokenMessage& broken) {
+    why = std::string("a message that is broken: ") + broken.what();
+  }
+  find_mount(why.empty() ? "" : "/tf_static: " + why);
+}
+
+void TopicSensor::take_description(const std::string& urdf) {
+  std::string why;
+  {
+    const std::scoped_lock lock(mount_mutex_);
+    why = tree_.add_urdf(urdf);
+  }
+  find_mount(why);
+}
+
+void TopicSensor::find_mount(const std::string& why_not_all) {
+  if (!why_not_all.empty()) services_.log(LogLevel::kWarning, why_not_all + "; it is not used");
+  std::string text;
+  {
+    const std::scoped_lock lock(mount_mutex_);
+    const auto found = tree_.find(imu_frame_, frames_.body);
+    if (!found) return;
+    const bool is_same = has_mount_ && found->R_AtoB.isApprox(frames_.R_ItoB, 1e-9) &&
+                         found->p_AinB.isApprox(frames_.p_IinB, 1e-9);
+    if (is_same) return;
+    has_mount_ = true;
+    frames_.R_ItoB = found->R_AtoB;
+    frames_.p_IinB = found->p_AinB;
+    const Eigen::Vector3d& p = frames_.p_IinB;
+    const Eigen::AngleAxisd turn(frames_.R_ItoB);
+    text = "frame '" + imu_frame_ + "' is in '" + frames_.body + "' at [" +
+           log::number_text(p.x()) + ", " + log::number_text(p.y()) + ", " +
+           log::number_text(p.z()) + "] m, turned by " + log::number_text(turn.angle()) + " rad";
+  }
+  services_.log(LogLevel::kInfo, text);
+}
+
+void TopicSensor::say_missing_mount() {
+  std::string text;
+  {
+    const std::scoped_lock lock(mount_mutex_);
+    if (has_mount_) return;
+    text = "nothing says where frame '" + imu_frame_ + "' is in '" + frames_.body +
+           "': no pose is published";
+    const auto names = tree_.names();
+    if (names.empty()) text += " (nothing has come on /tf_static)";
+    for (const std::string& wanted : {imu_frame_, frames_.body}) {
+      if (names.empty() || std::find(names.begin(), names.end(), wanted) != names.end()) continue;
+      text += "; there is no '" + wanted + "'" + log::did_you_mean(wanted, names);
+    }
+  }
+  services_.log(LogLevel::kWarning, text);
 }
 
 void TopicSensor::name_missing(const std::string& topic,

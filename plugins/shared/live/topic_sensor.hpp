@@ -3,12 +3,15 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "estimate_messages.hpp"
+#include "frame_tree.hpp"
 #include "intake.hpp"
 #include "live_params.hpp"
 #include "live_queue.hpp"
@@ -35,17 +38,26 @@ class TopicSensor : public Sensor {
 
   /// Why nothing will come any more, although nobody has said so; empty while it may.
   virtual std::string gone() const { return {}; }
-  /// `path`: null where it is the same as before.
-  virtual void publish(const Odometry& odometry, const Path* path,
+  /// `odometry`: null while nothing says where the body is; `path`: likewise, and where it is the
+  /// same as before.
+  virtual void publish(const Odometry* odometry, const Path* path,
                        const Diagnostics& diagnostics) = 0;
 
   /// Ends the sensor, and says why.
   void end(LogLevel level, const std::string& why);
   /// Ends it with an InputError of next(): what it has given is not what it should have.
   void fail(const std::string& why);
+  /// Whether the robot is asked where its IMU sits: for messages of /tf_static and a description.
+  bool asks_for_mount() const { return publish_ && !imu_frame_.empty(); }
+  bool has_mount() const;
+  /// What is of no use is said.
+  void take_transforms(std::span<const std::uint8_t> message);
+  void take_description(const std::string& urdf);
+
   /// Whether nothing that could be used has come for this long.
   bool is_idle(Clock::duration longer_than) const;
-  /// Once, some seconds after the start: whether topics without publisher are to be named now.
+  /// Once, some seconds after the start: whether topics without publisher are to be named now. Says
+  /// itself that nothing tells where the IMU sits.
   bool is_time_to_name_missing();
   /// `there`: the topics that are published.
   void name_missing(const std::string& topic, const std::vector<std::string>& there) const;
@@ -57,9 +69,17 @@ class TopicSensor : public Sensor {
   StepQueue* steps() { return steps_; }
 
  private:
+  void find_mount(const std::string& why_not_all);
+  void say_missing_mount();
+
   HostServices services_;
   bag::TopicOptions options_;
+  MakeFields make_fields_;
+  std::string imu_frame_;
+  mutable std::mutex mount_mutex_;
+  FrameTree tree_;
   OutputFrames frames_;
+  bool has_mount_;
   bool publish_;
   double sigma_rate_;
   double warn_latency_s_;

@@ -6,6 +6,9 @@
 //                                 /cam1/image_raw/compressed; best effort, as drivers are
 //   ros2_node wrong DOMAIN N      what must not be: /imu0 of another type, and N messages of joints
 //                                 whose names are missing
+//   ros2_node mount DOMAIN Z      once, latched: on /tf_static where a plate is on base_link, on
+//                                 /robot_description where imu_link is on the plate, Z m above it;
+//                                 until SIGTERM
 //   ros2_node record DOMAIN FILE  viwo/odometry, viwo/path, /tf and /diagnostics, a line each,
 //                                 until SIGTERM
 //   ros2_node play DOMAIN BAG     a ROS 2 bag in its own time, best effort
@@ -36,6 +39,7 @@ using namespace viwo::testing::ros2;
 
 constexpr std::int64_t kStart = 1'700'000'000 * kSecond;
 constexpr int kPerImage = 20;
+std::atomic<bool> terminated = false;
 
 int publish(dds_entity_t node, int n) {
   const Writer imu(node, sensor_msgs_msg_dds__Imu__desc, "/imu0", Delivery::kBestEffort);
@@ -89,7 +93,31 @@ int publish_wrong(dds_entity_t node, int n) {
   return 0;
 }
 
-std::atomic<bool> terminated = false;
+int publish_mount(dds_entity_t node, const std::string& z_m) {
+  const Writer frames(node, tf2_msgs_msg_dds__TFMessage__desc, "/tf_static", Delivery::kLatched);
+  const Writer description(node, std_msgs_msg_dds__String__desc, "/robot_description",
+                           Delivery::kLatched);
+  geometry_msgs_msg_dds__TransformStamped_ plate{};
+  set_header(plate.header, kStart);
+  std::string parent = "base_link", child = "plate";
+  plate.header.frame_id = parent.data();
+  plate.child_frame_id = child.data();
+  plate.transform.translation.x = 0.5;
+  plate.transform.rotation.w = 1.;
+  tf2_msgs_msg_dds__TFMessage_ message{};
+  message.transforms._buffer = &plate;
+  message.transforms._length = message.transforms._maximum = 1;
+  frames.write(&message);
+  std::string urdf =
+      "<robot name='r'><joint name='j' type='fixed'><parent link='plate'/><child link='imu_link'/>"
+      "<origin xyz='0 0 " +
+      z_m + "'/></joint></robot>";
+  std_msgs_msg_dds__String_ text{};
+  text.data = urdf.data();
+  description.write(&text);
+  while (!terminated) dds_sleepfor(DDS_MSECS(20));
+  return 0;
+}
 
 int record(dds_entity_t node, const std::string& file) {
   std::ofstream out(file);
@@ -176,6 +204,7 @@ int run(const std::string& mode, int domain, const std::string& what) {
   int code = 2;
   if (mode == "publish") code = publish(node, std::stoi(what));
   if (mode == "wrong") code = publish_wrong(node, std::stoi(what));
+  if (mode == "mount") code = publish_mount(node, what);
   if (mode == "record") code = record(node, what);
   if (mode == "play") code = play(node, what, Delivery::kBestEffort);
   if (mode == "step") code = play(node, what, Delivery::kKeepAll);
@@ -188,7 +217,7 @@ int run(const std::string& mode, int domain, const std::string& what) {
 
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::cerr << "ros2_node publish|wrong|record|play|step|lossy DOMAIN N|FILE|BAG\n";
+    std::cerr << "ros2_node publish|wrong|mount|record|play|step|lossy DOMAIN N|Z|FILE|BAG\n";
     return 2;
   }
   std::signal(SIGTERM, [](int) { terminated = true; });

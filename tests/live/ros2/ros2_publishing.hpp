@@ -27,7 +27,7 @@ inline void require(dds_return_t code, const std::string& what) {
   if (code < 0) throw std::runtime_error(what + ": " + dds_strretcode(-code));
 }
 
-enum class Delivery { kBestEffort, kKeepAll, kKeepOne };
+enum class Delivery { kBestEffort, kKeepAll, kKeepOne, kLatched };
 
 /// Who publishes a topic of a type.
 class Writer {
@@ -44,6 +44,7 @@ class Writer {
                          DDS_SECS(600));
     const bool all = delivery == Delivery::kKeepAll;
     dds_qset_history(qos, all ? DDS_HISTORY_KEEP_ALL : DDS_HISTORY_KEEP_LAST, all ? 0 : 1);
+    if (delivery == Delivery::kLatched) dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
     writer_ = dds_create_writer(participant, made, qos, nullptr);
     dds_delete_qos(qos);
     require(writer_, "writer of " + topic);

@@ -1,4 +1,5 @@
 // The sensor ros2_topics with another DDS on loopback.
+#include <algorithm>
 #include <chrono>
 #include <string>
 #include <thread>
@@ -45,6 +46,23 @@ class Ros2Topics : public testing::DdsTest {
     const auto deadline = steady_clock::now() + 20s;
     while (!said().has(text) && steady_clock::now() < deadline) std::this_thread::sleep_for(20ms);
     return said().has(text);
+  }
+  /// What the recorder has heard when all of that is there, or after twenty seconds.
+  static std::string publish_until_heard(Sensor& sensor, EstimateSample estimate,
+                                         const std::vector<std::string>& all) {
+    const auto deadline = steady_clock::now() + 20s;
+    std::string heard;
+    const auto has = [&heard](const std::string& one) {
+      return heard.find(one) != std::string::npos;
+    };
+    for (std::int64_t k = 0;
+         !std::all_of(all.begin(), all.end(), has) && steady_clock::now() < deadline; ++k) {
+      estimate.t_ns = kStart + k * 50'000'000;
+      sensor.estimate(estimate);
+      std::this_thread::sleep_for(50ms);
+      heard = dds_->text_of("heard.txt");
+    }
+    return heard;
   }
   /// All that it gives until nothing comes any more.
   struct Given {
@@ -190,27 +208,44 @@ TEST_F(Ros2Topics, PublishesTheEstimate) {
   estimate.calibration_names = {"r_1"};
   estimate.calibration = {0.0255};
   estimate.calibration_sigma = {0.25};
-  const auto deadline = steady_clock::now() + 20s;
-  std::string heard;
-  const auto complete = [&heard] {
-    // The warning last, which has a clock of its own: nothing comes on /imu0.
-    for (const char* line : {"odometry ", "tf ", "path ", " level 1 "}) {
-      if (heard.find(line) == std::string::npos) return false;
-    }
-    return true;
-  };
-  for (std::int64_t k = 0; !complete() && steady_clock::now() < deadline; ++k) {
-    estimate.t_ns = kStart + k * 50'000'000;
-    sensor->estimate(estimate);
-    std::this_thread::sleep_for(50ms);
-    heard = dds_->text_of("heard.txt");
-  }
+  // The warning last, which has a clock of its own: nothing comes on /imu0.
+  const std::string heard =
+      publish_until_heard(*sensor, estimate, {"odometry ", "tf ", "path ", " level 1 "});
   EXPECT_THAT(heard, ContainsRegex("odometry 170000000[0-9]+ map base_link 0.5 2 3 0.25 0.25"))
       << dds_->text_of("recorder.log");
   EXPECT_THAT(heard, ContainsRegex("tf 170000000[0-9]+ map base_link 0.5"));
   EXPECT_THAT(heard, ContainsRegex("path map [0-9]+ 0.5"));
   EXPECT_THAT(heard, ContainsRegex("diagnostics 170000000[0-9]+ level 1 latency_s=0.0125 "));
   EXPECT_THAT(heard, HasSubstr(" r_1=0.0255 sigma r_1=0.25"));
+}
+
+TEST_F(Ros2Topics, AsksTheRobotWhereItsImuSits) {
+  const auto sensor = make(", imu_topic: /imu0, imu_frame: imu_link, body_frame: base_link");
+  Child recorder(dds_->node("record", dds_->file("heard.txt")), dds_->file("recorder.log"));
+  EstimateSample estimate;
+  estimate.p_IinG_m = {1., 2., 3.};
+  // Nothing is said yet of where the body is, but that.
+  const std::string before = publish_until_heard(*sensor, estimate, {"diagnostics ", " level 1 "});
+  EXPECT_THAT(before, ::testing::Not(HasSubstr("odometry ")));
+  EXPECT_TRUE(
+      wait_until_said("nothing says where frame 'imu_link' is in 'base_link': no pose is "
+                      "published (nothing has come on /tf_static)"));
+  Child robot(dds_->node("mount", "0.25"), dds_->file("robot.log"));
+  ASSERT_TRUE(
+      wait_until_said("frame 'imu_link' is in 'base_link' at [0.5, 0, 0.25] m, turned by 0 rad"))
+      << dds_->text_of("robot.log");
+  EXPECT_THAT(publish_until_heard(*sensor, estimate, {"odometry "}),
+              ContainsRegex("odometry 170000000[0-9]+ odom base_link 0.5 2 2.75"));
+  EXPECT_THAT(error_of(", imu_topic: /i, imu_frame: imu_link, p_IinB_m: [1, 0, 0]"),
+              HasSubstr("sensor.imu_frame: p_IinB_m and rpy_ItoB_rad say where 'imu_link' sits"));
+}
+
+TEST_F(Ros2Topics, HearsFramesThatWereSaidBeforeItCame) {
+  Child robot(dds_->node("mount", "0.5"), dds_->file("robot.log"));
+  std::this_thread::sleep_for(500ms);  // it is said once, and long ago
+  const auto sensor = make(", imu_topic: /imu0, imu_frame: imu_link, body_frame: base_link");
+  EXPECT_TRUE(
+      wait_until_said("frame 'imu_link' is in 'base_link' at [0.5, 0, 0.5] m, turned by 0 rad"));
 }
 
 }  // namespace
