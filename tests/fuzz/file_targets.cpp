@@ -1,4 +1,5 @@
 // Files that are read whole, and messages: everything but the recordings of sensor_targets.cpp.
+#include <cmath>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include <zlib.h>
 
+#include "frame_tree.hpp"
 #include "plugin_digest.hpp"
 #include "plugin_file.hpp"
 #include "run_journal.hpp"
@@ -16,6 +18,7 @@
 #include "viwo/image/image_file.hpp"
 #include "viwo/log/kalibr.hpp"
 #include "viwo/log/tum.hpp"
+#include "viwo/math/utf8.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
 #include "viwo/results/run_record.hpp"
 #include "viwo/setup/calibration_file.hpp"
@@ -64,7 +67,9 @@ void image(Bytes bytes) {
 }
 
 void yaml(Bytes bytes) {
-  const config::Node node = config::parse(text_of(bytes), "text.yaml");
+  const std::string text(text_of(bytes));
+  const config::Node node = config::parse(text, "text.yaml");
+  if (valid_utf8(text) != text) return;  // what is none is written as U+FFFD
   require(config::parse(config::to_yaml(node), "again.yaml") == node,
           "YAML that reads back otherwise than it was written");
 }
@@ -125,6 +130,24 @@ void plugin(Bytes bytes) {
   require(plugin_digest(library).size() == digest_in(api_build_record()).size(), "no digest");
 }
 
+/// Each way between frames is a pose.
+void check(const live::FrameTree& tree) {
+  const std::vector<std::string> names = tree.names();
+  for (const std::string& a : names) {
+    const auto pose = tree.find(a, names.front());
+    if (!pose) continue;
+    require(std::abs(pose->R_AtoB.determinant() - 1.) < 1e-6, "a rotation that is none");
+  }
+}
+
+void urdf(Bytes bytes) {
+  live::FrameTree tree;
+  if (const std::string why = tree.add_urdf(std::string(text_of(bytes))); tree.names().empty()) {
+    throw InputError(why.empty() ? "no fixed joints" : why);
+  }
+  check(tree);
+}
+
 #if defined(VIWO_FUZZ_ROS1) || defined(VIWO_FUZZ_ROS2)
 /// The first byte says what the message is said to be.
 template <class Fields>
@@ -133,7 +156,16 @@ void message(Bytes bytes) {
   Image pixels;
   try {
     Fields in(bytes.subspan(1));
-    switch (const auto kind = static_cast<bag::Kind>(bytes[0] % 9); kind) {
+    constexpr int kTwist = 8, kTransforms = 9;
+    const int which = bytes[0] % 10;
+    if (which == kTwist) bag::read_twist(in);
+    if (which == kTransforms) {
+      live::FrameTree tree;
+      for (const bag::Transform& transform : bag::read_transforms(in)) tree.add(transform);
+      check(tree);
+    }
+    if (which >= kTwist) return;
+    switch (const auto kind = static_cast<bag::Kind>(which); kind) {
       case bag::Kind::kImu:
         bag::read_imu(in);
         break;
@@ -152,8 +184,6 @@ void message(Bytes bytes) {
       case bag::Kind::kNavSatFix:
         bag::read_fix(in);
         break;
-      default:
-        bag::read_twist(in);
     }
   } catch (const bag::BrokenMessage& broken) {
     throw InputError(broken.what());
@@ -165,28 +195,31 @@ void message(Bytes bytes) {
 
 std::vector<Target> file_targets() {
   return {
-      {"tum", tum, "framework/log/src/tum.cpp framework/log/src/text_reader.cpp"},
-      {"kalibr_cameras", kalibr_cameras, "framework/log/src/kalibr.cpp"},
-      {"kalibr_imu", kalibr_imu, "framework/log/src/kalibr.cpp"},
-      {"image", image, "framework/image/src/image_file.cpp"},
-      {"yaml", yaml, "framework/config/src/yaml.cpp framework/config/src/node.cpp"},
-      {"run", run_configuration, "framework/setup/src framework/config/src"},
-      {"experiment", experiment_file, "framework/experiment/src/experiment.cpp"},
-      {"calibration", calibration, "framework/setup/src/calibration_file.cpp"},
-      {"journal", journal,
-       "framework/experiment/src/run_journal.cpp framework/results/src/run_record.cpp"},
-      {"plugin", plugin,
-       "framework/plugin_host/src/build_record_check.cpp "
-       "framework/plugin_host/src/plugin_digest.cpp framework/plugin_host/src/plugin_file.cpp"},
+    {"tum", tum, "framework/log/src/tum.cpp framework/log/src/text_reader.cpp"},
+        {"kalibr_cameras", kalibr_cameras, "framework/log/src/kalibr.cpp"},
+        {"kalibr_imu", kalibr_imu, "framework/log/src/kalibr.cpp"},
+        {"image", image, "framework/image/src/image_file.cpp"},
+        {"yaml", yaml, "framework/config/src/yaml.cpp framework/config/src/node.cpp"},
+        {"run", run_configuration, "framework/setup/src framework/config/src"},
+        {"experiment", experiment_file, "framework/experiment/src/experiment.cpp"},
+        {"calibration", calibration, "framework/setup/src/calibration_file.cpp"},
+        {"journal", journal,
+         "framework/experiment/src/run_journal.cpp framework/results/src/run_record.cpp"},
+        {"plugin", plugin,
+         "framework/plugin_host/src/build_record_check.cpp "
+         "framework/plugin_host/src/plugin_digest.cpp framework/plugin_host/src/plugin_file.cpp"},
+#if VIWO_HAS_TINYXML2
+        {"urdf", urdf, "plugins/shared/live/frame_tree.cpp"},
+#endif
 #ifdef VIWO_FUZZ_ROS1
-      {"ros1_message", message<bag::Ros1Fields>,
-       "plugins/shared/bags/messages.cpp "
-       "plugins/shared/bags/bag_image.cpp"},
+        {"ros1_message", message<bag::Ros1Fields>,
+         "plugins/shared/bags/messages.cpp "
+         "plugins/shared/bags/bag_image.cpp"},
 #endif
 #ifdef VIWO_FUZZ_ROS2
-      {"cdr", message<bag::Ros2Fields>,
-       "plugins/shared/bags/messages.cpp "
-       "plugins/shared/bags/bag_image.cpp"},
+        {"cdr", message<bag::Ros2Fields>,
+         "plugins/shared/bags/messages.cpp "
+         "plugins/shared/bags/bag_image.cpp"},
 #endif
   };
 }

@@ -74,10 +74,10 @@ class Message:
 
     def __init__(self, cdr):
         self.cdr, self.body = cdr, b""
-        self.put("I", 7) if not cdr else None  # sequence number
-        self.put("I", 100)
-        self.put("I", 5000000)
-        self.text("frame")
+
+    def header(self):
+        self.put("I", 7) if not self.cdr else None  # sequence number
+        return self.put("I", 100).put("I", 5000000).text("frame")
 
     def put(self, form, *values):
         size = struct.calcsize("<" + form)
@@ -104,7 +104,7 @@ class Message:
 
 def messages(cdr, png):
     def new():
-        return Message(cdr)
+        return Message(cdr).header()
     joints = new().put("I", 2).text("a").text("b").put("I", 2).put("d", 1., 2.).put("I", 2).put("d", 3., 4.)
     kinds = [
         new().put("d", *[0., 0., 0., 1.], *[0.] * 9, 1., 2., 3., *[0.] * 9, 0., 0., 9.8, *[0.] * 9),
@@ -116,6 +116,10 @@ def messages(cdr, png):
         new().put("b", 0).put("H", 1).put("d", 45., 16., 120., *[1., 0., 0., 0., 1., 0., 0., 0., 1.]).put("B", 3)]
     out = {f"{i}": bytes([i]) + kind.bytes() for i, kind in enumerate(kinds)}
     out["8"] = bytes([8]) + kinds[6].bytes()
+    frames = Message(cdr).put("I", 2)
+    for child in ("imu", "camera"):
+        frames.header().text(child).put("d", 1., 2., 3., 0., 0., 0.6, 0.8)
+    out["9"] = bytes([9]) + frames.bytes()
     for name, size in (("rgb8", 9), ("mono16", 6), ("bayer_rggb8", 3), ("yuv422", 6)):
         out[name] = bytes([1]) + new().put("I", 2, 3).text(name).put("B", 0).put("I", size).raw(bytes(2 * size)).bytes()
     return out
@@ -223,6 +227,11 @@ def main():
             seed(target, name, data)
     seed("sqlite_bag", "imu", database(messages(True, png)["0"][1:], folder))
 
+    seed("urdf", "a", "<?xml version='1.0'?>\n<robot name='r'><link name='a'/>\n<joint name='j' type='fixed'>"
+         "<parent link='a'/><child link='b'/><origin xyz='0.1 0 2e-1' rpy='0 0 1.5'/></joint>\n"
+         "<joint name='k' type='fixed'><parent link='b'/><child link='/c'/></joint>"
+         "<joint name='w' type='continuous'><parent link='a'/><child link='w'/></joint></robot>\n")
+
     seed("tum", "a", "# t x y z qx qy qz qw\n1.000000001 1 2 3 0 0 0 1\n2.5 1e-3 2 3 0.6 0 0 0.8\n")
     for name in ("pinhole", "euroc", "t265_like", "kaist_urban"):
         seed("kalibr_cameras", name, (ROOT / f"configs/cameras/{name}.yaml").read_bytes())
@@ -232,8 +241,9 @@ def main():
     seed("image", "pgm", b"P5 3 2 255\n" + bytes(6))
     seed("yaml", "all", "a: &x {b: [1, 'two', \"t\\u00e9\\n\"], c: ~}\n<<: *x\nd: |\n  text\n  more\ne: !!str 1\nf: - 1\n"
          .replace("f: - 1\n", "f:\n  - 1\n  - {g: *x}\n"))
-    for name in ("robot", "camera"):
-        seed("run", name, (FILES / f"{name}.yaml").read_bytes())
+    for name in ("robot", "camera"):  # to simulate takes longer than to read
+        seed("run", name, (FILES / f"{name}.yaml").read_bytes().replace(b"    features: 15", b"    duration_s: 0.5\n    features: 15")
+             .replace(b"    duration_s: 4\n", b""))
     seed("run", "log", "sensors: {imu: {type: asl_imu, path: imu0}, wheels: {type: asl_encoders, path: wheels0}}\n"
          "kinematics: {type: differential, radius_left_m: 0.05, radius_right_m: 0.05, baseline_m: 0.3}\n"
          "estimator: {start: moving, clones: 4}\nupdates: {wheel_odometry: {}}\n")

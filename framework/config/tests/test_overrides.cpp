@@ -97,7 +97,7 @@ TEST(Overrides, ParseAnAssignmentAsYaml) {
   EXPECT_EQ(list.value.at_path("1.c")->mark().text(), "--set a.b");
   EXPECT_TRUE(parse_assignment("a=").value.is_null());
   EXPECT_EQ(error_of([] { parse_assignment("a.b"); }), "--set a.b  expected path.to.key=value");
-  EXPECT_EQ(error_of([] { parse_assignment("a=[1").value; }).substr(0, 27),
+  EXPECT_EQ(error_of([] { parse_assignment("a=[1"); }).substr(0, 27),
             "--set a  not valid YAML: en");
 }
 

@@ -174,7 +174,8 @@ TEST(Joints, AreTakenAgainWhenTheLogGoesOnMoreSlowly) {
   int n_rejected = 0;
   double t_s = 0.;
   for (int k = 0; k < 200; ++k) {
-    EncoderReading reading = reading_of(t_s += k < 100 ? 0.01 : 0.05, {wrapped(t_s, 1.)});
+    t_s += k < 100 ? 0.01 : 0.05;
+    EncoderReading reading = reading_of(t_s, {wrapped(t_s, 1.)});
     if (map.convert(reading) == nullptr) continue;
     ++n_rejected;
     EXPECT_LT(k, 120);
@@ -428,9 +429,9 @@ TEST(Joints, AllocateNothing) {
   JointMap map(params, 4, 4, true, 0.2);
   const EncoderReading reading = reading_of(0., {0., 0., 0., 0.}, {0., 0., 0., 0.});
   const long before = testing::allocations();
-  for (std::int64_t k = 0; k < 100; ++k) {
+  for (std::size_t k = 0; k < 100; ++k) {
     EncoderReading next = reading;
-    next.t_ns = k * 10'000'000;
+    next.t_ns = static_cast<std::int64_t>(k) * 10'000'000;
     next.drive[k % 4] = k % 7 == 0 ? 0.5 : 0.;  // some are rejected
     next.steer_rad[k % 3] = k % 11 == 0 ? 0.5 : 0.;
     map.convert(next);

@@ -17,6 +17,8 @@
 namespace viwo::live {
 namespace {
 
+constexpr const char* kTooMany = "more frames than a robot has (1000)";
+
 std::string plain(std::string_view name) {
   return std::string(name.substr(name.starts_with('/') ? 1 : 0));
 }
@@ -58,6 +60,7 @@ std::string FrameTree::add(const bag::Transform& transform) {
   if (!p.allFinite() || !(std::abs(q.norm() - 1.) < 1e-2)) {
     return "a transform of frame '" + child + "' that is none (numbers, or norm of the quaternion)";
   }
+  if (is_full_for(child)) return kTooMany;
   fixed_[child] = {parent, {q.normalized().toRotationMatrix(), p}};
   return "";
 }
@@ -84,6 +87,7 @@ std::string FrameTree::add_urdf(const std::string& xml) {
       unused = "a fixed joint of the robot's description, of '" + child + "', is none";
       continue;
     }
+    if (is_full_for(child)) return kTooMany;
     // What /tf_static says is what the robot runs with.
     fixed_.try_emplace(child, Fixed{parent, {rotation_of_rpy(*rpy), *p}});
   }
@@ -92,6 +96,10 @@ std::string FrameTree::add_urdf(const std::string& xml) {
   (void)xml;
   return "this build reads no description of a robot (libtinyxml2-dev)";
 #endif
+}
+
+bool FrameTree::is_full_for(const std::string& child) const {
+  return fixed_.size() >= kMost && fixed_.find(child) == fixed_.end();
 }
 
 std::vector<std::pair<std::string, FramePose>> FrameTree::up_from(const std::string& name) const {

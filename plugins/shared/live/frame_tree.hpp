@@ -1,6 +1,7 @@
 // Where frames of a robot are, by what it says of itself: /tf_static and its URDF.
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <optional>
 #include <string>
@@ -22,6 +23,8 @@ struct FramePose {
 /// Frames by the frame that each is fixed to. Names may begin with '/', as those of old had to.
 class FrameTree {
  public:
+  static constexpr std::size_t kMost = 1000;  ///< frames; no robot has so many
+
   /// Newer ones replace what was known of the child. Why it is of no use; "" when it was taken.
   std::string add(const bag::Transform& transform);
   /// The fixed joints of a robot's description (URDF). Likewise.
@@ -36,6 +39,7 @@ class FrameTree {
     std::string parent;
     FramePose pose;
   };
+  bool is_full_for(const std::string& child) const;
   /// The frames from `name` to its root and where `name` is in each; none twice.
   std::vector<std::pair<std::string, FramePose>> up_from(const std::string& name) const;
 

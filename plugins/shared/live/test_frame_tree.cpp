@@ -66,6 +66,17 @@ TEST(FrameTree, RefusesWhatIsNoTransformAndSurvivesRings) {
   EXPECT_TRUE(tree.find("a", "b"));
 }
 
+TEST(FrameTree, TakesNoMoreThanARobotHas) {
+  FrameTree tree;
+  for (std::size_t i = 0; i < FrameTree::kMost; ++i) {
+    ASSERT_EQ(tree.add(turned_z("f" + std::to_string(i), "f" + std::to_string(i + 1), 0., 1., 0.)),
+              "");
+  }
+  EXPECT_THAT(tree.add(turned_z("f0", "one", 1., 0., 0.)), HasSubstr("more frames"));
+  EXPECT_EQ(tree.add(turned_z("f999", "f1000", 0., 2., 0.)), "") << "known ones may change";
+  expect_at(tree.find("f1000", "f0"), 0., 1001., 0., 0.);
+}
+
 #if VIWO_HAS_TINYXML2
 TEST(FrameTree, TakesTheFixedJointsOfADescription) {
   FrameTree tree;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -149,10 +150,12 @@ void TopicSensor::take_description(const std::string& urdf) {
 }
 
 void TopicSensor::find_mount(const std::string& why_not_all) {
-  if (!why_not_all.empty()) services_.log(LogLevel::kWarning, why_not_all + "; it is not used");
   std::string text;
   {
     const std::scoped_lock lock(mount_mutex_);
+    if (std::exchange(why_not_all_, why_not_all) != why_not_all && !why_not_all.empty()) {
+      services_.log(LogLevel::kWarning, why_not_all + "; it is not used");
+    }
     const auto found = tree_.find(imu_frame_, frames_.body);
     if (!found) return;
     const bool is_same = has_mount_ && found->R_AtoB.isApprox(frames_.R_ItoB, 1e-9) &&

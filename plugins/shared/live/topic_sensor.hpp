@@ -80,6 +80,7 @@ class TopicSensor : public Sensor {
   FrameTree tree_;
   OutputFrames frames_;
   bool has_mount_;
+  std::string why_not_all_;  ///< as it was said last
   bool publish_;
   double sigma_rate_;
   double warn_latency_s_;
