@@ -28,6 +28,9 @@ options=(-max_len=16384 -print_final_stats=1 -print_funcs=0 -use_value_profile=1
 fuzz() {  # TARGET SECONDS
   local corpus=build-fuzz/corpus/$1 log=build-fuzz/fuzz_$1.log status=0
   mkdir -p "$corpus" build-fuzz/findings
+  # A hundred epochs of a filter whose linear algebra is instrumented take seconds.
+  local limits=("${limits[@]}")
+  if [[ $1 = filter* ]]; then limits+=(-timeout=120); fi
   VIWO_FUZZ_TARGET=$1 build-fuzz/tests/fuzz/viwo_fuzz "${limits[@]}" "${options[@]}" \
     -max_total_time="$2" -artifact_prefix="build-fuzz/findings/$1-" "$corpus" "tests/fuzz/corpus/$1" \
     > "$log" 2>&1 || status=1
