@@ -73,6 +73,7 @@ void blank_search_path(std::string& bytes, std::span<const elf::Segment> segment
       kept.push_back(entry);
     }
   }
+  if (n == 0) return;
   kept.resize(n);
   std::memcpy(bytes.data() + begin, kept.data(), n * sizeof(elf::Dynamic));
   for (const std::uint64_t path : paths) {

@@ -46,8 +46,10 @@ class Structure {
     while (at < size_) {
       const Record record = read_record(at, size_);
       check_record(record);
+      index_is_record_ = index_is_record_ || at == index_place_;
       at = record.end;
     }
+    if (!index_is_record_) fail(index_place_, "there is no record where the index should begin");
     for (const std::uint64_t place : wanted_chunks_) {
       if (!chunks_.contains(place)) fail(place, "there is no chunk where the index has one");
     }
@@ -125,19 +127,19 @@ class Structure {
     const std::uint32_t data_size = u32_at(std::string_view(rest).substr(size));
     if (data_size > end - record.data) fail(at, "a record goes beyond the end");
     record.end = record.data + data_size;
-    check_fields(record);
+    check_fields(record.header, at);
     const std::string_view op = record.field("op");
     if (op.size() != 1) fail(at, "a record has no kind");
     record.op = op[0];
     return record;
   }
 
-  void check_fields(const Record& record) const {
-    std::string_view rest = record.header;
+  /// roscpp believes the lengths of fields, whatever there is behind them.
+  void check_fields(std::string_view rest, std::uint64_t record_begin) const {
     while (!rest.empty()) {
       if (rest.size() < 4 || u32_at(rest) > rest.size() - 4 ||
           rest.substr(4, u32_at(rest)).find('=') == std::string_view::npos) {
-        fail(record.begin, "the header of a record is wrong");
+        fail(record_begin, "the header of a record is wrong");
       }
       rest.remove_prefix(4 + u32_at(rest));
     }
@@ -169,14 +171,20 @@ class Structure {
         wanted_chunks_.insert(place(record, "chunk_pos"));
         return check_list(record, 8);
       case kConnection:
-        connections_.insert(number(record, "conn"));
-        return;
+        return check_connection(record);
       default:
         fail(record.begin, "a record is of an unknown kind");
     }
   }
 
-  void check_file_header(const Record& record) const {
+  /// Its data are the header that the publisher gave.
+  void check_connection(const Record& record) {
+    connections_.insert(number(record, "conn"));
+    if (record.end - record.data > kMaxHeader) fail(record.begin, "the header of a topic is wrong");
+    check_fields(read(record.data, record.end - record.data), record.begin);
+  }
+
+  void check_file_header(const Record& record) {
     const std::string_view encryptor = record.field("encryptor");
     if (!encryptor.empty() && encryptor != "rosbag/NoEncryptor") {
       throw InputError(file_ + "  is encrypted, which is not read");
@@ -186,6 +194,8 @@ class Structure {
       throw InputError(file_ + "  has no index: its recording was not ended" + remedy());
     }
     if (index > size_) fail(size_, "the file ends before its index");
+    index_place_ = index;
+    index_is_record_ = index == size_;  // of a bag without topics
   }
 
   /// A list of items as long as `count` says.
@@ -295,6 +305,8 @@ class Structure {
   std::string file_;
   FileBytes in_;
   std::uint64_t size_;
+  std::uint64_t index_place_ = 0;
+  bool index_is_record_ = false;
   std::set<std::uint64_t> chunks_, wanted_chunks_;
   std::set<std::uint32_t> connections_, indexed_;
   std::uint64_t whole_bytes_ = 0;  ///< of all chunks, decompressed

@@ -212,6 +212,22 @@ std::string compressed_bag(const std::vector<std::uint32_t>& sizes, const std::s
   return out + record({"op=\x07", "conn=" + raw(std::uint32_t{0}), "topic=/imu0"}, "");
 }
 
+TEST_F(Ros1Bag, RefusesWhatRosWouldBelieveBeyondTheEndOfARecord) {
+  write_drive();
+  const std::string whole = read();
+  std::string content = whole;
+  // The header that a publisher gave, in the index.
+  content.replace(content.rfind("message_definition=") - 4, 4, raw(std::uint32_t{900'000}));
+  std::ofstream(file(), std::ios::binary) << content;
+  EXPECT_THAT(error_of(section(kAll)), HasSubstr("the header of a record is wrong"));
+  content = whole;
+  const auto place = content.find("index_pos=") + 10;
+  content[place] = static_cast<char>(content[place] ^ 1);
+  std::ofstream(file(), std::ios::binary) << content;
+  EXPECT_THAT(error_of(section(kAll)),
+              HasSubstr("there is no record where the index should begin"));
+}
+
 TEST_F(Ros1Bag, RefusesChunksThatTakeMoreThanARecordingDoes) {
   const auto error = [this](const std::vector<std::uint32_t>& sizes, const std::string& bytes) {
     std::ofstream(file(), std::ios::binary) << compressed_bag(sizes, bytes);
