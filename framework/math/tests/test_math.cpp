@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "viwo/math/chi2.hpp"
+#include "viwo/math/rpy.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/math/trajectory.hpp"
@@ -163,6 +164,23 @@ TEST(Utf8, KeepsCharactersAndReplacesEachOtherByte) {
   expect("\xed\xa0\x80", no + no + no);           // half of a pair
   expect("\xf4\x90\x80\x80", no + no + no + no);  // beyond the last
   expect("\xf5\xff\xfe", no + no + no);           // in no text at all
+}
+
+TEST(Rpy, TurnsAboutFixedAxesInTheirOrder) {
+  // Each axis by hand: roll takes y to z, then pitch z to x, then yaw x to y.
+  const Eigen::Vector3d y = rotation_of_rpy({M_PI_2, M_PI_2, M_PI_2}) * Eigen::Vector3d::UnitY();
+  EXPECT_NEAR((y - Eigen::Vector3d::UnitY()).norm(), 0., 1e-12);
+  const Eigen::Vector3d x = rotation_of_rpy({0.3, M_PI_2, 0.}) * Eigen::Vector3d::UnitX();
+  EXPECT_NEAR((x + Eigen::Vector3d::UnitZ()).norm(), 0., 1e-12);
+  for (const Eigen::Vector3d& rpy :
+       {Eigen::Vector3d(0.1, -0.7, 2.5), Eigen::Vector3d(-3., 1.5, -0.2),
+        Eigen::Vector3d::Zero().eval()}) {
+    EXPECT_NEAR((rpy_of_rotation(rotation_of_rpy(rpy)) - rpy).norm(), 0., 1e-12);
+  }
+  for (const double pitch : {M_PI_2, -M_PI_2}) {
+    const Eigen::Matrix3d R = rotation_of_rpy({0.4, pitch, 0.9});
+    EXPECT_NEAR((rotation_of_rpy(rpy_of_rotation(R)) - R).norm(), 0., 1e-7) << "up or down";
+  }
 }
 
 }  // namespace

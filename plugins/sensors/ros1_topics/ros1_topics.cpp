@@ -141,18 +141,24 @@ class Ros1Topics final : public live::TopicSensor {
         });
   }
 
+  /// A parameter that may be set later. The master is asked for nothing when it is not there.
+  void ask_for_description() {
+    if (!asks_for_mount() || has_mount() || description_.empty()) return;
+    if (!is_reachable(master_, kProbe)) return;
+    std::string urdf;
+    if (!ros::param::get(description_, urdf)) return;
+    take_description(urdf);
+    description_.clear();
+  }
+
   /// Every second.
   void watch() {
-    std::string urdf;
-    if (asks_for_mount() && !has_mount() && !description_.empty() &&
-        node_->getParam(description_, urdf)) {
-      take_description(urdf);
-      description_.clear();
-    }
-    if (is_time_to_name_missing()) name_missing_topics();
     if (is_idle(kSilence) && !is_reachable(master_, kProbe)) {
       end(LogLevel::kWarning, "the ROS master at " + master_.uri + " is gone and nothing comes");
+      return;
     }
+    ask_for_description();
+    if (is_time_to_name_missing()) name_missing_topics();
   }
 
   /// Topics that nobody publishes, with those that were perhaps meant.

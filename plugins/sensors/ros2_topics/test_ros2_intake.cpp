@@ -282,6 +282,19 @@ TEST(CdrMessage, HasZerosBetweenItsNumbersHoweverLongItIs) {
   EXPECT_EQ(in.u32(), 3U);
 }
 
+TEST(CdrMessage, AlignsWhatMakesItGrow) {
+  for (std::size_t n = 1000; n < 1040; ++n) {
+    CdrMessage out;
+    for (std::size_t i = 0; i < n; ++i) out << std::uint8_t{7};
+    out << std::uint16_t{0x0102} << std::uint8_t{3} << 4.;
+    bag::Ros2Fields in(out.bytes());
+    for (std::size_t i = 0; i < n; ++i) in.u8();
+    ASSERT_EQ(in.u16(), 0x0102) << n;
+    ASSERT_EQ(in.u8(), 3) << n;
+    ASSERT_EQ(in.f64(), 4.) << n;
+  }
+}
+
 TEST(Ros2Messages, HaveEachNumberAtItsPlace) {
   live::Odometry odometry;
   odometry.pose = {kTime, {1., 2., 3.}, {0.1, 0.2, 0.3, 0.9}};

@@ -59,7 +59,10 @@ class CdrMessage {
     buffer_.emplace(bytes_.data(), bytes_.size());
     out_.emplace(*buffer_, order_, kDdsCdr);
     out_->serialize_encapsulation();
-    if (n_written > kEncapsulationBytes) out_->jump(n_written - kEncapsulationBytes);
+    if (n_written <= kEncapsulationBytes) return;
+    // The last byte is written again: the next number is aligned by the size of what was before it.
+    out_->jump(n_written - kEncapsulationBytes - 1);
+    *out_ << bytes_[n_written - 1];
   }
 
   Cdr::Endianness order_;

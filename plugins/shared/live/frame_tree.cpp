@@ -10,6 +10,9 @@
 
 #include <Eigen/Geometry>
 
+#include "viwo/log/text.hpp"
+#include "viwo/math/rpy.hpp"
+
 #if VIWO_HAS_TINYXML2
 #include <tinyxml2.h>
 #endif
@@ -17,11 +20,8 @@
 namespace viwo::live {
 namespace {
 
-constexpr const char* kTooMany = "more frames than a robot has (1000)";
-
-std::string plain(std::string_view name) {
-  return std::string(name.substr(name.starts_with('/') ? 1 : 0));
-}
+constexpr std::size_t kLongestName = 256;
+constexpr double kFarthest_m = 1e6;
 
 #if VIWO_HAS_TINYXML2
 /// Three numbers, or none where nothing is said (null).
@@ -44,32 +44,48 @@ std::string attribute(const tinyxml2::XMLElement& joint, const char* child, cons
 
 }  // namespace
 
-Eigen::Matrix3d rotation_of_rpy(const Eigen::Vector3d& rpy_rad) {
-  return (Eigen::AngleAxisd(rpy_rad.z(), Eigen::Vector3d::UnitZ()) *
-          Eigen::AngleAxisd(rpy_rad.y(), Eigen::Vector3d::UnitY()) *
-          Eigen::AngleAxisd(rpy_rad.x(), Eigen::Vector3d::UnitX()))
-      .toRotationMatrix();
+std::string plain_name(std::string_view name) {
+  return std::string(name.substr(name.starts_with('/') ? 1 : 0));
+}
+
+std::string FrameTree::put(const std::string& child, const Fixed& fixed) {
+  if (fixed.parent.empty() || child.empty()) return "a transform of a frame without a name";
+  if (fixed.parent.size() > kLongestName || child.size() > kLongestName) {
+    return "a name of a frame that is longer than 256 bytes";
+  }
+  if (fixed.parent == child) return "a transform of frame " + log::quoted(child) + " to itself";
+  if (!fixed.pose.R_AtoB.allFinite() || !(fixed.pose.p_AinB.norm() < kFarthest_m)) {
+    return "a transform of frame " + log::quoted(child) +
+           " that is none (numbers, or norm of the quaternion)";
+  }
+  const auto known = fixed_.find(child);
+  if (known == fixed_.end() && fixed_.size() >= kMost) {
+    return "more frames than a robot has (1000)";
+  }
+  // What /tf_static says is what the robot runs with.
+  if (known != fixed_.end() && fixed.is_of_urdf && !known->second.is_of_urdf) return "";
+  fixed_[child] = fixed;
+  return "";
+}
+
+void FrameTree::merge(const FrameTree& other) {
+  for (const auto& [child, fixed] : other.fixed_) put(child, fixed);
 }
 
 std::string FrameTree::add(const bag::Transform& transform) {
-  const std::string parent = plain(transform.parent), child = plain(transform.child);
-  if (parent.empty() || child.empty()) return "a transform of a frame without a name";
-  if (parent == child) return "a transform of frame '" + child + "' to itself";
   const Eigen::Quaterniond q(Eigen::Map<const Eigen::Vector4d>(transform.q_xyzw.data()));
-  const Eigen::Vector3d p(transform.p_m.data());
-  if (!p.allFinite() || !(std::abs(q.norm() - 1.) < 1e-2)) {
-    return "a transform of frame '" + child + "' that is none (numbers, or norm of the quaternion)";
-  }
-  if (is_full_for(child)) return kTooMany;
-  fixed_[child] = {parent, {q.normalized().toRotationMatrix(), p}};
-  return "";
+  const bool is_turn = std::abs(q.norm() - 1.) < 1e-2;
+  const Eigen::Matrix3d R =
+      is_turn ? q.normalized().toRotationMatrix() : Eigen::Matrix3d::Constant(NAN);
+  return put(plain_name(transform.child),
+             {plain_name(transform.parent), {R, Eigen::Vector3d(transform.p_m.data())}});
 }
 
 std::string FrameTree::add_urdf(const std::string& xml) {
 #if VIWO_HAS_TINYXML2
   tinyxml2::XMLDocument document;
   if (document.Parse(xml.data(), xml.size()) != tinyxml2::XML_SUCCESS) {
-    return std::string("the robot's description is no XML: ") + document.ErrorStr();
+    return "the robot's description is no XML: " + log::printable(document.ErrorStr());
   }
   const tinyxml2::XMLElement* const robot = document.FirstChildElement("robot");
   if (robot == nullptr) return "the robot's description has no element 'robot'";
@@ -81,25 +97,19 @@ std::string FrameTree::add_urdf(const std::string& xml) {
     const auto* const origin = joint->FirstChildElement("origin");
     const auto p = three_numbers(origin != nullptr ? origin->Attribute("xyz") : nullptr);
     const auto rpy = three_numbers(origin != nullptr ? origin->Attribute("rpy") : nullptr);
-    const std::string parent = plain(attribute(*joint, "parent", "link"));
-    const std::string child = plain(attribute(*joint, "child", "link"));
-    if (!p || !rpy || parent.empty() || child.empty() || parent == child) {
-      unused = "a fixed joint of the robot's description, of '" + child + "', is none";
-      continue;
+    const std::string child = plain_name(attribute(*joint, "child", "link"));
+    const std::string parent = plain_name(attribute(*joint, "parent", "link"));
+    std::string why = "its origin is not of three numbers each";
+    if (p && rpy) why = put(child, {parent, {rotation_of_rpy(*rpy), *p}, true});
+    if (!why.empty()) {
+      unused = "the robot's description, fixed joint of " + log::quoted(child) + ": " + why;
     }
-    if (is_full_for(child)) return kTooMany;
-    // What /tf_static says is what the robot runs with.
-    fixed_.try_emplace(child, Fixed{parent, {rotation_of_rpy(*rpy), *p}});
   }
   return unused;
 #else
   (void)xml;
   return "this build reads no description of a robot (libtinyxml2-dev)";
 #endif
-}
-
-bool FrameTree::is_full_for(const std::string& child) const {
-  return fixed_.size() >= kMost && fixed_.find(child) == fixed_.end();
 }
 
 std::vector<std::pair<std::string, FramePose>> FrameTree::up_from(const std::string& name) const {
@@ -117,7 +127,7 @@ std::vector<std::pair<std::string, FramePose>> FrameTree::up_from(const std::str
 }
 
 std::optional<FramePose> FrameTree::find(const std::string& a, const std::string& b) const {
-  const auto from_a = up_from(plain(a)), from_b = up_from(plain(b));
+  const auto from_a = up_from(plain_name(a)), from_b = up_from(plain_name(b));
   for (const auto& [name, a_there] : from_a) {
     const auto common = std::find_if(from_b.begin(), from_b.end(),
                                      [&name = name](const auto& up) { return up.first == name; });
@@ -127,6 +137,11 @@ std::optional<FramePose> FrameTree::find(const std::string& a, const std::string
     return FramePose{back * a_there.R_AtoB, back * (a_there.p_AinB - b_there.p_AinB)};
   }
   return std::nullopt;
+}
+
+bool FrameTree::has(const std::string& name) const {
+  const auto all = names();
+  return std::find(all.begin(), all.end(), plain_name(name)) != all.end();
 }
 
 std::vector<std::string> FrameTree::names() const {

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -30,23 +31,28 @@ class FrameTree {
   /// The fixed joints of a robot's description (URDF). Likewise.
   std::string add_urdf(const std::string& xml);
 
-  /// Where `a` is in `b`; nothing when nothing says so.
+  /// Takes what the other has, too.
+  void merge(const FrameTree& other);
+
+  /// Where `a` is in `b`; nothing when no fixed frames join them.
   std::optional<FramePose> find(const std::string& a, const std::string& b) const;
+  bool has(const std::string& name) const;
   std::vector<std::string> names() const;
 
  private:
   struct Fixed {
     std::string parent;
     FramePose pose;
+    bool is_of_urdf = false;
   };
-  bool is_full_for(const std::string& child) const;
+  std::string put(const std::string& child, const Fixed& fixed);
   /// The frames from `name` to its root and where `name` is in each; none twice.
   std::vector<std::pair<std::string, FramePose>> up_from(const std::string& name) const;
 
   std::map<std::string, Fixed> fixed_;
 };
 
-/// R = Rz(yaw) Ry(pitch) Rx(roll).
-Eigen::Matrix3d rotation_of_rpy(const Eigen::Vector3d& rpy_rad);
+/// Without the '/' that it may begin with.
+std::string plain_name(std::string_view name);
 
 }  // namespace viwo::live

@@ -2,8 +2,8 @@
 
 #include <set>
 
-#include "frame_tree.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/math/rpy.hpp"
 
 namespace viwo::live {
 

@@ -58,6 +58,10 @@ TEST(FrameTree, RefusesWhatIsNoTransformAndSurvivesRings) {
   EXPECT_THAT(tree.add({"base", "imu", {}, {0., 0., nan, 1.}}), HasSubstr("that is none"));
   EXPECT_THAT(tree.add({"base", "imu", {0., nan, 0.}, {0., 0., 0., 1.}}),
               HasSubstr("that is none"));
+  EXPECT_THAT(tree.add({"base", "imu", {1e308, 0., 0.}, {0., 0., 0., 1.}}), HasSubstr("is none"));
+  EXPECT_THAT(tree.add(turned_z("base", std::string(1000, 'x'), 1., 0., 0.)), HasSubstr("256"));
+  EXPECT_THAT(tree.add({"base", "\x1b[31m", {}, {0., 0., 0., 0.}}),
+              ::testing::Not(HasSubstr("\x1b")));
   EXPECT_TRUE(tree.names().empty());
   tree.add(turned_z("a", "b", 1., 0., 0.));
   tree.add(turned_z("b", "c", 1., 0., 0.));
@@ -88,14 +92,15 @@ TEST(FrameTree, TakesTheFixedJointsOfADescription) {
     <joint name="steer" type="continuous"><parent link="base_link"/><child link="wheel"/></joint>
     <joint name="bad" type="fixed"><parent link="base_link"/><child link="lamp"/>
       <origin xyz="1 two 3"/></joint></robot>)";
-  EXPECT_THAT(tree.add_urdf(urdf), HasSubstr("of 'lamp', is none"));
+  EXPECT_THAT(tree.add_urdf(urdf), HasSubstr("of 'lamp': its origin is not of three numbers"));
   expect_at(tree.find("imu", "base_link"), 0.1, 1., 0.5, M_PI_2);
   EXPECT_FALSE(tree.find("wheel", "base_link")) << "it moves";
   EXPECT_FALSE(tree.find("lamp", "base_link"));
-  // Roll, then pitch, then yaw, about fixed axes: x goes to y by the yaw alone, z to x by the
-  // pitch.
-  const Eigen::Vector3d turned = rotation_of_rpy({0.3, M_PI_2, 0.}) * Eigen::Vector3d::UnitX();
-  EXPECT_NEAR((turned - Eigen::Vector3d(0., 0., -1.)).norm(), 0., 1e-12);
+  // What is newer holds.
+  std::string moved = urdf;
+  moved.replace(moved.find("\"1 0 0\"") + 1, 1, "3");
+  tree.add_urdf(moved);
+  expect_at(tree.find("imu", "base_link"), 0.1, 3., 0.5, M_PI_2);
   // /tf_static holds, whichever came first.
   EXPECT_EQ(tree.add(turned_z("mast", "imu", 2., 0., 0.)), "");
   tree.add_urdf(urdf);

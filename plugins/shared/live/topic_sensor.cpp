@@ -10,6 +10,8 @@
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/rpy.hpp"
+#include "viwo/math/significant.hpp"
 
 namespace viwo::live {
 namespace {
@@ -19,6 +21,12 @@ using namespace std::chrono_literals;
 constexpr auto kPoll = 100ms;           ///< how late an end that nobody signals is seen
 constexpr auto kTopicSilence = 1000ms;  ///< of one topic: worth a warning
 constexpr auto kPublisherWait = 3s;     ///< before topics without publisher are named
+
+std::string list_text(const Eigen::Vector3d& v) {
+  std::string text;
+  for (const double value : v) text += (text.empty() ? "[" : ", ") + significant(value, 6);
+  return text + "]";
+}
 
 std::unique_ptr<MeasurementQueue> make_queue(const LiveParams& params, Pace pace) {
   const auto max_images = static_cast<std::size_t>(params.max_waiting_images);
@@ -42,7 +50,9 @@ TopicSensor::TopicSensor(const LiveParams& params, const HostServices& services,
       idle_timeout_(std::llround(1e3 * params.idle_timeout_s)),
       queue_(make_queue(params, pace)),
       steps_(dynamic_cast<StepQueue*>(queue_.get())),
-      intake_(options_, services_, *queue_, make_fields, pace) {}
+      intake_(options_, services_, *queue_, make_fields, pace) {
+  if (asks_for_mount()) find_mount("");  // of a frame in itself it is known
+}
 
 Status TopicSensor::next(Measurement& out) {
   const auto since = Clock::now();
@@ -141,21 +151,20 @@ void TopicSensor::take_transforms(std::span<const std::uint8_t> message) {
 }
 
 void TopicSensor::take_description(const std::string& urdf) {
-  std::string why;
+  FrameTree described;  // to read it takes time, which the estimate is not to wait for
+  const std::string why = described.add_urdf(urdf);
   {
     const std::scoped_lock lock(mount_mutex_);
-    why = tree_.add_urdf(urdf);
+    tree_.merge(described);
   }
   find_mount(why);
 }
 
 void TopicSensor::find_mount(const std::string& why_not_all) {
+  if (!why_not_all.empty()) say_once(LogLevel::kWarning, why_not_all + "; it is not used");
   std::string text;
   {
     const std::scoped_lock lock(mount_mutex_);
-    if (std::exchange(why_not_all_, why_not_all) != why_not_all && !why_not_all.empty()) {
-      services_.log(LogLevel::kWarning, why_not_all + "; it is not used");
-    }
     const auto found = tree_.find(imu_frame_, frames_.body);
     if (!found) return;
     const bool is_same = has_mount_ && found->R_AtoB.isApprox(frames_.R_ItoB, 1e-9) &&
@@ -164,13 +173,20 @@ void TopicSensor::find_mount(const std::string& why_not_all) {
     has_mount_ = true;
     frames_.R_ItoB = found->R_AtoB;
     frames_.p_IinB = found->p_AinB;
-    const Eigen::Vector3d& p = frames_.p_IinB;
-    const Eigen::AngleAxisd turn(frames_.R_ItoB);
-    text = "frame '" + imu_frame_ + "' is in '" + frames_.body + "' at [" +
-           log::number_text(p.x()) + ", " + log::number_text(p.y()) + ", " +
-           log::number_text(p.z()) + "] m, turned by " + log::number_text(turn.angle()) + " rad";
+    text = "frame '" + imu_frame_ + "' is in '" + frames_.body +
+           "' at p_IinB_m: " + list_text(frames_.p_IinB) +
+           ", rpy_ItoB_rad: " + list_text(rpy_of_rotation(frames_.R_ItoB));
   }
-  services_.log(LogLevel::kInfo, text);
+  say_once(LogLevel::kInfo, text);
+}
+
+void TopicSensor::say_once(LogLevel level, const std::string& text) {
+  constexpr std::size_t kMost = 20;
+  {
+    const std::scoped_lock lock(mount_mutex_);
+    if (said_.size() >= kMost || !said_.insert(text).second) return;
+  }
+  services_.log(level, text);
 }
 
 void TopicSensor::say_missing_mount() {
@@ -181,10 +197,16 @@ void TopicSensor::say_missing_mount() {
     text = "nothing says where frame '" + imu_frame_ + "' is in '" + frames_.body +
            "': no pose is published";
     const auto names = tree_.names();
-    if (names.empty()) text += " (nothing has come on /tf_static)";
+    bool are_there = true;
     for (const std::string& wanted : {imu_frame_, frames_.body}) {
-      if (names.empty() || std::find(names.begin(), names.end(), wanted) != names.end()) continue;
-      text += "; there is no '" + wanted + "'" + log::did_you_mean(wanted, names);
+      if (names.empty() || tree_.has(wanted)) continue;
+      are_there = false;
+      text += "; there is no '" + wanted + "'" + log::did_you_mean(plain_name(wanted), names);
+    }
+    if (names.empty()) {
+      text += " (no frame is known from /tf_static or the robot's description)";
+    } else if (are_there) {
+      text += ": both are there, but no fixed frames join them";
     }
   }
   services_.log(LogLevel::kWarning, text);

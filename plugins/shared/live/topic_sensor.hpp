@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -70,6 +71,7 @@ class TopicSensor : public Sensor {
 
  private:
   void find_mount(const std::string& why_not_all);
+  void say_once(LogLevel level, const std::string& text);
   void say_missing_mount();
 
   HostServices services_;
@@ -80,7 +82,7 @@ class TopicSensor : public Sensor {
   FrameTree tree_;
   OutputFrames frames_;
   bool has_mount_;
-  std::string why_not_all_;  ///< as it was said last
+  std::set<std::string> said_;  ///< of mounts: what is said again is not worth a line
   bool publish_;
   double sigma_rate_;
   double warn_latency_s_;

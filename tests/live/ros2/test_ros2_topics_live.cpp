@@ -229,10 +229,10 @@ TEST_F(Ros2Topics, AsksTheRobotWhereItsImuSits) {
   EXPECT_THAT(before, ::testing::Not(HasSubstr("odometry ")));
   EXPECT_TRUE(
       wait_until_said("nothing says where frame 'imu_link' is in 'base_link': no pose is "
-                      "published (nothing has come on /tf_static)"));
+                      "published (no frame is known from /tf_static or the robot's description)"));
   Child robot(dds_->node("mount", "0.25"), dds_->file("robot.log"));
-  ASSERT_TRUE(
-      wait_until_said("frame 'imu_link' is in 'base_link' at [0.5, 0, 0.25] m, turned by 0 rad"))
+  ASSERT_TRUE(wait_until_said(
+      "frame 'imu_link' is in 'base_link' at p_IinB_m: [0.5, 0, 0.25], rpy_ItoB_rad: [0, 0, 0]"))
       << dds_->text_of("robot.log");
   EXPECT_THAT(publish_until_heard(*sensor, estimate, {"odometry "}),
               ContainsRegex("odometry 170000000[0-9]+ odom base_link 0.5 2 2.75"));
@@ -244,8 +244,8 @@ TEST_F(Ros2Topics, HearsFramesThatWereSaidBeforeItCame) {
   Child robot(dds_->node("mount", "0.5"), dds_->file("robot.log"));
   std::this_thread::sleep_for(500ms);  // it is said once, and long ago
   const auto sensor = make(", imu_topic: /imu0, imu_frame: imu_link, body_frame: base_link");
-  EXPECT_TRUE(
-      wait_until_said("frame 'imu_link' is in 'base_link' at [0.5, 0, 0.5] m, turned by 0 rad"));
+  EXPECT_TRUE(wait_until_said(
+      "frame 'imu_link' is in 'base_link' at p_IinB_m: [0.5, 0, 0.5], rpy_ItoB_rad: [0, 0, 0]"));
 }
 
 }  // namespace
