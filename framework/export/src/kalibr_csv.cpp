@@ -72,6 +72,10 @@ Exported to_csv(const Robot& robot) {
               log::number_text(entry.sigma) + "," + field(entry.unit) + "\n";
     }
   }
+  for (std::size_t i = 0; i < file.drive_signs.size(); ++i) {
+    text +=
+        "drive_sign_" + std::to_string(i + 1) + "," + std::to_string(file.drive_signs[i]) + ",0,\n";
+  }
   return {text, lost.texts()};
 }
 

@@ -115,6 +115,8 @@ void recognise(const CalibrationFile& file, Robot& robot) {
     add_axles(intrinsics, robot);
   }
   robot.beside = intrinsics.unused();
+  const std::size_t known = std::min(file.drive_signs.size(), robot.wheels.size());
+  for (std::size_t i = 0; i < known; ++i) robot.wheels[i].reversed = file.drive_signs[i] < 0;
 }
 
 /// The values of entries; InputError if one is missing.
@@ -152,6 +154,14 @@ CameraView camera_of(const CalibrationFile& file, std::size_t index) {
 }
 
 }  // namespace
+
+std::string Robot::reversed_wheels() const {
+  std::string names;
+  for (const Wheel& wheel : wheels) {
+    if (wheel.reversed) names += (names.empty() ? "" : ", ") + wheel.name;
+  }
+  return names;
+}
 
 double Robot::mean_radius_m() const {
   double sum = 0.;

@@ -27,6 +27,7 @@ struct Wheel {
   double x_m = 0., y_m = 0.;  ///< in O; of a mecanum wheel not known
   bool steers = false;
   double zero_rad = 0.;             ///< what the steering encoder reads straight ahead
+  bool reversed = false;            ///< its drive turns backwards where the log's goes up
   double tan_gamma = 0., k_m = 0.;  ///< of a mecanum wheel: row [1, tan_gamma, k]
 };
 
@@ -46,6 +47,8 @@ struct Robot {
   std::vector<std::string> beside;  ///< intrinsics that are none of the above
 
   double mean_radius_m() const;
+  /// Names of the wheels whose drives turn backwards, "3, 4"; "" for none.
+  std::string reversed_wheels() const;
 };
 
 /// InputError for cameras of which parameters are missing.

@@ -89,6 +89,11 @@ Node mecanum(const Robot& robot, Lost& lost) {
 Exported to_ros2_control(const Robot& robot) {
   Lost lost(robot);
   lost.all_but_geometry();
+  if (const std::string names = robot.reversed_wheels(); !names.empty()) {
+    lost.add("drive_signs: the drives of " + names +
+             " turn backwards against the readings of the recording, which the hardware's side "
+             "has to undo (the URDF has them)");
+  }
   std::string controller = "diff_drive_controller", remark;
   Node params;
   if (robot.base == Base::kAckermann) {

@@ -3,21 +3,13 @@
 
 #include "formats.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/rpy.hpp"
 
 namespace viwo::exports {
 namespace {
 
 std::string triple(const Eigen::Vector3d& v) {
   return log::number_text(v[0]) + " " + log::number_text(v[1]) + " " + log::number_text(v[2]);
-}
-
-/// Roll, pitch, yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll).
-Eigen::Vector3d rpy_of(const Eigen::Matrix3d& R) {
-  const double cos_pitch = std::hypot(R(0, 0), R(1, 0));
-  const double pitch = std::atan2(-R(2, 0), cos_pitch);
-  // Pointing up or down roll and yaw are about one axis.
-  if (cos_pitch < 1e-9) return {0., pitch, std::atan2(-R(0, 1), R(1, 1))};
-  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
 }
 
 std::string joint(const std::string& name, const char* type, const std::string& parent,
@@ -55,14 +47,14 @@ std::string wheel_text(const Wheel& wheel) {
   return text + wheel_link(rim, wheel.radius_m) +
          joint(drive_joint(wheel), "continuous", wheel.steers ? fork : "base_link", rim,
                wheel.steers ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : hub,
-               Eigen::Vector3d::Zero(), "0 1 0");
+               Eigen::Vector3d::Zero(), wheel.reversed ? "0 -1 0" : "0 1 0");
 }
 
 std::string camera_text(std::size_t index, const CameraView& camera) {
   const std::string frame = "cam" + std::to_string(index) + "_optical_frame";
   const Eigen::Matrix3d R_CtoI = camera.R_ItoC.transpose();
   return empty_link(frame) + joint("cam" + std::to_string(index) + "_joint", "fixed", "imu_link",
-                                   frame, -(R_CtoI * camera.p_IinC), rpy_of(R_CtoI), "");
+                                   frame, -(R_CtoI * camera.p_IinC), rpy_of_rotation(R_CtoI), "");
 }
 
 /// What must not stand in a comment of XML.
@@ -95,14 +87,15 @@ std::vector<std::string> lost_in_urdf(const Robot& robot) {
 Exported to_urdf(const Robot& robot) {
   const std::vector<std::string> lost = lost_in_urdf(robot);
   std::string text = "<?xml version=\"1.0\"?>\n<!--\n" + without_dashes(head(robot, lost, "")) +
-                     "base_link is O: x forward, y left, z up, on the ground. Steering joints "
-                     "have the position that\ntheir encoders read: the zeros are in their "
-                     "origins.\n-->\n<robot name=\"" +
+                     "base_link is O: x forward, y left, z up, on the ground. Joints have the "
+                     "position that\ntheir encoders read: zeros of the steering are in their "
+                     "origins, drives that turn backwards in\ntheir axes.\n-->\n<robot name=\"" +
                      robot.file->model + "\">\n" + empty_link("base_link");
   for (const Wheel& wheel : robot.wheels) text += wheel_text(wheel);
   if (robot.mount) {
     text += empty_link("imu_link") + joint("imu_joint", "fixed", "base_link", "imu_link",
-                                           robot.mount->p_IinO, rpy_of(robot.mount->R_ItoO), "");
+                                           robot.mount->p_IinO,
+                                           rpy_of_rotation(robot.mount->R_ItoO), "");
     for (std::size_t i = 0; i < robot.cameras.size(); ++i) {
       text += camera_text(i, robot.cameras[i]);
     }

@@ -27,6 +27,17 @@ std::string radii(const std::vector<Wheel>& wheels) {
   return constant("double[]", "kWheelRadiiMeters", "{" + numbers(all) + "}");
 }
 
+/// Nothing where no drive is: what is not said to be so is not.
+std::string inverted(const Robot& robot, const std::vector<Wheel>& wheels) {
+  if (robot.reversed_wheels().empty()) return "";
+  std::string all;
+  for (const Wheel& wheel : wheels) {
+    all += (all.empty() ? "" : ", ") + std::string(wheel.reversed ? "true" : "false");
+  }
+  return "  /** Against the readings of the recording: drives that turn backwards. */\n" +
+         constant("boolean[]", "kDriveInverted", "{" + all + "}");
+}
+
 std::string kinematics(const std::string& type, const std::string& arguments) {
   return constant(type, "kKinematics", "new " + type + "(" + arguments + ")");
 }
@@ -40,6 +51,7 @@ std::string swerve(const Robot& robot) {
     zeros.push_back(std::remainder(wheel.zero_rad, 2. * M_PI) / (2. * M_PI));
   }
   return "  // In the order of the modules in viwo's configuration.\n" + radii(robot.wheels) +
+         inverted(robot, robot.wheels) +
          "  /** What the steering encoders read where the wheels point forward, from -0.5 to 0.5, "
          "as turned by\n   * steer_scale and steer_shift_rad of the configuration. To be taken off "
          "the reading: for a CANcoder,\n   * off the MagnetOffset that was set while recording. */"
@@ -58,11 +70,11 @@ std::string mecanum(const Robot& robot) {
     places += (i == 0 ? "\n      " : ",\n      ") + place(kSigns[i][0] * half, kSigns[i][1] * half);
   }
   return "  // Front left, front right, rear left, rear right.\n" + radii(wheels) +
-         kinematics("MecanumDriveKinematics", places);
+         inverted(robot, wheels) + kinematics("MecanumDriveKinematics", places);
 }
 
 std::string differential(const Robot& robot) {
-  return "  // Left, right.\n" + radii(robot.wheels) +
+  return "  // Left, right.\n" + radii(robot.wheels) + inverted(robot, robot.wheels) +
          constant("double", "kTrackWidthMeters", log::number_text(robot.track_m)) +
          kinematics("DifferentialDriveKinematics", "kTrackWidthMeters");
 }

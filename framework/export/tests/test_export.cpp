@@ -28,6 +28,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using viwo::testing::error_of;
 
 constexpr double kRounding = 1e-12;
@@ -356,6 +357,27 @@ TEST(Export, AsJavaForWpilibHasPlacesRadiiAndOffsetsInTurns) {
     EXPECT_EQ(corners[2 * i] > 0., i < 2);
     EXPECT_EQ(corners[2 * i + 1] > 0., i % 2 == 0);
   }
+}
+
+TEST(Export, SaysWhichDrivesTurnBackwards) {
+  CalibrationFile file = differential();
+  file.drive_signs = {1, -1};
+  const std::string urdf = export_calibration(file, "urdf").text;
+  const auto axis_of = [&urdf](const std::string& joint) {
+    const auto begin = urdf.find("\"" + joint + "\"");
+    const auto axis = urdf.find("<axis xyz=\"", begin) + 11;
+    return urdf.substr(axis, urdf.find('"', axis) - axis);
+  };
+  EXPECT_EQ(axis_of("drive_left_joint"), "0 1 0");
+  EXPECT_EQ(axis_of("drive_right_joint"), "0 -1 0");
+  EXPECT_THAT(export_calibration(file, "wpilib").text,
+              HasSubstr("boolean[] kDriveInverted = {false, true};"));
+  EXPECT_THAT(export_calibration(file, "csv").text,
+              AllOf(HasSubstr("\ndrive_sign_1,1,0,\n"), HasSubstr("\ndrive_sign_2,-1,0,\n")));
+  EXPECT_THAT(export_calibration(file, "ros2_control").lost,
+              Contains(HasSubstr("the drives of right turn backwards")));
+  file.drive_signs = {1, 1};
+  EXPECT_THAT(export_calibration(file, "wpilib").text, Not(HasSubstr("kDriveInverted")));
 }
 
 TEST(Export, AsKalibrChainIsReadBackAsTheSameCameras) {
