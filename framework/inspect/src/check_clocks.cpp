@@ -232,12 +232,19 @@ void check_wheel_clock(const Recording& recording, const Wheels& wheels, const Y
   std::string key = wheels.prior.name.empty()
                         ? "wheels.t_OtoI_s"
                         : "wheel_sets." + wheels.prior.name + ".wheels.t_OtoI_s";
-  if (!recording.setup->filter) key = "a run of the wheels alone, which has no key for it,";
   Finding clock = clock_finding(
       label, {"clock", "clock", key, rates.label, wheels.prior.wheels.t_OtoI_s}, *lag,
       wheels.prior.sigma_time_offset_s, std::max(period_of(rates.turns), period_of(of_wheels)));
   clock.figures.push_back({"wheels by gyro", lag->slope, ""});
-  if (!recording.setup->filter) clock.remedies.clear();  // there is no such key
+  if (!recording.setup->filter) {
+    clock.remedies.clear();  // there is no such key
+    const auto at = clock.what.find(", beyond what");
+    if (at != std::string::npos) {
+      clock.what.replace(at, std::string::npos,
+                         ": a run of the wheels alone does not mind; viwo calibrate finds it "
+                         "(prior_sigma_clock_offset_s)");
+    }
+  }
   if (lag->correlation < -0.8) {
     clock.severity = Severity::kFault;
     clock.remedies.clear();

@@ -186,7 +186,7 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
                         (eval::quantile(speeds.ratio, 0.75) - eval::quantile(speeds.ratio, 0.25)) /
                         std::sqrt(static_cast<double>(speeds.ratio.size()));
   finding.figures.push_back({"sigma", spread, ""});
-  if (std::abs(ratio - 1.) > kMostFactor + 3. * spread) {
+  if (std::abs(ratio - 1.) > std::max(kMostFactor, 3. * spread)) {
     finding.severity = Severity::kFault;
     if (check_sides(wheels, poses, label, other, out)) return;
     const auto unit = std::find_if(units.begin(), units.end(), [&](const Unit& u) {

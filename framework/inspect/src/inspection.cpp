@@ -7,6 +7,7 @@
 
 #include "checks.hpp"
 #include "plots.hpp"
+#include "viwo/config/yaml.hpp"
 
 namespace viwo::inspect {
 namespace {
@@ -124,6 +125,26 @@ void demote_consequences(const Recording& recording, Findings& findings) {
   }
 }
 
+/// Scales and shifts are found of the joints of a model; the configuration has them of the channels
+/// of the log, of which several may make a joint, or none.
+void give_to_channels(const config::Node& configuration, Remedy& remedy) {
+  const std::size_t dot = remedy.key.rfind('.') + 1;
+  const bool scales = remedy.key.ends_with("_scale");
+  if (!scales && !remedy.key.ends_with("_shift_rad") && !remedy.key.ends_with("_turn")) return;
+  const std::string joint = remedy.key.substr(dot, 5);  // drive or steer
+  const auto* channels = configuration.at_path(remedy.key.substr(0, dot) + joint + "_channel");
+  if (channels == nullptr || channels->items().empty()) return;
+  const config::Node of_joints = config::parse(remedy.value, "remedy");
+  std::string list;
+  for (const config::Node& channel : channels->items()) {
+    const auto i = static_cast<std::size_t>(std::stod(channel.scalar()));
+    if (i > of_joints.items().size()) return;
+    list += (list.empty() ? "" : ", ");
+    list += i == 0 ? (scales ? "1" : "0") : of_joints.items()[i - 1].scalar();
+  }
+  remedy.value = "[" + list + "]";
+}
+
 }  // namespace
 
 const char* name(Severity severity) {
@@ -164,6 +185,9 @@ Inspection inspect(RunSetup& setup) {
     if (!found.key.ends_with(" lag") && !is_of_unread(recording, found)) {
       findings.push_back(of_plausibility(found));
     }
+  }
+  for (Finding& finding : findings) {
+    for (Remedy& remedy : finding.remedies) give_to_channels(setup.resolved, remedy);
   }
   demote_consequences(recording, findings);
   std::vector<std::string> sensors;

@@ -82,10 +82,9 @@ std::optional<config::Node> combined(const config::Node& configuration, const Re
   if (remedy.key.ends_with("_channel")) {
     return has_order ? std::nullopt : std::optional(value);
   }
-  if (!(scales || shifts) || !there.is_list() || (there.items().empty() && !has_order)) {
-    return value;
-  }
-  if (has_order || there.items().size() != value.items().size()) return {};
+  if (has_order && value.is_list() && value.items().size() != channels->items().size()) return {};
+  if (!(scales || shifts) || !there.is_list() || there.items().empty()) return value;
+  if (there.items().size() != value.items().size()) return {};
   for (std::size_t i = 0; i < value.items().size(); ++i) {
     const double a = std::stod(there.items()[i].scalar()), b = std::stod(value.items()[i].scalar());
     value.items()[i] = config::Node::scalar_of(significant(scales ? a * b : a + b, 10));

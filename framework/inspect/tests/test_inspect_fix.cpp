@@ -71,6 +71,30 @@ TEST(FixedConfiguration, MendsTheJointsOfALog) {
   EXPECT_THAT(faults_of(mended), IsEmpty());
 }
 
+TEST(FixedConfiguration, GivesScalesToTheChannelsOfTheLog) {
+  std::string pattern = (std::filesystem::temp_directory_path() / "viwo_fix_XXXXXX").string();
+  ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+  const std::filesystem::path folder = pattern;
+  // The first channel is the second drive, and turns backwards.
+  RunSetup faulty = changed(swerve(), {.wheels = [](EncoderSample& s) {
+                              std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[1]);
+                              s.drive_rad_per_s[0] *= -1.;
+                              return true;
+                            }});
+  write_log(faulty, folder);
+  config::Node run = on_log(folder);
+  config::set_path(run, "sensors.wheels0.drive_channel", config::parse("[2, 1, 3, 4]", "test"));
+  RunSetup setup = read_run(run, testing::registry());
+  const Inspection found = inspect(setup);
+  EXPECT_EQ(remedy_of(finding_of(found, "wheels0", "order"), "sensors.wheels0.drive_scale"),
+            "[-1, 1, 1, 1]");
+  setup = read_run(setup.resolved, testing::registry());
+  const std::string text = fixed_configuration(setup, found, testing::registry());
+  setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
+  std::filesystem::remove_all(folder);
+}
+
 TEST(FixedConfiguration, SaysWhyAKeyIsChangedAndWhatItHasNoKeyFor) {
   RunSetup setup = swerve();
   Inspection inspection;
