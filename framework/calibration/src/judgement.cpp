@@ -94,6 +94,28 @@ double contradiction(const CalibrationResult& result) {
   return moved > 0. ? std::sqrt(left / moved) : 0.;
 }
 
+/// A drive that gives one number all the time while another turns.
+void judge_channels(CalibrationResult& result) {
+  constexpr double kTurns_rad_per_s = 0.1;
+  const auto& recordings = result.setup->recordings;
+  const int n = recordings.front().setup.model->description().n_drive;
+  Eigen::ArrayXd lowest = Eigen::ArrayXd::Constant(n, INFINITY), highest = -lowest;
+  for (const CalibrationRecording& recording : recordings) {
+    for (const EncoderSample& sample : recording.data.wheels()) {
+      const Eigen::Map<const Eigen::ArrayXd> drive(sample.drive_rad_per_s.data(), n);
+      lowest = lowest.min(drive);
+      highest = highest.max(drive);
+    }
+  }
+  if (!((highest - lowest).maxCoeff() > kTurns_rad_per_s)) return;
+  for (int i = 0; i < n; ++i) {
+    if (highest[i] > lowest[i]) continue;
+    result.doubts.push_back("drive_" + std::to_string(i + 1) + " reads " +
+                            significant(lowest[i], 3) +
+                            " rad/s all the time, while another turns: not connected, or not read");
+  }
+}
+
 void judge_wheels(CalibrationResult& result) {
   constexpr double kPart = 0.3;
   const double part = contradiction(result);
@@ -252,6 +274,7 @@ void judge(CalibrationResult& result) {
   judge_what_was_given(result);
   judge_search(result);
   judge_left_over(result);
+  judge_channels(result);
   judge_wheels(result);
   judge_change(result);
   judge_ends(result);

@@ -65,6 +65,13 @@ TEST(Judgement, DoubtsWhatNothingWasLearnedOf) {
   EXPECT_FALSE(calibrate(straight).is_trusted());
 }
 
+TEST(Judgement, DoubtsADriveThatIsStuck) {
+  CalibrationSetup setup = differential(kRight + ", prior_sigma_radius_m: 0.1");
+  testing::change_wheels(setup, [](EncoderSample& sample) { sample.drive_rad_per_s[1] = 0.; });
+  EXPECT_THAT(calibrate(setup).doubts,
+              Contains(HasSubstr("drive_2 reads 0 rad/s all the time, while another turns")));
+}
+
 TEST(Judgement, DoubtsADistanceThatTheWheelsContradict) {
   CalibrationSetup setup =
       differential(kRight + ", prior_sigma_radius_m: 1e-4, prior_sigma_baseline_m: 1e-4");

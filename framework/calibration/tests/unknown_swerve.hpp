@@ -1,6 +1,7 @@
 // A swerve robot of which nothing is known but where its wheels are, driven with a gyro.
 #pragma once
 
+#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -32,15 +33,20 @@ inline CalibrationSetup gyro_setup(const std::string& robot, const std::string& 
 }
 
 /// As if all wheels were larger than they are.
-inline void scale_drives(CalibrationSetup& setup, double scale) {
+inline void change_wheels(CalibrationSetup& setup,
+                          const std::function<void(EncoderSample&)>& change) {
   for (CalibrationRecording& recording : setup.recordings) {
     const auto wheels = recording.data.wheels();
     std::vector<EncoderSample> samples(wheels.begin(), wheels.end());
-    for (EncoderSample& sample : samples) {
-      for (double& rate : sample.drive_rad_per_s) rate *= scale;
-    }
+    for (EncoderSample& sample : samples) change(sample);
     recording.data.recorded.set(recording.data.wheels_name, samples);
   }
+}
+
+inline void scale_drives(CalibrationSetup& setup, double scale) {
+  change_wheels(setup, [scale](EncoderSample& sample) {
+    for (double& rate : sample.drive_rad_per_s) rate *= scale;
+  });
 }
 
 inline const std::string kPlaces =
