@@ -129,6 +129,12 @@ TEST_F(AslTest, OneAngleIsTooLittleForARate) {
   options.drive_is_angle = true;
   EXPECT_EQ(message_of([&] { read_asl_encoders(file, options); }),
             file.string() + "  has too few readings without a gap for a rate");
+  const auto slow = write("slow.csv", "timestamp_ns,drive_1\n1,1\n800000001,2\n1600000001,3\n");
+  options.limits.max_gap_s = 0.2;
+  EXPECT_EQ(message_of([&] { read_asl_encoders(slow, options); }),
+            slow.string() +
+                "  has too few readings without a gap for a rate: they are 0.8 s apart, and "
+                "max_gap_s is 0.2");
 }
 
 TEST_F(AslTest, ReadsEurocGroundTruthAndRejectsWrongQuaternions) {

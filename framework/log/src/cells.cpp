@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "viwo/math/significant.hpp"
+
 namespace viwo::log {
 namespace {
 
@@ -89,6 +91,15 @@ std::vector<EncoderSample> samples_from(std::span<const EncoderReading> readings
   }
   make_cells(samples, max_gap_s);
   return samples;
+}
+
+std::string spacing_text(std::span<const EncoderReading> readings, double max_gap_s) {
+  if (readings.size() < 2) return "";
+  const double spacing_s = seconds_between(readings.front().t_ns, readings.back().t_ns) /
+                           static_cast<double>(readings.size() - 1);
+  if (spacing_s < max_gap_s) return "";
+  return ": they are " + significant(spacing_s, 3) + " s apart, and max_gap_s is " +
+         significant(max_gap_s, 3);
 }
 
 }  // namespace viwo::log

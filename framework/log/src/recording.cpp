@@ -70,7 +70,8 @@ EncoderRecording EncoderCollector::finish(const TextReader& at) {
   out.samples =
       samples_from(readings_, options_.drive_is_angle, options_.limits.max_gap_s, options_.stride);
   if (out.samples.empty()) {
-    throw InputError(at.file().string() + "  has too few readings without a gap for a rate");
+    throw InputError(at.file().string() + "  has too few readings without a gap for a rate" +
+                     spacing_text(readings_, options_.limits.max_gap_s));
   }
   return out;
 }

@@ -196,7 +196,8 @@ log::EncoderRecording read_wheels(const Contents& contents, const Params& params
   auto samples = log::samples_from(readings, wheels.is_angle, params.max_gap_s, params.stride);
   auto out = finish(contents, order, std::move(samples));
   if (!out.samples.empty()) return out;
-  throw InputError(contents.file() + "  has too few readings without a gap for a rate");
+  throw InputError(contents.file() + "  has too few readings without a gap for a rate" +
+                   log::spacing_text(readings, params.max_gap_s));
 }
 
 log::ImuRecording read_imu(const Contents& contents, const Params& params) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "viwo/api/measurement.hpp"
@@ -41,5 +42,9 @@ std::vector<EncoderSample> cells_from_angles(std::span<const EncoderReading> ang
 /// Samples from readings at increasing stamps: cells_from_angles(), or make_cells() of rates.
 std::vector<EncoderSample> samples_from(std::span<const EncoderReading> readings,
                                         bool drive_is_angle, double max_gap_s, int stride);
+
+/// Behind "too few readings for a rate": ": they are 0.8 s apart, and max_gap_s is 0.2", if they
+/// are.
+std::string spacing_text(std::span<const EncoderReading> readings, double max_gap_s);
 
 }  // namespace viwo::log
