@@ -13,6 +13,7 @@
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/log/kalibr.hpp"
+#include "viwo/math/rpy.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/random.hpp"
@@ -196,11 +197,10 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
 /// A wheel set from its section `wheels`; the intrinsics and their sigmas are those of its model.
 void read_wheels(const WheelsParams& p, WheelSet set, CalibrationError error,
                  const ReadContext& context, FilterSetup& setup, Errors& errors) {
-  const Vector3d& rpy = p.rpy_ItoO_rad;
   WheelsPrior& prior = set.prior;
   prior.sensor = p.sensor;
   prior.wheels.model = &set.model->model();
-  prior.wheels.R_ItoO = sim::rotation_from_euler(rpy.z(), rpy.y(), rpy.x());
+  prior.wheels.R_ItoO = rotation_of_rpy(p.rpy_ItoO_rad);
   prior.wheels.p_IinO = p.p_IinO_m;
   prior.wheels.t_OtoI_s = p.t_OtoI_s;
   prior.sigma_extrinsics << p.sigma_R_ItoO_rad, p.sigma_p_IinO_m;

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "viwo/api/status.hpp"
+#include "viwo/math/rpy.hpp"
 #include "viwo/math/se2.hpp"
 
 namespace viwo::sim {
@@ -52,9 +53,7 @@ Vector6d pose_values(const PoseSample& pose, bool planar, double previous_yaw) {
 }  // namespace
 
 Eigen::Matrix3d rotation_from_euler(double yaw, double pitch, double roll) {
-  return (Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Vector3d::UnitY()) *
-          Eigen::AngleAxisd(roll, Vector3d::UnitX()))
-      .toRotationMatrix();
+  return rotation_of_rpy({roll, pitch, yaw});
 }
 
 BodyTrajectory BodyTrajectory::drive(const PlanarMotion& motion, const Ground& ground,

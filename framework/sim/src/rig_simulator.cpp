@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "viwo/api/status.hpp"
+#include "viwo/math/rpy.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/true_cameras.hpp"
 
@@ -61,8 +62,7 @@ std::vector<CameraView> cameras_from(const RigParams& params, const HostServices
 RigSimulation rig_from(const RigParams& params, double duration_s, std::int64_t start_ns,
                        const HostServices& services) {
   RigSimulation rig;
-  const Eigen::Vector3d rpy = params.rpy_ItoO_rad;
-  rig.mounting = {rotation_from_euler(rpy[2], rpy[1], rpy[0]), params.p_IinO_m};
+  rig.mounting = {rotation_of_rpy(params.rpy_ItoO_rad), params.p_IinO_m};
   rig.with_imu = params.imu;
   rig.imu = imu_from(params, duration_s, start_ns, services.exact);
   rig.features = features_from(params, duration_s, start_ns, services.exact);
