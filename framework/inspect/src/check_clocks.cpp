@@ -188,13 +188,20 @@ Finding clock_finding(const std::string& label, const ClockWords& words, const L
   }
   if (std::abs(lag.lag_s) <= most_s) {
     finding.what = words.clock + " fits: off by " + by + " against " + words.other;
-  } else {
-    finding.severity = Severity::kFault;
-    finding.what = std::string(lag.lag_s > 0. ? "lags behind " : "is ahead of ") + words.other +
-                   " by " + by + ", beyond what " + words.key + " says";
-    const double value = words.configured_s - lag.lag_s;
-    finding.remedies = {{words.key, significant(1e-4 * std::round(1e4 * value), 6)}};
+    return finding;
   }
+  finding.severity = Severity::kFault;
+  finding.what =
+      std::string(lag.lag_s > 0. ? "lags behind " : "is ahead of ") + words.other + " by " + by;
+  if (words.key.empty()) {
+    finding.what +=
+        ": a run of the wheels alone does not mind; viwo calibrate finds it "
+        "(prior_sigma_clock_offset_s)";
+    return finding;
+  }
+  finding.what += ", beyond what " + words.key + " says";
+  const double value = words.configured_s - lag.lag_s;
+  finding.remedies = {{words.key, significant(1e-4 * std::round(1e4 * value), 6)}};
   return finding;
 }
 
@@ -232,19 +239,11 @@ void check_wheel_clock(const Recording& recording, const Wheels& wheels, const Y
   std::string key = wheels.prior.name.empty()
                         ? "wheels.t_OtoI_s"
                         : "wheel_sets." + wheels.prior.name + ".wheels.t_OtoI_s";
+  if (!recording.setup->filter) key.clear();
   Finding clock = clock_finding(
       label, {"clock", "clock", key, rates.label, wheels.prior.wheels.t_OtoI_s}, *lag,
       wheels.prior.sigma_time_offset_s, std::max(period_of(rates.turns), period_of(of_wheels)));
   clock.figures.push_back({"wheels by gyro", lag->slope, ""});
-  if (!recording.setup->filter) {
-    clock.remedies.clear();  // there is no such key
-    const auto at = clock.what.find(", beyond what");
-    if (at != std::string::npos) {
-      clock.what.replace(at, std::string::npos,
-                         ": a run of the wheels alone does not mind; viwo calibrate finds it "
-                         "(prior_sigma_clock_offset_s)");
-    }
-  }
   if (lag->correlation < -0.8) {
     clock.severity = Severity::kFault;
     clock.remedies.clear();

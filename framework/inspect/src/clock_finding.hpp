@@ -11,7 +11,7 @@ namespace viwo::inspect {
 struct ClockWords {
   std::string check;         ///< Finding::check
   std::string clock;         ///< what is compared: "clock"
-  std::string key;           ///< that says the offset, t_other = t + offset
+  std::string key;           ///< that says the offset, t_other = t + offset; "": there is none
   std::string other;         ///< sensor it is compared with
   double configured_s = 0.;  ///< that has been added to the stamps before
 };
