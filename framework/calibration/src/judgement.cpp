@@ -5,6 +5,7 @@
 
 #include "segment_choice.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::calibration {
@@ -98,20 +99,14 @@ double contradiction(const CalibrationResult& result) {
 void judge_channels(CalibrationResult& result) {
   constexpr double kTurns_rad_per_s = 0.1;
   const auto& recordings = result.setup->recordings;
-  const int n = recordings.front().setup.model->description().n_drive;
-  Eigen::ArrayXd lowest = Eigen::ArrayXd::Constant(n, INFINITY), highest = -lowest;
+  DriveRanges ranges(recordings.front().setup.model->description().n_drive);
   for (const CalibrationRecording& recording : recordings) {
-    for (const EncoderSample& sample : recording.data.wheels()) {
-      const Eigen::Map<const Eigen::ArrayXd> drive(sample.drive_rad_per_s.data(), n);
-      lowest = lowest.min(drive);
-      highest = highest.max(drive);
-    }
+    for (const EncoderSample& sample : recording.data.wheels()) ranges.add(sample);
   }
-  if (!((highest - lowest).maxCoeff() > kTurns_rad_per_s)) return;
-  for (int i = 0; i < n; ++i) {
-    if (highest[i] > lowest[i]) continue;
-    result.doubts.push_back("drive_" + std::to_string(i + 1) + " reads " +
-                            significant(lowest[i], 3) +
+  if (!(ranges.largest_change() > kTurns_rad_per_s)) return;
+  for (const auto& [drive, value] : ranges.stuck()) {
+    result.doubts.push_back("drive_" + std::to_string(drive + 1) + " reads " +
+                            significant(value, 3) +
                             " rad/s all the time, while another turns: not connected, or not read");
   }
 }

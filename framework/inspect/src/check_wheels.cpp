@@ -8,6 +8,7 @@
 #include "checks.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 #include "viwo/wheel/wheel_check.hpp"
 #include "viwo/wheel/wheel_noise.hpp"
@@ -68,14 +69,10 @@ std::optional<Calibration> calibrated(const Wheels& wheels) {
 /// A channel that gives one number all the time while another moves.
 void check_channels(const Wheels& wheels, const std::string& label, Findings& out) {
   const auto& samples = wheels.samples;
-  const ModelDescription& description = wheels.model->description();
   constexpr double kMoves_rad_per_s = 0.1;
-  double fastest = 0.;
-  for (const EncoderSample& sample : samples) {
-    for (int i = 0; i < description.n_drive; ++i) {
-      fastest = std::max(fastest, std::abs(sample.drive_rad_per_s[static_cast<std::size_t>(i)]));
-    }
-  }
+  DriveRanges ranges(wheels.model->description().n_drive);
+  for (const EncoderSample& sample : samples) ranges.add(sample);
+  const double fastest = ranges.fastest();
   if (fastest < kMoves_rad_per_s || samples.size() < 100) {
     out.push_back({label,
                    Severity::kNote,
@@ -84,15 +81,9 @@ void check_channels(const Wheels& wheels, const std::string& label, Findings& ou
                    {{"fastest drive", fastest, "rad/s"}}});
     return;
   }
-  for (std::size_t i = 0; i < static_cast<std::size_t>(description.n_drive); ++i) {
-    const double value = samples.front().drive_rad_per_s[i];
-    if (std::any_of(samples.begin(), samples.end(), [&](const EncoderSample& sample) {
-          return sample.drive_rad_per_s[i] != value;
-        })) {
-      continue;
-    }
+  for (const auto& [drive, value] : ranges.stuck()) {
     out.push_back({label, Severity::kFault, "channel",
-                   "drive_" + std::to_string(i + 1) + " reads " + significant(value, 3) +
+                   "drive_" + std::to_string(drive + 1) + " reads " + significant(value, 3) +
                        " rad/s all the time, while another turns with up to " +
                        significant(fastest, 3) + " rad/s: not connected, or not read"});
   }

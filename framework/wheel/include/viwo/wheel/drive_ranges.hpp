@@ -1,0 +1,59 @@
+// What the drives read over a recording, to see one that is not connected, or not read.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "viwo/api/measurement.hpp"
+
+namespace viwo {
+
+class DriveRanges {
+ public:
+  explicit DriveRanges(int n_drive) : ranges_(static_cast<std::size_t>(n_drive)) {}
+
+  void add(const EncoderSample& sample) {
+    for (std::size_t i = 0; i < ranges_.size(); ++i) {
+      ranges_[i].lowest = std::min(ranges_[i].lowest, sample.drive_rad_per_s[i]);
+      ranges_[i].highest = std::max(ranges_[i].highest, sample.drive_rad_per_s[i]);
+    }
+  }
+  /// The largest rate of all, forwards or backwards, rad/s.
+  double fastest() const {
+    double fastest = 0.;
+    for (const Range& range : ranges_) {
+      fastest = std::max({fastest, std::abs(range.lowest), std::abs(range.highest)});
+    }
+    return fastest;
+  }
+  /// Of the drive that changes most, rad/s.
+  double largest_change() const {
+    double change = 0.;
+    for (const Range& range : ranges_) change = std::max(change, range.highest - range.lowest);
+    return change;
+  }
+  /// Drives that read one number all the time, and which, rad/s.
+  struct Stuck {
+    std::size_t drive = 0;
+    double value = 0.;
+  };
+  std::vector<Stuck> stuck() const {
+    std::vector<Stuck> all;
+    for (std::size_t i = 0; i < ranges_.size(); ++i) {
+      if (ranges_[i].highest == ranges_[i].lowest) all.push_back({i, ranges_[i].lowest});
+    }
+    return all;
+  }
+
+ private:
+  struct Range {
+    double lowest = std::numeric_limits<double>::infinity();
+    double highest = -lowest;
+  };
+  std::vector<Range> ranges_;
+};
+
+}  // namespace viwo
