@@ -139,11 +139,6 @@ std::optional<FramePose> FrameTree::find(const std::string& a, const std::string
   return std::nullopt;
 }
 
-bool FrameTree::has(const std::string& name) const {
-  const auto all = names();
-  return std::find(all.begin(), all.end(), plain_name(name)) != all.end();
-}
-
 std::vector<std::string> FrameTree::names() const {
   std::set<std::string> names;
   for (const auto& [child, fixed] : fixed_) {

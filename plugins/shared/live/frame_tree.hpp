@@ -36,7 +36,6 @@ class FrameTree {
 
   /// Where `a` is in `b`; nothing when no fixed frames join them.
   std::optional<FramePose> find(const std::string& a, const std::string& b) const;
-  bool has(const std::string& name) const;
   std::vector<std::string> names() const;
 
  private:

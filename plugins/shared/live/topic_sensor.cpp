@@ -198,10 +198,10 @@ void TopicSensor::say_missing_mount() {
            "': no pose is published";
     const auto names = tree_.names();
     bool are_there = true;
-    for (const std::string& wanted : {imu_frame_, frames_.body}) {
-      if (names.empty() || tree_.has(wanted)) continue;
+    for (const std::string& wanted : {plain_name(imu_frame_), plain_name(frames_.body)}) {
+      if (names.empty() || std::find(names.begin(), names.end(), wanted) != names.end()) continue;
       are_there = false;
-      text += "; there is no '" + wanted + "'" + log::did_you_mean(plain_name(wanted), names);
+      text += "; there is no '" + wanted + "'" + log::did_you_mean(wanted, names);
     }
     if (names.empty()) {
       text += " (no frame is known from /tf_static or the robot's description)";
