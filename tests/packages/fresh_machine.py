@@ -64,7 +64,7 @@ def main():
     run(*git, 'init', '-q')
     run(*git, 'add', '.')
     run(*git, 'commit', '-q', '-m', 'packages')
-    run(fresh_machine, codename[1], repository, 'bash', '/work/viwo/on_fresh_machine.sh', '/work/viwo')
+    run(fresh_machine, codename[1], repository, 'bash', './on_fresh_machine.sh', '"$PWD"')
     shutil.rmtree(work)
     return 0
 
