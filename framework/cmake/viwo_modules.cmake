@@ -21,8 +21,9 @@ endfunction()
 
 # viwo_add_test(NAME [WHOLE] SOURCES a.cpp ... LINKS target ... LABELS label ... DEPENDS target ...)
 # A GoogleTest executable, each of its tests known to ctest, in a process of its own; with WHOLE all of
-# them are one, which share what is expensive. Plugins of this build are found through
-# VIWO_TEST_PLUGIN_DIR, real recordings through VIWO_TEST_SHARED_DIR (which may not exist).
+# them are one, which share what is expensive. Temporary files are the program's own. Plugins of this
+# build are found through VIWO_TEST_PLUGIN_DIR, real recordings through VIWO_TEST_SHARED_DIR (which
+# may not exist).
 function(viwo_add_test name)
   if(NOT VIWO_BUILD_TESTS)
     return()
@@ -42,7 +43,7 @@ function(viwo_add_test name)
     VIWO_TEST_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     VIWO_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
     VIWO_TEST_SHARED_DIR="${PROJECT_SOURCE_DIR}/../shared")
-  target_link_libraries(${name} PRIVATE ${ARG_LINKS} GTest::gtest_main GTest::gmock)
+  target_link_libraries(${name} PRIVATE ${ARG_LINKS} viwo_test_folder GTest::gtest_main GTest::gmock)
   if(ARG_DEPENDS)
     add_dependencies(${name} ${ARG_DEPENDS})
   endif()
