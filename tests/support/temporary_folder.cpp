@@ -5,6 +5,7 @@
 #include <string>
 #include <system_error>
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace {
@@ -15,6 +16,7 @@ class TemporaryFolder {
     std::string pattern = (std::filesystem::temp_directory_path() / "viwo_test_XXXXXX").string();
     if (mkdtemp(pattern.data()) == nullptr) std::abort();
     folder_ = pattern;
+    chmod(pattern.c_str(), 0755);  // one test looks at its files as another user
     setenv("TMPDIR", folder_.c_str(), 1);
   }
   TemporaryFolder(const TemporaryFolder&) = delete;

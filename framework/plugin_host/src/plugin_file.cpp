@@ -88,6 +88,9 @@ std::string read_library_bytes(const std::filesystem::path& file) {
   if (status.type() == std::filesystem::file_type::not_found) {
     throw PluginRefused(file, "no such file");
   }
+  if (status.type() == std::filesystem::file_type::none) {
+    throw PluginRefused(file, "cannot be read: " + error.message() + " - check its permissions");
+  }
   if (std::filesystem::is_directory(status)) {
     throw PluginRefused(file, "is a folder, not a shared library");
   }

@@ -188,15 +188,20 @@ TEST_F(Registry, RefusesAFileThatIsNotThere) {
 
 TEST_F(Registry, RefusesAFileItMayNotRead) {
   const auto file = write("libviwo_kinematics_x.so", "");
+  const auto hidden = write("hidden/libviwo_kinematics_x.so", "");
   fs::permissions(file, fs::perms::none);
+  fs::permissions(hidden.parent_path(), fs::perms::none);
   // Root may read everything, so somebody else has to try.
   const bool is_root = ::geteuid() == 0;
   constexpr uid_t kNobody = 65534;
   ASSERT_EQ(is_root ? ::seteuid(kNobody) : 0, 0);
   const std::string text = error_of([&] { PluginRegistry({}).check(file); });
+  const std::string of_hidden = error_of([&] { PluginRegistry({}).check(hidden); });
   ASSERT_EQ(is_root ? ::seteuid(0) : 0, 0);
-  EXPECT_EQ(text, "refusing " + file.string() +
-                      ": cannot be read: Permission denied - check its permissions");
+  fs::permissions(hidden.parent_path(), fs::perms::owner_all);
+  const std::string why = ": cannot be read: Permission denied - check its permissions";
+  EXPECT_EQ(text, "refusing " + file.string() + why);
+  EXPECT_EQ(of_hidden, "refusing " + hidden.string() + why);
   EXPECT_EQ(PluginRegistry({kBadPlugins}).find("kinematics", "moody").name, "moody");
 }
 
