@@ -220,8 +220,9 @@ TEST_F(ViwoBag, RefusesWrongInputAndWritesNothing) {
   }
   EXPECT_EQ(run(path("log") + " " + path("a.db3")), 2);
   EXPECT_THAT(output_, HasSubstr(path("a.db3") + "  ends with '.db3': .bag makes a ROS 1 bag, "));
-  EXPECT_EQ(run(path("log") + " " + path("empty")), 2);
-  EXPECT_EQ(output_, path("empty") + "  exists\n");
+  write_log("of_others");
+  EXPECT_EQ(run(path("log") + " " + path("of_others")), 2);
+  EXPECT_EQ(output_, path("of_others") + "  exists and is no bag of one file\n");
   fs::remove(folder_ / "log/cam1/data/2.png");
   EXPECT_EQ(run(path("log") + " " + out), 2);
   EXPECT_EQ(output_, path("log/cam1/data/2.png") + ": the image is missing or cannot be read\n");
@@ -248,6 +249,23 @@ TEST_F(ViwoBag, KeepsTheBagThatIsThereUntilThereIsAnother) {
   ASSERT_EQ(run(path("log") + " " + path("link.bag")), 0) << output_;
   EXPECT_TRUE(fs::is_symlink(folder_ / "link.bag"));
   EXPECT_LT(content().size(), whole.size());
+}
+
+TEST_F(ViwoBag, ReplacesItsOwnFolder) {
+  const auto info = [this] {
+    return YAML::LoadFile(path("robot/metadata.yaml"))["rosbag2_bagfile_information"];
+  };
+  write_log("log");
+  ASSERT_EQ(run(path("log") + " " + path("robot")), 0) << output_;
+  fs::remove_all(folder_ / "log/cam1");
+  ASSERT_EQ(run(path("log") + " " + path("robot")), 0) << output_;
+  EXPECT_LT(info()["message_count"].as<int>(), 235);
+  fs::remove_all(folder_ / "log/imu0");
+  fs::remove(folder_ / "log/cam0/data/2.png");
+  EXPECT_EQ(run(path("log") + " " + path("robot")), 2);
+  EXPECT_TRUE(fs::exists(folder_ / "robot/robot_0.mcap"));
+  EXPECT_FALSE(fs::exists(folder_ / "robot.part"));
+  EXPECT_FALSE(fs::exists(folder_ / "robot.before"));
 }
 
 TEST_F(ViwoBag, AFullDiskIsAnError) {

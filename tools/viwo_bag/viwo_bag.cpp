@@ -232,11 +232,26 @@ void check_file(const fs::path& file, std::string_view magic) {
   if (begin != magic) throw InputError(file.string() + "  exists and is no bag");
 }
 
-void check_output(const fs::path& out, Format format) {
+std::string file_of_folder(const fs::path& out) { return out.filename().string() + "_0.mcap"; }
+
+/// Nor a folder that has something else than this program writes into it.
+void check_folder(const fs::path& out) {
   std::error_code ignored;
+  if (!fs::exists(out, ignored)) return;
+  bool is_bag = fs::is_directory(out, ignored) && !fs::is_symlink(out, ignored);
+  if (is_bag) {
+    for (const auto& entry : fs::directory_iterator(out)) {
+      const std::string name = entry.path().filename().string();
+      is_bag = is_bag && (name == "metadata.yaml" || name == file_of_folder(out));
+    }
+  }
+  if (!is_bag) throw InputError(out.string() + "  exists and is no bag of one file");
+}
+
+void check_output(const fs::path& out, Format format) {
   if (format == Format::kRos1) return check_file(out, "#ROSBAG V");
   if (format == Format::kMcap) return check_file(out, "\x89MCAP");
-  if (fs::exists(out, ignored)) throw InputError(out.string() + "  exists");
+  check_folder(out);
 }
 
 /// `file` is for ROS 2 a file in any case.
@@ -275,18 +290,19 @@ void write_file(const Log& log, const std::vector<Entry>& entries, const fs::pat
   }
 }
 
-/// The same for a folder, which is not there yet.
+/// The same for a folder.
 void write_folder([[maybe_unused]] const Log& log,
                   [[maybe_unused]] const std::vector<Entry>& entries, const fs::path& out) {
-  const fs::path part = out.string() + ".part";
-  check_output(part, Format::kMcapFolder);
+  const fs::path part = out.string() + ".part", before = out.string() + ".before";
 #ifdef VIWO_HAS_ROS2
-  fs::create_directory(part);
+  if (!fs::create_directory(part)) throw InputError(part.string() + "  exists");
   try {
-    bag::Ros2Writer writer((part / (out.filename().string() + "_0.mcap")).string());
+    bag::Ros2Writer writer((part / file_of_folder(out)).string());
     write_messages(log, entries, writer);
     writer.write_metadata();
+    if (fs::exists(out)) fs::rename(out, before);
     fs::rename(part, out);
+    fs::remove_all(before);
   } catch (...) {
     std::error_code ignored;
     fs::remove_all(part, ignored);
