@@ -51,7 +51,7 @@ TEST_F(ConfigurationTest, MustBeAFileOfYaml) {
   write("open.yaml", "a: [1\n");
   run("open.yaml", "open.yaml:2:1  not valid YAML: end of sequence flow not found");
   write("tab.yaml", "sensors:\n\tsim: 1\n");
-  run("tab.yaml", "tab.yaml:2:5  not valid YAML: illegal map value");
+  run("tab.yaml", "tab.yaml:2:5  not valid YAML: a line is indented by spaces, not by tabs");
   write("list.yaml", "- 1\n");
   run("list.yaml", "list.yaml:1:1  a run configuration is a section of keys");
   write("empty.yaml", "");
@@ -62,6 +62,15 @@ TEST_F(ConfigurationTest, MustBeAFileOfYaml) {
   write("calibration.yaml", "base: run.yaml\ncalibration: c\n");
   run("calibration.yaml",
       "calibration.yaml:2:1  this is a calibration, not a run: viwo calibrate takes it");
+  write("run.yaml", kRun);
+  for (const auto& [command, kind] : {std::pair{"calibrate", "a calibration"},
+                                      {"plan", "a plan"},
+                                      {"experiment", "an experiment"}}) {
+    expect_refused({command, "run.yaml", "--out", "out"},
+                   std::string("run.yaml:2:1  this is a run, not ") + kind + ": viwo run takes it");
+  }
+  write("plan.yaml", "plan: p\ngoals: {r_left: 1 %}\n");
+  run("plan.yaml", "plan.yaml:1:1  this is a plan, not a run: viwo plan takes it");
   write("binary.yaml", std::string("\x7f\0\1", 3));
   run("binary.yaml", "binary.yaml  is not a text file");
 }

@@ -1,6 +1,7 @@
 #include "viwo/calibration/calibrate.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <set>
 
@@ -11,6 +12,7 @@
 #include "judgement.hpp"
 #include "motion_reference.hpp"
 #include "segment_choice.hpp"
+#include "viwo/config/file_kind.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
@@ -137,6 +139,7 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
                                         const std::vector<std::string>& assignments,
                                         PluginRegistry& plugins) {
   Node file = config::load_file(path);
+  config::require_file_of("calibrate", file);
   const std::vector<std::string> of_base = assign(assignments, file);
   config::Errors errors;
   constexpr std::string_view kSections[] = {"recordings", "motions", "set"};
@@ -270,6 +273,22 @@ Intrinsics spread_of(const std::string& label, const std::vector<FitOf>& fits,
 }
 
 }  // namespace
+
+void TurnAgreement::add(double wheels_rad, double reference_rad) {
+  ++segments;
+  wheels_rad2 += wheels_rad * wheels_rad;
+  reference_rad2 += reference_rad * reference_rad;
+  product_rad2 += wheels_rad * reference_rad;
+}
+
+double TurnAgreement::correlation() const {
+  const double size = std::sqrt(wheels_rad2 * reference_rad2);
+  return size > 0. ? product_rad2 / size : 0.;
+}
+
+double TurnAgreement::ratio() const {
+  return wheels_rad2 > 0. ? std::sqrt(reference_rad2 / wheels_rad2) : 0.;
+}
 
 CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress) {
   const std::vector<FitOf> fits = fits_of(setup);

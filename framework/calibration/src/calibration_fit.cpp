@@ -272,6 +272,7 @@ class Fit {
     int segments = 0;
     for (const auto& problem : problems_) {
       estimate_.weighed_down += problem->n_weighed_down();
+      problem->add_turns(estimate_.turns);
       for (const Eigen::Vector3d& motion : problem->motions()) {
         estimate_.turn_rms_rad += motion[0] * motion[0];
         estimate_.way_rms_m += motion.tail<2>().squaredNorm();

@@ -235,6 +235,15 @@ void RecordingProblem::add_segment(int row, std::size_t k, const CalibrationPoin
   out.J.middleRows(row, rows) = std::sqrt(weights_[k]) * J.topRows(rows);
 }
 
+void RecordingProblem::add_turns(TurnAgreement& out) const {
+  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
+  for (std::size_t k = 0; k < motions_.size(); ++k) {
+    const bool first = !from_start || k == 0;
+    out.add(segments_[k].g[0] - (first ? 0. : segments_[k - 1].g[0]),
+            motions_[k][0] - (first ? 0. : motions_[k - 1][0]));
+  }
+}
+
 void RecordingProblem::weigh_segments() {
   if (weights_.empty()) return;
   const double most = chi2_quantile(kBelievable, rows_per_segment());

@@ -228,6 +228,25 @@ void judge_left_over(CalibrationResult& result) {
   }
 }
 
+/// What turns the other way, or so many times as far, is no calibration: however little it turns.
+void judge_turns(CalibrationResult& result) {
+  // By chance the correlation of n segments is 1/sqrt(n).
+  constexpr double kSigmas = 5., kLeast = 0.5, kMostRatio = 2.;
+  const TurnAgreement& turns = result.all.turns;
+  const double correlation = turns.correlation(), ratio = turns.ratio();
+  const double chance = 1. / std::sqrt(std::max(1, turns.segments));
+  if (std::abs(correlation) < std::max(kLeast, kSigmas * chance)) return;
+  if (correlation < 0.) {
+    result.doubts.push_back(
+        "the reference turns the other way than the wheels (correlation " +
+        significant(correlation, 2) +
+        "): an axis of the gyro that is reversed, or left and right of the wheels exchanged");
+  } else if (ratio > kMostRatio || ratio < 1. / kMostRatio) {
+    result.doubts.push_back("the reference turns " + significant(ratio, 3) +
+                            " times as far as the wheels: units, or gears");
+  }
+}
+
 void judge_lengths(CalibrationResult& result) {
   for (const std::string& text : result.failed_lengths) {
     result.warnings.push_back("segments that could not be compared: " + text);
@@ -269,6 +288,7 @@ void judge(CalibrationResult& result) {
   judge_what_was_given(result);
   judge_search(result);
   judge_left_over(result);
+  judge_turns(result);
   judge_channels(result);
   judge_wheels(result);
   judge_change(result);

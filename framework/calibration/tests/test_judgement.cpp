@@ -13,6 +13,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 /// A differential drive on a figure eight with a gyro, whose nominal values may be wrong.
 CalibrationSetup differential(const std::string& nominal) {
@@ -92,6 +93,25 @@ TEST(Judgement, DoubtsAGyroThatWouldNeedAGreatBias) {
     pose.q_BtoW = Eigen::AngleAxisd(turned, Eigen::Vector3d::UnitZ()) * pose.q_BtoW;
   }
   EXPECT_THAT(calibrate(setup).doubts, Contains(HasSubstr("the gyro would need a bias of")));
+}
+
+TEST(Judgement, DoubtsAGyroThatTurnsTheOtherWay) {
+  CalibrationSetup setup = differential(kRight);
+  testing::scale_turns(setup.recordings[0].motion.poses, -1.);
+  EXPECT_THAT(calibrate(setup).doubts,
+              Contains(HasSubstr("the reference turns the other way than the wheels")));
+}
+
+TEST(Judgement, DoubtsAGyroInAnotherUnit) {
+  CalibrationSetup setup = differential(kRight);
+  testing::scale_turns(setup.recordings[0].motion.poses, M_PI / 180.);
+  EXPECT_THAT(calibrate(setup).doubts, Contains(HasSubstr("times as far as the wheels: units")));
+}
+
+TEST(Judgement, KnowsNoSideOfADriveThatDoesNotTurn) {
+  CalibrationSetup setup = testing::gyro_setup(
+      testing::kPlaces + "radius_m: 0.0255", testing::kPlaces + "radius_m: 0.0255", 1, "straight");
+  EXPECT_THAT(calibrate(setup).doubts, Not(Contains(HasSubstr("turns"))));
 }
 
 }  // namespace

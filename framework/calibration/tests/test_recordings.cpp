@@ -10,6 +10,7 @@
 
 #include "motion_reference.hpp"
 #include "simulated.hpp"
+#include "unknown_swerve.hpp"
 #include "viwo/calibration/calibrate.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/math/se2.hpp"
@@ -119,6 +120,33 @@ TEST(FrcRecording, IsTrustedUnlessADriveIsReversed) {
   auto reversed = read_calibration_setup(file, {"sensors.wheels0.drive_scale=[1, -1]"}, registry());
   EXPECT_THAT(calibrate(reversed).doubts,
               ::testing::Contains(::testing::HasSubstr("still contradict each other by")));
+}
+
+// It turns little: what a reversed gyro leaves is less than the wheels slip.
+TEST(FrcRecording, IsDoubtedWhereTheHeadingOfItsGyroIsReversed) {
+  const auto log = std::filesystem::path(VIWO_TEST_SHARED_DIR) /
+                   "data/real/frc_swerve/FRC_20240910_002841.wpilog.gz";
+  if (!std::filesystem::exists(log)) GTEST_SKIP() << "no recording " << log;
+  const auto folder = std::filesystem::path(::testing::TempDir());
+  std::ofstream(folder / "run.yaml")
+      << "sensors: {log0: {type: wpilog, path: " << log.string()
+      << ", module_entries: [/Chassis/ActualFrontLeftModuleState, "
+         "/Chassis/ActualBackRightModuleState], wheel_radius_m: 0.0508, cycle_entry: "
+         "/Chassis/ActualSpeed, heading_entry: /Chassis/Pose/rotation}}\n"
+         "kinematics: {type: four_wis_wid, x_m: [0.28575, -0.28575], y_m: [0.28575, -0.28575], "
+         "radius_m: 0.0508, prior_sigma_radius_m: 0.002, prior_sigma_position_m: 0.005, "
+         "prior_sigma_steer_offset_rad: 0.02, sigma_drive_rad_per_s: 0.5, sigma_steer_rad: 0.01, "
+         "sigma_lateral_m_per_s: 0.05}\n";
+  std::ofstream(folder / "calibration.yaml")
+      << "calibration: frc\nbase: run.yaml\nreference: gyro\n";
+  const auto doubts = [&](double factor) {
+    auto setup = read_calibration_setup(folder / "calibration.yaml", {}, registry());
+    testing::scale_turns(setup.recordings[0].motion.poses, factor);
+    return calibrate(setup).doubts;
+  };
+  EXPECT_THAT(doubts(1.), ::testing::IsEmpty());
+  EXPECT_THAT(doubts(-1.), ::testing::Contains(::testing::HasSubstr("turns the other way")));
+  EXPECT_THAT(doubts(M_PI / 180.), ::testing::Contains(::testing::HasSubstr("times as far")));
 }
 
 TEST_F(Recordings, ThreeModelsRunSideBySide) {

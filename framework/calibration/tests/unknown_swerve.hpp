@@ -49,6 +49,17 @@ inline void scale_drives(CalibrationSetup& setup, double scale) {
   });
 }
 
+/// The turns of a reference `factor` times as far.
+inline void scale_turns(Trajectory& poses, double factor) {
+  double before_rad = yaw(poses.front()), turned_rad = before_rad;
+  for (StampedPose& pose : poses) {
+    const double now_rad = yaw(pose);
+    turned_rad += factor * wrap_angle(now_rad - before_rad);
+    before_rad = now_rad;
+    pose.q_BtoW = Eigen::AngleAxisd(turned_rad, Eigen::Vector3d::UnitZ());
+  }
+}
+
 inline const std::string kPlaces =
     "type: four_wis_wid, x_m: [0.1125, -0.1125, -0.1125, 0.1125], "
     "y_m: [0.1125, 0.1125, -0.1125, -0.1125], prior_sigma_position_m: 0.001, ";

@@ -212,6 +212,14 @@ class TreeBuilder final : public YAML::EventHandler {
   std::optional<Node> root_;
 };
 
+bool is_indented_by_tab(std::string_view text, const YAML::Mark& mark) {
+  if (mark.is_null()) return false;
+  std::istringstream lines{std::string(text)};
+  std::string line;
+  for (int i = 0; i <= mark.line; ++i) std::getline(lines, line);
+  return line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string::npos;
+}
+
 }  // namespace
 
 Node parse_text(std::string_view text, const std::string& origin, bool with_positions) {
@@ -229,7 +237,9 @@ Node parse_text(std::string_view text, const std::string& origin, bool with_posi
     }
     return std::move(builder).take();
   } catch (const YAML::Exception& error) {
-    fail(builder.mark_of(error.mark), "not valid YAML: " + error.msg);
+    const bool by_tab = is_indented_by_tab(text, error.mark);
+    fail(builder.mark_of(error.mark),
+         "not valid YAML: " + (by_tab ? "a line is indented by spaces, not by tabs" : error.msg));
   }
 }
 

@@ -15,6 +15,7 @@
 
 #include "run_identity.hpp"
 #include "run_journal.hpp"
+#include "viwo/config/file_kind.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
@@ -323,6 +324,7 @@ Node configuration_of(const ExperimentSetup& setup, const Variant& variant,
 ExperimentSetup read_experiment(const std::filesystem::path& path,
                                 const ExperimentOptions& options) {
   const Node file = config::load_file(path);
+  config::require_file_of("experiment", file);
   config::Errors errors;
   constexpr std::string_view kSections[] = {"variants", "recordings", "motions", "set"};
   const auto params =

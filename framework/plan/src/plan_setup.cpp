@@ -2,6 +2,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "viwo/config/file_kind.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
@@ -106,6 +107,7 @@ void PlanParams::bind(ParamBinder& b) {
 PlanSetup read_plan_setup(const std::filesystem::path& path,
                           const std::vector<std::string>& assignments, PluginRegistry& plugins) {
   Node file = config::load_file(path);
+  config::require_file_of("plan", file);
   config::apply(file, assignments);
   PlanSetup setup;
   config::Errors errors;

@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "viwo/config/file_kind.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
@@ -107,13 +108,7 @@ void refuse_unused(const std::vector<Definition>& defined, const Node& run,
 Node load_run(const std::filesystem::path& file) {
   Node run = config::load_file(file);
   if (!run.is_map()) config::fail(run.mark(), "a run configuration is a section of keys");
-  for (const char* kind : {"experiment", "calibration"}) {
-    if (run.find(kind) == nullptr || run.find("base") == nullptr) continue;
-    config::fail(run.find_entry(kind)->key_mark,
-                 std::string("this is ") + (kind[0] == 'e' ? "an experiment" : "a calibration") +
-                     ", not a run: viwo " + (kind[0] == 'e' ? "experiment" : "calibrate") +
-                     " takes it");
-  }
+  config::require_file_of("run", run);
   return run;
 }
 

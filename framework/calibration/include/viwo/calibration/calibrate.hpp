@@ -112,6 +112,18 @@ struct ByHand {
   double sigmas = 0.;         ///< by which the wheels miss it
 };
 
+/// How the turns of the wheels in the segments go with those of the reference.
+struct TurnAgreement {
+  int segments = 0;
+  double wheels_rad2 = 0., reference_rad2 = 0., product_rad2 = 0.;  ///< sums over the segments
+
+  void add(double wheels_rad, double reference_rad);
+  /// Correlation about zero, -1 .. 1; 0 where nothing turns.
+  double correlation() const;
+  /// How many times as much the reference turns.
+  double ratio() const;
+};
+
 /// What one fit found.
 struct CalibrationEstimate {
   Intrinsics x_WI;
@@ -131,6 +143,7 @@ struct CalibrationEstimate {
   int unknowns = 0;           ///< that were estimated, those of the recordings with them
   int parity_directions = 0;  ///< about which the wheels alone tell more than the prior
   double turn_rms_rad = 0., way_rms_m = 0.;  ///< of the segments, by the reference
+  TurnAgreement turns;
   double cost = 0.;
   double log_volume = 0.;  ///< of the intrinsics' covariance in prior units, square root (CAL-11)
   /// By how much dead reckoning misses the ends of recordings that are left out, where it was

@@ -1,0 +1,34 @@
+#include "viwo/config/file_kind.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+
+#include "viwo/config/errors.hpp"
+
+namespace viwo::config {
+
+void require_file_of(std::string_view command, const Node& file) {
+  struct Kind {
+    const char *command, *what, *key, *with;  ///< the keys that only this kind has
+  };
+  constexpr Kind kKinds[] = {{"experiment", "an experiment", "experiment", "base"},
+                             {"calibrate", "a calibration", "calibration", "base"},
+                             {"plan", "a plan", "plan", "goals"},
+                             {"run", "a run", "sensors", "sensors"}};
+  const auto is_of = [&](const Kind& kind) {
+    return file.find(kind.key) != nullptr && file.find(kind.with) != nullptr;
+  };
+  const auto* const wanted =
+      std::find_if(std::begin(kKinds), std::end(kKinds),
+                   [&](const Kind& kind) { return command == kind.command; });
+  if (!file.is_map() || is_of(*wanted)) return;
+  for (const Kind& kind : kKinds) {
+    if (!is_of(kind)) continue;
+    fail(file.find_entry(kind.key)->key_mark, std::string("this is ") + kind.what + ", not " +
+                                                  wanted->what + ": viwo " + kind.command +
+                                                  " takes it");
+  }
+}
+
+}  // namespace viwo::config
