@@ -70,6 +70,10 @@ TableReader::TableReader(const std::filesystem::path& file) : reader_(file) {
   if (header.find(';') != std::string_view::npos) separator_ = ';';
   split(header, separator_, false, fields_);
   check_columns();
+  if (std::all_of(fields_.begin(), fields_.end(),
+                  [](std::string_view name) { return parse_number(name).has_value(); })) {
+    reader_.fail("numbers where the header is expected: the first line names the columns");
+  }
   for (const std::string_view name : fields_) {
     if (name.empty()) reader_.fail("the header has a column without a name");
     if (has_column(name)) reader_.fail("the header has the column " + quoted(name) + " twice");

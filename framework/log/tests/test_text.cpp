@@ -223,6 +223,10 @@ TEST_F(TableReaderTest, RefusesAHeaderWithAmbiguousColumns) {
   const auto nameless = write("nameless.csv", "a,,b\n");
   EXPECT_EQ(message_of([&] { TableReader{nameless}; }),
             nameless.string() + ":1  the header has a column without a name");
+  const auto numbers = write("numbers.csv", "1298445274541884928,0.5,nan\n");
+  EXPECT_EQ(message_of([&] { TableReader{numbers}; }),
+            numbers.string() +
+                ":1  numbers where the header is expected: the first line names the columns");
 }
 
 TEST_F(TextWriterTest, ReportsAFullDiskAndAMissingFolder) {

@@ -197,7 +197,11 @@ std::shared_ptr<const Bag> open_ros1(const fs::path& path, const std::vector<std
     for (const auto& entry : fs::directory_iterator(path)) {
       if (entry.path().extension() == ".bag") files.push_back(open_file(entry.path()));
     }
-    if (files.empty()) throw ParamError("path", "no *.bag in the folder " + path.string());
+    if (files.empty()) {
+      const bool is_ros2 = fs::exists(path / "metadata.yaml");
+      throw ParamError("path", "no *.bag in the folder " + path.string() +
+                                   (is_ros2 ? " - did you mean type: ros2_bag?" : ""));
+    }
     std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) {
       return std::pair(a->begin_ns, a->name) < std::pair(b->begin_ns, b->name);
     });

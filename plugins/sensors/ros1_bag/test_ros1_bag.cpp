@@ -266,6 +266,8 @@ TEST_F(Ros1Bag, PlaysTheBagsOfAFolderOneAfterTheOther) {
               HasSubstr("sensor.paths: no file 'run_7.bag' in "));
   fs::create_directories(folder_ / "none");
   EXPECT_THAT(error_of(section(kAll, "none")), HasSubstr("sensor.path: no *.bag in the folder "));
+  std::ofstream(folder_ / "none/metadata.yaml") << "";
+  EXPECT_THAT(error_of(section(kAll, "none")), HasSubstr("did you mean type: ros2_bag?"));
 }
 
 }  // namespace

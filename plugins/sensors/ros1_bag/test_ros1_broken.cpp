@@ -148,6 +148,8 @@ TEST_F(Ros1Bag, RefusesWhatIsNoBag) {
   std::ofstream(file("text.bag")) << "timestamp_ns,x\n1,2\n";
   EXPECT_THAT(error_of(section(kAll, "text.bag")),
               HasSubstr(file("text.bag") + "  is no ROS 1 bag"));
+  std::ofstream(file("other.bag")) << "\x89MCAP0\r\n";
+  EXPECT_THAT(error_of(section(kAll, "other.bag")), HasSubstr("did you mean type: ros2_bag?"));
 }
 
 TEST_F(Ros1Bag, RefusesADamagedChunk) {

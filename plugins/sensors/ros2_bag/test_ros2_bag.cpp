@@ -112,6 +112,7 @@ TEST_F(Ros2Bag, RefusesWhatItCannotRead) {
   EXPECT_THAT(error_of(section(kAll, "")),
               HasSubstr(file("metadata.yaml") + ":2:1  not valid YAML: "));
   EXPECT_THAT(error_of(section(kAll, "bag_0.db3.zstd")), HasSubstr("is a file .zstd" + remedy));
+  EXPECT_THAT(error_of(section(kAll, "robot.bag")), HasSubstr("did you mean type: ros1_bag?"));
   fs::create_directories(folder_ / "none");
   EXPECT_THAT(error_of(section(kAll, "none")),
               HasSubstr("is no ROS 2 bag: it has neither metadata.yaml nor *.mcap or *.db3"));
