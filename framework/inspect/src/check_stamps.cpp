@@ -233,37 +233,58 @@ void check_rejections(const Recording& recording, Findings& out) {
   }
 }
 
-/// Of those that are to be used together.
-void check_overlap(const Recording& recording, Findings& out) {
+/// Of streams, the time that all of them cover, and what bounds it.
+struct Overlap {
   std::int64_t begin_ns = INT64_MIN, end_ns = INT64_MAX;
   double shortest_s = INFINITY, longest_s = 0.;
-  const Stamps *latest = nullptr, *earliest = nullptr;
-  for (const Stamps& stamps : recording.stamps) {
-    if (stamps.t_ns.size() < kFewestStamps) continue;
+  const Stamps *latest = nullptr, *earliest = nullptr;  ///< first to begin late, to end early
+
+  void add(const Stamps& stamps) {
     const auto [first, last] = std::minmax_element(stamps.t_ns.begin(), stamps.t_ns.end());
     if (*first > begin_ns) begin_ns = *first, latest = &stamps;
     if (*last < end_ns) end_ns = *last, earliest = &stamps;
     shortest_s = std::min(shortest_s, seconds_between(*first, *last));
     longest_s = std::max(longest_s, seconds_between(*first, *last));
   }
-  if (latest == nullptr || recording.stamps.size() < 2) return;
-  const double common_s = seconds_between(begin_ns, end_ns);
-  const std::vector<Figure> figures = {{"in common", std::max(common_s, 0.), "s"},
-                                       {"shortest", shortest_s, "s"},
-                                       {"longest", longest_s, "s"}};
-  const std::string text = significant(std::max(common_s, 0.), 4) + " s that all sensors cover";
-  if (common_s > 0.9 * shortest_s) {
+  double common_s() const {
+    return latest != nullptr ? std::max(seconds_between(begin_ns, end_ns), 0.) : 0.;
+  }
+};
+
+/// A reference may cover less than what the estimate is made of.
+bool moves_the_estimate(const Stamps& stamps) {
+  return *stamps.type == sample_type<ImuSample>() || *stamps.type == sample_type<EncoderSample>() ||
+         *stamps.type == sample_type<ImageSample>() || *stamps.type == sample_type<FeatureSample>();
+}
+
+/// Of those that are to be used together.
+void check_overlap(const Recording& recording, Findings& out) {
+  Overlap all, moving;
+  for (const Stamps& stamps : recording.stamps) {
+    if (stamps.t_ns.size() < kFewestStamps) continue;
+    all.add(stamps);
+    if (moves_the_estimate(stamps)) moving.add(stamps);
+  }
+  if (all.latest == nullptr || recording.stamps.size() < 2) return;
+  const std::vector<Figure> figures = {{"in common", all.common_s(), "s"},
+                                       {"shortest", all.shortest_s, "s"},
+                                       {"longest", all.longest_s, "s"}};
+  const auto covers = [&](double part) {
+    return all.common_s() >= part * all.shortest_s && moving.common_s() >= part * moving.longest_s;
+  };
+  const std::string text = significant(all.common_s(), 4) + " s that all sensors cover";
+  if (covers(0.9)) {
     out.push_back({"recording", Severity::kFits, "overlap", text, figures});
     return;
   }
-  // Half of the shortest is lost.
-  const bool is_fault = common_s < 0.5 * shortest_s;
+  const bool is_fault = !covers(0.5);
   out.push_back({"recording", is_fault ? Severity::kFault : Severity::kNote, "overlap",
-                 text + " (the shortest has " + significant(shortest_s, 4) +
-                     " s): " + label_of(recording, *latest) + " begins last, " +
-                     label_of(recording, *earliest) + " ends first" +
-                     (is_fault ? ": are their clocks the same, are they of one "
-                                 "recording?"
+                 text + " (the shortest has " + significant(all.shortest_s, 4) +
+                     " s, the longest " + significant(all.longest_s, 4) +
+                     " s): " + label_of(recording, *all.latest) + " begins last, " +
+                     label_of(recording, *all.earliest) + " ends first" +
+                     (is_fault ? ": are their clocks the same, are they of one recording, and "
+                                 "all of it?"
                                : ""),
                  figures});
 }

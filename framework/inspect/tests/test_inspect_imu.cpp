@@ -74,6 +74,17 @@ TEST(InspectStamps, TellsSensorsThatHaveLittleTimeInCommon) {
   EXPECT_THAT(faults_of(few), Contains("recording overlap"));
 }
 
+TEST(InspectStamps, TellsASensorThatEndsEarly) {
+  const auto until = [](std::int64_t end_s) {
+    return inspected(swerve(),
+                     {.wheels = [=](EncoderSample& s) { return s.t_ns < end_s * kSecond; }});
+  };
+  EXPECT_EQ(finding_of(until(25), "recording", "overlap").severity, Severity::kNote);
+  const Inspection early = until(6);
+  EXPECT_THAT(faults_of(early), Contains("recording overlap"));
+  EXPECT_THAT(finding_of(early, "recording", "overlap").what, HasSubstr("wheels0 ends first"));
+}
+
 TEST(InspectStamps, TellsIntervalsThatNoRunTakes) {
   RunSetup slow = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
   std::int64_t last_ns = -kSecond;
