@@ -307,6 +307,17 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationForACalibrationBoard) {
   EXPECT_LT(calibration.at("cam1.fx").at("sigma").get<double>(), 0.5);
 }
 
+TEST_F(ResultsTest, AreDoubtfulWhereTheReferenceContradictsThem) {
+  write("run.yaml", kRun);
+  const Outcome outcome = viwo({"run", "run.yaml", "--out", "out", "--set",
+                                "sensors.sim.drive_scale=[57.3, 57.3, 57.3, 57.3]"});
+  EXPECT_EQ(outcome.code, 1) << outcome.err;
+  EXPECT_EQ(outcome.out.find("status doubtful\n  the reference contradicts the estimate: after "),
+            0U)
+      << outcome.out;
+  EXPECT_EQ(summary().at("status"), "doubtful");
+}
+
 TEST_F(ResultsTest, OfTheDeliveredConfigurationForSatelliteFixes) {
   const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/real";
   if (!fs::exists(data / "husky_bag")) GTEST_SKIP() << "the recording is not here";
@@ -319,6 +330,18 @@ TEST_F(ResultsTest, OfTheDeliveredConfigurationForSatelliteFixes) {
   const nlohmann::json result = summary("run");
   EXPECT_EQ(result.at("status"), "ok");
   EXPECT_LT(result.at("calibration").at("gnss.yaw_EtoG").at("sigma").get<double>(), 0.1);
+  // The twist that the bag has is not for wheels.
+  const Outcome wheels =
+      viwo({"run", kConfigFolder + "runs/husky_gnss.yaml", "--out", "none", "--set",
+            "placeholders.data=" + fs::canonical(data).string(), "--set",
+            "kinematics={type: differential, radius_left_m: 0.16, radius_right_m: 0.16, "
+            "baseline_m: 0.5}"});
+  EXPECT_EQ(wheels.code, 2);
+  EXPECT_NE(wheels.err.find("drive_joints are the twist of an odometry, but kinematics "
+                            "'differential' takes angular velocities of wheels - did you mean "
+                            "kinematics: {type: body_twist}?"),
+            std::string::npos)
+      << wheels.err;
 }
 
 TEST_F(ResultsTest, OfTheDeliveredExperimentWithWrongCameras) {

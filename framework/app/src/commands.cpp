@@ -203,7 +203,7 @@ int run_command(const Arguments& arguments) {
   figures.write(report_of(setup, result));
   if (!picture_failure.empty()) throw std::runtime_error(picture_failure);
   if (!mcap_failure.empty()) throw std::runtime_error(mcap_failure);
-  return result.status == RunStatus::kOk ? 0 : 1;
+  return is_trusted(result) ? 0 : 1;
 }
 
 int experiment_command(const Arguments& arguments) {

@@ -104,8 +104,10 @@ void EstimateOutput::write(double t_s, const Filter& filter) {
 std::string EstimateOutput::finish(const RunResult& result) {
   if (!failure_.empty()) return failure_;
   try {
-    const bool failed = result.status != RunStatus::kOk;
-    out_->close(failed ? (result.cause.empty() ? "the run failed" : result.cause) : "");
+    std::string why = result.cause;
+    if (why.empty() && !result.doubts.empty()) why = result.doubts.front();
+    if (why.empty() && result.status != RunStatus::kOk) why = "the run failed";
+    out_->close(why);
   } catch (const std::exception& error) {
     failure_ = error.what();
   }

@@ -61,6 +61,9 @@ void write_start_of_next(const std::filesystem::path& file, const RunSetup& setu
     const bool diverged = result.status == RunStatus::kDiverged;
     calibration.status = diverged ? Status::kDiverged : Status::kFailed;
     calibration.reasons = {result.cause};
+  } else if (!result.doubts.empty()) {
+    calibration.status = Status::kDoubtful;
+    calibration.reasons = result.doubts;
   }
   log::write_text(file, calibration_text(calibration, "viwo run"));
 }
@@ -171,8 +174,9 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
   timing["total"] = stage_json(result.total_ms);
   json summary = {
       {"viwo_version", viwo_version()},
-      {"status", name(result.status)},
+      {"status", status_text(result)},
       {"cause", result.cause},
+      {"doubts", result.doubts},
       {"warnings", result.warnings},
       {"noises", noises},
       {"name", setup.name},
@@ -225,8 +229,9 @@ void describe_odometry(const PreintegratedPose& total, std::ostream& out) {
 
 std::string describe(const RunResult& result) {
   TextStream out;
-  out << "status " << name(result.status);
+  out << "status " << status_text(result);
   if (!result.cause.empty()) out << ": " << result.cause;
+  for (const std::string& doubt : result.doubts) out << "\n  " << doubt;
   out << "\n" << significant(result.duration_s, 4) << " s, ";
   if (result.updates.empty() && result.total.samples > 0) {
     describe_odometry(result.total, out);

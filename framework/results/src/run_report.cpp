@@ -19,7 +19,7 @@ constexpr int kTopViewHeight = 460;
 
 KeyValues facts_of(const RunSetup& setup, const RunResult& result) {
   KeyValues facts;
-  facts.entries = {{"status", name(result.status)},
+  facts.entries = {{"status", status_text(result)},
                    {"seed", static_cast<double>(setup.seed)},
                    {"duration [s]", result.duration_s},
                    {"epochs", result.epochs}};
@@ -105,6 +105,9 @@ void add_result_section(const RunSetup& setup, const RunResult& result, Document
   if (result.status != RunStatus::kOk) {
     section.blocks.emplace_back(Paragraph{std::string(name(result.status)) + ": " + result.cause,
                                           Paragraph::Tone::kWarning});
+  }
+  for (const std::string& line : result.doubts) {
+    section.blocks.emplace_back(Paragraph{"Doubtful: " + line, Paragraph::Tone::kWarning});
   }
   for (const std::string& line : result.warnings) {
     section.blocks.emplace_back(Paragraph{line, Paragraph::Tone::kWarning});

@@ -108,6 +108,14 @@ TEST(Contradictions, AreUpdatesThatHaveMoreRejectedThanGatesDoByChance) {
   EXPECT_TRUE(warned(0, 40));
 }
 
+TEST(Contradictions, AreDoubtsWhereTheyAreMoreThanHalf) {
+  const auto doubted = [](std::int64_t applied, std::int64_t rejected) {
+    return contradictions({{"wheel_odometry", {applied, rejected}, {}, {}, {}}}).at(0).is_doubt;
+  };
+  EXPECT_FALSE(doubted(500, 500));
+  EXPECT_TRUE(doubted(499, 501));
+}
+
 TEST(Contradictions, AreTellTalesOfSwappedJoints) {
   // Left and right wheels are each other's: the base seems to turn the other way.
   RunSetup setup = filter_setup();
@@ -123,13 +131,20 @@ TEST(Contradictions, AreTellTalesOfSwappedJoints) {
   data.recorded.set(data.wheels_name, samples);
   const RunResult result = viwo::run(setup, data);
   EXPECT_THAT(result.warnings, Contains(HasSubstr("left and right of the wheels are exchanged")));
-  EXPECT_THAT(result.warnings,
-              Contains(HasSubstr(
-                  " rejected: what it measures and the rest contradict each other - check")));
-  EXPECT_THAT(describe(result), HasSubstr("warning: wheel_odometry: "));
-  EXPECT_EQ(summary_of(setup, result).at("warnings").at(0), result.warnings[0]);
-  EXPECT_THAT(report::to_html(report_of(setup, result)), HasSubstr(result.warnings[0]));
+  ASSERT_EQ(result.doubts.size(), 2U);
+  EXPECT_THAT(result.doubts[0],
+              HasSubstr(" rejected: what it measures and the rest contradict each other - check"));
+  EXPECT_THAT(result.doubts[1], HasSubstr("the reference contradicts the estimate: after "));
+  EXPECT_THAT(describe(result), HasSubstr("status doubtful\n  wheel_odometry: "));
+  const nlohmann::json summary = summary_of(setup, result);
+  EXPECT_EQ(summary.at("status"), "doubtful");
+  EXPECT_EQ(summary.at("doubts").at(1), result.doubts[1]);
+  EXPECT_EQ(summary.at("warnings").at(0), result.warnings[0]);
+  const std::string page = report::to_html(report_of(setup, result));
+  EXPECT_THAT(page, HasSubstr(result.doubts[0]));
+  EXPECT_THAT(page, HasSubstr(result.warnings[0]));
   EXPECT_TRUE(filter_run().result.warnings.empty());
+  EXPECT_TRUE(is_trusted(filter_run().result));
 }
 
 TEST(DisplayUnit, IsSmallWhereValuesAre) {

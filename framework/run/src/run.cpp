@@ -31,6 +31,11 @@ const char* name(RunStatus status) {
   return "failed";
 }
 
+const char* status_text(const RunResult& result) {
+  const bool doubtful = result.status == RunStatus::kOk && !result.doubts.empty();
+  return doubtful ? "doubtful" : name(result.status);
+}
+
 namespace {
 
 StampedPose stamped(std::int64_t t_ns, const Eigen::Vector3d& pose) {
@@ -194,6 +199,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
     result.accuracy = eval::evaluate(data.reference, result.estimate, setup.evaluation);
     result.nees_planar = nees.mean();
     warn_of_gaps(result);
+    doubt_against_reference(result);
   }
   return result;
 }

@@ -66,8 +66,8 @@ void RunningWarnings::epoch(const RunResult& result, const Estimator& estimator)
     say_once(of, now_s, of + "failed: " + update.failures.cause);
     if (update.failures.disabled) say_once(of + "disabled", now_s, of + "is disabled");
   }
-  for (const std::string& line : contradictions(result.updates)) {
-    say_once("contradictions of " + line.substr(0, line.find(':')), now_s, line);
+  for (const Contradiction& found : contradictions(result.updates)) {
+    say_once("contradictions of " + found.update, now_s, found.text);
   }
   look_at_rejections(now_s, estimator);
 }

@@ -32,24 +32,27 @@ std::string since(std::int64_t begin_ns, const std::string& place) {
 
 }  // namespace
 
-std::vector<std::string> contradictions(const std::vector<UpdateTrack>& updates) {
+std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& updates) {
   // Gates reject five percent at most (gate_probability) of what is good. A fifth, and seven sigmas
   // of the count more than that, is not by chance; of less than forty it may be the first seconds
   // of a start that is off.
   constexpr std::int64_t kFewest = 40;
   constexpr double kGated = 0.05, kSigmas = 7.;
-  std::vector<std::string> lines;
+  std::vector<Contradiction> found;
   for (const UpdateTrack& update : updates) {
     const auto& [applied, rejected] = update.total;
     const std::int64_t of = applied + rejected;
     const double n = static_cast<double>(of);
     const double chance = kGated * n + kSigmas * std::sqrt(kGated * (1. - kGated) * n);
     if (of < kFewest || 5 * rejected <= of || static_cast<double>(rejected) <= chance) continue;
-    lines.push_back(update.name + ": " + std::to_string(rejected) + " of " + std::to_string(of) +
-                    " rejected: what it measures and the rest contradict each other - check "
-                    "calibration and axes of cameras and IMU, order of the joints, kinematics");
+    found.push_back({update.name,
+                     update.name + ": " + std::to_string(rejected) + " of " + std::to_string(of) +
+                         " rejected: what it measures and the rest contradict each other - check "
+                         "calibration and axes of cameras and IMU, units, signs and order of the "
+                         "joints, kinematics",
+                     2 * rejected > of});
   }
-  return lines;
+  return found;
 }
 
 std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
@@ -88,6 +91,21 @@ std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& cal
                     ": its configuration is wrong, or what is next to it");
   }
   return lines;
+}
+
+void doubt_against_reference(RunResult& result) {
+  constexpr std::int64_t kFewest = 10;
+  if (!result.accuracy || result.accuracy->rpe.empty()) return;
+  const auto shortest =
+      std::min_element(result.accuracy->rpe.begin(), result.accuracy->rpe.end(),
+                       [](const auto& a, const auto& b) { return a.length_m < b.length_m; });
+  if (shortest->count < kFewest || !(shortest->mean_m > 0.5 * shortest->length_m)) return;
+  result.doubts.push_back("the reference contradicts the estimate: after " +
+                          eval::length_text(shortest->length_m) + " m it is off by " +
+                          significant(shortest->mean_m, 3) + " m, mean of " +
+                          std::to_string(shortest->count) +
+                          " segments - units, signs, order or mount of a sensor are wrong, or of "
+                          "the reference: viwo inspect tells which");
 }
 
 void warn_of_gaps(RunResult& result) {

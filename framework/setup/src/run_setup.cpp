@@ -212,6 +212,25 @@ void require_drive_signs(const CalibrationFile& file, const RunSetup& setup) {
                    "], with the sizes that are there");
 }
 
+/// The twist of an odometry (joints v_x, v_y and omega_z of the readers of ROS) is no wheels.
+void require_no_twist_for_wheels(const Node& run, const RunSetup& setup) {
+  if (!setup.model) return;
+  const std::vector<NoiseSpec>& noises = setup.model->description().noises;
+  if (noises.empty() || !noises.front().parameter.ends_with("rad_per_s")) return;
+  const std::string sensor = setup.routes.sensor_of(Consumer::kWheels);
+  const Node* const joints = run.at_path("sensors." + sensor + ".drive_joints");
+  if (joints == nullptr || joints->items().empty()) return;
+  for (const Node& joint : joints->items()) {
+    const std::string& name = joint.scalar();
+    if (name != "v_x" && name != "v_y" && name != "omega_z") return;
+  }
+  config::fail(joints->mark(), "sensors." + sensor +
+                                   ".drive_joints are the twist of an odometry, but kinematics '" +
+                                   setup.kinematics.info.name +
+                                   "' takes angular velocities of wheels - did you mean "
+                                   "kinematics: {type: body_twist}?");
+}
+
 /// What the user of a calibration.yaml should know.
 void warn_of(const CalibrationStart& start, RunSetup& setup) {
   if (const std::string doubts = doubts_of(start.file()); !doubts.empty()) {
@@ -277,6 +296,7 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
   read_sensors(run, context, setup, errors);
   if (errors.empty()) setup.routes = read_routes(run, setup, std::move(measuring), errors);
   errors.throw_if_any();
+  require_no_twist_for_wheels(run, setup);
   if (start) {
     if (!start->took_anything()) {
       config::fail(start->file().model_mark, "this calibration has nothing that the run has");

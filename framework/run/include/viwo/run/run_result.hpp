@@ -117,6 +117,8 @@ struct RunResult {
   std::vector<std::pair<std::string, RejectionCount>> rejections;
   std::vector<NoiseFound> noises;     ///< "UPDATE.NAME", by updates that look for them
   std::vector<std::string> warnings;  ///< what is suspicious of the run as a whole
+  /// Why a run that came to its end is not to be trusted (warnings.hpp).
+  std::vector<std::string> doubts;
 
   // Of the filter.
   PoseNees nees;
@@ -132,6 +134,12 @@ struct RunResult {
   bool on_disk = false;
   std::vector<RunPicture> pictures;  ///< for the page, in time order
 };
+
+/// That of the result as a whole: of a run that came to its end with doubts "doubtful".
+const char* status_text(const RunResult& result);
+inline bool is_trusted(const RunResult& result) {
+  return result.status == RunStatus::kOk && result.doubts.empty();
+}
 
 StageTime stage_time(std::vector<double> ms);
 
