@@ -41,6 +41,14 @@ struct Speeds {
   double path_m = 0.;
 };
 
+double usual_spacing_s(const Trajectory& poses) {
+  std::vector<double> spacings_s;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    spacings_s.push_back(seconds_between(poses[i - 1].t_ns, poses[i].t_ns));
+  }
+  return spacings_s.empty() ? 0. : eval::median(spacings_s);
+}
+
 Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
   Speeds speeds;
   TwistSolver solver(wheels.model, {});
@@ -48,6 +56,7 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
   TwistSolution solution;
   constexpr double kWindow_s = 1., kLeast_m = 0.03;
   const auto clock_ns = static_cast<std::int64_t>(std::llround(1e9 * wheels.prior.wheels.t_OtoI_s));
+  const double gap_s = std::max(0.5, 2.5 * usual_spacing_s(poses));
   double path = 0., time_s = 0.;
   Eigen::Vector2d along = Eigen::Vector2d::Zero();
   std::int64_t begin_ns = 0;
@@ -59,8 +68,8 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
     along += solution.xi.head<2>() * dt_s;
     time_s += dt_s;
     if (seconds_between(begin_ns, sample.end_ns) < kWindow_s) continue;
-    const auto from = interpolate(poses, begin_ns + clock_ns, 0.5);
-    const auto to = interpolate(poses, sample.end_ns + clock_ns, 0.5);
+    const auto from = interpolate(poses, begin_ns + clock_ns, gap_s);
+    const auto to = interpolate(poses, sample.end_ns + clock_ns, gap_s);
     const bool is_whole = time_s > 0.9 * seconds_between(begin_ns, sample.end_ns);
     if (from && to && is_whole) {
       const Vector3d moved = to->p_BinW - from->p_BinW;
@@ -268,7 +277,7 @@ void check_clock(const Recording& recording, std::vector<Turn> of_poses, const s
     clock.what = "turns opposite to " + other + " (correlation " +
                  significant(lag->correlation, 3) +
                  "): its z axis points down, its quaternion is inverted (world in body), or " +
-                 other + " is reversed";
+                 other + " is reversed or has left and right exchanged";
   }
   out.push_back(clock);
 }

@@ -203,8 +203,10 @@ void check_rejections(const Recording& recording, Findings& out) {
     const double share = static_cast<double>(rejection.count) /
                          static_cast<double>(std::max<std::int64_t>(
                              static_cast<std::int64_t>(of) + rejection.count, 1));
-    // A row that a power loss has cut short is none of weight; one of a thousand is a fault.
-    const bool is_fault = rejection.count >= 5 && share > 1e-3;
+    // A row that a power loss has cut short is none of weight; one of a thousand is a fault, and so
+    // is damage behind which nothing can be read.
+    const bool loses_the_rest = rejection.reason.find("the rest is not read") != std::string::npos;
+    const bool is_fault = loses_the_rest || (rejection.count >= 5 && share > 1e-3);
     out.push_back({sensor,
                    is_fault ? Severity::kFault : Severity::kNote,
                    "rejected",
@@ -273,6 +275,14 @@ void check_overlap(const Recording& recording, Findings& out) {
     return all.common_s() >= part * all.shortest_s && moving.common_s() >= part * moving.longest_s;
   };
   const std::string text = significant(all.common_s(), 4) + " s that all sensors cover";
+  constexpr double kShort_s = 2.;
+  if (all.longest_s < kShort_s) {
+    out.push_back({"recording", Severity::kFault, "overlap",
+                   "it lasts " + significant(all.longest_s, 3) +
+                       " s, in which nothing shows: are its stamps in another unit?",
+                   figures});
+    return;
+  }
   if (covers(0.9)) {
     out.push_back({"recording", Severity::kFits, "overlap", text, figures});
     return;

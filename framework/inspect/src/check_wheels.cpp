@@ -66,21 +66,47 @@ std::optional<Calibration> calibrated(const Wheels& wheels) {
   return found;
 }
 
+/// How far poses are from the first of them for a tenth of the time.
+double distance_of(const Trajectory& poses) {
+  std::vector<double> distances_m;
+  for (const StampedPose& pose : poses) {
+    distances_m.push_back((pose.p_BinW - poses.front().p_BinW).norm());
+  }
+  return distances_m.empty() ? 0. : eval::quantile(distances_m, 0.9);
+}
+
+/// What stands still, while the poses go somewhere if there are any.
+Finding standstill(const Recording& recording, const std::string& label, double fastest) {
+  constexpr double kGoes_m = 0.3;
+  Finding finding{label,
+                  Severity::kNote,
+                  "motion",
+                  "the wheels do not turn in this recording",
+                  {{"fastest drive", fastest, "rad/s"}}};
+  for (const Poses& poses : recording.poses) {
+    const double distance_m = distance_of(poses.poses);
+    if (distance_m < kGoes_m) continue;
+    const std::string other = poses.of_imu ? recording.label<StateSample>(poses.sensor)
+                                           : recording.label<PoseSample>(poses.sensor);
+    finding.severity = Severity::kFault;
+    finding.what = "the wheels turn with no more than " + significant(fastest, 2) +
+                   " rad/s, while " + other + " goes " + significant(distance_m, 2) +
+                   " m: their unit, or not connected";
+    finding.figures.push_back({"distance", distance_m, "m"});
+  }
+  return finding;
+}
+
 /// A channel that gives one number all the time while another moves.
-void check_channels(const Wheels& wheels, const std::string& label, Findings& out) {
+void check_channels(const Recording& recording, const Wheels& wheels, const std::string& label,
+                    Findings& out) {
   const auto& samples = wheels.samples;
   constexpr double kMoves_rad_per_s = 0.1;
   DriveRanges ranges(wheels.model->description().n_drive);
   for (const EncoderSample& sample : samples) ranges.add(sample);
   const double fastest = ranges.fastest();
-  if (fastest < kMoves_rad_per_s || samples.size() < 100) {
-    out.push_back({label,
-                   Severity::kNote,
-                   "motion",
-                   "the wheels do not turn in this recording",
-                   {{"fastest drive", fastest, "rad/s"}}});
-    return;
-  }
+  if (fastest < kMoves_rad_per_s) return out.push_back(standstill(recording, label, fastest));
+  if (samples.size() < 100) return;
   for (const auto& [drive, value] : ranges.stuck()) {
     out.push_back({label, Severity::kFault, "channel",
                    "drive_" + std::to_string(drive + 1) + " reads " + significant(value, 3) +
@@ -307,7 +333,7 @@ void check_wheels(const Recording& recording, Findings& out) {
       continue;
     }
     if (wheels.samples.empty()) continue;
-    check_channels(wheels, label, out);
+    check_channels(recording, wheels, label, out);
     if (wheels.model->n_rows() <= 3) continue;
     const std::optional<Calibration> calibration = calibrated(wheels);
     if (!calibration) {

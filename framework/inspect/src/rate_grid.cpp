@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "viwo/eval/statistics.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/plausibility/heading_rate.hpp"
@@ -12,7 +13,18 @@
 namespace viwo::inspect {
 namespace {
 
-constexpr std::int64_t kLongestNs = 200'000'000;
+/// What is longer is a gap: of sensors that are slow by nature, some of their periods.
+std::int64_t longest_ns(std::span<const Turn> turns) {
+  constexpr std::int64_t kLongestNs = 200'000'000;
+  constexpr double kPeriods = 2.5;
+  std::vector<double> lengths;
+  lengths.reserve(turns.size());
+  for (const Turn& turn : turns) {
+    lengths.push_back(static_cast<double>(turn.end_ns - turn.begin_ns));
+  }
+  if (lengths.empty()) return kLongestNs;
+  return std::max<std::int64_t>(kLongestNs, std::llround(kPeriods * eval::median(lengths)));
+}
 
 std::size_t cells_between(std::int64_t begin_ns, std::int64_t end_ns) {
   constexpr std::int64_t kMostCells = 8'640'000;  // a day
@@ -25,8 +37,9 @@ std::size_t cells_between(std::int64_t begin_ns, std::int64_t end_ns) {
 RateGrid::RateGrid(std::int64_t begin_ns, std::int64_t end_ns, std::span<const Turn> turns)
     : begin_ns_(begin_ns), rates_(cells_between(begin_ns, end_ns), Eigen::Vector3d::Zero()) {
   std::vector<std::int64_t> covered(rates_.size());
+  const std::int64_t longest = longest_ns(turns);
   for (const Turn& turn : turns) {
-    if (turn.end_ns <= turn.begin_ns || turn.end_ns - turn.begin_ns > kLongestNs) continue;
+    if (turn.end_ns <= turn.begin_ns || turn.end_ns - turn.begin_ns > longest) continue;
     const std::int64_t first = std::max<std::int64_t>(0, (turn.begin_ns - begin_ns) / kCellNs);
     for (std::int64_t i = first; begin_ns + i * kCellNs < turn.end_ns; ++i) {
       if (static_cast<std::size_t>(i) >= rates_.size()) break;

@@ -17,7 +17,8 @@ class RateGrid {
   static constexpr double kCell_s = 1e-9 * kCellNs;
 
   RateGrid() = default;
-  /// From `begin_ns` to `end_ns`; turns that are longer than 0.2 s are gaps.
+  /// From `begin_ns` to `end_ns`; turns that are longer than 0.2 s, and than two and a
+  /// half as long as usual, are gaps.
   RateGrid(std::int64_t begin_ns, std::int64_t end_ns, std::span<const Turn> turns);
 
   std::size_t size() const { return rates_.size(); }

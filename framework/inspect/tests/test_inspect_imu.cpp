@@ -125,6 +125,27 @@ TEST(InspectStamps, DoesNotTakeOneStampForTheTimeOfTheRecording) {
   EXPECT_GT(figure_of(finding_of(stray, "wheels0", "stamps"), "longest interval"), 5.);
 }
 
+/// Damaged in the middle: once, and for good.
+class Damaged : public testing::InMemory {
+ public:
+  using InMemory::InMemory;
+  void rejections(std::vector<RejectionCount>& out) const override {
+    out.push_back({"bytes that are no record: the rest is not read", 1, "byte 77"});
+  }
+};
+
+TEST(InspectStamps, TellsOfDamageBehindWhichNothingIsRead) {
+  RunSetup setup = changed(swerve(), {});
+  std::vector<Measurement> samples;
+  for (SensorEntry& entry : setup.sensors) {
+    if (entry.name != "wheels0") continue;
+    for (Measurement m; entry.sensor.object->next(m) == Status::kOk;) samples.push_back(m);
+    entry.sensor.object =
+        std::make_shared<Damaged>(SampleTypes{&sample_type<EncoderSample>()}, samples);
+  }
+  EXPECT_THAT(faults_of(inspect(setup)), ElementsAre("wheels0 rejected"));
+}
+
 /// Ends with a fault, and had some samples rejected.
 class Poor : public testing::InMemory {
  public:

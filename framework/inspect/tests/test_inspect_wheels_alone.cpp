@@ -132,5 +132,56 @@ TEST(InspectHeadings, TellsThatTheyAreLate) {
   EXPECT_NEAR(figure_of(finding_of(late, "wheels0", "clock"), "lag"), -0.15, 0.01);
 }
 
+/// Wheels and poses of a robot that is asked every 0.8 s.
+Inspection of_a_slow_robot(const std::function<void(EncoderSample&)>& fault) {
+  RunSetup setup = read_run(
+      config::parse(
+          "sensors: {sim: {type: planar_simulator, motion: figure_eight, duration_s: 400, "
+          "speed_m_per_s: 0.1, yaw_rate_rad_per_s: 0.3, rate_hz: 1.25, reference_rate_hz: 1.25, "
+          "robot: &robot {type: differential, radius_left_m: 0.02, radius_right_m: 0.02, "
+          "baseline_m: 0.09}}}\nkinematics: *robot\nevaluation: {reference_max_gap_s: 2}\n",
+          "run.yaml"),
+      testing::registry());
+  return inspected(std::move(setup), {.wheels = [&fault](EncoderSample& s) {
+                     fault(s);
+                     return true;
+                   }});
+}
+
+TEST(InspectSlowSensors, AreComparedAsOthersAre) {
+  const Inspection right = of_a_slow_robot([](EncoderSample&) {});
+  EXPECT_THAT(faults_of(right), IsEmpty());
+  const Finding clock = finding_of(right, "poses0", "clock");
+  EXPECT_GT(figure_of(clock, "correlation"), 0.9);
+  // A reading of the simulator is the speed at an instant, half a period from the middle.
+  EXPECT_LT(std::abs(figure_of(clock, "lag")), 0.5);
+  const Inspection exchanged = of_a_slow_robot(
+      [](EncoderSample& s) { std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[1]); });
+  EXPECT_THAT(faults_of(exchanged), Contains("poses0 clock"));
+  EXPECT_THAT(finding_of(exchanged, "poses0", "clock").what, HasSubstr("left and right exchanged"));
+  const Inspection degrees = of_a_slow_robot([](EncoderSample& s) {
+    for (double& rate : s.drive_rad_per_s) rate *= kDegree / 2.;
+  });
+  EXPECT_THAT(finding_of(degrees, "wheels0", "motion").what,
+              HasSubstr(" rad/s, while poses0 goes "));
+}
+
+TEST(InspectStampsInAnotherUnit, MakeARecordingInWhichNothingShows) {
+  RunSetup setup = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
+  const Inspection found = inspected(std::move(setup), {.wheels =
+                                                            [](EncoderSample& s) {
+                                                              s.t_ns /= 1000, s.begin_ns /= 1000,
+                                                                  s.end_ns /= 1000;
+                                                              return true;
+                                                            },
+                                                        .poses =
+                                                            [](PoseSample& s) {
+                                                              s.t_ns /= 1000;
+                                                              return true;
+                                                            }});
+  EXPECT_THAT(finding_of(found, "recording", "overlap").what,
+              HasSubstr("are its stamps in another unit?"));
+}
+
 }  // namespace
 }  // namespace viwo::inspect
