@@ -11,7 +11,7 @@ same arguments give the same bytes.
 
 What a run on OUT must be is the second word of `list`:
     accurate    nearly as accurate as on LOG
-    flagged     diverged or failed, or it warns of the sensor
+    flagged     diverged, failed or doubtful, or it warns of the sensor
     either      one of the two
     told        flagged, or refused with the reason: a part of the log cannot be used
 """

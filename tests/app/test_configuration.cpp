@@ -51,7 +51,8 @@ TEST_F(ConfigurationTest, MustBeAFileOfYaml) {
   write("open.yaml", "a: [1\n");
   run("open.yaml", "open.yaml:2:1  not valid YAML: end of sequence flow not found");
   write("tab.yaml", "sensors:\n\tsim: 1\n");
-  run("tab.yaml", "tab.yaml:2:5  not valid YAML: a line is indented by spaces, not by tabs");
+  run("tab.yaml",
+      "tab.yaml:2:5  not valid YAML: illegal map value (indent by spaces: tabs are none)");
   write("list.yaml", "- 1\n");
   run("list.yaml", "list.yaml:1:1  a run configuration is a section of keys");
   write("empty.yaml", "");

@@ -60,9 +60,10 @@ class Bench:
         shutil.rmtree(out)
         cause = [summary['cause']] if summary['cause'] else []
         ate_m = summary['accuracy'].get('ate_m')
+        warnings = summary['doubts'] + summary['warnings']
         return Outcome(done.returncode, summary['status'],
                        float('inf') if ate_m is None else ate_m, summary['duration_s'],
-                       cause + summary['warnings'], summary['warnings'])
+                       cause + warnings, warnings)
 
     def call(self, *words):
         return subprocess.run([str(word) for word in (self.viwo, *words)], text=True,

@@ -3,7 +3,7 @@
 of scripts/inject_fault.py in simulated logs of 30 s, and what runs on them come to.
 
 accurate: status ok to the end of the log and an ATE of at most twice that of the clean log and
-20 mm. flagged: diverged or failed, or a warning that names the sensor with the fault. A run that is
+20 mm. flagged: diverged, failed or doubtful, or a warning that names the sensor with the fault. A run that is
 neither is silent. A log is refused (exit code 2) only where the fault leaves no way to use it.
 """
 import argparse

@@ -222,7 +222,13 @@ TEST_F(ViwoBag, RefusesWrongInputAndWritesNothing) {
   EXPECT_THAT(output_, HasSubstr(path("a.db3") + "  ends with '.db3': .bag makes a ROS 1 bag, "));
   write_log("of_others");
   EXPECT_EQ(run(path("log") + " " + path("of_others")), 2);
-  EXPECT_EQ(output_, path("of_others") + "  exists and is no bag of one file\n");
+  EXPECT_EQ(output_, path("of_others") + "  exists and is no bag that viwo_bag has written\n");
+  // of a recorder, whose header has its name
+  fs::create_directories(folder_ / "recorded");
+  std::ofstream(path("recorded/metadata.yaml")) << "rosbag2_bagfile_information:\n";
+  std::ofstream(path("recorded/recorded_0.mcap")) << "\x89MCAP0\r\n ros2 libmcap 0.8.0";
+  EXPECT_EQ(run(path("log") + " " + path("recorded")), 2);
+  EXPECT_TRUE(fs::exists(folder_ / "recorded/recorded_0.mcap"));
   fs::remove(folder_ / "log/cam1/data/2.png");
   EXPECT_EQ(run(path("log") + " " + out), 2);
   EXPECT_EQ(output_, path("log/cam1/data/2.png") + ": the image is missing or cannot be read\n");
@@ -260,7 +266,10 @@ TEST_F(ViwoBag, ReplacesItsOwnFolder) {
   fs::remove_all(folder_ / "log/cam1");
   ASSERT_EQ(run(path("log") + " " + path("robot")), 0) << output_;
   EXPECT_LT(info()["message_count"].as<int>(), 235);
-  fs::remove_all(folder_ / "log/imu0");
+  fs::create_directories(folder_ / "robot.before");
+  EXPECT_EQ(run(path("log") + " " + path("robot")), 2);
+  EXPECT_EQ(output_, path("robot.before") + "  exists\n");
+  fs::remove(folder_ / "robot.before");
   fs::remove(folder_ / "log/cam0/data/2.png");
   EXPECT_EQ(run(path("log") + " " + path("robot")), 2);
   EXPECT_TRUE(fs::exists(folder_ / "robot/robot_0.mcap"));

@@ -234,18 +234,24 @@ void check_file(const fs::path& file, std::string_view magic) {
 
 std::string file_of_folder(const fs::path& out) { return out.filename().string() + "_0.mcap"; }
 
-/// Nor a folder that has something else than this program writes into it.
+/// Nor a folder that this program has not written: a recording may be the only one.
 void check_folder(const fs::path& out) {
   std::error_code ignored;
   if (!fs::exists(out, ignored)) return;
-  bool is_bag = fs::is_directory(out, ignored) && !fs::is_symlink(out, ignored);
-  if (is_bag) {
+  bool is_own = fs::is_directory(out, ignored) && !fs::is_symlink(out, ignored);
+  if (is_own) {
     for (const auto& entry : fs::directory_iterator(out)) {
       const std::string name = entry.path().filename().string();
-      is_bag = is_bag && (name == "metadata.yaml" || name == file_of_folder(out));
+      is_own = is_own && (name == "metadata.yaml" || name == file_of_folder(out));
     }
   }
-  if (!is_bag) throw InputError(out.string() + "  exists and is no bag of one file");
+  if (is_own) {
+    constexpr std::size_t kHeader = 64;  // profile and library: "ros2", "viwo"
+    std::string begin(kHeader, '\0');
+    std::ifstream(out / file_of_folder(out), std::ios::binary).read(begin.data(), kHeader);
+    is_own = begin.find("viwo") != std::string::npos;
+  }
+  if (!is_own) throw InputError(out.string() + "  exists and is no bag that viwo_bag has written");
 }
 
 void check_output(const fs::path& out, Format format) {
@@ -295,16 +301,22 @@ void write_folder([[maybe_unused]] const Log& log,
                   [[maybe_unused]] const std::vector<Entry>& entries, const fs::path& out) {
   const fs::path part = out.string() + ".part", before = out.string() + ".before";
 #ifdef VIWO_HAS_ROS2
+  if (fs::exists(before)) throw InputError(before.string() + "  exists");
   if (!fs::create_directory(part)) throw InputError(part.string() + "  exists");
+  bool is_moved = false;
   try {
     bag::Ros2Writer writer((part / file_of_folder(out)).string());
     write_messages(log, entries, writer);
     writer.write_metadata();
-    if (fs::exists(out)) fs::rename(out, before);
+    if (fs::exists(out)) {
+      fs::rename(out, before);
+      is_moved = true;
+    }
     fs::rename(part, out);
-    fs::remove_all(before);
+    if (is_moved) fs::remove_all(before);
   } catch (...) {
     std::error_code ignored;
+    if (is_moved && !fs::exists(out, ignored)) fs::rename(before, out, ignored);
     fs::remove_all(part, ignored);
     throw;
   }

@@ -1,5 +1,5 @@
 // viwo: visual-inertial-wheel odometry from the command line.
-// Exit codes: 0 done; 1 the run failed or diverged; 2 the input is wrong.
+// Exit codes: 0 done; 1 the run failed, diverged or is doubtful; 2 the input is wrong.
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -76,8 +76,9 @@ void print_help() {
   for (const Command& command : kCommands) {
     std::cout << "  viwo " << command.usage << "\n      " << command.summary << "\n";
   }
-  std::cout << "  viwo --version | --help, and --help for each command\n\n"
-               "Exit codes: 0 done; 1 the run failed or diverged; 2 the input is wrong.\n";
+  std::cout
+      << "  viwo --version | --help, and --help for each command\n\n"
+         "Exit codes: 0 done; 1 the run failed, diverged or is doubtful; 2 the input is wrong.\n";
 }
 
 int dispatch(const std::vector<std::string>& words) {

@@ -270,9 +270,10 @@ class Fit {
       estimate_.residuals += at[static_cast<std::size_t>(kind)].residuals;
     }
     int segments = 0;
-    for (const auto& problem : problems_) {
+    for (std::size_t p = 0; p < problems_.size(); ++p) {
+      const auto& problem = problems_[p];
       estimate_.weighed_down += problem->n_weighed_down();
-      problem->add_turns(estimate_.turns);
+      problem->add_turns(estimate_.gyro_bias_rad_per_s[p], estimate_.turns);
       for (const Eigen::Vector3d& motion : problem->motions()) {
         estimate_.turn_rms_rad += motion[0] * motion[0];
         estimate_.way_rms_m += motion.tail<2>().squaredNorm();

@@ -58,8 +58,9 @@ class RecordingProblem {
 
   /// Motion of the reference over each segment, [yaw, x, y].
   const std::vector<Eigen::Vector3d>& motions() const { return motions_; }
-  /// Adds the turns of the segments where they were evaluated last, each since the one before.
-  void add_turns(TurnAgreement& out) const;
+  /// Adds the turns of the segments where they were evaluated last, each since the one before, a
+  /// gyro's without `gyro_bias_rad_per_s`.
+  void add_turns(double gyro_bias_rad_per_s, TurnAgreement& out) const;
 
   /// Noise that whitens the residuals (CAL-3).
   void set_noise(const CalibrationNoise& noise) { noise_ = noise; }

@@ -230,12 +230,13 @@ void judge_left_over(CalibrationResult& result) {
 
 /// What turns the other way, or so many times as far, is no calibration: however little it turns.
 void judge_turns(CalibrationResult& result) {
-  // By chance the correlation of n segments is 1/sqrt(n).
+  // By chance atanh of the correlation of n segments is normal, of sigma 1/sqrt(n - 3).
   constexpr double kSigmas = 5., kLeast = 0.5, kMostRatio = 2.;
   const TurnAgreement& turns = result.all.turns;
   const double correlation = turns.correlation(), ratio = turns.ratio();
-  const double chance = 1. / std::sqrt(std::max(1, turns.segments));
-  if (std::abs(correlation) < std::max(kLeast, kSigmas * chance)) return;
+  const double size = std::min(std::abs(correlation), 1. - 1e-12);
+  const double spare = std::max(0., static_cast<double>(turns.segments - 3));
+  if (size < kLeast || std::atanh(size) * std::sqrt(spare) < kSigmas) return;
   if (correlation < 0.) {
     result.doubts.push_back(
         "the reference turns the other way than the wheels (correlation " +

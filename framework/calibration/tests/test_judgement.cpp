@@ -109,9 +109,15 @@ TEST(Judgement, DoubtsAGyroInAnotherUnit) {
 }
 
 TEST(Judgement, KnowsNoSideOfADriveThatDoesNotTurn) {
-  CalibrationSetup setup = testing::gyro_setup(
-      testing::kPlaces + "radius_m: 0.0255", testing::kPlaces + "radius_m: 0.0255", 1, "straight");
-  EXPECT_THAT(calibrate(setup).doubts, Not(Contains(HasSubstr("turns"))));
+  const std::string right = testing::kPlaces + "radius_m: 0.0255";
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    CalibrationSetup setup = testing::gyro_setup(right, right, seed, "straight");
+    EXPECT_THAT(calibrate(setup).doubts, Not(Contains(HasSubstr("turns")))) << seed;
+    CalibrationSetup two = testing::gyro_setup(
+        "type: differential, radius_left_m: 0.05, radius_right_m: 0.05, baseline_m: 0.3",
+        "type: differential, baseline_m: 0.3, " + kRight, seed, "straight");
+    EXPECT_THAT(calibrate(two).doubts, Not(Contains(HasSubstr("turns")))) << seed;
+  }
 }
 
 }  // namespace

@@ -12,9 +12,9 @@ void require_file_of(std::string_view command, const Node& file) {
   struct Kind {
     const char *command, *what, *key, *with;  ///< the keys that only this kind has
   };
-  constexpr Kind kKinds[] = {{"experiment", "an experiment", "experiment", "base"},
+  constexpr Kind kKinds[] = {{"experiment", "an experiment", "experiment", "experiment"},
                              {"calibrate", "a calibration", "calibration", "base"},
-                             {"plan", "a plan", "plan", "goals"},
+                             {"plan", "a plan", "plan", "plan"},
                              {"run", "a run", "sensors", "sensors"}};
   const auto is_of = [&](const Kind& kind) {
     return file.find(kind.key) != nullptr && file.find(kind.with) != nullptr;

@@ -146,7 +146,7 @@ std::string runs_csv(const ExperimentResult& result) {
   for (const ExperimentRun& run : result.runs) {
     csv << result.setup.variants[run.variant].name << ','
         << result.setup.recordings[run.recording].name << ',' << run.seed << ','
-        << name(run.result.status) << ',' << run.result.duration_s << ',' << run.result.wall_s
+        << status_text(run.result) << ',' << run.result.duration_s << ',' << run.result.wall_s
         << ',' << run.result.total.samples << ',' << run.result.total.rank_deficient << ','
         << run.result.total.gated;
     for (const Metric& metric : metrics) {

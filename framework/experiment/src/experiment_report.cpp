@@ -176,13 +176,14 @@ void add_failures(const ExperimentResult& result, Section& section) {
   table.columns = {{"variant"}, {"recording"}, {"seed"}, {"status"}, {"cause"}};
   std::size_t count = 0;
   for (const ExperimentRun& run : result.runs) {
-    if (run.result.status == RunStatus::kOk || ++count > kMaxRows) continue;
+    if (is_trusted(run.result) || ++count > kMaxRows) continue;
     table.rows.push_back(
         {result.setup.variants[run.variant].name, result.setup.recordings[run.recording].name,
-         static_cast<double>(run.seed), name(run.result.status), run.result.cause});
+         static_cast<double>(run.seed), status_text(run.result),
+         run.result.doubts.empty() ? run.result.cause : run.result.doubts.front()});
   }
   if (count == 0) return;
-  table.caption = "Runs that failed or diverged: " + std::to_string(count);
+  table.caption = "Runs that failed, diverged or are doubtful: " + std::to_string(count);
   if (count > kMaxRows) table.caption += ", the first " + std::to_string(kMaxRows);
   section.blocks.emplace_back(std::move(table));
 }

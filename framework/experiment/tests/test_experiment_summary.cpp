@@ -181,7 +181,7 @@ TEST_F(Summary, SaysWhyARunIsNotOk) {
   EXPECT_THAT(csv.substr(0, csv.find('\n')), ::testing::EndsWith(",epoch_ms,cause"));
   EXPECT_THAT(csv, ::testing::EndsWith(",\"went, as \"\"they\"\" say, away\"\n"));
   const std::string page = text_of(folder_ / "out" / "report.html");
-  EXPECT_THAT(page, HasSubstr("Runs that failed or diverged: 1"));
+  EXPECT_THAT(page, HasSubstr("Runs that failed, diverged or are doubtful: 1"));
   EXPECT_THAT(page, HasSubstr("went, as &quot;they&quot; say,"));
 }
 

@@ -288,11 +288,14 @@ void check_overlap(const Recording& recording, Findings& out) {
     return;
   }
   const bool is_fault = !covers(0.5);
+  // Of what the estimate is made of, where the rest is no worse than it.
+  const bool is_moving = moving.common_s() < 0.9 * moving.longest_s;
+  const Overlap& bound = is_moving ? moving : all;
   out.push_back({"recording", is_fault ? Severity::kFault : Severity::kNote, "overlap",
                  text + " (the shortest has " + significant(all.shortest_s, 4) +
                      " s, the longest " + significant(all.longest_s, 4) +
-                     " s): " + label_of(recording, *all.latest) + " begins last, " +
-                     label_of(recording, *all.earliest) + " ends first" +
+                     " s): " + label_of(recording, *bound.latest) + " begins last, " +
+                     label_of(recording, *bound.earliest) + " ends first" +
                      (is_fault ? ": are their clocks the same, are they of one recording, and "
                                  "all of it?"
                                : ""),

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 
 #include "checks.hpp"
+#include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/wheel/drive_ranges.hpp"
@@ -66,13 +67,23 @@ std::optional<Calibration> calibrated(const Wheels& wheels) {
   return found;
 }
 
-/// How far poses are from the first of them for a tenth of the time.
+/// How far from their middle poses go for a tenth of the time; 0 where they jump nearly as far from
+/// one to the next, as those of a body at rest that are noisy.
 double distance_of(const Trajectory& poses) {
-  std::vector<double> distances_m;
-  for (const StampedPose& pose : poses) {
-    distances_m.push_back((pose.p_BinW - poses.front().p_BinW).norm());
+  if (poses.size() < 2) return 0.;
+  Eigen::Vector3d middle;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    std::vector<double> along;
+    for (const StampedPose& pose : poses) along.push_back(pose.p_BinW[i]);
+    middle[i] = eval::median(along);
   }
-  return distances_m.empty() ? 0. : eval::quantile(distances_m, 0.9);
+  std::vector<double> distances_m, steps_m;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    distances_m.push_back((poses[i].p_BinW - middle).norm());
+    if (i > 0) steps_m.push_back((poses[i].p_BinW - poses[i - 1].p_BinW).norm());
+  }
+  const double distance_m = eval::quantile(distances_m, 0.9);
+  return distance_m > 3. * eval::median(steps_m) ? distance_m : 0.;
 }
 
 /// What stands still, while the poses go somewhere if there are any.

@@ -108,9 +108,9 @@ TEST(Contradictions, AreUpdatesThatHaveMoreRejectedThanGatesDoByChance) {
   EXPECT_TRUE(warned(0, 40));
 }
 
-TEST(Contradictions, AreDoubtsWhereTheyAreMoreThanHalf) {
+TEST(Contradictions, KnowWhereTheyAreMoreThanHalf) {
   const auto doubted = [](std::int64_t applied, std::int64_t rejected) {
-    return contradictions({{"wheel_odometry", {applied, rejected}, {}, {}, {}}}).at(0).is_doubt;
+    return contradictions({{"wheel_odometry", {applied, rejected}, {}, {}, {}}}).at(0).is_most;
   };
   EXPECT_FALSE(doubted(500, 500));
   EXPECT_TRUE(doubted(499, 501));

@@ -85,9 +85,6 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
     result.status = RunStatus::kFailed;
     result.cause = no_epoch(*setup.filter, estimator);
   }
-  for (Contradiction& found : contradictions(result.updates)) {
-    (found.is_doubt ? result.doubts : result.warnings).push_back(std::move(found.text));
-  }
   const std::vector<RejectionCount> rejections = estimator.rejections();
   const std::int64_t begin_ns = result.pieces.empty() ? 0 : result.pieces.front().begin_ns;
   for (std::string& line : suspicions(rejections, result.noises, begin_ns)) {
@@ -99,8 +96,8 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
   if (result.status == RunStatus::kOk && !result.reference.empty()) {
     result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);
     warn_of_gaps(result);
-    doubt_against_reference(result);
   }
+  doubt(result);
 }
 
 /// One run, with as many estimators as it takes.

@@ -48,8 +48,8 @@ std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& update
     found.push_back({update.name,
                      update.name + ": " + std::to_string(rejected) + " of " + std::to_string(of) +
                          " rejected: what it measures and the rest contradict each other - check "
-                         "calibration and axes of cameras and IMU, units, signs and order of the "
-                         "joints, kinematics",
+                         "calibration, axes, units and noise of both, order and signs of joints, "
+                         "kinematics",
                      2 * rejected > of});
   }
   return found;
@@ -93,17 +93,65 @@ std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& cal
   return lines;
 }
 
-void doubt_against_reference(RunResult& result) {
+namespace {
+
+/// Root mean square distance of the reference from its middle.
+double extent_m(const Trajectory& reference) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  const auto n = static_cast<double>(reference.size());
+  for (const StampedPose& pose : reference) mean += pose.p_BinW / n;
+  double squares = 0.;
+  for (const StampedPose& pose : reference) squares += (pose.p_BinW - mean).squaredNorm() / n;
+  return std::sqrt(squares);
+}
+
+/// The error on segments by their length: the least of all lengths, and the largest.
+struct SegmentParts {
+  double least = 0., most = 0.;
+  const eval::SegmentErrors* shortest = nullptr;  ///< null where no length has enough segments
+};
+SegmentParts segment_parts(const eval::Accuracy& accuracy) {
   constexpr std::int64_t kFewest = 10;
-  if (!result.accuracy || result.accuracy->rpe.empty()) return;
-  const auto shortest =
-      std::min_element(result.accuracy->rpe.begin(), result.accuracy->rpe.end(),
-                       [](const auto& a, const auto& b) { return a.length_m < b.length_m; });
-  if (shortest->count < kFewest || !(shortest->mean_m > 0.5 * shortest->length_m)) return;
+  SegmentParts parts;
+  for (const eval::SegmentErrors& segment : accuracy.rpe) {
+    if (segment.count < kFewest) continue;
+    const double part = segment.mean_m / segment.length_m;
+    const bool is_first = parts.shortest == nullptr;
+    parts.least = is_first ? part : std::min(parts.least, part);
+    parts.most = std::max(parts.most, part);
+    if (is_first || segment.length_m < parts.shortest->length_m) parts.shortest = &segment;
+  }
+  return parts;
+}
+
+}  // namespace
+
+void doubt(RunResult& result) {
+  const bool is_done = result.status == RunStatus::kOk;
+  SegmentParts parts;
+  if (result.accuracy) parts = segment_parts(*result.accuracy);
+  constexpr double kAgrees = 0.1, kContradicts = 0.5, kPartOfExtent = 0.3;
+  const bool agrees = parts.shortest != nullptr && parts.most < kAgrees;
+  for (Contradiction& found : contradictions(result.updates)) {
+    const bool is_doubt = is_done && found.is_most && !agrees;
+    (is_doubt ? result.doubts : result.warnings).push_back(std::move(found.text));
+  }
+  if (!is_done) return;
+  const PreintegratedPose& wheels = result.total;
+  if (result.updates.empty() && 2 * wheels.rejected > wheels.samples) {
+    result.doubts.push_back(std::to_string(wheels.rejected) + " of " +
+                            std::to_string(wheels.samples) +
+                            " encoder samples are refused by the kinematic model");
+  }
+  // A body that is turned on the other, or has no orientation, goes where it goes all the same.
+  if (parts.shortest == nullptr || parts.least < kContradicts ||
+      result.accuracy->ate_m < kPartOfExtent * extent_m(result.reference)) {
+    return;
+  }
   result.doubts.push_back("the reference contradicts the estimate: after " +
-                          eval::length_text(shortest->length_m) + " m it is off by " +
-                          significant(shortest->mean_m, 3) + " m, mean of " +
-                          std::to_string(shortest->count) +
+                          eval::length_text(parts.shortest->length_m) + " m it is off by " +
+                          significant(parts.shortest->mean_m, 3) + " m, mean of " +
+                          std::to_string(parts.shortest->count) +
                           " segments - units, signs, order or mount of a sensor are wrong, or of "
                           "the reference: viwo inspect tells which");
 }

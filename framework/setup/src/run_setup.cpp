@@ -215,8 +215,9 @@ void require_drive_signs(const CalibrationFile& file, const RunSetup& setup) {
 /// The twist of an odometry (joints v_x, v_y and omega_z of the readers of ROS) is no wheels.
 void require_no_twist_for_wheels(const Node& run, const RunSetup& setup) {
   if (!setup.model) return;
-  const std::vector<NoiseSpec>& noises = setup.model->description().noises;
-  if (noises.empty() || !noises.front().parameter.ends_with("rad_per_s")) return;
+  for (const NoiseSpec& noise : setup.model->description().noises) {
+    if (noise.kind == NoiseKind::kDrive && !noise.parameter.ends_with("rad_per_s")) return;
+  }
   const std::string sensor = setup.routes.sensor_of(Consumer::kWheels);
   const Node* const joints = run.at_path("sensors." + sensor + ".drive_joints");
   if (joints == nullptr || joints->items().empty()) return;

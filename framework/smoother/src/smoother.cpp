@@ -311,8 +311,10 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
                   " of its sigmas");
   }
   for (Recording& recording : recordings) {
-    for (const std::string& warning : recording.result.warnings) {
-      out.warnings.push_back(recording.input->name + ": " + warning);
+    for (const auto* texts : {&recording.result.doubts, &recording.result.warnings}) {
+      for (const std::string& text : *texts) {
+        out.warnings.push_back(recording.input->name + ": " + text);
+      }
     }
     out.runs.push_back(std::move(recording.result));
     out.residuals += recording.factors->rows();

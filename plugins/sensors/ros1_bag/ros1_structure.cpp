@@ -109,9 +109,9 @@ class Structure {
     if (begin.starts_with("#ROSBAG V")) {
       throw InputError(file_ + "  is a bag of another format than 2.0");
     }
-    const bool is_mcap = begin.starts_with("\x89MCAP");
+    const bool is_ros2 = begin.starts_with("\x89MCAP") || begin.starts_with("SQLite");
     throw InputError(file_ + "  is no ROS 1 bag" +
-                     (is_mcap ? " - did you mean type: ros2_bag?" : ""));
+                     (is_ros2 ? " - did you mean type: ros2_bag?" : ""));
   }
 
   Record read_record(std::uint64_t at, std::uint64_t end) const {

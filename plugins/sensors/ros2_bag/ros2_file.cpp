@@ -66,7 +66,7 @@ std::vector<fs::path> files_of(const fs::path& path) {
     if (extension == ".zstd" || extension == ".lz4") {
       throw InputError(path.string() + "  is a file " + extension + kRemedy);
     }
-    if (extension == ".bag") {
+    if (extension == ".bag" && fs::exists(path, ignored)) {
       throw InputError(path.string() + "  is no ROS 2 bag - did you mean type: ros1_bag?");
     }
     return {path};

@@ -112,6 +112,7 @@ TEST_F(Ros2Bag, RefusesWhatItCannotRead) {
   EXPECT_THAT(error_of(section(kAll, "")),
               HasSubstr(file("metadata.yaml") + ":2:1  not valid YAML: "));
   EXPECT_THAT(error_of(section(kAll, "bag_0.db3.zstd")), HasSubstr("is a file .zstd" + remedy));
+  std::ofstream(file("robot.bag")) << "#ROSBAG V2.0\n";
   EXPECT_THAT(error_of(section(kAll, "robot.bag")), HasSubstr("did you mean type: ros1_bag?"));
   fs::create_directories(folder_ / "none");
   EXPECT_THAT(error_of(section(kAll, "none")),

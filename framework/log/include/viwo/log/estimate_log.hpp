@@ -31,8 +31,8 @@ class EstimateLog {
   virtual ~EstimateLog() = default;
   /// The next epoch. std::runtime_error when it cannot be written.
   virtual void write(const EstimateSample& estimate, std::span<const SeenImage> images) = 0;
-  /// Ends the file: the last state, and why the run failed ("" if it did not). std::runtime_error
-  /// when not all of it could be written; what has been stays readable.
+  /// Ends the file: the last state, and why the run is not to be trusted ("" if it is).
+  /// std::runtime_error when not all of it could be written; what has been stays readable.
   virtual void close(const std::string& failure) = 0;
 };
 

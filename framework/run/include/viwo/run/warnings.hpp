@@ -10,13 +10,20 @@
 
 namespace viwo {
 
-/// An update that had more than a fifth of its factors rejected.
+/// An update that had more than a fifth of its factors rejected, or weighed down, by gates.
 struct Contradiction {
   std::string update;
   std::string text;
-  bool is_doubt = false;  ///< more than half: it, or what contradicts it, is wrong
+  bool is_most = false;  ///< more than half
 };
 std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& updates);
+
+/// Of a run that came to its end, with its accuracy: contradictions are doubts where they are of
+/// most of an update, but warnings where a reference agrees with the estimate. An estimate that has
+/// little to do with how the reference moves is doubted, too: off by more than half of the way on
+/// segments of every length, and aligned by a good part of where the reference went. So are wheels
+/// most of whose samples cannot be used.
+void doubt(RunResult& result);
 
 /// Warnings of what a fifth of the samples was left out for, and of noises far above what is
 /// configured. Stamps become times since `begin_ns`.
@@ -25,10 +32,6 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
 
 /// Warnings of calibration that has gone where its prior does not reach.
 std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration);
-
-/// A doubt of an estimate that has little to do with how the reference moves: off by more than half
-/// of the way on the shortest segments that are compared.
-void doubt_against_reference(RunResult& result);
 
 /// An accuracy that most of the estimate has no part in, because the reference has gaps there.
 void warn_of_gaps(RunResult& result);
