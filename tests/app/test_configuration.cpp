@@ -52,7 +52,8 @@ TEST_F(ConfigurationTest, MustBeAFileOfYaml) {
   run("open.yaml", "open.yaml:2:1  not valid YAML: end of sequence flow not found");
   write("tab.yaml", "sensors:\n\tsim: 1\n");
   run("tab.yaml",
-      "tab.yaml:2:5  not valid YAML: illegal map value (indent by spaces: tabs are none)");
+      "tab.yaml:2:5  not valid YAML: illegal map value (YAML is indented by spaces, this line by a "
+      "tab)");
   write("list.yaml", "- 1\n");
   run("list.yaml", "list.yaml:1:1  a run configuration is a section of keys");
   write("empty.yaml", "");

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "support.hpp"
@@ -36,7 +37,8 @@ class RealWheels : public CommandLineTest {
       words.push_back("--set");
       words.push_back(assignment);
     }
-    expect_done(words);
+    const Outcome outcome = viwo(words);
+    EXPECT_LE(outcome.code, 1) << outcome.err;  // what is held wrong is doubtful
     return summary();
   }
 
@@ -131,6 +133,25 @@ TEST_F(RealWheels, OfACarOnAHighwayAreBelieved) {
   const nlohmann::json car = run("comma2k19_car.yaml");
   EXPECT_EQ(car["status"], "ok");
   EXPECT_LT(rejected(car), 0.02);
+}
+
+/// The highway has no curve that a gyro could tell the direction by; the accelerometer does.
+TEST_F(RealWheels, ThatAreAllReversedAreNamed) {
+  const auto warnings_of = [this](const std::string& configuration, const std::string& set) {
+    const Outcome outcome =
+        viwo({"run", std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/" + configuration, "--out",
+              "out", "--set", "placeholders.data=" + std::filesystem::canonical(kData).string(),
+              "--set", set});
+    EXPECT_EQ(outcome.code, 1) << outcome.err;
+    EXPECT_EQ(summary().at("status"), "doubtful");
+    return summary().at("warnings").dump();
+  };
+  const std::string reversed = "sensors.wheels0.drive_scale=[-1, -1, -1, -1]";
+  EXPECT_THAT(warnings_of("comma2k19_car.yaml", reversed),
+              ::testing::HasSubstr("wheels0: accelerate opposite to imu0 (correlation -0.8"));
+  EXPECT_THAT(warnings_of("comma2k19_car.yaml", "wheels.rpy_ItoO_rad=[0, 0, 3.1416]"),
+              ::testing::HasSubstr("wheels0: accelerate opposite to imu0"));
+  EXPECT_THAT(warnings_of("ucsd_skid_steer.yaml", reversed), ::testing::HasSubstr("opposite to"));
 }
 
 /// Two modules of a swerve robot, out of the log of its program: nearer with them where they are

@@ -239,7 +239,8 @@ Node parse_text(std::string_view text, const std::string& origin, bool with_posi
   } catch (const YAML::Exception& error) {
     const bool by_tab = is_indented_by_tab(text, error.mark);
     fail(builder.mark_of(error.mark),
-         "not valid YAML: " + error.msg + (by_tab ? " (indent by spaces: tabs are none)" : ""));
+         "not valid YAML: " + error.msg +
+             (by_tab ? " (YAML is indented by spaces, this line by a tab)" : ""));
   }
 }
 

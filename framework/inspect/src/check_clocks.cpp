@@ -22,12 +22,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-double period_of(const std::vector<Turn>& turns) {
-  std::vector<double> periods;
-  for (const Turn& turn : turns) periods.push_back(seconds_between(turn.begin_ns, turn.end_ns));
-  return periods.empty() ? 0. : eval::median(periods);
-}
-
 /// A clock that was set: the lags of tenths of the time are of two values, one after the other.
 struct ClockChange {
   double at_s = 0., first_s = 0., then_s = 0.;

@@ -41,14 +41,6 @@ struct Speeds {
   double path_m = 0.;
 };
 
-double usual_spacing_s(const Trajectory& poses) {
-  std::vector<double> spacings_s;
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    spacings_s.push_back(seconds_between(poses[i - 1].t_ns, poses[i].t_ns));
-  }
-  return spacings_s.empty() ? 0. : eval::median(spacings_s);
-}
-
 Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
   Speeds speeds;
   TwistSolver solver(wheels.model, {});
@@ -56,7 +48,7 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
   TwistSolution solution;
   constexpr double kWindow_s = 1., kLeast_m = 0.03;
   const auto clock_ns = static_cast<std::int64_t>(std::llround(1e9 * wheels.prior.wheels.t_OtoI_s));
-  const double gap_s = std::max(0.5, 2.5 * usual_spacing_s(poses));
+  const double gap_s = std::max(0.5, 2.5 * period_of(turns_of(poses)));
   double path = 0., time_s = 0.;
   Eigen::Vector2d along = Eigen::Vector2d::Zero();
   std::int64_t begin_ns = 0;
@@ -252,9 +244,7 @@ void check_clock(const Recording& recording, std::vector<Turn> of_poses, const s
          "too little rotation, or too little in common with " + other + ", to compare its clock"});
     return;
   }
-  std::vector<double> periods;
-  for (const Turn& turn : of_poses) periods.push_back(seconds_between(turn.begin_ns, turn.end_ns));
-  const double period_s = periods.empty() ? 0. : eval::median(periods);
+  const double period_s = period_of(of_poses);
   const bool is_key = !recording.setup->filter;
   Finding clock = clock_finding(
       label,

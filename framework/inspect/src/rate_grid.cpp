@@ -13,19 +13,6 @@
 namespace viwo::inspect {
 namespace {
 
-/// What is longer is a gap: of sensors that are slow by nature, some of their periods.
-std::int64_t longest_ns(std::span<const Turn> turns) {
-  constexpr std::int64_t kLongestNs = 200'000'000;
-  constexpr double kPeriods = 2.5;
-  std::vector<double> lengths;
-  lengths.reserve(turns.size());
-  for (const Turn& turn : turns) {
-    lengths.push_back(static_cast<double>(turn.end_ns - turn.begin_ns));
-  }
-  if (lengths.empty()) return kLongestNs;
-  return std::max<std::int64_t>(kLongestNs, std::llround(kPeriods * eval::median(lengths)));
-}
-
 std::size_t cells_between(std::int64_t begin_ns, std::int64_t end_ns) {
   constexpr std::int64_t kMostCells = 8'640'000;  // a day
   const std::int64_t cells = (end_ns - begin_ns) / RateGrid::kCellNs;
@@ -37,9 +24,12 @@ std::size_t cells_between(std::int64_t begin_ns, std::int64_t end_ns) {
 RateGrid::RateGrid(std::int64_t begin_ns, std::int64_t end_ns, std::span<const Turn> turns)
     : begin_ns_(begin_ns), rates_(cells_between(begin_ns, end_ns), Eigen::Vector3d::Zero()) {
   std::vector<std::int64_t> covered(rates_.size());
-  const std::int64_t longest = longest_ns(turns);
+  // What is longer is a gap: of sensors that are slow by nature, some of their periods.
+  constexpr double kLongest_s = 0.2, kPeriods = 2.5;
+  const double longest_s = std::max(kLongest_s, kPeriods * period_of(turns));
   for (const Turn& turn : turns) {
-    if (turn.end_ns <= turn.begin_ns || turn.end_ns - turn.begin_ns > longest) continue;
+    const double length_s = seconds_between(turn.begin_ns, turn.end_ns);
+    if (length_s <= 0. || length_s > longest_s) continue;
     const std::int64_t first = std::max<std::int64_t>(0, (turn.begin_ns - begin_ns) / kCellNs);
     for (std::int64_t i = first; begin_ns + i * kCellNs < turn.end_ns; ++i) {
       if (static_cast<std::size_t>(i) >= rates_.size()) break;
@@ -57,6 +47,13 @@ RateGrid::RateGrid(std::int64_t begin_ns, std::int64_t end_ns, std::span<const T
       rates_[i].setConstant(std::numeric_limits<double>::quiet_NaN());
     }
   }
+}
+
+double period_of(std::span<const Turn> turns) {
+  std::vector<double> periods_s;
+  periods_s.reserve(turns.size());
+  for (const Turn& turn : turns) periods_s.push_back(seconds_between(turn.begin_ns, turn.end_ns));
+  return periods_s.empty() ? 0. : eval::median(periods_s);
 }
 
 std::vector<Turn> turns_of(std::span<const ImuSample> imu) {

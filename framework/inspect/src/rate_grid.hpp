@@ -32,6 +32,9 @@ class RateGrid {
   std::vector<Eigen::Vector3d> rates_;
 };
 
+/// Their median length, s; 0 for none.
+double period_of(std::span<const Turn> turns);
+
 /// Rate of the gyro in I, between its readings.
 std::vector<Turn> turns_of(std::span<const ImuSample> imu);
 /// About the vertical, as z, between headings.

@@ -87,7 +87,30 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
                                        " turn by " + significant(wheels, 2) +
                                        ": it is stuck or not upright, or the wheels are wrong "
                                        "(signs, order, zeros of the steering)"});
+    return;
   }
+  find_opposed(C, out);
+}
+
+/// Where it hardly turns, wheels that are all reversed still accelerate against the IMU.
+void TwistCheck::find_opposed(const Eigen::MatrixXd& C, Findings& out) const {
+  if (gyro_is_ != Gyro::kMounted) return;
+  double force = 0., wheels = 0., both = 0.;
+  for (int i = 0; i < 2; ++i) {
+    Entries h = Entries::Zero();
+    h[kChange + i] = h[kTurn + i] = 1.;
+    force += C(kForce + i, kForce + i);
+    wheels += h.dot(C * h);
+    both += h.dot(C.col(kForce + i));
+  }
+  // Slopes are in the force, too, but have no sign: of 40 windows and more it is beyond chance.
+  constexpr double kLeast = kLeastForce * kLeastForce, kOpposed = -0.7;
+  const double r = both / std::sqrt(force * wheels);
+  if (std::min(force, wheels) < kLeast || !(r < kOpposed)) return;
+  out.push_back({imu_ + " axes", wheels_ + ": accelerate opposite to " + imu_ + " (correlation " +
+                                     significant(r, 2) +
+                                     "): sign of all drives, or the IMU is turned: add 3.1416 to "
+                                     "the yaw of wheels.rpy_ItoO_rad"});
 }
 
 /// The rates are alike but for a factor.
@@ -96,6 +119,7 @@ void TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
   const std::string fast = significant(std::abs(slope), 3) + " times as fast as the wheels";
   const std::string slow = significant(1. / std::abs(slope), 3) + " times as fast as the gyro";
   constexpr double kDeg = 180. / std::numbers::pi;
+  constexpr double kOpposite = 2.;  // a sign, and intrinsics that are to be found
   const std::string key = imu_ + " rate";
   if (is_about(std::abs(slope), kDeg)) {
     out.push_back({key, imu_ + ": the gyro turns " + fast +
@@ -116,7 +140,7 @@ void TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
                    wheels_ + ": turn " + slow + ": drives are in revolutions per second",
                    false,
                    {drives_times(2. * std::numbers::pi)}});
-  } else if (is_about(slope, -1.)) {
+  } else if (slope < -1. / kOpposite && slope > -kOpposite) {
     find_reversed(C, out);
   } else if (std::abs(slope - 1.) > factor_tolerance() && std::abs(r) > kVeryAlike) {
     out.push_back({key, imu_ + ": the gyro turns " + significant(slope, 3) +

@@ -162,7 +162,21 @@ dds::DataWriter& DdsNode::make_writer(const std::string& topic, const std::strin
   return *made;
 }
 
-bool take(dds::DataReader& reader, bag::Bytes& out, dds::SampleInfo& info) {
+void DdsNode::on_data_available(dds::DataReader* reader) {
+  {
+    const std::scoped_lock lock(mutex_);
+    has_data_.insert(reader);
+  }
+  on_change_();
+}
+
+bool DdsNode::take(dds::DataReader& reader, bag::Bytes& out, dds::SampleInfo& info) {
+  {
+    // Fast DDS ends the process (an assertion) where its first message is taken before it has told
+    // that it is there.
+    const std::scoped_lock lock(mutex_);
+    if (!has_data_.contains(&reader)) return false;
+  }
   return is_ok(reader.take_next_sample(&out, &info));
 }
 

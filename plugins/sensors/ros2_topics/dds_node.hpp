@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -46,8 +47,12 @@ class DdsNode final : private dds::DomainParticipantListener {
   /// Reliable; late readers get nothing of before. `most`: messages that wait to be sent.
   dds::DataWriter& make_writer(const std::string& topic, const std::string& type, int most);
 
+  /// Takes a message; false when there is none. A message of which only an end is told (no data)
+  /// is empty.
+  bool take(dds::DataReader& reader, bag::Bytes& out, dds::SampleInfo& info);
+
  private:
-  void on_data_available(dds::DataReader* /*reader*/) override { on_change_(); }
+  void on_data_available(dds::DataReader* reader) override;
 #ifdef FASTDDS_VERSION_MAJOR
   void on_data_writer_discovery(dds::DomainParticipant* participant,
                                 rtps::WriterDiscoveryStatus reason,
@@ -63,15 +68,13 @@ class DdsNode final : private dds::DomainParticipantListener {
   std::function<void()> on_change_;
   mutable std::mutex mutex_;
   std::map<rtps::GUID_t, Published> published_;
+  std::set<const dds::DataReader*> has_data_;  ///< readers that had some
   std::atomic<int> generation_ = 0;
   dds::DomainParticipant* participant_ = nullptr;
   dds::Subscriber* subscriber_ = nullptr;
   dds::Publisher* publisher_ = nullptr;
 };
 
-/// Takes a message; false when there is none. A message of which only an end is told (no data)
-/// is empty.
-bool take(dds::DataReader& reader, bag::Bytes& out, dds::SampleInfo& info);
 /// Whether it could be given to DDS.
 bool write(dds::DataWriter& writer, bag::Bytes message);
 

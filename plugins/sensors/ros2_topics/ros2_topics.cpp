@@ -128,10 +128,10 @@ class Ros2Topics final : public live::TopicSensor {
   void take_frames() {
     bag::Bytes message;
     dds::SampleInfo info;
-    while (tf_static_ != nullptr && take(*tf_static_, message, info)) {
+    while (tf_static_ != nullptr && node_.take(*tf_static_, message, info)) {
       if (info.valid_data) take_transforms(message);
     }
-    while (description_ != nullptr && take(*description_, message, info)) {
+    while (description_ != nullptr && node_.take(*description_, message, info)) {
       if (!info.valid_data) continue;
       try {
         take_description(std::string(fields_of(message)->text()));
@@ -262,7 +262,7 @@ class Ros2Topics final : public live::TopicSensor {
     Inlet& inlet = inlets_[i];
     auto message = std::make_shared<bag::Bytes>();
     dds::SampleInfo info;
-    if (!take(*inlet.reader, *message, info)) return false;
+    if (!node_.take(*inlet.reader, *message, info)) return false;
     if (!info.valid_data) return true;
     count_lost(i, info);
     if (inlet.finished) {
