@@ -220,6 +220,8 @@ TEST_F(ViwoBag, RefusesWrongInputAndWritesNothing) {
   }
   EXPECT_EQ(run(path("log") + " " + path("a.db3")), 2);
   EXPECT_THAT(output_, HasSubstr(path("a.db3") + "  ends with '.db3': .bag makes a ROS 1 bag, "));
+  EXPECT_EQ(run(path("log") + " " + path("empty")), 2);
+  EXPECT_EQ(output_, path("empty") + "  exists and is no bag that viwo_bag has written\n");
   write_log("of_others");
   EXPECT_EQ(run(path("log") + " " + path("of_others")), 2);
   EXPECT_EQ(output_, path("of_others") + "  exists and is no bag that viwo_bag has written\n");

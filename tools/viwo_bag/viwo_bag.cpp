@@ -246,10 +246,12 @@ void check_folder(const fs::path& out) {
     }
   }
   if (is_own) {
-    constexpr std::size_t kHeader = 64;  // profile and library: "ros2", "viwo"
-    std::string begin(kHeader, '\0');
-    std::ifstream(out / file_of_folder(out), std::ios::binary).read(begin.data(), kHeader);
-    is_own = begin.find("viwo") != std::string::npos;
+    // The header: its lengths, profile and library.
+    constexpr std::string_view kHeader("\x04\0\0\0ros2\x04\0\0\0viwo", 16);
+    std::string begin(64, '\0');
+    std::ifstream(out / file_of_folder(out), std::ios::binary)
+        .read(begin.data(), static_cast<std::streamsize>(begin.size()));
+    is_own = begin.find(kHeader) != std::string::npos;
   }
   if (!is_own) throw InputError(out.string() + "  exists and is no bag that viwo_bag has written");
 }

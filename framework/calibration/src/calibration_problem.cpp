@@ -238,9 +238,9 @@ void RecordingProblem::add_segment(int row, std::size_t k, const CalibrationPoin
 void RecordingProblem::add_turns(double gyro_bias_rad_per_s, TurnAgreement& out) const {
   const bool from_start = options_.segments == calibration::Segments::kTrajectory;
   const bool gyro = recording_.motion.kind == ReferenceKind::kGyro;
+  const double bias = gyro ? gyro_bias_rad_per_s : 0.;
   for (std::size_t k = 0; k < motions_.size(); ++k) {
     const bool first = !from_start || k == 0;
-    const double bias = gyro ? gyro_bias_rad_per_s : 0.;
     const double duration_s = seconds_between(stamps_ns_[k], stamps_ns_[k + 1]);
     out.add(segments_[k].g[0] - (first ? 0. : segments_[k - 1].g[0]),
             motions_[k][0] - (first ? 0. : motions_[k - 1][0]) - bias * duration_s);

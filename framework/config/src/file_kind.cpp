@@ -10,7 +10,7 @@ namespace viwo::config {
 
 void require_file_of(std::string_view command, const Node& file) {
   struct Kind {
-    const char *command, *what, *key, *with;  ///< the keys that only this kind has
+    const char *command, *what, *key, *with;  ///< keys that together only this kind has
   };
   constexpr Kind kKinds[] = {{"experiment", "an experiment", "experiment", "experiment"},
                              {"calibrate", "a calibration", "calibration", "base"},

@@ -295,8 +295,7 @@ Span span_of(const Recording& recording) {
 void check_poses(const Recording& recording, Findings& out) {
   for (const Poses& poses : recording.poses) {
     if (poses.poses.size() < 10) continue;
-    const std::string label = poses.of_imu ? recording.label<StateSample>(poses.sensor)
-                                           : recording.label<PoseSample>(poses.sensor);
+    const std::string label = recording.label(poses);
     if (has_jumps(poses, label, out)) continue;
     if (!recording.imu.empty() && poses.of_imu) {
       if (!has_axes_of_imu(recording, poses, label, out)) continue;

@@ -239,7 +239,7 @@ void check_rejections(const Recording& recording, Findings& out) {
 struct Overlap {
   std::int64_t begin_ns = INT64_MIN, end_ns = INT64_MAX;
   double shortest_s = INFINITY, longest_s = 0.;
-  const Stamps *latest = nullptr, *earliest = nullptr;  ///< first to begin late, to end early
+  const Stamps *latest = nullptr, *earliest = nullptr;  ///< begins last, ends first
 
   void add(const Stamps& stamps) {
     const auto [first, last] = std::minmax_element(stamps.t_ns.begin(), stamps.t_ns.end());

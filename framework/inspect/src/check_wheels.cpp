@@ -97,8 +97,7 @@ Finding standstill(const Recording& recording, const std::string& label, double 
   for (const Poses& poses : recording.poses) {
     const double distance_m = distance_of(poses.poses);
     if (distance_m < kGoes_m) continue;
-    const std::string other = poses.of_imu ? recording.label<StateSample>(poses.sensor)
-                                           : recording.label<PoseSample>(poses.sensor);
+    const std::string other = recording.label(poses);
     finding.severity = Severity::kFault;
     finding.what = "the wheels turn with no more than " + significant(fastest, 2) +
                    " rad/s, while " + other + " goes " + significant(distance_m, 2) +

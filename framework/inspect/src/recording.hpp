@@ -83,6 +83,9 @@ struct Recording {
   std::string label(const std::string& sensor) const {
     return label(sensor, sample_type<T>());
   }
+  std::string label(const Poses& of) const {
+    return of.of_imu ? label<StateSample>(of.sensor) : label<PoseSample>(of.sensor);
+  }
   std::int64_t begin_ns() const;  ///< of the IMU, else the earliest; 0 if there is nothing
 };
 
