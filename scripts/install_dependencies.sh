@@ -1,9 +1,9 @@
 #!/bin/bash
-# install_dependencies.sh [--tests | --engines | --fuzz | --packages]
+# install_dependencies.sh [--tests | --engines | --fuzz | --packages | --peers]
 # Installs with apt what building viwo needs and this machine lacks; nothing when all is there.
 # --tests adds what only the tests use, --engines also Slurm and Open MPI for the nightly tests of
-# campaigns, --fuzz clang and its tools for scripts/fuzz.sh, --packages what cpack needs. Never asks a
-# question.
+# campaigns, --fuzz clang and its tools for scripts/fuzz.sh, --packages what cpack needs, --peers what
+# the peers of scripts/compare_peers.sh need. Never asks a question.
 set -euo pipefail
 
 missing=()
@@ -45,6 +45,10 @@ fi
 if [ "${1:-}" = --packages ]; then
   need_command dpkg-dev dpkg-shlibdeps
   need_command file file
+fi
+if [ "${1:-}" = --peers ]; then
+  need_command python3 python3
+  for package in libboost-{date-time,filesystem,system,thread}-dev; do need_package "$package"; done
 fi
 need_command ninja-build ninja
 need_command ccache ccache
