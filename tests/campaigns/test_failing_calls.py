@@ -36,10 +36,12 @@ REASONS = {
     "read": "Input/output error|cannot|read|truncated",
     "mmap": "memory|alloc|mmap",
     "thread": "thread|Resource temporarily unavailable",
-    "memory": "memory|alloc",
+    "memory": "memory|alloc|cannot be loaded",  # the loader has no room for more words
 }
-# An update that fails loses an epoch, and the run goes on: the user is told.
-SAID = re.compile("failed in [0-9]+ epochs?, which it skipped: .*memory")
+# An update that fails loses an epoch, an image that is not read its tracks, and the run goes on: the user is
+# told.
+SAID = re.compile("failed in [0-9]+ epochs?, which it skipped: .*memory|"
+                  "[0-9]+ x image that cannot be read, first at")
 
 TIMES = {"wall_s", "epoch_ms", "timing_ms", "realtime_factor", "peak_rss_mb", "epoch_p95_ms"}
 EXPERIMENT = f"""\

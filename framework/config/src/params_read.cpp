@@ -245,7 +245,7 @@ std::optional<ParamValue> read_fallback(const ParamSpec& spec, const std::string
     return ValueReader(spec, path, context, errors).read(fallback_section(spec));
   }
   if (spec.type != ParamType::kPath || std::get<std::string>(spec.fallback).empty()) {
-    return spec.fallback;
+    return copy_of(spec.fallback);
   }
   return resolve_path(std::get<std::string>(spec.fallback), where);
 }
@@ -293,6 +293,21 @@ std::vector<std::string> choices_of(const ParamSpec& spec) {
     text.remove_prefix(std::min(end + 1, text.size()));
   }
   return choices;
+}
+
+ParamValue copy_of(const ParamValue& value) {
+  return std::visit(
+      [](const auto& held) {
+        auto copy = held;  // what can fail
+        return ParamValue(std::move(copy));
+      },
+      value);
+}
+
+ParamSet copy_of(const ParamSet& values) {
+  ParamSet copies;
+  for (const auto& [name, value] : values) copies.emplace(name, copy_of(value));
+  return copies;
 }
 
 ParamSet read_params(const Node& map, const Mark& where, std::string_view what,
