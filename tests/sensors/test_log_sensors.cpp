@@ -132,7 +132,7 @@ TEST_F(LogSensors, RosTextEncodersTakeVelocitiesAndTheReceptionClock) {
 TEST_F(LogSensors, AnUnknownJointIsReportedWhereItIsWritten) {
   const auto path = write("odom.csv", kJoints);
   EXPECT_EQ(error_of("{type: ros_text_encoders, drive: [x], path: " + path + "}"),
-            "test.yaml:1:34  sensor.drive: no joint 'x' in " + path + " - did you mean 's'?");
+            "test.yaml:1:34  sensor.drive: no joint 'x' in " + path + " - there are: s, d");
 }
 
 TEST_F(LogSensors, RosTextPoseYieldsPoses) {

@@ -127,7 +127,7 @@ TEST_F(AslImagesTest, FoldersAndFilesThatAreMissingAreNamed) {
   camera("cam2", {1, 2});
   const std::string root = folder_.string();
   EXPECT_EQ(refusal({folder_ / "cam0", folder_ / "cam1"}),
-            root + "/cam1  there is no such folder of images - did you mean 'cam0'?");
+            root + "/cam1  there is no such folder of images - there are: cam0, cam2");
   EXPECT_EQ(refusal({folder_ / "images"}),
             root + "/images  there is no such folder of images - there are: cam0, cam2");
   fs::remove(folder_ / "cam2" / "data.csv");

@@ -128,6 +128,8 @@ TEST(Suggestions, CountSwapsAsOneEdit) {
   EXPECT_EQ(nearest("x", known), "") << "a complete replacement is no misspelling";
   EXPECT_EQ(nearest("base", std::vector<std::string>{"name"}), "") << "half of it replaced";
   EXPECT_EQ(nearest("r_5", std::vector<std::string>{"r_1"}), "") << "another number is no slip";
+  EXPECT_EQ(nearest("a_z", std::vector<std::string>{"a_x"}), "") << "nor is another axis";
+  EXPECT_EQ(nearest("a_X", std::vector<std::string>{"a_x"}), "a_x");
   EXPECT_EQ(nearest("abd", std::vector<std::string>{"abe", "abc"}), "abe");
 }
 

@@ -4,10 +4,10 @@
 #include <array>
 #include <charconv>
 #include <cstdlib>
-#include <numeric>
 #include <utility>
 
 #include "viwo/api/stamp_order.hpp"
+#include "viwo/config/suggest.hpp"
 
 namespace viwo::log {
 namespace {
@@ -66,31 +66,6 @@ std::optional<Decimal> take_apart(std::string_view text) {
   return out;
 }
 
-/// Digits number things: drive_3 is no misspelling of drive_1.
-std::size_t change_cost(char a, char b) {
-  if (a == b) return 0;
-  return is_digit(a) && is_digit(b) ? 2 : 1;
-}
-
-/// Edit distance with transpositions of neighbours (optimal string alignment).
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
-  std::iota(last.begin(), last.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t change = change_cost(a[i - 1], b[j - 1]);
-      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + change});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
-        row[j] = std::min(row[j], before[j - 2] + 1);
-      }
-    }
-    std::swap(before, last);
-    std::swap(last, row);
-  }
-  return last[b.size()];
-}
-
 /// How many bytes the first character has; 0 where it is none.
 std::size_t utf8_size(std::string_view text) {
   const auto first = static_cast<unsigned char>(text[0]);
@@ -116,7 +91,8 @@ std::string list_of(const std::vector<std::string>& candidates, std::string_view
   for (const std::string& candidate : candidates) {
     const double longer =
         static_cast<double>(std::max({candidate.size(), name.size(), std::size_t{1}}));
-    const auto off = size > kLongest ? static_cast<double>(edit_distance(name, candidate)) : 0.;
+    const auto off =
+        size > kLongest ? static_cast<double>(config::edit_distance(name, candidate)) : 0.;
     ranked.emplace_back(off / longer, candidate);
   }
   std::stable_sort(ranked.begin(), ranked.end(),
@@ -197,16 +173,8 @@ std::string printable(std::string_view text) {
 }
 
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates) {
-  const std::string* nearest = nullptr;
-  std::size_t nearest_distance = 3;
-  for (const std::string& candidate : candidates) {
-    const std::size_t distance = edit_distance(name, candidate);
-    if (distance < nearest_distance) {
-      nearest = &candidate;
-      nearest_distance = distance;
-    }
-  }
-  if (nearest != nullptr) return " - did you mean '" + printable(*nearest) + "'?";
+  const std::string near = config::nearest(name, candidates);
+  if (!near.empty()) return " - did you mean '" + printable(near) + "'?";
   return " - there are: " + list_of(candidates, name);
 }
 

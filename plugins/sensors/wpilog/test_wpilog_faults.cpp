@@ -104,7 +104,7 @@ TEST_F(WpiLog, WhatIsMissingInADamagedLogIsSaidWithTheDamage) {
   EXPECT_THAT(error_of(log(out.bytes.substr(0, whole + 9), kOneDrive)),
               HasSubstr("no entry '/d' in " + (folder_ / "a.wpilog").string() +
                         "; the log is damaged: log cut short (first at a.wpilog: byte " +
-                        std::to_string(whole) + ") - did you mean '/a'?"));
+                        std::to_string(whole) + ") - there are: /a"));
   EXPECT_THAT(error_of(log(Writer().bytes + std::string(100, '\0'), kOneDrive)),
               HasSubstr("; the log is damaged: control record that cannot be read (first at "
                         "a.wpilog: byte 12)"));
