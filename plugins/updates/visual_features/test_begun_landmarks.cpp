@@ -1,0 +1,145 @@
+// How landmarks begin in the state.
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include "anchored_point.hpp"
+#include "test_support.hpp"
+#include "viwo/math/chi2.hpp"
+
+namespace viwo::visual {
+namespace {
+
+using testing::Random;
+using testing::Scene;
+using testing::SceneOptions;
+
+/// What one batch gives when the tracks that all clones have seen become landmarks.
+struct Begun {
+  Scene truth, estimate;
+  Eigen::VectorXd error;  ///< truth = estimate [+] error
+  Eigen::MatrixXd P_root;
+  FactorSink sink;
+  Eigen::MatrixXd Lambda;
+  Eigen::VectorXd eta;
+
+  Begun(const SceneOptions& options, Random& random) : sink(1, 1) {
+    truth = testing::make_scene(options, 12, random);
+    const auto n = truth.P.cols();
+    const Eigen::VectorXd sigma = truth.P.diagonal().cwiseSqrt();
+    const Eigen::MatrixXd L = truth.P.llt().matrixL();
+    error = L * testing::normals(random, static_cast<int>(n));
+    estimate = truth;
+    estimate.plus(-error);
+    estimate.first_estimates();
+    Params params = testing::default_params();
+    params.max_landmarks = 5;
+    params.gate_probability = 0.;
+    VisualFeatures update(params, HostServices{});
+    estimate.start(update);
+    sink = estimate.sink();
+    for (std::size_t k = 0; k < truth.clones.size(); ++k) {
+      testing::epoch(update, estimate, k + 1, testing::images(truth, k, 1., random), sink,
+                     k + 1 == truth.clones.size());
+    }
+    Lambda = Eigen::MatrixXd::Zero(estimate.P.rows(), estimate.P.cols());
+    eta = Eigen::VectorXd::Zero(estimate.P.rows());
+    if (sink.information() != nullptr) testing::scatter(*sink.information(), Lambda, eta);
+  }
+};
+
+TEST(Landmarks, BeginWithAllTheirSightsAndEstimateThemselvesConsistently) {
+  // Two-sided, over runs: clones, calibration and landmarks together. Half the noise or a landmark
+  // that has none of the uncertainty of its anchor must show.
+  const SceneOptions options{.n_clones = 8, .n_cameras = 1, .sigma_theta = 0.002, .sigma_p = 0.01};
+  Random random(65);
+  double nees = 0., broken = 0.;
+  int n_total = 0;
+  for (int run = 0; run < 40; ++run) {
+    const Begun begun(options, random);
+    const auto n = begun.truth.P.cols();
+    const auto n_new = 3 * static_cast<Eigen::Index>(begun.sink.added().size());
+    if (n_new == 0) continue;
+    Eigen::VectorXd error(n + n_new);
+    error.head(n) = begun.error;
+    const CloneState& newest = begun.truth.clones.back();
+    Scene truth = begun.truth;
+    const CameraView camera = truth.camera(0);
+    const Anchor anchor{newest.R_GtoI, camera.R_ItoC, newest.p_IinG, camera.p_IinC};
+    for (std::size_t k = 0; k < begun.sink.added().size(); ++k) {
+      const AddedBlock& added = begun.sink.added()[k];
+      const Eigen::Vector3d value = Eigen::Map<const Eigen::Vector3d>(added.value.data());
+      // The landmark next to it is its own.
+      Eigen::Vector3d nearest = Eigen::Vector3d::Constant(1e9);
+      for (const Eigen::Vector3d& p_FinG : truth.landmarks) {
+        const Eigen::Vector3d off = inverse_depth_of_point(anchor.to_camera(p_FinG)) - value;
+        if (off.norm() < nearest.norm()) nearest = off;
+      }
+      ASSERT_EQ(begun.estimate.column(added.id), n + 3 * static_cast<int>(k));
+      error.segment<3>(n + 3 * static_cast<Eigen::Index>(k)) = nearest;
+    }
+    const auto size = n + n_new;
+    Eigen::MatrixXd Lambda = begun.Lambda.topLeftCorner(size, size);
+    Lambda.topLeftCorner(n, n) += begun.truth.P.inverse();
+    const Eigen::VectorXd left = error - Lambda.llt().solve(begun.eta.head(size));
+    nees += left.dot(Lambda * left);
+    Eigen::MatrixXd wrong = Lambda;
+    const int column = newest.column;
+    wrong.block(n, column, n_new, kPoseSize).setZero();
+    wrong.block(column, n, kPoseSize, n_new).setZero();
+    broken += left.dot(wrong * left);
+    n_total += static_cast<int>(size);
+  }
+  EXPECT_GT(n_total, 1500);
+  const double low = chi2_quantile(0.0005, n_total), high = chi2_quantile(0.9995, n_total);
+  EXPECT_GT(nees, low);
+  EXPECT_LT(nees, high);
+  EXPECT_TRUE(broken < low || broken > high) << broken << " in " << low << " .. " << high;
+}
+
+TEST(Landmarks, BeginWithTheRowsThatTheEliminatedTracksWouldHave) {
+  // Eliminating the landmarks from their factor gives the factor of the same tracks without them.
+  Random random(66);
+  const SceneOptions options{
+      .n_clones = 6, .n_cameras = 2, .calibrates = true, .sigma_theta = 1e-3, .sigma_p = 1e-3};
+  Scene scene = testing::make_scene(options, 0, random);
+  scene.landmarks = {{0.4, 0.1, 4.}, {0.7, -0.2, 5.}, {0.2, 0.3, 3.5}};
+  std::vector<Eigen::MatrixXd> Lambdas;
+  std::vector<Eigen::VectorXd> etas;
+  const auto n = scene.P.cols();
+  for (const int most : {0, 3}) {
+    Random noise(67);
+    Scene estimate = scene;
+    Params params = testing::default_params();
+    params.max_landmarks = most;
+    params.gate_probability = 0.;
+    VisualFeatures update(params, HostServices{});
+    estimate.start(update);
+    FactorSink sink = estimate.sink();
+    for (std::size_t k = 0; k < 6; ++k) {
+      testing::epoch(update, estimate, k + 1, testing::images(scene, k, 1., noise), sink, k == 5);
+    }
+    ASSERT_EQ(sink.applied(), 3);
+    ASSERT_EQ(sink.added().size(), most == 0 ? 0u : 3u);
+    const auto size = estimate.P.cols(), n_new = size - n;
+    Eigen::MatrixXd Lambda = Eigen::MatrixXd::Zero(size, size);
+    Eigen::VectorXd eta = Eigen::VectorXd::Zero(size);
+    testing::scatter(*sink.information(), Lambda, eta);
+    if (n_new > 0) {
+      const Eigen::MatrixXd F = Lambda.bottomRightCorner(n_new, n_new).inverse();
+      const Eigen::MatrixXd G = Lambda.topRightCorner(n, n_new);
+      Lambda.topLeftCorner(n, n) -= G * F * G.transpose();
+      eta.head(n) -= G * F * eta.tail(n_new);
+    }
+    Lambdas.emplace_back(Lambda.topLeftCorner(n, n));
+    etas.emplace_back(eta.head(n));
+  }
+  EXPECT_LT((Lambdas[0] - Lambdas[1]).norm(), 1e-9 * Lambdas[0].norm());
+  EXPECT_LT((etas[0] - etas[1]).norm(), 1e-8 * etas[0].norm());
+}
+
+}  // namespace
+}  // namespace viwo::visual
