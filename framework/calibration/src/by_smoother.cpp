@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "recording_name.hpp"
 #include "undetermined.hpp"
 
 namespace viwo::calibration {
@@ -11,7 +12,7 @@ smoother::Smoothed smooth(const CalibrationSetup& setup, const std::vector<std::
   std::vector<smoother::Input> inputs;
   for (const std::size_t i : recordings) {
     const CalibrationRecording& recording = setup.recordings[i];
-    inputs.push_back({"recording '" + recording.label.name + "'", recording.run});
+    inputs.push_back({name_of(recording.label), recording.run});
   }
   return smoother::smooth(inputs, *setup.plugins, progress);
 }

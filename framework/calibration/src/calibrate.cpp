@@ -11,6 +11,7 @@
 #include "joint_search.hpp"
 #include "judgement.hpp"
 #include "motion_reference.hpp"
+#include "recording_name.hpp"
 #include "segment_choice.hpp"
 #include "viwo/config/file_kind.hpp"
 #include "viwo/config/overrides.hpp"
@@ -67,8 +68,8 @@ void refuse_misspelt_labels(const Recording& recording) {
       const bool is_near = label.starts_with(stem) ||
                            !config::nearest(label, std::vector<std::string>{known}).empty();
       if (label == known || !is_near) continue;
-      throw InputError("recording '" + recording.name + "': label '" + label +
-                       "' - did you mean '" + known + "'?");
+      throw InputError(name_of(recording) + ": label '" + label + "' - did you mean '" + known +
+                       "'?");
     }
   }
 }
@@ -100,8 +101,8 @@ void require_for_smoother(const CalibrationSetup& setup, const Node& file) {
   }
   for (const CalibrationRecording& recording : setup.recordings) {
     if (!recording.motion.distance_m && !recording.motion.turn_rad) continue;
-    throw InputError("recording '" + recording.label.name +
-                     "': distance_m and turn_deg are not for reference: smoother");
+    throw InputError(name_of(recording.label) +
+                     ": distance_m and turn_deg are not for reference: smoother");
   }
 }
 
@@ -168,9 +169,9 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
     refuse_misspelt_labels(recording);
     for (const std::string& label : setup.leave_out_by) {
       if (recording.labels.contains(label)) continue;
-      config::fail(file.find("leave_out_by")->mark(), "recording '" + recording.name +
-                                                          "' has no label '" + label +
-                                                          "', by which leave_out_by divides them");
+      config::fail(
+          file.find("leave_out_by")->mark(),
+          name_of(recording) + " has no label '" + label + "', by which leave_out_by divides them");
     }
     setup.recordings.push_back(read_recording(recording, base, params.reference, plugins));
     require_one_kind(setup.recordings);

@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include "recording_name.hpp"
 #include "viwo/math/arrays.hpp"
 
 namespace viwo::calibration {
@@ -25,8 +26,7 @@ std::optional<double> number_of(const Recording& recording, const char* label, c
   const auto [stop, error] = std::from_chars(text.data(), end, number);
   if (error != std::errc() || stop != end || !std::isfinite(number) ||
       !(may_be_any || number > 0.)) {
-    throw InputError("recording '" + recording.name + "': " + label + " is '" + text + "', not " +
-                     what);
+    throw InputError(name_of(recording) + ": " + label + " is '" + text + "', not " + what);
   }
   return number;
 }
@@ -87,7 +87,7 @@ Trajectory yaw_of_headings(std::span<const HeadingSample> headings) {
 
 MotionReference motion_reference(const Recording& label, const RunSetup& setup, const RunData& data,
                                  ReferenceKind kind) {
-  const std::string where = "recording '" + label.name + "'";
+  const std::string where = name_of(label);
   MotionReference out;
   out.kind = kind;
   const bool has_gyro = !data.imu().empty() || !data.headings().empty();
