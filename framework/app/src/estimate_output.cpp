@@ -5,9 +5,9 @@
 #include <limits>
 #include <stdexcept>
 
+#include "viwo/feed/estimate_sample.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/plugin_host/part.hpp"
-#include "viwo/run/estimate_sample.hpp"
 
 namespace viwo::app {
 namespace {
@@ -104,8 +104,7 @@ void EstimateOutput::write(double t_s, const Filter& filter) {
 std::string EstimateOutput::finish(const RunResult& result) {
   if (!failure_.empty()) return failure_;
   try {
-    std::string why = result.cause;
-    if (why.empty() && !result.doubts.empty()) why = result.doubts.front();
+    std::string why = reason(result);
     if (why.empty() && result.status != RunStatus::kOk) why = "the run failed";
     out_->close(why);
   } catch (const std::exception& error) {

@@ -108,8 +108,7 @@ std::string title_of(const ExperimentSetup& setup, const ExperimentRun& run) {
 std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
   std::string line = title_of(setup, run);
   line += std::string("  ") + status_text(run.result);
-  if (!run.result.cause.empty()) line += ": " + run.result.cause;
-  if (!run.result.doubts.empty()) line += ": " + run.result.doubts.front();
+  if (const std::string why = reason(run.result); !why.empty()) line += ": " + why;
   if (std::isfinite(run.result.nees.pose)) {
     line += "  NEES " + significant(run.result.nees.pose, 3);
   }

@@ -153,7 +153,7 @@ std::string runs_csv(const ExperimentResult& result) {
       csv << ',';
       if (const double value = metric.of(run.result); std::isfinite(value)) csv << value;
     }
-    csv << ',' << csv_field(run.result.cause) << '\n';
+    csv << ',' << csv_field(reason(run.result)) << '\n';
   }
   return csv.str();
 }

@@ -179,8 +179,7 @@ void add_failures(const ExperimentResult& result, Section& section) {
     if (is_trusted(run.result) || ++count > kMaxRows) continue;
     table.rows.push_back(
         {result.setup.variants[run.variant].name, result.setup.recordings[run.recording].name,
-         static_cast<double>(run.seed), status_text(run.result),
-         run.result.doubts.empty() ? run.result.cause : run.result.doubts.front()});
+         static_cast<double>(run.seed), status_text(run.result), reason(run.result)});
   }
   if (count == 0) return;
   table.caption = "Runs that failed, diverged or are doubtful: " + std::to_string(count);

@@ -175,13 +175,17 @@ TEST_F(Summary, MarksOnTheTerminalWhatIsMoreThanChance) {
 }
 
 TEST_F(Summary, SaysWhyARunIsNotOk) {
-  summary_of(with_errors({1., 2., 3., 6., 1., 1., 1., kNan}));
+  ExperimentResult result = with_errors({1., 2., 3., 6., 1., 1., 1., kNan});
+  result.runs.front().result.doubts = {"it goes elsewhere", "and more"};
+  summary_of(result);
   const std::string csv = text_of(folder_ / "out" / "runs.csv");
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 9);
+  EXPECT_THAT(csv, HasSubstr(",doubtful,"));
+  EXPECT_THAT(csv, HasSubstr(",it goes elsewhere\n"));
   EXPECT_THAT(csv.substr(0, csv.find('\n')), ::testing::EndsWith(",epoch_ms,cause"));
   EXPECT_THAT(csv, ::testing::EndsWith(",\"went, as \"\"they\"\" say, away\"\n"));
   const std::string page = text_of(folder_ / "out" / "report.html");
-  EXPECT_THAT(page, HasSubstr("Runs that failed, diverged or are doubtful: 1"));
+  EXPECT_THAT(page, HasSubstr("Runs that failed, diverged or are doubtful: 2"));
   EXPECT_THAT(page, HasSubstr("went, as &quot;they&quot; say,"));
 }
 
