@@ -9,12 +9,12 @@
 
 #include "checks.hpp"
 #include "clock_finding.hpp"
-#include "lag.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/series/lag.hpp"
 
 namespace viwo::inspect {
 namespace {

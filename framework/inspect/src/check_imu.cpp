@@ -5,11 +5,11 @@
 #include <string>
 
 #include "checks.hpp"
-#include "rate_grid.hpp"
-#include "rests.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/series/rate_grid.hpp"
+#include "viwo/series/rests.hpp"
 
 namespace viwo::inspect {
 namespace {
@@ -160,32 +160,6 @@ void check_channels(const Recording& recording, const std::string& label, Findin
 }
 
 }  // namespace
-
-Vector3d up_of(const Recording& recording) {
-  Vector3d sum = Vector3d::Zero();
-  for (const ImuSample& sample : recording.imu) {
-    const Vector3d f = to_vector(sample.accel_m_per_s2);
-    if (f.norm() > 0.) sum += f.normalized();
-  }
-  // One that is turned over and over has no direction.
-  constexpr double kSteady = 0.9;
-  const auto n = static_cast<double>(recording.imu.size());
-  return sum.norm() > kSteady * n && n > 0. ? Vector3d(sum.normalized()) : Vector3d::Zero();
-}
-
-std::vector<YawRates> yaw_rates_of(const Recording& recording, const WheelsPrior& prior) {
-  std::vector<YawRates> all;
-  if (!recording.imu.empty()) {
-    const Vector3d up = up_of(recording);
-    const Vector3d axis = up.norm() > 0. ? up : Vector3d(prior.wheels.R_ItoO.row(2));
-    all.push_back(
-        {recording.label<ImuSample>(recording.imu_sensor), about(turns_of(recording.imu), axis)});
-  }
-  for (const Headings& other : recording.headings) {
-    all.push_back({recording.label<HeadingSample>(other.sensor), turns_of(other.samples)});
-  }
-  return all;
-}
 
 void check_imu(const Recording& recording, Findings& out) {
   if (recording.imu.empty()) return;

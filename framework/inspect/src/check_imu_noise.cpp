@@ -3,11 +3,11 @@
 #include <cmath>
 #include <string>
 
-#include "allan.hpp"
 #include "checks.hpp"
-#include "rests.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/series/allan.hpp"
+#include "viwo/series/rests.hpp"
 
 namespace viwo::inspect {
 namespace {

@@ -7,11 +7,11 @@
 
 #include "checks.hpp"
 #include "clock_finding.hpp"
-#include "lag.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/plausibility/channel_change.hpp"
+#include "viwo/series/lag.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::inspect {
@@ -273,24 +273,6 @@ void check_clock(const Recording& recording, std::vector<Turn> of_poses, const s
 }
 
 }  // namespace
-
-Span span_of(const Recording& recording) {
-  std::int64_t begin_ns = INT64_MIN, end_ns = INT64_MAX;
-  const auto include = [&](std::int64_t first_ns, std::int64_t last_ns) {
-    begin_ns = std::max(begin_ns, first_ns);
-    end_ns = std::min(end_ns, last_ns);
-  };
-  if (!recording.imu.empty()) {
-    include(recording.imu.front().t_ns, recording.imu.back().t_ns);
-  } else {
-    for (const Wheels& wheels : recording.wheels) {
-      if (wheels.samples.empty()) continue;
-      include(wheels.samples.front().begin_ns, wheels.samples.back().end_ns);
-      break;
-    }
-  }
-  return begin_ns < end_ns && begin_ns != INT64_MIN ? Span{begin_ns, end_ns} : Span{};
-}
 
 void check_poses(const Recording& recording, Findings& out) {
   for (const Poses& poses : recording.poses) {

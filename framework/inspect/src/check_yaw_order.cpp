@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "checks.hpp"
-#include "rate_grid.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/plausibility/channel_change.hpp"
+#include "viwo/series/rate_grid.hpp"
 
 namespace viwo::inspect {
 namespace {

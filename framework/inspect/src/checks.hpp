@@ -5,10 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "recording.hpp"
 #include "viwo/inspect/inspection.hpp"
+#include "viwo/series/recording.hpp"
 
 namespace viwo::inspect {
+
+using namespace series;  // what every check speaks of
 
 /// Rate, jitter, gaps, what readers have rejected, sensors that broke off, what is in common.
 void check_stamps(const Recording& recording, Findings& out);
@@ -32,24 +34,5 @@ void check_wheel_clocks(const Recording& recording, Findings& out);
 void check_camera_clocks(const Recording& recording, Findings& out);
 /// Clock, sign and speed of poses against gyro and wheels.
 void check_poses(const Recording& recording, Findings& out);
-
-/// Upwards in I, of length 1: the mean direction of the specific force; zero where that has no
-/// direction, or there is no IMU.
-Eigen::Vector3d up_of(const Recording& recording);
-
-/// What a gyro says of the turns about the vertical, as z; of an IMU whose accelerometer has no
-/// direction about what the mounting has for it.
-struct YawRates {
-  std::string label;
-  std::vector<Turn> turns;
-};
-/// Of the IMU, and of all that integrate for themselves.
-std::vector<YawRates> yaw_rates_of(const Recording& recording, const WheelsPrior& prior);
-
-/// The time that all of the IMU, wheels and poses cover, and a bit more: of grids.
-struct Span {
-  std::int64_t begin_ns = 0, end_ns = 0;
-};
-Span span_of(const Recording& recording);
 
 }  // namespace viwo::inspect

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "lag.hpp"
 #include "viwo/inspect/inspection.hpp"
+#include "viwo/series/lag.hpp"
 
 namespace viwo::inspect {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "checks.hpp"
-#include "rate_grid.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/report/curves.hpp"
+#include "viwo/series/rate_grid.hpp"
 
 namespace viwo::inspect {
 namespace {

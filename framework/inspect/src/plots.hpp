@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "recording.hpp"
 #include "viwo/report/document.hpp"
+#include "viwo/series/recording.hpp"
 
 namespace viwo::inspect {
 

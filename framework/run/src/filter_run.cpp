@@ -2,15 +2,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
 
-#include "feed.hpp"
 #include "filter_start.hpp"
 #include "recorder.hpp"
 #include "restart.hpp"
 #include "running_warnings.hpp"
+#include "viwo/feed/feed.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/plausibility/plausibility.hpp"
 #include "viwo/run/run.hpp"
@@ -135,7 +136,7 @@ class FilterRun {
       warnings_.say(now_s(), plausibility_.findings());
       if (!estimator_->failure().empty() && !begin_anew(more)) break;
     }
-    feed_->finish(result_);
+    end_feed();
     recorder_->end_piece(*estimator_, estimator_->failure());
     recorder_->finish(*estimator_);
     // Beside sensors that work while it runs, the filter's own time says little.
@@ -170,6 +171,19 @@ class FilterRun {
     result_.warnings.push_back("interrupted at " + time_text(std::llround(1e9 * now_s())) +
                                ": the rest of the recording was not used");
     return true;
+  }
+
+  void end_feed() {
+    FeedReport report = feed_->finish();
+    result_.reference = std::move(report.reference);
+    if (result_.cause.empty()) result_.cause = std::move(report.cause);
+    const auto append = [](auto& to, auto& from) {
+      to.insert(to.end(), std::make_move_iterator(from.begin()),
+                std::make_move_iterator(from.end()));
+    };
+    append(result_.stages, report.stages);
+    append(result_.rejections, report.rejections);
+    append(result_.warnings, report.warnings);
   }
 
   void make_epochs() {

@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "bounded_series.hpp"
+#include "viwo/feed/bounded_series.hpp"
+#include "viwo/feed/stage_time.hpp"
 #include "viwo/run/run.hpp"
 
 namespace viwo {

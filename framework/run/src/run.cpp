@@ -36,6 +36,11 @@ const char* status_text(const RunResult& result) {
   return doubtful ? "doubtful" : name(result.status);
 }
 
+std::string reason(const RunResult& result) {
+  if (!result.cause.empty() || result.doubts.empty()) return result.cause;
+  return result.doubts.front();
+}
+
 namespace {
 
 StampedPose stamped(std::int64_t t_ns, const Eigen::Vector3d& pose) {
@@ -100,20 +105,6 @@ class PlanarNees {
 };
 
 }  // namespace
-
-StageTime stage_time(std::vector<double> ms) {
-  StageTime stage;
-  if (ms.empty()) return stage;
-  stage.mean_ms = std::accumulate(ms.begin(), ms.end(), 0.) / static_cast<double>(ms.size());
-  std::sort(ms.begin(), ms.end());
-  const auto percentile = [&ms](std::size_t percent) {
-    return ms[(ms.size() - 1) * percent / 100];
-  };
-  stage.p95_ms = percentile(95);
-  stage.p99_ms = percentile(99);
-  stage.max_ms = ms.back();
-  return stage;
-}
 
 RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   RunResult result;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "inputs.hpp"
 #include "viwo/asl/asl.hpp"
+#include "viwo/feed/inputs.hpp"
 
 namespace viwo {
 

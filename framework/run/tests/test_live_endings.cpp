@@ -11,8 +11,8 @@
 
 #include <gtest/gtest.h>
 
-#include "bounded_series.hpp"
 #include "live_device.hpp"
+#include "viwo/feed/bounded_series.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/results/run_output.hpp"

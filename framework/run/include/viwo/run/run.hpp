@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "viwo/run/run_data.hpp"
+#include "viwo/feed/feed.hpp"
 #include "viwo/run/run_result.hpp"
 
 namespace viwo {
@@ -21,7 +21,7 @@ using OnProgress = std::function<void(double)>;
 using OnStart = std::function<EstimatorObserver*(const Estimator&)>;
 
 /// Who is to know what happens in a run; any of them may be empty.
-struct RunHooks {
+struct RunHooks : FeedHooks {
   OnProgress progress;
   OnStart on_start;
   /// An epoch is done, and recorded in the result, which is not complete yet. The time this takes
@@ -29,11 +29,8 @@ struct RunHooks {
   std::function<void(const RunResult&)> on_epoch;
   /// The same with what the filter knows: time since the start [s].
   std::function<void(double, const Filter&)> on_estimate;
-  std::function<bool()> interrupted;  ///< whether the run is to end now, with what it has
   /// Something is wrong with the run, said when it is first seen: time since the start [s], what.
   std::function<void(double, const std::string&)> on_warning;
-  /// A live sensor has given an image, which is still to be worked on. In another thread.
-  std::function<void(const ImageSample&)> on_live_image;
 };
 
 /// Runs the filter over all measurements and evaluates. A filter that diverges, or a kinematic

@@ -10,19 +10,12 @@
 
 #include "viwo/estimator/estimator.hpp"
 #include "viwo/eval/accuracy.hpp"
+#include "viwo/feed/stage_time.hpp"
 #include "viwo/math/trajectory.hpp"
 #include "viwo/setup/calibration_file.hpp"
 #include "viwo/wheel/preintegration.hpp"
 
 namespace viwo {
-
-/// Statistics of the time that a stage took per epoch.
-struct StageTime {
-  double mean_ms = 0.;
-  double p95_ms = 0.;
-  double p99_ms = 0.;
-  double max_ms = 0.;
-};
 
 enum class RunStatus { kOk, kDiverged, kFailed };
 const char* name(RunStatus status);
@@ -137,10 +130,10 @@ struct RunResult {
 
 /// That of the result as a whole: of a run that came to its end with doubts "doubtful".
 const char* status_text(const RunResult& result);
+/// Why that is not "ok": the cause, or the first of the doubts; "" of a result that is trusted.
+std::string reason(const RunResult& result);
 inline bool is_trusted(const RunResult& result) {
   return result.status == RunStatus::kOk && result.doubts.empty();
 }
-
-StageTime stage_time(std::vector<double> ms);
 
 }  // namespace viwo
