@@ -236,6 +236,17 @@ Node fallback_section(const ParamSpec& spec) {
   }
 }
 
+/// The copy constructor of libstdc++'s std::variant (12) crashes when memory runs out in it: of
+/// texts and lists it destroys what it has not made.
+ParamValue copy_of(const ParamValue& value) {
+  return std::visit(
+      [](const auto& held) {
+        auto copy = held;  // what can fail
+        return ParamValue(std::move(copy));
+      },
+      value);
+}
+
 /// What a configuration that is silent means. Only a nested model may fail: its plugin is not
 /// installed.
 std::optional<ParamValue> read_fallback(const ParamSpec& spec, const std::string& path,
@@ -293,21 +304,6 @@ std::vector<std::string> choices_of(const ParamSpec& spec) {
     text.remove_prefix(std::min(end + 1, text.size()));
   }
   return choices;
-}
-
-ParamValue copy_of(const ParamValue& value) {
-  return std::visit(
-      [](const auto& held) {
-        auto copy = held;  // what can fail
-        return ParamValue(std::move(copy));
-      },
-      value);
-}
-
-ParamSet copy_of(const ParamSet& values) {
-  ParamSet copies;
-  for (const auto& [name, value] : values) copies.emplace(name, copy_of(value));
-  return copies;
 }
 
 ParamSet read_params(const Node& map, const Mark& where, std::string_view what,

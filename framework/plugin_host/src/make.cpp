@@ -189,7 +189,7 @@ Loaded<Interface> PluginRegistry::make(const Node& section, const std::string& p
   if constexpr (std::is_same_v<Interface, Update>) {
     object = std::make_shared<CheckedUpdate>(std::move(object), info, sample_kinds_);
   }
-  return {std::move(object), info, config::copy_of(instance->params), std::move(resolved)};
+  return {std::move(object), info, std::move(resolved)};
 }
 
 Loaded<KinematicModel> PluginRegistry::make_kinematics(

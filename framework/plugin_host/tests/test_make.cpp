@@ -37,7 +37,7 @@ TEST(Make, AKinematicModelThatComputes) {
       registry.make_kinematics(section("{type: moody, radius_m: 0.25}"), "k", 1, errors);
   ASSERT_EQ(errors.text(), "");
   EXPECT_EQ(loaded.info.name, "moody");
-  EXPECT_EQ(std::get<double>(loaded.params.at("radius_m")), 0.25);
+  EXPECT_EQ(loaded.resolved.find("radius_m")->scalar(), "0.25");
   ModelDescription description;
   loaded.object->describe(description);
   EXPECT_EQ(description.intrinsics.at(0).nominal, 0.25);

@@ -36,11 +36,6 @@ ParamSet read_params(const Node& map, const Mark& where, std::string_view what,
                      std::span<const ParamSpec> specs, std::span<const std::string_view> other_keys,
                      const ReadContext& context, Errors& errors);
 
-/// Copies. The copy constructor of libstdc++'s std::variant (12) crashes when memory runs out in
-/// it: of texts and lists it destroys what it has not made.
-ParamValue copy_of(const ParamValue& value);
-ParamSet copy_of(const ParamSet& values);
-
 /// The texts that a parameter may be; none: any.
 std::vector<std::string> choices_of(const ParamSpec& spec);
 

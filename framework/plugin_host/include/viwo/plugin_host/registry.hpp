@@ -35,7 +35,6 @@ template <class Interface>
 struct Loaded {
   std::shared_ptr<Interface> object;  ///< keeps its library and the models it was given
   PluginInfo info;
-  ParamSet params;
   config::Node resolved;  ///< `type` and every parameter: a valid section of a configuration
 };
 
