@@ -4,6 +4,7 @@
 // only calls what they declare; the result is for measuring, not for passing on.
 // Writes OUT/trajectory.tum, OUT/timing.csv (CPU time of the thread, in ms, of an image and the
 // inertial measurements before it) and OUT/peer.json.
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -142,6 +143,18 @@ Recording read_images(const std::string& folder, int cameras) {
   return recording;
 }
 
+ov_core::CameraData pictures_of(const Image& image) {
+  ov_core::CameraData pictures;
+  pictures.timestamp = image.t_s;
+  for (std::size_t i = 0; i < image.files.size(); ++i) {
+    pictures.sensor_ids.push_back(image.cameras[i]);
+    pictures.images.push_back(cv::imread(image.files[i], cv::IMREAD_GRAYSCALE));
+    if (pictures.images.back().empty()) fail("cannot decode " + image.files[i]);
+    pictures.masks.push_back(cv::Mat::zeros(pictures.images.back().size(), CV_8UC1));
+  }
+  return pictures;
+}
+
 double thread_cpu_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -216,6 +229,7 @@ int main(int argc, char** argv) {
   options.use_multi_threading_subs = false;
 
   const bool of_images = std::ifstream(folder + "/mav0/cam0/data.csv").good();
+  const auto cameras = static_cast<std::size_t>(options.state_options.num_cameras);
   const Recording recording = of_images ? read_images(folder, options.state_options.num_cameras)
                                         : read_measurements(folder);
   if (recording.imu.empty() || recording.images.empty() || recording.truth.size() < 2) {
@@ -226,41 +240,36 @@ int main(int argc, char** argv) {
   std::ofstream trajectory(out + "/trajectory.tum"), timing(out + "/timing.csv");
   trajectory.precision(17);
   timing << "time_s,epoch_ms\n";
-  std::size_t next_imu = 0, epochs = 0, truth = 0;
+  const double begin_s = recording.imu.front().timestamp;
+  const auto first = std::find_if(recording.truth.begin(), recording.truth.end(),
+                                  [&](const auto& state) { return state(0) > begin_s - 1e-6; });
+  if (first == recording.truth.end()) {
+    fail(folder + " has no truth during the inertial measurements");
+  }
+  std::size_t next_imu = 0, epochs = 0;
   double nees = 0.0;
   bool started = false;
   for (const Image& image : recording.images) {
-    ov_core::CameraData pictures;
-    pictures.timestamp = image.t_s;
-    for (std::size_t i = 0; i < image.files.size(); ++i) {
-      pictures.sensor_ids.push_back(image.cameras[i]);
-      pictures.images.push_back(cv::imread(image.files[i], cv::IMREAD_GRAYSCALE));
-      if (pictures.images.back().empty()) fail("cannot decode " + image.files[i]);
-      pictures.masks.push_back(cv::Mat::zeros(pictures.images.back().size(), CV_8UC1));
-    }
-    const double begin_s = thread_cpu_s();
+    if (of_images && image.cameras.size() != cameras) continue;  // one of a pair
+    const ov_core::CameraData pictures = pictures_of(image);
+    const double began_s = thread_cpu_s();
     // One reading beyond the image, to interpolate.
     while (next_imu < recording.imu.size() &&
            (next_imu == 0 || recording.imu[next_imu - 1].timestamp <= image.t_s)) {
-      if (!started) {
-        // As viwo: at the first inertial measurement that has a truth.
-        const double t_s = recording.imu[next_imu].timestamp;
-        while (truth + 1 < recording.truth.size() && recording.truth[truth](0) < t_s - 1e-6)
-          ++truth;
-        if (recording.truth[truth](0) < t_s + 1e-6) {
-          start(system, recording.truth[truth]);
-          started = true;
-        }
+      // At the first truth behind an inertial measurement, as viwo does.
+      if (!started && recording.imu[next_imu].timestamp > (*first)(0) - 1e-6) {
+        start(system, *first);
+        started = true;
       }
       system.feed_measurement_imu(recording.imu[next_imu++]);
     }
-    if (!started || next_imu == recording.imu.size()) continue;
+    if (!started || image.t_s <= (*first)(0) || next_imu == recording.imu.size()) continue;
     if (of_images) {
       system.feed_measurement_camera(pictures);
     } else {
       system.feed_measurement_simulation(image.t_s, image.cameras, image.features);
     }
-    const double spent_s = thread_cpu_s() - begin_s;
+    const double spent_s = thread_cpu_s() - began_s;
     const Estimate estimate = estimate_of(system);
     const Eigen::Vector4d& q = estimate.q_ItoG.coeffs();
     trajectory << image.t_s << ' ' << estimate.p_IinG.transpose() << ' ' << q.transpose() << '\n';
