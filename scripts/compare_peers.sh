@@ -10,7 +10,7 @@
 #   --rounds N          of every run, for the medians of times (3)
 #   --rows TEXT         only rows whose name contains TEXT
 #   --no-images         no rendered images
-# Peers are licensed by their authors (GPL); nothing of them is part of viwo. Everything is built for this
+# OpenVINS is GPL-3.0, sqrtVINS LGPL-3.0; nothing of them is part of viwo. Everything is built for this
 # machine's instruction set. Times mean something on a machine that is otherwise idle.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

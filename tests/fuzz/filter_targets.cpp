@@ -374,8 +374,9 @@ std::vector<Target> filter_targets() {
   constexpr const char* kSources =
       "framework/estimator/src framework/filter/src framework/wheel/src framework/start/src "
       "plugins/updates plugins/shared/wheel_updates plugins/kinematics/four_wis_wid";
-  return {{"filter", estimator, kSources},
-          {"filter_run", whole_run, std::string(kSources) + " framework/run/src"}};
+  return {
+      {"filter", estimator, kSources},
+      {"filter_run", whole_run, std::string(kSources) + " framework/feed/src framework/run/src"}};
 }
 
 }  // namespace viwo::fuzz
