@@ -17,6 +17,17 @@
 #include "viwo/series/lag.hpp"
 
 namespace viwo::inspect {
+
+using series::CameraTurns;
+using series::Lag;
+using series::RateGrid;
+using series::Recording;
+using series::Span;
+using series::Turn;
+using series::turns_of;
+using series::Wheels;
+using series::YawRates;
+
 namespace {
 
 using Eigen::Matrix3d;

@@ -12,6 +12,10 @@
 #include "viwo/series/rests.hpp"
 
 namespace viwo::inspect {
+
+using series::Recording;
+using series::Rest;
+
 namespace {
 
 using Eigen::Vector3d;

@@ -10,6 +10,12 @@
 #include "viwo/series/rests.hpp"
 
 namespace viwo::inspect {
+
+using series::allan_deviation;
+using series::AllanPoint;
+using series::Recording;
+using series::Rest;
+
 namespace {
 
 /// What the start of the filter takes for a vibration, too: three times the noise.

@@ -15,6 +15,16 @@
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::inspect {
+
+using series::Lag;
+using series::Poses;
+using series::RateGrid;
+using series::Recording;
+using series::Span;
+using series::Turn;
+using series::turns_of;
+using series::Wheels;
+
 namespace {
 
 using Eigen::Vector3d;

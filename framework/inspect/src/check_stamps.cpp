@@ -9,6 +9,11 @@
 #include "viwo/math/time_text.hpp"
 
 namespace viwo::inspect {
+
+using series::Recording;
+using series::Stamps;
+using series::Wheels;
+
 namespace {
 
 /// A spacing that lacks at least one sample, and is more than jitter: the next of a shaken clock

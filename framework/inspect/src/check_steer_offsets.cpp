@@ -15,6 +15,10 @@
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::inspect {
+
+using series::Recording;
+using series::Wheels;
+
 namespace {
 
 using Vector = Eigen::VectorXd;

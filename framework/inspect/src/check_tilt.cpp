@@ -11,6 +11,9 @@
 #include "viwo/math/so3.hpp"
 
 namespace viwo::inspect {
+
+using series::Recording;
+
 namespace {
 
 using Eigen::Matrix3d;

@@ -10,6 +10,10 @@
 #include "viwo/plausibility/channel_change.hpp"
 
 namespace viwo::inspect {
+
+using series::Recording;
+using series::Wheels;
+
 namespace {
 
 /// After how much the angle of a drive begins anew: its rates, which are differences of angles,

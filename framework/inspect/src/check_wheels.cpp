@@ -15,6 +15,11 @@
 #include "viwo/wheel/wheel_noise.hpp"
 
 namespace viwo::inspect {
+
+using series::Poses;
+using series::Recording;
+using series::Wheels;
+
 namespace {
 
 /// Every so many samples, so that what is done to each is done to no more than this of them.

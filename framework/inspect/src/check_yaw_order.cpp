@@ -9,6 +9,14 @@
 #include "viwo/series/rate_grid.hpp"
 
 namespace viwo::inspect {
+
+using series::RateGrid;
+using series::Recording;
+using series::Span;
+using series::turns_of;
+using series::Wheels;
+using series::YawRates;
+
 namespace {
 
 /// Part of the variance of the gyro's rate that the wheels leave.

@@ -10,29 +10,27 @@
 
 namespace viwo::inspect {
 
-using namespace series;  // what every check speaks of
-
 /// Rate, jitter, gaps, what readers have rejected, sensors that broke off, what is in common.
-void check_stamps(const Recording& recording, Findings& out);
+void check_stamps(const series::Recording& recording, Findings& out);
 /// Gravity at rest, biases, channels that repeat.
-void check_imu(const Recording& recording, Findings& out);
+void check_imu(const series::Recording& recording, Findings& out);
 /// Unit, signs and axes of the gyro against the tilt that the accelerometer shows.
-void check_tilt(const Recording& recording, Findings& out);
+void check_tilt(const series::Recording& recording, Findings& out);
 /// White noise and random walk at rest, by Allan deviations, against the configuration.
-void check_imu_noise(const Recording& recording, Findings& out);
+void check_imu_noise(const series::Recording& recording, Findings& out);
 /// Channels that never change, wheels that the others contradict, noises against the configuration.
-void check_wheels(const Recording& recording, Findings& out);
+void check_wheels(const series::Recording& recording, Findings& out);
 /// Angles of drives that begin anew after a turn.
-void check_turns(const Recording& recording, Findings& out);
+void check_turns(const series::Recording& recording, Findings& out);
 /// Signs and order of wheels that cannot contradict each other, by the gyro's rate.
-void check_yaw_order(const Recording& recording, Findings& out);
+void check_yaw_order(const series::Recording& recording, Findings& out);
 /// Constant offsets of steering angles that stop the wheels from contradicting each other.
-void check_steer_offsets(const Recording& recording, Findings& out);
+void check_steer_offsets(const series::Recording& recording, Findings& out);
 /// Clock, sign and scale of the wheels' yaw rate against the gyro's.
-void check_wheel_clocks(const Recording& recording, Findings& out);
+void check_wheel_clocks(const series::Recording& recording, Findings& out);
 /// Clock and axes of each camera against the gyro.
-void check_camera_clocks(const Recording& recording, Findings& out);
+void check_camera_clocks(const series::Recording& recording, Findings& out);
 /// Clock, sign and speed of poses against gyro and wheels.
-void check_poses(const Recording& recording, Findings& out);
+void check_poses(const series::Recording& recording, Findings& out);
 
 }  // namespace viwo::inspect

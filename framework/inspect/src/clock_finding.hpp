@@ -19,7 +19,7 @@ struct ClockWords {
 /// Of rates compared after what is configured: fits, a fault with the offset to write, or a note
 /// that the two cannot be compared. `sigma_prior_s`: how uncertain the configuration says it is;
 /// `period_s`: the longer sample interval of the two.
-Finding clock_finding(const std::string& label, const ClockWords& words, const Lag& lag,
+Finding clock_finding(const std::string& label, const ClockWords& words, const series::Lag& lag,
                       double sigma_prior_s, double period_s);
 
 }  // namespace viwo::inspect

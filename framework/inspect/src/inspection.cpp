@@ -10,6 +10,12 @@
 #include "viwo/config/yaml.hpp"
 
 namespace viwo::inspect {
+
+using series::gather;
+using series::Headings;
+using series::Recording;
+using series::Wheels;
+
 namespace {
 
 using Checks = std::span<const std::string_view>;

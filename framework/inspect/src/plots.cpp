@@ -9,6 +9,13 @@
 #include "viwo/series/rate_grid.hpp"
 
 namespace viwo::inspect {
+
+using series::Recording;
+using series::Stamps;
+using series::Turn;
+using series::turns_of;
+using series::Wheels;
+
 namespace {
 
 using report::Plot;

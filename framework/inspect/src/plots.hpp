@@ -8,6 +8,6 @@
 
 namespace viwo::inspect {
 
-std::vector<report::Plot> plots_of(const Recording& recording);
+std::vector<report::Plot> plots_of(const series::Recording& recording);
 
 }  // namespace viwo::inspect

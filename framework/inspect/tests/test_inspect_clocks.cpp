@@ -1,6 +1,5 @@
 // Clocks and axes of wheels, cameras and poses against the gyro.
 #include <cmath>
-#include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -144,21 +144,17 @@ std::vector<YawRates> yaw_rates_of(const Recording& recording, const WheelsPrior
 }
 
 Span span_of(const Recording& recording) {
-  std::int64_t begin_ns = INT64_MIN, end_ns = INT64_MAX;
-  const auto include = [&](std::int64_t first_ns, std::int64_t last_ns) {
-    begin_ns = std::max(begin_ns, first_ns);
-    end_ns = std::min(end_ns, last_ns);
-  };
+  Span span;
   if (!recording.imu.empty()) {
-    include(recording.imu.front().t_ns, recording.imu.back().t_ns);
+    span = {recording.imu.front().t_ns, recording.imu.back().t_ns};
   } else {
-    for (const Wheels& wheels : recording.wheels) {
-      if (wheels.samples.empty()) continue;
-      include(wheels.samples.front().begin_ns, wheels.samples.back().end_ns);
-      break;
+    const auto first = std::find_if(recording.wheels.begin(), recording.wheels.end(),
+                                    [](const Wheels& wheels) { return !wheels.samples.empty(); });
+    if (first != recording.wheels.end()) {
+      span = {first->samples.front().begin_ns, first->samples.back().end_ns};
     }
   }
-  return begin_ns < end_ns && begin_ns != INT64_MIN ? Span{begin_ns, end_ns} : Span{};
+  return span.begin_ns < span.end_ns ? span : Span{};
 }
 
 }  // namespace viwo::series

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "viwo/series/rate_grid.hpp"
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -62,7 +63,8 @@ struct YawRates {
 /// Of the IMU, and of all that integrate for themselves.
 std::vector<YawRates> yaw_rates_of(const Recording& recording, const WheelsPrior& prior);
 
-/// The time that all of the IMU, wheels and poses cover, and a bit more: of grids.
+/// The time of grids: that of the IMU, or of the first wheels that gave samples; empty without
+/// them.
 struct Span {
   std::int64_t begin_ns = 0, end_ns = 0;
 };
