@@ -112,9 +112,8 @@ void require_one_kind(const std::vector<CalibrationRecording>& recordings) {
     return r.motion.kind != recordings.front().motion.kind;
   });
   if (other == recordings.end()) return;
-  throw InputError("recording '" + recordings.front().label.name + "' and recording '" +
-                   other->label.name +
-                   "': one has reference poses and one has a gyro only; say reference: gyro");
+  throw InputError(name_of(recordings.front().label) + " and " + name_of(other->label) +
+                   ": one has reference poses and one has a gyro only; say reference: gyro");
 }
 
 CalibrationRecording read_recording(const Recording& label, const Node& base, ReferenceKind kind,

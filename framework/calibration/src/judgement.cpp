@@ -25,10 +25,6 @@ const std::vector<IntrinsicSpec>& specs_of(const CalibrationResult& result) {
   return result.setup->recordings.front().setup.model->description().intrinsics;
 }
 
-std::string recording_of(const CalibrationResult& result, std::size_t recording) {
-  return name_of(result.setup->recordings[recording].label);
-}
-
 /// Strange is a warning, unbelievable a doubt.
 void add_by_size(double sigmas, const std::string& text, CalibrationResult& result) {
   if (std::abs(sigmas) < kStrange) return;
@@ -59,8 +55,8 @@ void judge_knowledge(CalibrationResult& result) {
 void judge_what_was_given(CalibrationResult& result) {
   for (const ByHand& one : result.all.by_hand) {
     add_by_size(one.sigmas,
-                recording_of(result, one.recording) + ": the wheels miss its " + one.label +
-                    " by " + significant(std::abs(one.sigmas), 2) +
+                name_of(result.setup->recordings[one.recording].label) + ": the wheels miss its " +
+                    one.label + " by " + significant(std::abs(one.sigmas), 2) +
                     " sigmas: a measurement of another drive, its unit, or sigma_distance_m, "
                     "sigma_turn_deg",
                 result);
@@ -70,7 +66,7 @@ void judge_what_was_given(CalibrationResult& result) {
     const double bias = result.all.gyro_bias_rad_per_s[i];
     if (!(result.all.gyro_bias_sigma_rad_per_s[i] > 0.)) continue;
     add_by_size(bias / prior,
-                recording_of(result, i) + ": the gyro would need a bias of " +
+                name_of(result.setup->recordings[i].label) + ": the gyro would need a bias of " +
                     significant(bias, 2) +
                     " rad/s: it turns where the wheels do not, or "
                     "prior_sigma_gyro_bias_rad_per_s is too narrow",
