@@ -1,4 +1,4 @@
-// Every configuration that is delivered runs, and ends as it says.
+// Every configuration that is delivered runs, shortened where it takes long, and ends as it says.
 #include <map>
 #include <set>
 
@@ -52,7 +52,7 @@ TEST_F(DeliveredForTheRecordingsTest, ExperimentWithSimulatedCameras) {
                "hybrid", "--set", set_});
 }
 
-// Without those left out, of which test_recordings has the figures.
+// Without those left out: framework/calibration/tests/test_recordings.cpp does it as delivered.
 TEST_F(DeliveredForTheRecordingsTest, Calibration) {
   std::ifstream file(kConfigFolder + "calibrations/recordings.yaml");
   const std::string config{std::istreambuf_iterator<char>(file), {}};
