@@ -18,8 +18,7 @@ import statistics
 import subprocess
 import sys
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 NAMES = {'viwo': 'viwo', 'openvins': 'OpenVINS', 'sqrtvins': 'sqrtVINS'}
 
 # What is set in a peer's own configuration of its own simulator. Their gates are at 95 %, times the multipliers;
@@ -33,18 +32,23 @@ PEER_SETTINGS = {
     'relative_config_imu': '"imu.yaml"', 'relative_config_imucam': '"cameras.yaml"', 'sim_do_perturbation': 'false',
     'sim_distance_threshold': 1.2, 'sim_freq_cam': 10, 'sim_freq_imu': 200, 'sim_min_feature_gen_dist': 5.0,
     'sim_max_feature_gen_dist': 7.0}
-NOISE = {'accelerometer_noise_density': 2.0e-3, 'accelerometer_random_walk': 3.0e-3,
-         'gyroscope_noise_density': 1.6968e-4, 'gyroscope_random_walk': 1.9393e-5}
-
-
-def peer_imu():
-    """An IMU without scales or misalignment, as Kalibr writes it."""
-    unit, zero = '[[1.0,0.0,0.0],[0.0,1.0,0.0],[0.0,0.0,1.0]]', '[[0.0,0.0,0.0],[0.0,0.0,0.0],[0.0,0.0,0.0]]'
-    rows = [f'  {key}: {value!r}' for key, value in NOISE.items()]
-    for name, value in (('Tw', unit), ('R_IMUtoGYRO', unit), ('Ta', unit), ('R_IMUtoACC', unit), ('Tg', zero)):
-        rows += [f'  {name}:'] + [f'    - [{row}]' for row in value.strip('[]').split('],[')]
-    return '%YAML:1.0\nimu0:\n' + '\n'.join(rows) + ('\n  rostopic: /imu0\n  time_offset: 0.0\n'
-                                                    '  update_rate: 200.0\n  model: "kalibr"\n')
+# An IMU without scales or misalignment, with the noises of openvins_sim.yaml and euroc.yaml.
+PEER_IMU = """%YAML:1.0
+imu0:
+  accelerometer_noise_density: 2.0e-3
+  accelerometer_random_walk: 3.0e-3
+  gyroscope_noise_density: 1.6968e-4
+  gyroscope_random_walk: 1.9393e-5
+  rostopic: /imu0
+  time_offset: 0.0
+  update_rate: 200.0
+  model: "kalibr"
+  Tw: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+  R_IMUtoGYRO: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+  Ta: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+  R_IMUtoACC: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+  Tg: [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+"""
 
 
 class Row:
@@ -72,7 +76,7 @@ class Row:
         theirs = (source / 'config/rpng_sim/estimator_config.yaml').read_text().splitlines()
         kept = [line for line in theirs if line.partition(':')[0] not in settings]
         config.write_text('\n'.join(kept + [f'{key}: {value}' for key, value in settings.items()]) + '\n')
-        (folder / 'imu.yaml').write_text(peer_imu())
+        (folder / 'imu.yaml').write_text(PEER_IMU)
         rig = (ROOT / 'configs/cameras' / f'{self.rig}.yaml').read_text()
         rig = rig.replace('camera_model', 'timeshift_cam_imu: 0.0\n  camera_model')
         (folder / 'cameras.yaml').write_text('%YAML:1.0\n' + rig)
@@ -159,7 +163,7 @@ class Programs:
             result = run(row.viwo_command(self.viwo, data) + ['--out', out / 'out'], environment, done=(0, 1))
             summary = json.loads((out / 'out/summary.json').read_text())
             result.update({key: summary['timing_ms']['total'][key] for key in ('mean', 'p95', 'max')})
-            result.update(errors_of(self.viwo, out / 'out/reference.tum', out / 'out/trajectory.tum'))
+            trajectory = out / 'out/trajectory.tum'
             result.update(nees=summary['accuracy']['nees_pose'], epochs=summary['epochs'])
         else:
             feed, source = self.peers[name]
@@ -167,8 +171,9 @@ class Programs:
             result = run([feed, config, data, out], environment)
             report = json.loads((out / 'peer.json').read_text())
             result.update(times_of(out / 'timing.csv'))
-            result.update(errors_of(self.viwo, data / 'reference.tum', out / 'trajectory.tum'))
+            trajectory = out / 'trajectory.tum'
             result.update(nees=report['nees_pose'], epochs=report['epochs'])
+        result.update(errors_of(self.viwo, data / 'reference.tum', trajectory))
         result['allocations'] = int(counted.read_text()) / result['epochs']
         result['cpu_ms'] = result['cpu_s'] * 1e3 / result['epochs']
         return result

@@ -4,6 +4,11 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
 
 #include "core/VioManagerOptions.h"
 #include "sim/Simulator.h"
@@ -43,7 +48,6 @@ int main(int argc, char** argv) {
   auto features = table(out + "/features.csv", "t,cam_id,feat_id,u,v");
   auto truth =
       table(out + "/groundtruth.csv", "t,qx,qy,qz,qw,px,py,pz,vx,vy,vz,bgx,bgy,bgz,bax,bay,baz");
-  features.precision(17);
   double first_s = -1.0;
   while (simulator.ok()) {
     double t_s = 0.0;

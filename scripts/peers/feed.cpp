@@ -6,18 +6,20 @@
 // inertial measurements before it) and OUT/peer.json.
 #include <algorithm>
 #include <array>
-#include <cstdio>
+#include <cctype>
+#include <cstddef>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 #include <iostream>
 #include <memory>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Dense>
 #include <opencv2/imgcodecs.hpp>
-#include <time.h>
 
 #include "core/VioManager.h"
 #include "state/State.h"
@@ -185,10 +187,11 @@ Estimate estimate_of(peer::VioManager& system) {
 
 // The normalised squared error of a pose; 6 is consistent. Truth between two of its rows: slerp.
 double nees_of(const Estimate& estimate, const Recording& recording, double t_s) {
-  std::size_t k = 1;
-  while (k + 1 < recording.truth.size() && recording.truth[k](0) < t_s) ++k;
-  const auto& a = recording.truth[k - 1];
-  const auto& b = recording.truth[k];
+  const auto& truth = recording.truth;
+  const auto next = std::lower_bound(truth.begin() + 1, truth.end() - 1, t_s,
+                                     [](const auto& state, double t) { return state(0) < t; });
+  const auto& a = *(next - 1);
+  const auto& b = *next;
   const double s = (t_s - a(0)) / (b(0) - a(0));
   const Eigen::Quaterniond q_a(a(4), a(1), a(2), a(3));
   const Eigen::Quaterniond q_ItoG = q_a.slerp(s, Eigen::Quaterniond(b(4), b(1), b(2), b(3)));
