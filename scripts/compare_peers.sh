@@ -7,6 +7,7 @@
 #   --sqrtvins SOURCE   the same of github.com/rpng/sqrtVINS
 #   --euroc SEQUENCE    folder that holds mav0, with images and truth, of the EuRoC MAV dataset
 #   --seeds N           exports of the simulator, for the means (10)
+#   --seconds S         of an export, at most (120)
 #   --rounds N          of every run, for the medians of times (3)
 #   --rows TEXT         only rows whose name contains TEXT
 #   --no-images         no rendered images
@@ -16,7 +17,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 usage() {
-  sed -n '2,16s/^# \{0,1\}//p' "$root/scripts/compare_peers.sh"
+  sed -n '2,17s/^# \{0,1\}//p' "$root/scripts/compare_peers.sh"
   exit "${1:-2}"
 }
 
@@ -25,7 +26,7 @@ while (($#)); do
   case $1 in
     -h | --help) usage 0 ;;
     --no-images) rest+=("$1") && shift && continue ;;
-    --openvins | --sqrtvins | --euroc | --seeds | --rounds | --rows) ;;
+    --openvins | --sqrtvins | --euroc | --seeds | --seconds | --rounds | --rows) ;;
     *) echo "compare_peers.sh: unknown option $1" >&2 && usage ;;
   esac
   if (($# < 2)); then echo "compare_peers.sh: $1 needs a value" >&2 && usage; fi
@@ -51,7 +52,7 @@ flags=(-w -march=native -DEIGEN_MAX_STATIC_ALIGN_BYTES=16)
 source_of() {  # NAME WHERE CORE: the folder that holds CORE, unpacked where it is an archive
   local where=$2
   if [[ -f $where ]]; then
-    mkdir -p "$work/$1-source"
+    rm -rf "$work/$1-source" && mkdir "$work/$1-source"
     tar -xzf "$where" -C "$work/$1-source"
     where=$work/$1-source
   fi
@@ -79,8 +80,10 @@ build_peer() {  # NAME SOURCE CORE MACROS...
   local program
   for program in feed export_openvins; do
     if [[ $program = export_openvins && $name != openvins ]]; then continue; fi
-    g++ -std=c++17 -O3 "${flags[@]}" "${macros[@]}" "${includes[@]}" "scripts/peers/$program.cpp" \
-      -o "$work/$name/$program" -L"$work/$name" -Wl,-rpath,"$work/$name" "-l${core}_lib" -lopencv_core \
+    # Hidden: the inline functions of the library remain its own.
+    g++ -std=c++17 -O3 -DNDEBUG -fvisibility=hidden -fvisibility-inlines-hidden "${flags[@]}" \
+      "${macros[@]}" "${includes[@]}" "scripts/peers/$program.cpp" -o "$work/$name/$program" \
+      -L"$work/$name" -Wl,-rpath,"$work/$name" "-l${core}_lib" -lopencv_core \
       -lopencv_imgcodecs -lopencv_imgproc -lopencv_calib3d -lboost_filesystem -lboost_system
   done
 }

@@ -4,8 +4,10 @@
 Called by ../compare_peers.sh, which builds what it needs; --help for the options. For every row a program
 runs once per seed and round, in turn with the others, on one core (taskset). Times are CPU times of the
 thread that estimates, per image epoch with its inertial measurements, as the programs write them: mean, 95th
-percentile and largest, medians over the runs. Errors are those of `viwo evaluate --alignment none` for all of
-them: RMSE over the way, means over the seeds.
+percentile and largest, medians over the runs. Errors are those of `viwo evaluate --align none` for all of
+them: RMSE over the way, means over the seeds. Allocations are counted in a run of their own, which is not
+timed: those of a peer's epochs, and all of viwo's process. A run whose position is off by more than LOST of the
+way, or that ends with an error, is lost: it is counted, and in no mean.
 """
 
 import argparse
@@ -18,6 +20,7 @@ import statistics
 import subprocess
 import sys
 
+LOST = 0.05
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 NAMES = {'viwo': 'viwo', 'openvins': 'OpenVINS', 'sqrtvins': 'sqrtVINS'}
 
@@ -25,7 +28,7 @@ NAMES = {'viwo': 'viwo', 'openvins': 'OpenVINS', 'sqrtvins': 'sqrtVINS'}
 # viwo's is set to that.
 PEER_SETTINGS = {
     'verbosity': '"WARNING"', 'use_stereo': 'true', 'calib_imu_intrinsics': 'false', 'calib_imu_g_sensitivity': 'false',
-    'max_slam': 0, 'max_slam_in_update': 0, 'max_msckf_in_update': 100, 'gravity_mag': 9.81, 'try_zupt': 'false',
+    'max_msckf_in_update': 100, 'gravity_mag': 9.81, 'try_zupt': 'false',
     'record_timing_information': 'false', 'use_klt': 'true', 'use_aruco': 'false', 'use_mask': 'false',
     'fast_threshold': 20, 'grid_x': 5, 'grid_y': 5, 'min_px_dist': 10, 'downsample_cameras': 'false',
     'track_frequency': 31.0, 'num_opencv_threads': 0, 'up_msckf_sigma_px': 1, 'up_msckf_chi2_multipler': 1,
@@ -54,10 +57,10 @@ imu0:
 class Row:
     """A line of the table: data of each seed, and what the estimators are told."""
 
-    def __init__(self, name, data, cameras, *, rig='euroc', clones=11, calibrate=False, points=250,
-                 images=False, histogram='NONE'):
+    def __init__(self, name, data, cameras, *, rig='euroc', clones=11, landmarks=0, calibrate=False,
+                 points=250, images=False, histogram='NONE'):
         self.name, self.data, self.cameras, self.rig = name, data, cameras, rig
-        self.clones, self.calibrate, self.points = clones, calibrate, points
+        self.clones, self.landmarks, self.calibrate, self.points = clones, landmarks, calibrate, points
         self.images, self.histogram = images, histogram
 
     def write_peer_config(self, source, folder, seed=0):
@@ -67,6 +70,7 @@ class Row:
         calibrate = 'true' if self.calibrate else 'false'
         settings = {
             **PEER_SETTINGS, 'max_cameras': self.cameras, 'max_clones': self.clones,
+            'max_slam': self.landmarks, 'max_slam_in_update': self.landmarks,
             # Of all cameras together; started from the truth, a tracker keeps the number for initialising.
             'num_pts': self.points * (self.cameras if self.images else 1),
             'init_max_features': self.points * self.cameras,
@@ -85,7 +89,8 @@ class Row:
     def viwo_command(self, viwo, data):
         """With the gate of the peers and their start."""
         rig = ROOT / 'configs/cameras' / f'{self.rig}.yaml'
-        settings = [f'estimator.clones={self.clones}', 'updates.visual_features.gate_probability=0.05',
+        settings = [f'estimator.clones={self.clones}', f'updates.visual_features.max_landmarks={self.landmarks}',
+                    'updates.visual_features.gate_probability=0.05',
                     f'cameras.kalibr={rig}', f'cameras.calibrate={"true" if self.calibrate else "false"}',
                     'cameras.sigma_position_m=0.015']
         if not self.images:
@@ -110,8 +115,12 @@ class Row:
         return command
 
 
+class Lost(Exception):
+    """A run that ended with an error."""
+
+
 def run(command, environment=None, done=(0,)):
-    """Runs to the end on one core; CPU time in seconds and largest memory in MB."""
+    """Runs to the end on one core; CPU time in seconds and largest memory in MB. Raises Lost."""
     pinned = ['taskset', '-c', '0'] if shutil.which('taskset') else []
     with subprocess.Popen([*pinned, *map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           text=True, env={**os.environ, **(environment or {})}) as process:
@@ -119,7 +128,7 @@ def run(command, environment=None, done=(0,)):
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in done:
-        sys.exit(f'{" ".join(map(str, command))}\nended with {process.returncode}:\n{said[-2000:]}')
+        raise Lost(f'{" ".join(map(str, command))}\nended with {process.returncode}:\n{said[-2000:]}')
     return {'cpu_s': usage.ru_utime + usage.ru_stime, 'rss_mb': usage.ru_maxrss / 1024}
 
 
@@ -131,13 +140,13 @@ def times_of(file):
 
 
 def errors_of(viwo, reference, estimate):
-    """RMSE without alignment."""
+    """RMSE without alignment, and whether that is more than LOST of the way."""
     said = subprocess.run([viwo, 'evaluate', '--reference', reference, '--estimate', estimate, '--align', 'none'],
                           capture_output=True, text=True, check=False)
     if said.returncode != 0:
         sys.exit(f'viwo evaluate: {said.stderr}')
     found = json.loads(said.stdout)
-    return {'m': found['ate_m'], 'deg': found['ate_deg']}
+    return {'m': found['ate_m'], 'deg': found['ate_deg'], 'lost': found['ate_m'] > LOST * found['path_length_m']}
 
 
 class Programs:
@@ -151,13 +160,14 @@ class Programs:
         self.preload = arguments.count
         self.work = arguments.work
 
-    def run(self, name, row, data):
+    def run(self, name, row, data, count=False):
         """One run; what it took, and how far it is off."""
         out = self.work / 'runs' / f'{row.name.replace(" ", "_").replace(",", "")}_{name}'
         shutil.rmtree(out, ignore_errors=True)
         out.mkdir(parents=True)
-        counted = out / 'allocations.txt'
-        environment = {'OV_NO_RETRI': '1', 'LD_PRELOAD': str(self.preload), 'VIWO_COUNT_FILE': str(counted)}
+        environment = {'OV_NO_RETRI': '1'}
+        if count:
+            environment |= {'LD_PRELOAD': str(self.preload), 'VIWO_COUNT_FILE': str(out / 'allocations.txt')}
         if name == 'viwo':
             # 1: the result is doubtful, and the table shows by how much.
             result = run(row.viwo_command(self.viwo, data) + ['--out', out / 'out'], environment, done=(0, 1))
@@ -165,6 +175,7 @@ class Programs:
             result.update({key: summary['timing_ms']['total'][key] for key in ('mean', 'p95', 'max')})
             trajectory = out / 'out/trajectory.tum'
             result.update(nees=summary['accuracy']['nees_pose'], epochs=summary['epochs'])
+            allocations = int((out / 'allocations.txt').read_text()) if count else None
         else:
             feed, source = self.peers[name]
             config = row.write_peer_config(source, out / 'config')
@@ -173,42 +184,64 @@ class Programs:
             result.update(times_of(out / 'timing.csv'))
             trajectory = out / 'trajectory.tum'
             result.update(nees=report['nees_pose'], epochs=report['epochs'])
+            allocations = report['allocations']
         result.update(errors_of(self.viwo, data / 'reference.tum', trajectory))
-        result['allocations'] = int(counted.read_text()) / result['epochs']
         result['cpu_ms'] = result['cpu_s'] * 1e3 / result['epochs']
+        if count:
+            result['allocations'] = allocations / result['epochs']
         return result
 
     def compare(self, row, rounds):
         """Every program on every seed, in turn; medians of what is timed, means of what is estimated."""
         runs = {name: [] for name in self.names}
+        lost = {name: set() for name in self.names}
+        summary = {name: {} for name in self.names}
         for _ in range(rounds):
             for data in row.data:
                 for name in self.names:
-                    runs[name].append(self.run(name, row, data))
-        summary = {}
+                    try:
+                        result = self.run(name, row, data)
+                    except Lost as error:
+                        print(error, file=sys.stderr)
+                        lost[name].add(data)
+                        continue
+                    if result['lost']:
+                        lost[name].add(data)
+                    else:
+                        runs[name].append(result)
         for name, results in runs.items():
-            middle = {key: statistics.median(result[key] for result in results)
-                      for key in ('mean', 'p95', 'max', 'rss_mb', 'allocations', 'cpu_ms')}
-            mean = {key: statistics.fmean(result[key] for result in results) for key in ('m', 'deg', 'nees')}
-            summary[name] = {**middle, **mean}
+            summary[name]['lost'] = len(lost[name])
+            if not results:
+                continue
+            for key in ('mean', 'p95', 'max', 'rss_mb', 'cpu_ms'):
+                summary[name][key] = statistics.median(result[key] for result in results)
+            for key in ('m', 'deg', 'nees'):
+                summary[name][key] = statistics.fmean(result[key] for result in results)
+            data = next(data for data in row.data if data not in lost[name])
+            summary[name]['allocations'] = self.run(name, row, data, count=True)['allocations']
         return summary
 
 
 def tabulate(rows, names):
     """Markdown: a line for each row and program."""
     lines = ['| (recordings) | | ms per epoch: mean, p95, max | ratio to OpenVINS | RMSE | pose NEES (6) | '
-             'whole process: ms per epoch, allocations per epoch, MB |', '|---|---|---|---|---|---|---|']
+             'whole process: ms per epoch, MB | allocations per epoch |', '|---|---|---|---|---|---|---|---|']
     for row, results in rows:
         for name in names:
             result = results[name]
+            line = f'| {row.name if name == names[0] else ""} ({len(row.data)}) | {NAMES[name]} | '
+            lost = f' ({result["lost"]} lost)' if result['lost'] else ''
+            if 'mean' not in result:
+                lines.append(f'{line}all lost | | | | | |')
+                continue
             # On images viwo's epochs are without its front end, which has a thread of its own.
             key = 'cpu_ms' if row.images else 'mean'
             times = '' if row.images else f'{result["mean"]:.3f}, {result["p95"]:.2f}, {result["max"]:.2f}'
+            ratio = f'{result[key] / results["openvins"][key]:.3f}' if key in results['openvins'] else ''
             lines.append(
-                f'| {row.name if name == names[0] else ""} ({len(row.data)}) | {NAMES[name]} | {times} | '
-                f'{result[key] / results["openvins"][key]:.2f} | {result["deg"]:.3f} deg, '
-                f'{result["m"]:.4f} m | {result["nees"]:.2f} | {result["cpu_ms"]:.2f}, '
-                f'{result["allocations"]:.0f}, {result["rss_mb"]:.0f} |')
+                f'{line}{times} | {ratio} | {result["deg"]:.3f} deg, {result["m"]:.4f} m{lost} | '
+                f'{result["nees"]:.2f} | {result["cpu_ms"]:.2f}, {result["rss_mb"]:.0f} | '
+                f'{result["allocations"]:.0f} |')
     return '\n'.join(lines)
 
 
@@ -231,30 +264,39 @@ class Data:
     def __init__(self, arguments):
         self.arguments, self.folder = arguments, arguments.work / 'data'
 
+    @staticmethod
+    def make(folder, settings, command):
+        """Runs what writes a folder, unless it was written with these settings before."""
+        done = folder / 'made_with.txt'
+        wanted = '\n'.join(map(str, settings))
+        if done.exists() and done.read_text() == wanted:
+            return
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        run(command)
+        write_reference(folder)
+        done.write_text(wanted)
+
     def exports(self, cameras, points):
         """Of OpenVINS's simulator, a folder for each seed."""
         folders = []
+        seconds = self.arguments.seconds
         for seed in range(1, self.arguments.seeds + 1):
             folder = self.folder / f'seed{seed}_{points}' / ('mono' if cameras == 1 else 'stereo')
-            if not (folder / 'done').exists():
-                row = Row('export', [], cameras, points=points)
-                config = row.write_peer_config(self.arguments.openvins[1], folder / 'config', seed)
-                run([self.arguments.export, config, self.arguments.seconds, folder])
-                write_reference(folder)
-                (folder / 'done').touch()
+            config = Row('export', [], cameras, points=points).write_peer_config(
+                self.arguments.openvins[1], self.arguments.work / 'runs/export', seed)
+            settings = [seconds, *(file.read_text() for file in sorted(config.parent.iterdir()))]
+            self.make(folder, settings, [self.arguments.export, config, seconds, folder])
             folders.append(folder)
         return folders
 
     def rendered(self):
         """The robot of viwo_images.yaml, as a EuRoC folder."""
         folder = self.folder / 'rendered'
-        if not (folder / 'done').exists():
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir(parents=True)
-            run([self.arguments.viwo, 'simulate', ROOT / 'configs/runs/viwo_images.yaml', '--out', folder / 'mav0',
-                 '--set', f'sensors.simulator0.duration_s={min(self.arguments.seconds, 60)}'])
-            write_reference(folder)
-            (folder / 'done').touch()
+        seconds = min(self.arguments.seconds, 60)
+        self.make(folder, [seconds], [
+            self.arguments.viwo, 'simulate', ROOT / 'configs/runs/viwo_images.yaml', '--out', folder / 'mav0',
+            '--set', f'sensors.simulator0.duration_s={seconds}'])
         return folder
 
     def real(self):
@@ -276,6 +318,8 @@ def rows_of(arguments):
         yield Row(f'{name}, 1000 points, 100 offered', data.exports(cameras, 1000)[:1], cameras, points=1000)
     for cameras, name in ((1, 'mono'), (2, 'stereo')):
         yield Row(f'{name}, cameras calibrated', data.exports(cameras, 250), cameras, calibrate=True)
+    for cameras, name in ((1, 'mono'), (2, 'stereo')):
+        yield Row(f'{name}, 25 landmarks', data.exports(cameras, 250), cameras, landmarks=25)
     for cameras, name in ((1, 'mono'), (2, 'stereo')):
         yield Row(f'{name}, 30 clones', data.exports(cameras, 250)[:1], cameras, clones=30)
     if not arguments.no_images:

@@ -1,5 +1,5 @@
-/* A preloaded library that counts what a program asks of malloc and its like, and writes the number to the
-   file that VIWO_COUNT_FILE names when the program ends. */
+/* A preloaded library that counts what a program asks of malloc and its like, tells it whoever asks, and
+   writes the number to the file that VIWO_COUNT_FILE names when the program ends. */
 #define _GNU_SOURCE
 #include <stdatomic.h>
 #include <stddef.h>
@@ -12,6 +12,8 @@ extern void* __libc_realloc(void* block, size_t size);
 extern void* __libc_memalign(size_t alignment, size_t size);
 
 static atomic_ulong allocations;
+
+unsigned long viwo_allocations(void) { return atomic_load(&allocations); }
 
 void* malloc(size_t size) {
   atomic_fetch_add_explicit(&allocations, 1, memory_order_relaxed);
@@ -41,10 +43,9 @@ int posix_memalign(void** block, size_t alignment, size_t size) {
 }
 
 __attribute__((destructor)) static void write_count(void) {
-  const unsigned long counted = atomic_load(&allocations);
   const char* name = getenv("VIWO_COUNT_FILE");
   FILE* file = name == NULL ? NULL : fopen(name, "w");
   if (file == NULL) return;
-  fprintf(file, "%lu\n", counted);
+  fprintf(file, "%lu\n", viwo_allocations());
   fclose(file);
 }

@@ -2,8 +2,9 @@
 // sensor vio_csv reads it, or, where FOLDER/mav0 is there, on the images of a EuRoC folder.
 // Compiled against either of them by ../compare_peers.sh, with PEER_OPENVINS or PEER_SQRTVINS. It
 // only calls what they declare; the result is for measuring, not for passing on.
-// Writes OUT/trajectory.tum, OUT/timing.csv (CPU time of the thread, in ms, of an image and the
-// inertial measurements before it) and OUT/peer.json.
+// Writes OUT/trajectory.tum (at the stamp of the IMU: that of the image and the estimated clock),
+// OUT/timing.csv (CPU time of the thread, in ms, of an image and the inertial measurements before it)
+// and OUT/peer.json; allocations are those of an epoch, and null without libcount_allocations.so.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -36,6 +37,9 @@ using Pixel = Eigen::VectorXf;
 namespace peer = ov_srvins;
 using Pixel = Eigen::Vector2f;
 #endif
+
+// Of libcount_allocations.so, where it is preloaded.
+extern "C" __attribute__((weak, visibility("default"))) unsigned long viwo_allocations();
 
 namespace {
 
@@ -163,7 +167,10 @@ double thread_cpu_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
+unsigned long allocations_now() { return viwo_allocations != nullptr ? viwo_allocations() : 0; }
+
 struct Estimate {
+  double clock_s;             // of the cameras behind that of the IMU
   Eigen::Quaterniond q_ItoG;  // the numbers of the peer's JPL quaternion q_GtoI
   Eigen::Vector3d p_IinG;
   Eigen::Matrix<double, 6, 6> covariance;  // orientation (JPL, left), position
@@ -173,10 +180,13 @@ Estimate estimate_of(peer::VioManager& system) {
   const auto state = system.get_state();
 #ifdef PEER_OPENVINS
   const auto imu = state->_imu;
+  const auto clock = state->_calib_dt_CAMtoIMU;
 #else
   const auto imu = state->imu;
+  const auto clock = state->calib_dt_CAMtoIMU;
 #endif
   Estimate estimate;
+  estimate.clock_s = static_cast<double>(clock->value()(0));
   const Eigen::Vector4d q = imu->quat().template cast<double>();
   estimate.q_ItoG = Eigen::Quaterniond(q(3), q(0), q(1), q(2)).normalized();
   estimate.p_IinG = imu->pos().template cast<double>();
@@ -250,12 +260,14 @@ int main(int argc, char** argv) {
     fail(folder + " has no truth during the inertial measurements");
   }
   std::size_t next_imu = 0, epochs = 0;
+  unsigned long allocations = 0;
   double nees = 0.0;
   bool started = false;
   for (const Image& image : recording.images) {
     if (of_images && image.cameras.size() != cameras) continue;  // one of a pair
     const ov_core::CameraData pictures = pictures_of(image);
     const double began_s = thread_cpu_s();
+    const unsigned long allocated = allocations_now();
     // One reading beyond the image, to interpolate.
     while (next_imu < recording.imu.size() &&
            (next_imu == 0 || recording.imu[next_imu - 1].timestamp <= image.t_s)) {
@@ -273,15 +285,18 @@ int main(int argc, char** argv) {
       system.feed_measurement_simulation(image.t_s, image.cameras, image.features);
     }
     const double spent_s = thread_cpu_s() - began_s;
+    allocations += allocations_now() - allocated;
     const Estimate estimate = estimate_of(system);
     const Eigen::Vector4d& q = estimate.q_ItoG.coeffs();
-    trajectory << image.t_s << ' ' << estimate.p_IinG.transpose() << ' ' << q.transpose() << '\n';
+    const double t_s = image.t_s + estimate.clock_s;
+    trajectory << t_s << ' ' << estimate.p_IinG.transpose() << ' ' << q.transpose() << '\n';
     timing << image.t_s - recording.images.front().t_s << ',' << spent_s * 1e3 << '\n';
-    nees += nees_of(estimate, recording, image.t_s);
+    nees += nees_of(estimate, recording, t_s);
     ++epochs;
   }
   if (epochs == 0) fail("no image was used");
   std::ofstream(out + "/peer.json")
       << "{\"epochs\": " << epochs << ", \"nees_pose\": " << nees / static_cast<double>(epochs)
+      << ", \"allocations\": " << (viwo_allocations != nullptr ? std::to_string(allocations) : "null")
       << "}\n";
 }
