@@ -29,6 +29,12 @@ ImuWatch::Values ImuWatch::values_of(const ImuSample& sample) {
   return {w[0], w[1], w[2], a[0], a[1], a[2]};
 }
 
+bool ImuWatch::is_noise() const {
+  return std::any_of(changes_.begin(), changes_.end(), [](const Changes& axis) {
+    return axis.n >= kFewest && 3 * axis.n_turns_back > axis.n;
+  });
+}
+
 bool ImuWatch::was_spike() const {
   return std::any_of(spike_.begin(), spike_.end(), [](double size) { return size > 0.; });
 }
@@ -81,11 +87,13 @@ void ImuWatch::watch_usual(const Values& now) {
     const double weight = is_known ? 0.01 : 1. / static_cast<double>(count_);
     usual_[i] += weight * ((is_known ? std::min(change, bound) : change) - usual_[i]);
   }
-  const double change = now[2] - newest_[2];
-  if (change == 0.) return;
-  ++n_changes_;
-  if (change * change_ < 0.) ++n_turns_back_;
-  change_ = change;
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    const double change = now[i] - newest_[i];
+    if (change == 0.) continue;
+    ++changes_[i].n;
+    if (change * changes_[i].last < 0.) ++changes_[i].n_turns_back;
+    changes_[i].last = change;
+  }
 }
 
 }  // namespace viwo

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "viwo/math/significant.hpp"
+#include "viwo/math/time_text.hpp"
 
 namespace viwo {
 
@@ -21,11 +22,18 @@ EncoderCheck::EncoderCheck(std::string name, std::string sensor,
     changes_.push_back({change});
   }
   if (n_steer_ > 0) changes_.push_back({{ChannelChange::kNoSteering}});
+  drives_.resize(n_drive());
 }
 
 std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
   if (sample.fault() != nullptr) return {};
   watch_steering(sample);
+  for (std::size_t i = 0; i < drives_.size(); ++i) {
+    constexpr double kTurns =
+        1e-3;  // rad/s: wheels that stand read zero, or next to it, all the time
+    const double rate = sample.drive_rad_per_s[i];
+    drives_[i].add(rate, sample.t_ns, std::abs(rate) > kTurns);
+  }
   last_ = sample;
   // They cost as many solutions as there are changes.
   constexpr std::int64_t kEvery = 5;
@@ -62,10 +70,29 @@ void EncoderCheck::try_changes(const EncoderSample& sample) {
   ++tried_;
 }
 
-void EncoderCheck::findings(Findings& out) const {
+void EncoderCheck::findings(std::int64_t zero_ns, Findings& out) const {
+  find_stuck(zero_ns, out);
   const std::size_t before = out.size();
   find_degrees(out);
   if (out.size() == before) find_change(out);
+}
+
+void EncoderCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {
+  const bool are_all = std::all_of(drives_.begin(), drives_.end(),
+                                   [](const StuckChannel& drive) { return drive.was_stuck(); });
+  for (std::size_t i = 0; i < drives_.size(); ++i) {
+    const StuckChannel& drive = drives_[i];
+    if (!drive.was_stuck()) continue;
+    const std::string channel = "drive_" + std::to_string(i + 1);
+    out.push_back(
+        {name_ + " stuck " + channel,
+         name_ + ": " + channel + " reads " + significant(drive.value(), 4) +
+             " rad/s all the time from " + time_text(drive.from_ns() - zero_ns) + " on, for " +
+             significant(seconds_between(drive.from_ns(), drive.to_ns()), 3) + " s: it was stuck",
+         false,
+         {},
+         are_all});
+  }
 }
 
 /// Angles beyond a turn are right where an encoder counts turns, but not so fast.

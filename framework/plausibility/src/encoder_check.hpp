@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "stuck_channel.hpp"
 #include "viwo/api/rig.hpp"
 #include "viwo/plausibility/channel_change.hpp"
 #include "viwo/plausibility/finding.hpp"
@@ -27,7 +28,8 @@ class EncoderCheck {
   Intrinsics rate_by_prior() const {
     return solution_.J_xi_WI.row(2).transpose().cwiseProduct(sigma_WI_);
   }
-  void findings(Findings& out) const;
+  /// Times in texts count from `zero_ns`.
+  void findings(std::int64_t zero_ns, Findings& out) const;
 
  private:
   struct Tried {
@@ -42,6 +44,7 @@ class EncoderCheck {
   std::size_t n_steer() const { return static_cast<std::size_t>(n_steer_); }
   void watch_steering(const EncoderSample& sample);
   void try_changes(const EncoderSample& sample);
+  void find_stuck(std::int64_t zero_ns, Findings& out) const;
   void find_degrees(Findings& out) const;
   void find_change(Findings& out) const;
 
@@ -51,6 +54,7 @@ class EncoderCheck {
   Intrinsics sigma_WI_;  ///< of the prior
   int n_steer_;
   std::vector<Tried> changes_;  ///< the first is none
+  std::vector<StuckChannel> drives_;
   std::int64_t samples_ = 0;
   std::int64_t tried_ = 0;
   std::optional<EncoderSample> last_;

@@ -14,7 +14,8 @@ constexpr double kLeast = 1e-3, kStep = 0.01;  // of LogMedian; its step is of t
 constexpr double kStandardGravity = 9.80665;
 constexpr std::int64_t kFewest = 500;  ///< readings before a verdict
 constexpr double kShortest_s = 3.;     ///< likewise
-constexpr double kLongPull_s = 10.;    ///< of no braking, and no curve
+constexpr int kManyEqual = 100;
+constexpr double kLongPull_s = 10.;  ///< of no braking, and no curve
 constexpr std::array<const char*, 6> kAxes = {"gyro's x",          "gyro's y",
                                               "gyro's z",          "accelerometer's x",
                                               "accelerometer's y", "accelerometer's z"};
@@ -60,7 +61,12 @@ void ImuCheck::add(const ImuSample& sample, bool moves) {
   const ImuWatch::Values values = ImuWatch::values_of(sample);
   watch_.add(sample);
   if (count_ == 0) begin_ns_ = equal_from_ns_ = sample.t_ns;
+  const ImuWatch::Values before = ImuWatch::values_of(last_);
   for (std::size_t i = 0; i < values.size(); ++i) {
+    // Coarse numbers of a sensor at rest repeat themselves on all three axes.
+    const std::size_t triad = i < 3 ? 0 : 3;
+    const std::size_t j = triad + (i + 1) % 3, k = triad + (i + 2) % 3;
+    channels_[i].add(values[i], sample.t_ns, values[j] != before[j] && values[k] != before[k]);
     if (count_ == 0) axes_[i].last = axes_[i].least = axes_[i].most = values[i];
     axes_[i].add(values[i], watch_.spike()[i]);
   }
@@ -86,10 +92,15 @@ void ImuCheck::watch_stuck(const ImuSample& sample, bool moves) {
     return;
   }
   moves_ = moves_ || moves;
+  if (equal <= kManyEqual) ++n_equal_;
   // Coarse numbers of an IMU at rest repeat themselves.
   const bool rests = to_vector(sample.gyro_rad_per_s).norm() < 0.05 && !moves_;
-  if (rests || !watch_.is_stuck() || equal <= std::max(stuck_, 20)) return;
-  if (seconds_between(equal_from_ns_, sample.t_ns) <= 0.1) return;
+  // Noise that is filtered hardly turns back, but no reading is the one before.
+  const double equal_s = seconds_between(equal_from_ns_, sample.t_ns);
+  const bool never_repeats =
+      equal > kManyEqual && equal_s > 1. && 10 * (n_equal_ - kManyEqual) < count_ - equal;
+  if (rests || !(watch_.is_stuck() || never_repeats) || equal <= std::max(stuck_, 20)) return;
+  if (equal_s <= 0.1) return;
   stuck_ = equal;
   stuck_from_ns_ = equal_from_ns_;
   stuck_to_ns_ = sample.t_ns;
@@ -97,6 +108,7 @@ void ImuCheck::watch_stuck(const ImuSample& sample, bool moves) {
 
 void ImuCheck::findings(std::int64_t zero_ns, Findings& out) const {
   find_stuck(zero_ns, out);
+  find_stuck_channels(zero_ns, out);
   if (count_ < kFewest || seconds_between(begin_ns_, last_.t_ns) < kShortest_s) return;
   find_gravity(out);
   find_saturated(out);
@@ -129,7 +141,26 @@ void ImuCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {
   out.push_back({name_ + " stuck",
                  name_ + ": the same six numbers " + std::to_string(stuck_) + " times from " +
                      time_text(stuck_from_ns_ - zero_ns) + " on: it was stuck for " +
-                     significant(seconds_between(stuck_from_ns_, stuck_to_ns_), 3) + " s"});
+                     significant(seconds_between(stuck_from_ns_, stuck_to_ns_), 3) + " s",
+                 false,
+                 {},
+                 stuck_ > kManyEqual});
+}
+
+void ImuCheck::find_stuck_channels(std::int64_t zero_ns, Findings& out) const {
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    const StuckChannel& channel = channels_[i];
+    if (!channel.was_stuck()) continue;
+    out.push_back({name_ + " stuck " + kAxes[i],
+                   name_ + ": the " + kAxes[i] + " reads " + significant(channel.value(), 3) +
+                       unit_of(i) + " all the time from " + time_text(channel.from_ns() - zero_ns) +
+                       " on, for " +
+                       significant(seconds_between(channel.from_ns(), channel.to_ns()), 3) +
+                       " s, while the other axes change: it was stuck",
+                   false,
+                   {},
+                   true});
+  }
 }
 
 /// A value that is cut off where its range ends comes again and again, to the last bit; noise

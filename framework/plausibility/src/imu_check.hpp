@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "stuck_channel.hpp"
 #include "viwo/api/measurement.hpp"
 #include "viwo/estimator/imu_watch.hpp"
 #include "viwo/plausibility/finding.hpp"
@@ -56,6 +57,7 @@ class ImuCheck {
   void watch_stuck(const ImuSample& sample, bool moves);
   void find_gravity(Findings& out) const;
   void find_stuck(std::int64_t zero_ns, Findings& out) const;
+  void find_stuck_channels(std::int64_t zero_ns, Findings& out) const;
   void find_saturated(Findings& out) const;
   void find_spikes(Findings& out) const;
 
@@ -65,10 +67,13 @@ class ImuCheck {
   std::int64_t begin_ns_ = 0;
   ImuSample last_;
   std::array<Axis, 6> axes_;  ///< of the gyro, then of the accelerometer
-  LogMedian force_;           ///< m/s^2
+  std::array<StuckChannel, 6> channels_;
+  LogMedian force_;  ///< m/s^2
   Eigen::Vector3d direction_sum_ = Eigen::Vector3d::Zero();
   ImuWatch watch_;
   // Readings with the same six numbers: those at hand, and the longest that cannot be true.
+  std::int64_t n_equal_ =
+      0;  ///< readings like the one before, of each row of them the first hundred
   bool moves_ = false;
   std::int64_t equal_from_ns_ = 0;
   int stuck_ = 0;

@@ -273,7 +273,7 @@ void Plausibility::look(bool at_end) {
   if (zero_ns_) checks_->imu.findings(*zero_ns_, findings_);
   for (const auto& wheels : checks_->wheels) {
     const std::size_t before = findings_.size();
-    wheels.encoders.findings(findings_);
+    wheels.encoders.findings(zero_ns_.value_or(0), findings_);
     // Wheels that contradict themselves say nothing of the IMU.
     if (findings_.size() != before) continue;
     wheels.twist.findings(checks_->imu.up(), findings_);

@@ -2,6 +2,7 @@
 // minute of them, with one thing done to all or some of them.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -23,8 +24,12 @@
 namespace viwo {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 /// What is done to the samples of each sensor.
 struct Fault {
@@ -376,6 +381,32 @@ TEST(Plausibility, SaysWhatItFindsWhileTheRunGoesOn) {
   const auto begins = ::testing::StartsWith("imu of simulator0: the accelerometer reads 9.8");
   EXPECT_THAT(told, ::testing::Contains(begins).Times(1));
   EXPECT_THAT(result.warnings, ::testing::Contains(begins).Times(1));
+}
+
+TEST(Plausibility, FindsAChannelThatIsStuckWhileTheOthersGoOn) {
+  std::int64_t begin_ns = 0;
+  const auto is_late = [&begin_ns](std::int64_t t_ns) {
+    if (begin_ns == 0) begin_ns = t_ns;
+    return t_ns - begin_ns > 20'000'000'000;
+  };
+  Fault fault;
+  fault.imu = [&is_late](ImuSample& imu) {
+    if (is_late(imu.t_ns)) imu.gyro_rad_per_s[2] = 0.;
+  };
+  EXPECT_THAT(found(fault), Contains(AllOf(HasSubstr("the gyro's z reads 0 rad/s all the time"),
+                                           HasSubstr("it was stuck"))));
+  // Every other reading of a coarse sensor may well repeat the one before.
+  fault.imu = [](ImuSample& imu) {
+    for (double& rate : imu.gyro_rad_per_s) rate = 0.01 * std::round(rate / 0.01);
+  };
+  EXPECT_THAT(found(fault), Not(Contains(HasSubstr("stuck"))));
+  fault.imu = [](ImuSample&) {};
+  double held = 0.;
+  fault.wheels = [&is_late, &held](EncoderSample& wheels) {
+    if (is_late(wheels.t_ns) && held != 0.) wheels.drive_rad_per_s[1] = held;
+    held = wheels.drive_rad_per_s[1];
+  };
+  EXPECT_THAT(found(fault), Contains(AllOf(HasSubstr("drive_2 reads "), HasSubstr("stuck"))));
 }
 
 }  // namespace

@@ -88,6 +88,9 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
   }
   const std::vector<RejectionCount> rejections = estimator.rejections();
   const std::int64_t begin_ns = result.pieces.empty() ? 0 : result.pieces.front().begin_ns;
+  for (std::string& line : refused_altogether(rejections, begin_ns)) {
+    result.doubts.push_back(std::move(line));
+  }
   for (std::string& line : suspicions(rejections, result.noises, begin_ns)) {
     result.warnings.push_back(std::move(line));
   }
@@ -143,7 +146,7 @@ class FilterRun {
     result_.wall_s = data_.streams.empty() && !live_ ? wall_s_ : seconds_since(begin);
     plausibility_.finish();
     for (const Finding& finding : plausibility_.findings()) {
-      result_.warnings.push_back(finding.text);
+      (finding.is_doubt ? result_.doubts : result_.warnings).push_back(finding.text);
     }
     conclude(setup_, *estimator_, result_);
     return std::move(result_);

@@ -25,8 +25,8 @@ class ImuWatch {
   /// How often the newest reading has repeated the one before without a break.
   int n_repeated() const { return n_repeated_; }
   /// Changes of white noise turn back two times of three, those of a motion that is sampled often
-  /// enough hardly ever. What has no noise may well repeat itself.
-  bool is_noise() const { return n_changes_ >= kFewest && 3 * n_turns_back_ > n_changes_; }
+  /// enough hardly ever; those of any axis tell. What has no noise may well repeat itself.
+  bool is_noise() const;
 
   /// The newest reading is far from the one before, after calm: a spike, unless the next one
   /// confirms it.
@@ -54,9 +54,11 @@ class ImuWatch {
   bool departs_ = false;  ///< the newest, from before_
   int n_calm_ = 0;        ///< readings up to before_ that were near the one before, as usual
   int n_repeated_ = 0;
-  // Of the gyro's z.
-  double change_ = 0.;  ///< the last one
-  std::int64_t n_changes_ = 0, n_turns_back_ = 0;
+  struct Changes {
+    double last = 0.;
+    std::int64_t n = 0, n_turns_back = 0;
+  };
+  std::array<Changes, kAxes> changes_;
 };
 
 }  // namespace viwo

@@ -17,6 +17,7 @@ struct Finding {
   std::string text;                   ///< sensor, figure, most likely cause
   bool is_over = false;               ///< it was so for a while
   std::vector<Remedy> remedies = {};  ///< of a cause that a configuration can undo
+  bool is_doubt = false;              ///< no filter makes up for it
 };
 using Findings = std::vector<Finding>;
 
