@@ -55,19 +55,37 @@ std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& update
   return found;
 }
 
+namespace {
+
+constexpr std::int64_t kFewestRejections = 20;
+
+std::string text_of(const RejectionCount& r, std::int64_t begin_ns) {
+  return r.reason + " - " + std::to_string(r.count) + " of " + std::to_string(r.of) + ", " +
+         since(begin_ns, r.first);
+}
+
+}  // namespace
+
+std::vector<std::string> refused_altogether(std::span<const RejectionCount> rejections,
+                                            std::int64_t begin_ns) {
+  std::vector<std::string> lines;
+  for (const RejectionCount& r : rejections) {
+    if (r.count >= kFewestRejections && r.count == r.of) lines.push_back(text_of(r, begin_ns));
+  }
+  return lines;
+}
+
 std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
                                     std::span<const NoiseFound> noises, std::int64_t begin_ns) {
-  constexpr std::int64_t kFewest = 20;
   constexpr double kMostFactor = 3.;  // between a guess and what is found
   std::vector<std::string> lines;
   for (const RejectionCount& r : rejections) {
-    if (r.of == 0 || r.count < kFewest || 5 * r.count < r.of) continue;
-    lines.push_back(r.reason + " - " + std::to_string(r.count) + " of " + std::to_string(r.of) +
-                    ", " + since(begin_ns, r.first));
+    if (r.count < kFewestRejections || 5 * r.count < r.of || r.count >= r.of) continue;
+    lines.push_back(text_of(r, begin_ns));
   }
   for (const NoiseFound& noise : noises) {
     const double factor = noise.found / noise.configured;
-    if (noise.count < kFewest || factor < kMostFactor) continue;
+    if (noise.count < kFewestRejections || factor < kMostFactor) continue;
     lines.push_back(noise.name + ": " + significant(noise.found, 2) +
                     (noise.unit.empty() ? "" : " ") + noise.unit + " was found, " +
                     significant(noise.configured, 2) +
@@ -143,16 +161,23 @@ void doubt(RunResult& result) {
                             std::to_string(wheels.samples) +
                             " encoder samples are refused by the kinematic model");
   }
+  if (parts.shortest == nullptr) return;
+  const double ate_m = result.accuracy->ate_m, extent = extent_m(result.reference);
+  std::string text;
   // A body that is turned on the other, or has no orientation, goes where it goes all the same.
-  if (parts.shortest == nullptr || parts.least < kContradicts ||
-      result.accuracy->ate_m < kPartOfExtent * extent_m(result.reference)) {
+  if (parts.least >= kContradicts && ate_m >= kPartOfExtent * extent) {
+    text = "after " + eval::length_text(parts.shortest->length_m) + " m it is off by " +
+           significant(parts.shortest->mean_m, 3) + " m, mean of " +
+           std::to_string(parts.shortest->count) + " segments";
+  } else if (ate_m > extent && ate_m > kAgrees * result.accuracy->path_length_m) {
+    text = "it is off by " + significant(ate_m, 3) +
+           " m, root mean square, and who had stayed in the middle by " + significant(extent, 3) +
+           " m";
+  } else {
     return;
   }
-  result.doubts.push_back("the reference contradicts the estimate: after " +
-                          eval::length_text(parts.shortest->length_m) + " m it is off by " +
-                          significant(parts.shortest->mean_m, 3) + " m, mean of " +
-                          std::to_string(parts.shortest->count) +
-                          " segments - units, signs, order or mount of a sensor are wrong, or of "
+  result.doubts.push_back("the reference contradicts the estimate: " + text +
+                          " - units, signs, order or mount of a sensor are wrong, or of "
                           "the reference: viwo inspect tells which");
 }
 

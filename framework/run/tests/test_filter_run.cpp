@@ -8,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "held_gauge.hpp"
@@ -21,6 +22,8 @@
 namespace viwo {
 namespace {
 
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using testing::InMemory;
 using testing::registry;
 using testing::set_sensors;
@@ -193,7 +196,31 @@ TEST(SimulateResult, IsDescribedByWhatThereIs) {
             "1 IMU sample; not written, as there is no table for them: 15 gnss fixes");
 }
 
-TEST(Suspicions, HaveTimesSinceTheStartOfTheRun) {
+TEST(Doubts, AreOfAnEstimateThatIsWorseThanNone) {
+  RunResult result;
+  result.status = RunStatus::kOk;
+  for (int i = 0; i < 100; ++i) {
+    const double angle = 0.1 * i;
+    result.reference.push_back({i, {std::cos(angle), std::sin(angle), 0.}});
+  }
+  // Good on short segments, of the time before it was lost.
+  result.accuracy.emplace();
+  result.accuracy->rpe = {{.length_m = 0.5, .count = 100, .mean_m = 0.01}};
+  result.accuracy->path_length_m = 10.;
+  const auto doubts = [&result](double ate_m) {
+    result.doubts.clear();
+    result.accuracy->ate_m = ate_m;
+    doubt(result);
+    return result.doubts;
+  };
+  EXPECT_THAT(doubts(1.2), ElementsAre(HasSubstr("off by 1.2 m, root mean square")));
+  EXPECT_THAT(doubts(0.9), ElementsAre());
+  // A tenth of a long way in a small room is no contradiction.
+  result.accuracy->path_length_m = 100.;
+  EXPECT_THAT(doubts(1.2), ElementsAre());
+}
+
+TEST(Suspicions, AreOfAPartAndHaveTimesSinceTheStartOfTheRun) {
   const auto place = [](const std::string& first) {
     const RejectionCount count{"what", 30, first, 100};
     const std::string line = suspicions({&count, 1}, {}, 1'400'000'000'500'000'000).at(0);
@@ -204,6 +231,10 @@ TEST(Suspicions, HaveTimesSinceTheStartOfTheRun) {
             "what - 30 of 100, t = 2.500 s .. t = 9.625 s");
   EXPECT_EQ(place("t = 0.25"), "what - 30 of 100, t = -1400000000.250 s");
   EXPECT_EQ(place("data.csv:17"), "what - 30 of 100, data.csv:17");
+  const std::vector<RejectionCount> counts = {
+      {"some", 30, "", 31}, {"all", 30, "t = 1", 30}, {"few", 19, "", 19}, {"unsaid", 30, "", 0}};
+  EXPECT_THAT(refused_altogether(counts, 0), ElementsAre(HasSubstr("all - 30 of 30, t = 1")));
+  EXPECT_THAT(suspicions(counts, {}, 0), ElementsAre(HasSubstr("some - 30 of 31")));
 }
 
 }  // namespace

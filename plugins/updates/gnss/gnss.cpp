@@ -106,6 +106,7 @@ class Gnss final : public Update {
       const auto place = is_sound(fix) ? place_of(filter, fix) : std::nullopt;
       if (!place) continue;
       if (!is_aligned_) {
+        if (n_tried_++ == 0) first_tried_ns_ = fix.t_ns;
         const auto found = align(filter, *place, fix, sink);
         if (!found) continue;
         at = *found;
@@ -131,6 +132,12 @@ class Gnss final : public Update {
     for (const Tally* tally : {&too_late_, &too_far_, &too_many_, &faulty_, &bad_covariance_,
                                &far_away_, &waiting_, &contradicting_}) {
       tally->append_to(out);
+    }
+    if (n_tried_ > 0 && !is_aligned_) {
+      out.push_back(
+          {"fix without use, as no alignment was found in which the motion of the "
+           "estimate is that of the fixes",
+           n_tried_, stamp_text(first_tried_ns_), n_tried_});
     }
   }
 
@@ -341,6 +348,7 @@ class Gnss final : public Update {
   std::optional<LocalFrame> frame_;
   std::optional<Start> start_;  // while the yaw is sought
   bool is_aligned_ = false;
+  std::int64_t n_tried_ = 0, first_tried_ns_ = 0;  ///< fixes by which an alignment was sought
   StreamId fixes_;
   BlockId lever_, alignment_, drift_;
   RoomId room_;

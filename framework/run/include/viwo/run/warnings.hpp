@@ -25,8 +25,12 @@ std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& update
 /// most of whose samples cannot be used.
 void doubt(RunResult& result);
 
-/// Warnings of what a fifth of the samples was left out for, and of noises far above what is
-/// configured. Stamps become times since `begin_ns`.
+/// Doubts of what all samples were left out for. Stamps become times since `begin_ns`.
+std::vector<std::string> refused_altogether(std::span<const RejectionCount> rejections,
+                                            std::int64_t begin_ns);
+
+/// Warnings of what a fifth of the samples, but not all, was left out for, and of noises far above
+/// what is configured. Stamps become times since `begin_ns`.
 std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
                                     std::span<const NoiseFound> noises, std::int64_t begin_ns);
 
