@@ -56,7 +56,9 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
   TwistSolver solver(wheels.model, {});
   solver.set_intrinsics(wheels.prior.wheels.x_WI);
   TwistSolution solution;
-  constexpr double kWindow_s = 1., kLeast_m = 0.03;
+  // As long as it takes to get somewhere, by either of them: choosing by one alone, errors of its
+  // own would be taken for way.
+  constexpr double kWindow_s = 1., kLongest_s = 30., kLeast_m = 0.03;
   const auto clock_ns = static_cast<std::int64_t>(std::llround(1e9 * wheels.prior.wheels.t_OtoI_s));
   const double gap_s = std::max(0.5, 2.5 * period_of(turns_of(poses)));
   double path = 0., time_s = 0.;
@@ -69,19 +71,22 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
     path += solution.xi.head<2>().norm() * dt_s;
     along += solution.xi.head<2>() * dt_s;
     time_s += dt_s;
-    if (seconds_between(begin_ns, sample.end_ns) < kWindow_s) continue;
+    const double window_s = seconds_between(begin_ns, sample.end_ns);
+    if (window_s < kWindow_s) continue;
     const auto from = interpolate(poses, begin_ns + clock_ns, gap_s);
     const auto to = interpolate(poses, sample.end_ns + clock_ns, gap_s);
-    const bool is_whole = time_s > 0.9 * seconds_between(begin_ns, sample.end_ns);
-    if (from && to && is_whole) {
-      const Vector3d moved = to->p_BinW - from->p_BinW;
+    const Vector3d moved = from && to ? Vector3d(to->p_BinW - from->p_BinW) : Vector3d::Zero();
+    const bool goes = path > kLeast_m || moved.norm() > kLeast_m;
+    if (from && to && !goes && window_s < kLongest_s) continue;
+    const bool is_whole = time_s > 0.9 * window_s;
+    if (goes && is_whole && moved.norm() > 0.) {
       const double angle = from->q_BtoW.angularDistance(to->q_BtoW);
       // Nearly straight: the chord is the path, wherever the body is on the base.
       constexpr double kStraight = 0.1;
-      if (moved.norm() > kLeast_m && angle < kStraight) {
+      if (angle < kStraight) {
         const Vector3d in_B = from->q_BtoW.conjugate() * moved;
         speeds.ratio.push_back(path / moved.norm());
-        if (along.norm() > 0. && in_B.head<2>().norm() > 0.) {
+        if (moved.norm() > kLeast_m && along.norm() > 0. && in_B.head<2>().norm() > 0.) {
           speeds.cosine.push_back(
               along.normalized().dot(Eigen::Vector2d(in_B.head<2>().normalized())));
         }

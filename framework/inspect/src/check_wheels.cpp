@@ -92,7 +92,8 @@ double distance_of(const Trajectory& poses) {
 }
 
 /// What stands still, while the poses go somewhere if there are any.
-Finding standstill(const Recording& recording, const std::string& label, double fastest) {
+Finding standstill(const Recording& recording, const Wheels& wheels, const std::string& label,
+                   double fastest) {
   constexpr double kGoes_m = 0.3;
   Finding finding{label,
                   Severity::kNote,
@@ -100,7 +101,14 @@ Finding standstill(const Recording& recording, const std::string& label, double 
                   "the wheels do not turn in this recording",
                   {{"fastest drive", fastest, "rad/s"}}};
   for (const Poses& poses : recording.poses) {
-    const double distance_m = distance_of(poses.poses);
+    Trajectory meanwhile;
+    for (const StampedPose& pose : poses.poses) {
+      const bool is_meanwhile = !wheels.samples.empty() &&
+                                pose.t_ns >= wheels.samples.front().begin_ns &&
+                                pose.t_ns <= wheels.samples.back().end_ns;
+      if (is_meanwhile) meanwhile.push_back(pose);
+    }
+    const double distance_m = distance_of(meanwhile);
     if (distance_m < kGoes_m) continue;
     const std::string other = recording.label(poses);
     finding.severity = Severity::kFault;
@@ -120,7 +128,9 @@ void check_channels(const Recording& recording, const Wheels& wheels, const std:
   DriveRanges ranges(wheels.model->description().n_drive);
   for (const EncoderSample& sample : samples) ranges.add(sample);
   const double fastest = ranges.fastest();
-  if (fastest < kMoves_rad_per_s) return out.push_back(standstill(recording, label, fastest));
+  if (fastest < kMoves_rad_per_s) {
+    return out.push_back(standstill(recording, wheels, label, fastest));
+  }
   if (samples.size() < 100) return;
   for (const auto& [drive, value] : ranges.stuck()) {
     out.push_back({label, Severity::kFault, "channel",

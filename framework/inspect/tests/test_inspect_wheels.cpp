@@ -236,6 +236,28 @@ TEST(InspectWheels, FindsDrivesInOtherUnitsByTheGyroAndByPoses) {
   EXPECT_THAT(remedy_of(speed, "sensors.wheels0.drive_scale"), HasSubstr("[0.104719"));
 }
 
+TEST(InspectPoses, DoNotTellTheSpeedOfASlowRobotByTheirErrors) {
+  constexpr double kSlow = 0.01;
+  std::int64_t n = 0;
+  const Inspection slow =
+      inspected(setup_of(testing::configuration("runs/simulated_swerve.yaml"),
+                         {"sensors.simulator0.duration_s=600", "placeholders.motion=straight"}),
+                {.wheels =
+                     [](EncoderSample& s) {
+                       for (double& rate : s.drive_rad_per_s) rate *= kSlow;
+                       return true;
+                     },
+                 .poses =
+                     [&n](PoseSample& s) {
+                       for (double& at : s.p_BinW_m) at *= kSlow;
+                       if (++n % 600 == 0) s.p_BinW_m[0] += 0.04;
+                       return true;
+                     }});
+  EXPECT_EQ(finding_of(slow, "wheels0", "speed").severity, Severity::kFits)
+      << finding_of(slow, "wheels0", "speed").what;
+  EXPECT_NEAR(figure_of(finding_of(slow, "wheels0", "speed"), "wheels by poses"), 1., 0.1);
+}
+
 TEST(InspectWheels, FindsThatAllDrivesAreReversedByPoses) {
   const Inspection reversed = with_wheels(
       setup_of(testing::configuration("runs/simulated_swerve.yaml")), [](EncoderSample& s) {
