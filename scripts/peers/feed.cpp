@@ -3,8 +3,9 @@
 // Compiled against either of them by ../compare_peers.sh, with PEER_OPENVINS or PEER_SQRTVINS. It
 // only calls what they declare; the result is for measuring, not for passing on.
 // Writes OUT/trajectory.tum (at the stamp of the IMU: that of the image and the estimated clock),
-// OUT/timing.csv (CPU time of the thread, in ms, of an image and the inertial measurements before it)
-// and OUT/peer.json; allocations are those of an epoch, and null without libcount_allocations.so.
+// OUT/timing.csv (CPU time of the thread, in ms, of an image and the inertial measurements before
+// it) and OUT/peer.json; allocations are those of an epoch, and null without
+// libcount_allocations.so.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -297,6 +298,6 @@ int main(int argc, char** argv) {
   if (epochs == 0) fail("no image was used");
   std::ofstream(out + "/peer.json")
       << "{\"epochs\": " << epochs << ", \"nees_pose\": " << nees / static_cast<double>(epochs)
-      << ", \"allocations\": " << (viwo_allocations != nullptr ? std::to_string(allocations) : "null")
-      << "}\n";
+      << ", \"allocations\": "
+      << (viwo_allocations != nullptr ? std::to_string(allocations) : "null") << "}\n";
 }
