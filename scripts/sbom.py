@@ -123,6 +123,14 @@ def shared_libraries():
     return found
 
 
+def made_as(file):
+    """The file that is made from the same sources for any processor (viwo_faster_copy.cmake)."""
+    copy = re.fullmatch(r'lib/viwo/(plugins/\w+/)?x86-64-v3/(.*)', str(file))
+    if not copy:
+        return file
+    return f'lib/viwo/{copy[1]}{copy[2]}' if copy[1] else f'bin/{copy[2]}'
+
+
 def build_inputs(build, files):
     """What ninja made the files from: (headers and sources, static libraries, folders of npm)."""
     inputs = output('ninja', '-C', build, '-t', 'inputs', *files).splitlines() if files else []
@@ -173,7 +181,7 @@ def parts(root, build):
     linked = {program: sorted({owners.get(known[name], name) for name in names})
               for program, names in sonames.items()}
     sources, archives, folders = build_inputs(
-        build, [file.relative_to(root / 'usr') for file in programs])
+        build, [made_as(file.relative_to(root / 'usr')) for file in programs])
     sources_linked = {debian_package(name)[1] for names in linked.values() for name in names}
     compiled_in = set(packages_of(archives).values())
     for name in set(packages_of(sources).values()):

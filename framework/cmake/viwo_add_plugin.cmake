@@ -8,6 +8,11 @@
 # same place below the prefix; the target viwo_plugins builds all of them. One with an OUTPUT_DIR is
 # for tests: neither installed nor built by viwo_plugins.
 set(VIWO_PLUGIN_DIR lib/viwo/plugins/v${VIWO_API_VERSION})
+set(VIWO_PLUGIN_RPATH "$ORIGIN/../../..")
+if(VIWO_IS_FASTER_COPY)
+  string(APPEND VIWO_PLUGIN_DIR /${VIWO_ARCH})
+  string(APPEND VIWO_PLUGIN_RPATH /..)
+endif()
 set(VIWO_PLUGIN_OUTPUT_DIR ${PROJECT_BINARY_DIR}/${VIWO_PLUGIN_DIR})
 
 function(viwo_add_plugin kind name)
@@ -32,7 +37,7 @@ function(viwo_add_plugin kind name)
   endif()
   # The library is in lib, three folders up, wherever the prefix is moved; in the build folder, too.
   set_target_properties(${target} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${VIWO_PLUGIN_OUTPUT_DIR}
-    INSTALL_RPATH "$ORIGIN/../../.." BUILD_WITH_INSTALL_RPATH ON)
+    INSTALL_RPATH "${VIWO_PLUGIN_RPATH}" BUILD_WITH_INSTALL_RPATH ON)
   install(TARGETS ${target} LIBRARY DESTINATION ${VIWO_PLUGIN_DIR})
   if(NOT TARGET viwo_plugins)
     add_custom_target(viwo_plugins)

@@ -46,7 +46,7 @@ install(TARGETS viwo_seal EXPORT viwoTargets RUNTIME DESTINATION bin COMPONENT d
 # Programs
 foreach(program viwo viwo_conformance_program)
   if(TARGET ${program})
-    set_target_properties(${program} PROPERTIES INSTALL_RPATH "$ORIGIN/../lib"
+    set_target_properties(${program} PROPERTIES INSTALL_RPATH "${VIWO_PROGRAM_RPATH}"
       BUILD_WITH_INSTALL_RPATH ON)
     set(component viwo)
     if(NOT program STREQUAL "viwo")
@@ -65,4 +65,5 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/plugins
   DESTINATION ${viwo_doc_dir} FILES_MATCHING PATTERN "*.md"
   PATTERN "images" EXCLUDE PATTERN "tests" EXCLUDE PATTERN "shared" EXCLUDE)
 
+include(viwo_faster_copy)
 include(viwo_packages)

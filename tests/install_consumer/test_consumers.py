@@ -7,6 +7,7 @@ each compiles alone.
 """
 
 import json
+import pathlib
 import re
 import shutil
 import statistics
@@ -20,6 +21,28 @@ def expected_line(line):
     """A line of an output block as a pattern: runs of spaces are one, '...' is anything."""
     words = re.split(r'\s+', line.strip())
     return ' +'.join('.*' if word == '...' else re.escape(word) for word in words)
+
+
+class FasterCopy(ConsumerTest):
+    def test_the_program_goes_on_as_the_copy_for_this_processor(self):
+        (self.folder / 'bin').mkdir()
+        shutil.copy(Installation.prefix / 'bin/viwo', self.folder / 'bin')
+        (self.folder / 'lib').symlink_to(Installation.prefix / 'lib')
+        program = self.folder / 'bin/viwo'
+        itself = self.run_command(program, '--version')
+        self.assertRegex(itself, r'^viwo \d')
+        (self.folder / 'lib').unlink()
+        shutil.copytree(Installation.prefix / 'lib', self.folder / 'lib', symlinks=True)
+        copy = self.folder / 'lib/viwo/x86-64-v3/viwo'
+        copy.parent.mkdir()
+        copy.write_text('#!/bin/sh\necho "the copy of $0: $*"\n', encoding='utf-8')
+        # As long as it is not a program, the other one does it.
+        self.assertEqual(self.run_command(program, '--version'), itself)
+        copy.chmod(0o755)
+        processor = pathlib.Path('/proc/cpuinfo').read_text(encoding='utf-8')
+        if all(flag in processor.split() for flag in ('avx2', 'fma', 'bmi2')):
+            self.assertEqual(self.run_command(program, '--version'), f'the copy of {copy}: --version\n')
+        self.assertEqual(self.run_command('env', 'VIWO_NO_FASTER_COPY=1', program, '--version'), itself)
 
 
 class Tutorial(ConsumerTest):

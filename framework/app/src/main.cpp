@@ -13,6 +13,7 @@
 #include "viwo/api/status.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
+#include "viwo/plugin_host/installation.hpp"
 
 namespace viwo::app {
 namespace {
@@ -109,6 +110,7 @@ int dispatch(const std::vector<std::string>& words) {
 }  // namespace viwo::app
 
 int main(int argc, char** argv) {
+  viwo::become_faster_copy(argv);
   viwo::app::end_well_without_memory();
   try {
     if (!viwo::host_record_is_consistent()) {

@@ -12,6 +12,7 @@
 #include "viwo/api/build_record.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/plugin_host/installation.hpp"
 
 namespace viwo::app {
 namespace {
@@ -70,8 +71,7 @@ std::string class_name(const std::string& name) {
 
 fs::path template_folder() {
   std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  const fs::path folder = program.parent_path().parent_path() / "share/viwo/templates";
+  const fs::path folder = installation_prefix() / "share/viwo/templates";
   if (!fs::is_directory(folder, error)) {
     throw InputError("viwo plugins new: no templates in " + folder.string() +
                      " - they come with the Debian package viwo-dev");

@@ -10,6 +10,7 @@
 #include "library.hpp"
 #include "plugin_file.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/plugin_host/installation.hpp"
 
 namespace viwo {
 namespace {
@@ -74,11 +75,11 @@ std::vector<fs::path> PluginRegistry::default_search_path(const std::vector<fs::
       rest.remove_prefix(std::min(colon + 1, rest.size()));
     }
   }
-  std::error_code error;
-  const fs::path executable = fs::read_symlink("/proc/self/exe", error);
-  const fs::path installed =
-      fs::path("lib/viwo/plugins") / (std::string("v").append(std::to_string(kApiVersion)));
-  if (!error) folders.push_back(executable.parent_path().parent_path() / installed);
+  const fs::path prefix = installation_prefix();
+  if (!prefix.empty()) {
+    folders.push_back(prefix / "lib/viwo/plugins" /
+                      std::string("v").append(std::to_string(kApiVersion)));
+  }
   return folders;
 }
 
@@ -141,7 +142,7 @@ std::shared_ptr<const Library> PluginRegistry::load(std::string_view kind, std::
     }
     throw InputError("no " + what + config::did_you_mean(name, names(kind)) + searched_text());
   }
-  return load_file(found);
+  return load_file(fastest_copy(found));
 }
 
 PluginInfo PluginRegistry::find(std::string_view kind, std::string_view name) {
