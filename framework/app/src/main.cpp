@@ -110,9 +110,9 @@ int dispatch(const std::vector<std::string>& words) {
 }  // namespace viwo::app
 
 int main(int argc, char** argv) {
-  viwo::become_faster_copy(argv);
   viwo::app::end_well_without_memory();
   try {
+    viwo::become_faster_copy(argv);
     if (!viwo::host_record_is_consistent()) {
       std::cerr << "viwo was built differently from its libviwo_api.so: rebuild both\n";
       return 1;

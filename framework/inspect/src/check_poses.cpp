@@ -56,8 +56,8 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
   TwistSolver solver(wheels.model, {});
   solver.set_intrinsics(wheels.prior.wheels.x_WI);
   TwistSolution solution;
-  // As long as it takes to get somewhere, by either of them: choosing by one alone, errors of its
-  // own would be taken for way.
+  // As long as it takes to get somewhere: where few windows of a slow robot were long enough,
+  // errors of its poses would be taken for way.
   constexpr double kWindow_s = 1., kLongest_s = 30., kLeast_m = 0.03;
   const auto clock_ns = static_cast<std::int64_t>(std::llround(1e9 * wheels.prior.wheels.t_OtoI_s));
   const double gap_s = std::max(0.5, 2.5 * period_of(turns_of(poses)));
@@ -76,17 +76,17 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
     const auto from = interpolate(poses, begin_ns + clock_ns, gap_s);
     const auto to = interpolate(poses, sample.end_ns + clock_ns, gap_s);
     const Vector3d moved = from && to ? Vector3d(to->p_BinW - from->p_BinW) : Vector3d::Zero();
-    const bool goes = path > kLeast_m || moved.norm() > kLeast_m;
+    const bool goes = moved.norm() > kLeast_m;
     if (from && to && !goes && window_s < kLongest_s) continue;
     const bool is_whole = time_s > 0.9 * window_s;
-    if (goes && is_whole && moved.norm() > 0.) {
+    if (goes && is_whole) {
       const double angle = from->q_BtoW.angularDistance(to->q_BtoW);
       // Nearly straight: the chord is the path, wherever the body is on the base.
       constexpr double kStraight = 0.1;
       if (angle < kStraight) {
         const Vector3d in_B = from->q_BtoW.conjugate() * moved;
         speeds.ratio.push_back(path / moved.norm());
-        if (moved.norm() > kLeast_m && along.norm() > 0. && in_B.head<2>().norm() > 0.) {
+        if (along.norm() > 0. && in_B.head<2>().norm() > 0.) {
           speeds.cosine.push_back(
               along.normalized().dot(Eigen::Vector2d(in_B.head<2>().normalized())));
         }

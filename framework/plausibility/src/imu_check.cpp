@@ -97,8 +97,9 @@ void ImuCheck::watch_stuck(const ImuSample& sample, bool moves) {
   const bool rests = to_vector(sample.gyro_rad_per_s).norm() < 0.05 && !moves_;
   // Noise that is filtered hardly turns back, but no reading is the one before.
   const double equal_s = seconds_between(equal_from_ns_, sample.t_ns);
-  const bool never_repeats =
-      equal > kManyEqual && equal_s > 1. && 10 * (n_equal_ - kManyEqual) < count_ - equal;
+  const bool never_repeats = equal > kManyEqual && equal_s > 1. &&
+                             count_ - equal > 10 * kManyEqual &&
+                             10 * (n_equal_ - kManyEqual) < count_ - equal;
   if (rests || !(watch_.is_stuck() || never_repeats) || equal <= std::max(stuck_, 20)) return;
   if (equal_s <= 0.1) return;
   stuck_ = equal;
