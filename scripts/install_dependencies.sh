@@ -1,9 +1,10 @@
 #!/bin/bash
-# install_dependencies.sh [--tests | --engines | --fuzz | --packages | --peers]
+# install_dependencies.sh [--tests | --engines | --fuzz | --packages | --peers | --arm64 | --libraries]
 # Installs with apt what building viwo needs and this machine lacks; nothing when all is there.
 # --tests adds what only the tests use, --engines also Slurm and Open MPI for the nightly tests of
 # campaigns, --fuzz clang and its tools for scripts/fuzz.sh, --packages what cpack needs, --peers what
-# the peers of scripts/compare_peers.sh need. Never asks a question.
+# the peers of scripts/compare_peers.sh need, --arm64 what scripts/arm64.sh needs. --libraries: only what
+# viwo links, for a system that another one builds for. Never asks a question.
 set -euo pipefail
 
 missing=()
@@ -36,6 +37,10 @@ if ! command -v apt-get > /dev/null || ! command -v dpkg-query > /dev/null; then
   exit 0
 fi
 
+if [ "${1:-}" = --libraries ]; then
+  need_command() { :; }
+  for package in libc6-dev libstdc++-12-dev; do need_package "$package"; done
+fi
 need_command g++ c++
 need_command cmake cmake
 need_command git git
@@ -49,6 +54,11 @@ fi
 if [ "${1:-}" = --peers ]; then
   need_command python3 python3
   for package in libboost-{date-time,filesystem,system,thread}-dev; do need_package "$package"; done
+fi
+if [ "${1:-}" = --arm64 ]; then
+  for package in g++-aarch64-linux-gnu qemu-user-static binfmt-support debootstrap; do
+    need_package "$package"
+  done
 fi
 need_command ninja-build ninja
 need_command ccache ccache
