@@ -49,10 +49,6 @@ struct Speeds {
   std::vector<double> ratio;   ///< of the wheels to the poses
   std::vector<double> cosine;  ///< of the direction in the plane, body frames as they are
   double path_m = 0.;
-  std::size_t n_windows = 0;  ///< those in which nothing goes straight, too
-
-  /// What is seen on the few windows of a robot that stands or turns may be errors of the poses.
-  bool are_told() const { return ratio.size() >= kFewestWindows && 5 * ratio.size() >= n_windows; }
 };
 
 Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
@@ -83,7 +79,6 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
     const bool goes = moved.norm() > kLeast_m;
     if (from && to && !goes && window_s < kLongest_s) continue;
     const bool is_whole = time_s > 0.9 * window_s;
-    ++speeds.n_windows;
     if (goes && is_whole) {
       const double angle = from->q_BtoW.angularDistance(to->q_BtoW);
       // Nearly straight: the chord is the path, wherever the body is on the base.
@@ -139,7 +134,7 @@ bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& la
     Wheels changed = wheels;
     for (EncoderSample& sample : changed.samples) change.undo(sample);
     const Speeds speeds = speeds_of(changed, poses.poses);
-    if (!speeds.are_told() || speeds.cosine.empty()) continue;
+    if (speeds.ratio.size() < kFewestWindows || speeds.cosine.empty()) continue;
     const double ratio = eval::median(speeds.ratio);
     if (std::abs(ratio - 1.) > kMostFactor || eval::median(speeds.cosine) < 0.) continue;
     const bool is_known = std::any_of(out.begin(), out.end(), [&](const Finding& f) {
@@ -191,7 +186,7 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
                  const std::string& other, Findings& out) {
   const std::string label = recording.label<EncoderSample>(wheels.sensor);
   const Speeds speeds = speeds_of(wheels, poses.poses);
-  if (!speeds.are_told()) return;
+  if (speeds.ratio.size() < kFewestWindows) return;
   const double ratio = eval::median(speeds.ratio);
   Finding finding{label,
                   Severity::kFits,
