@@ -2,13 +2,12 @@
 # arm64.sh [CTEST ARGUMENT...]   builds for arm64 on another machine, and runs unit tests under qemu
 # arm64.sh --packages            builds and makes the Debian packages for arm64, in build-arm64
 # With Debian's cross compiler and the libraries of a minimal Debian of this machine's release, which
-# debootstrap puts into /var/tmp/viwo_arm64_RELEASE the first time (4 GB; VIWO_ARM64_SYSTEM names another
-# folder). As root. Without arguments: the tests labelled unit, but those that are too slow for an emulator
-# (docs/arm64.md).
+# debootstrap puts into /var/tmp/viwo_arm64_RELEASE the first time (2 GB; VIWO_ARM64_SYSTEM names another
+# folder). As root. Tests are those labelled unit; under emulation some take longer than they are given.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 if [[ ${1:-} = -h || ${1:-} = --help ]]; then
-  sed -n '2,7s/^# //p' "$0"
+  sed -n '2,6s/^# //p' "$0"
   exit
 fi
 if [ "$(id -u)" -ne 0 ]; then echo "arm64.sh: a system in a folder is made as root" >&2 && exit 2; fi
@@ -60,7 +59,7 @@ cmake --build --preset arm64 --parallel "$(nproc)"
 
 if [ "${1:-}" = --packages ]; then
   echo "== Packages"
-  inside 'scripts/install_dependencies.sh --pack && cd build-arm64 && cpack'
+  inside 'scripts/install_dependencies.sh --packages && cd build-arm64 && cpack'
   exit
 fi
 echo "== Testing under qemu"

@@ -27,12 +27,10 @@ class FasterCopy(ConsumerTest):
     def test_the_program_goes_on_as_the_copy_for_this_processor(self):
         (self.folder / 'bin').mkdir()
         shutil.copy(Installation.prefix / 'bin/viwo', self.folder / 'bin')
-        (self.folder / 'lib').symlink_to(Installation.prefix / 'lib')
+        shutil.copytree(Installation.prefix / 'lib', self.folder / 'lib', symlinks=True)
         program = self.folder / 'bin/viwo'
         itself = self.run_command(program, '--version')
         self.assertRegex(itself, r'^viwo \d')
-        (self.folder / 'lib').unlink()
-        shutil.copytree(Installation.prefix / 'lib', self.folder / 'lib', symlinks=True)
         copy = self.folder / 'lib/viwo/x86-64-v3/viwo'
         copy.parent.mkdir()
         copy.write_text('#!/bin/sh\necho "the copy of $0: $*"\n', encoding='utf-8')

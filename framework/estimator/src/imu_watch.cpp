@@ -80,19 +80,17 @@ void ImuWatch::watch_spike(const Values& now) {
 
 void ImuWatch::watch_usual(const Values& now) {
   for (std::size_t i = 0; i < kAxes; ++i) {
-    const double change = std::abs(now[i] - newest_[i]);
+    const double signed_change = now[i] - newest_[i];
+    const double change = std::abs(signed_change);
     // Bounded once there is something to go by, so that spikes do not become usual.
     const bool is_known = count_ >= kFewest;
     const double bound = std::max(3. * usual_[i], 0.01 * least_of(i));
     const double weight = is_known ? 0.01 : 1. / static_cast<double>(count_);
     usual_[i] += weight * ((is_known ? std::min(change, bound) : change) - usual_[i]);
-  }
-  for (std::size_t i = 0; i < kAxes; ++i) {
-    const double change = now[i] - newest_[i];
     if (change == 0.) continue;
     ++changes_[i].n;
-    if (change * changes_[i].last < 0.) ++changes_[i].n_turns_back;
-    changes_[i].last = change;
+    if (signed_change * changes_[i].last < 0.) ++changes_[i].n_turns_back;
+    changes_[i].last = signed_change;
   }
 }
 

@@ -10,7 +10,6 @@
 #include "support.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
-#include "viwo/plugin_host/installation.hpp"
 #include "viwo/plugin_host/registry.hpp"
 
 #if defined(__SSE__)
@@ -61,20 +60,6 @@ TEST_F(Registry, LoadsAPluginAndKnowsAboutIt) {
   EXPECT_EQ(info.file, bad("moody"));
   ASSERT_EQ(info.params.size(), 2u);
   EXPECT_EQ(info.params[0].name, "radius_m");
-}
-
-TEST_F(Registry, LoadsTheCopyForThisProcessorUnlessToldNotTo) {
-  const std::string name = bad("moody").filename();
-  const std::string_view set = faster_instruction_set();
-  if (set.empty()) GTEST_SKIP() << "this processor takes no faster copies";
-  fs::copy_file(bad("moody"), folder_ / name);
-  EXPECT_EQ(PluginRegistry({folder_}).find("kinematics", "moody").file, folder_ / name);
-  fs::create_directory(folder_ / set);
-  fs::copy_file(bad("moody"), folder_ / set / name);
-  EXPECT_EQ(PluginRegistry({folder_}).find("kinematics", "moody").file, folder_ / set / name);
-  ::setenv("VIWO_NO_FASTER_COPY", "1", 1);
-  EXPECT_EQ(PluginRegistry({folder_}).find("kinematics", "moody").file, folder_ / name);
-  ::unsetenv("VIWO_NO_FASTER_COPY");
 }
 
 TEST_F(Registry, KeepsTextsOfAPluginValidAfterItIsGone) {
