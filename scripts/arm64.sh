@@ -35,10 +35,16 @@ outside() {
 
 echo "== Dependencies"
 scripts/install_dependencies.sh --arm64
+programs=/proc/sys/fs/binfmt_misc
+if [ ! -e $programs/qemu-aarch64 ]; then  # no system that does it at boot, such as a container
+  mountpoint -q $programs || mount -t binfmt_misc binfmt_misc $programs
+  update-binfmts --enable qemu-aarch64
+fi
 if [ ! -e "$system/complete" ]; then
   echo "== Debian $release for arm64 in $system (a quarter of an hour, once)"
   mirror=$(grep -hoE 'https?://[^ ]+/debian/?( |$)' /etc/apt/sources.list /etc/apt/sources.list.d/* 2> /dev/null |
     head -n 1 || true)
+  if [ -d "$system/debootstrap" ]; then rm -rf --one-file-system "$system"; fi  # it broke off
   mkdir -p "$system"
   debootstrap --arch=arm64 --variant=minbase "$release" "$system" ${mirror:+"$mirror"}
   cp -a /etc/apt/apt.conf.d/*proxy* "$system/etc/apt/apt.conf.d/" 2> /dev/null || true
