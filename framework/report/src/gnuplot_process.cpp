@@ -83,6 +83,12 @@ std::string last_part(std::string text) {
   return text;
 }
 
+[[noreturn]] void throw_missing() {
+  throw InputError(
+      "--figures needs gnuplot, which is not in PATH: install it (apt-get install gnuplot-nox) "
+      "or leave --figures out");
+}
+
 /// Standard error goes to `pipe_write`; the others to nowhere.
 int spawn(const std::filesystem::path& folder, const std::string& argument, int pipe_write,
           pid_t& child) {
@@ -110,11 +116,7 @@ void run_gnuplot(const std::filesystem::path& folder, const std::string& script,
   close(ends[1]);
   if (error != 0) {
     close(ends[0]);
-    if (error == ENOENT) {
-      throw InputError(
-          "--figures needs gnuplot, which is not in PATH: install it (apt-get install gnuplot-nox) "
-          "or leave --figures out");
-    }
+    if (error == ENOENT) throw_missing();
     throw std::runtime_error(std::string("cannot run gnuplot: ") + std::strerror(error));
   }
   const auto deadline = Clock::now() + limit;
@@ -122,6 +124,9 @@ void run_gnuplot(const std::filesystem::path& folder, const std::string& script,
   if (!message.empty()) message.insert(0, ":\n");
   const std::optional<int> status = end_until(child, deadline);
   if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0) return;
+  // What a child says that was made, but found no program (under qemu).
+  constexpr int kNotFound = 127;
+  if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == kNotFound) throw_missing();
   const std::string what = (folder / script).string();
   if (!status) {
     throw std::runtime_error("gnuplot was stopped: it had not finished " + what + " after " +
