@@ -79,6 +79,9 @@ void add_option(const std::string& name, po::options_description& options) {
   } else if (name == "align") {
     add("align", po::value<std::string>()->value_name("MODE")->default_value("yaw_position"),
         "alignment for the ATE: none, start, yaw_position or se3");
+  } else if (name == "max-gap") {
+    add("max-gap", po::value<double>()->value_name("SECONDS")->default_value(0.5, "0.5"),
+        "between poses of the reference that are further apart nothing is compared");
   }
 }
 
@@ -198,6 +201,7 @@ Arguments arguments_of(const po::variables_map& values) {
   arguments.reference = text("reference");
   arguments.estimate = text("estimate");
   arguments.align = text("align");
+  if (values.contains("max-gap")) arguments.max_gap_s = values["max-gap"].as<double>();
   arguments.to = text("to");
   return arguments;
 }

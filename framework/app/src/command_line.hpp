@@ -32,6 +32,7 @@ struct Arguments {
   std::string figures;          ///< "svg", "pdf" or none
   std::filesystem::path fix;    ///< none if empty
   std::string reference, estimate, align;
+  double max_gap_s = 0.;
   std::string to;              ///< a format of export
   std::filesystem::path plan;  ///< of which pieces a run says what is missing; none if empty
 };

@@ -58,8 +58,9 @@ constexpr Command kCommands[] = {
      "Writes what the sensors of a configuration yield (IMU, images' tracks, encoders, truth) as a "
      "log folder.",
      "out! seed set", 1, simulate_command},
-    {"evaluate", "evaluate --reference A.tum --estimate B.tum [--align MODE] [--out DIR]",
-     "Compares two trajectories (ATE, RPE, end error).", "reference estimate align out", 0,
+    {"evaluate",
+     "evaluate --reference A.tum --estimate B.tum [--align MODE] [--max-gap S] [--out DIR]",
+     "Compares two trajectories (ATE, RPE, end error).", "reference estimate align max-gap out", 0,
      evaluate_command},
     {"plugins", "plugins list | describe NAME | schema | check FILE | new KIND NAME [--out DIR]",
      "Lists the plugins that are found (kinematics, sensors, updates), the parameters of one or of "

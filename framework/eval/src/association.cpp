@@ -6,6 +6,7 @@
 #include <string>
 
 #include "viwo/api/status.hpp"
+#include "viwo/math/significant.hpp"
 
 namespace viwo::eval {
 
@@ -75,8 +76,9 @@ Association associate(const Trajectory& reference, const Trajectory& estimate, d
     throw InputError("no pose of the estimate lies in the time of the reference: " + ranges);
   }
   throw InputError(
-      "the reference has no pose near any pose of the estimate: its gaps are too long (" + ranges +
-      ")");
+      "the reference has no pose near any pose of the estimate: its gaps are longer than " +
+      significant(max_gap_s, 3) + " s (" + ranges +
+      ") - viwo evaluate --max-gap SECONDS, evaluation.reference_max_gap_s of a run");
 }
 
 }  // namespace viwo::eval

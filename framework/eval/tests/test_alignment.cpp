@@ -66,8 +66,9 @@ TEST(Association, WithNothingButGapsSaysSo) {
   const Trajectory estimate{{-500'000'000, {0., 0., 0.}, Eigen::Quaterniond::Identity()},
                             {5'000'000'000, {0., 0., 0.}, Eigen::Quaterniond::Identity()}};
   EXPECT_EQ(message_of([&] { associate(reference, estimate, kGap_s); }),
-            "the reference has no pose near any pose of the estimate: its gaps are too long "
-            "(reference from 0.000 s to 10.000 s, estimate from -0.500 s to 5.000 s)");
+            "the reference has no pose near any pose of the estimate: its gaps are longer "
+            "than 1.5 s (reference from 0.000 s to 10.000 s, estimate from -0.500 s to 5.000 s) - "
+            "viwo evaluate --max-gap SECONDS, evaluation.reference_max_gap_s of a run");
 }
 
 TEST(Association, RefusesTrajectoriesThatAreNotOnes) {
