@@ -201,6 +201,17 @@ TEST_F(ConfigurationTest, RefusesPlaceholdersThatAreUsedNowhere) {
   expect_done({"run", "run.yaml", "--set", "sensors.sim.motion=straight", "--out", "out"});
 }
 
+TEST_F(ConfigurationTest, RefusesPlaceholdersThatEachRecordingOverrules) {
+  write("run.yaml", replaced(kRun, "motion: circle\n",
+                             "motion: \"{motion}\"\nplaceholders: {motion: circle}\n"));
+  write("e.yaml", kExperiment);
+  expect_refused({"experiment", "e.yaml", "--set", "placeholders.motion=spin"},
+                 "--set placeholders.motion  each recording of e.yaml has its own 'motion': change "
+                 "the list there");
+  write("e.yaml", replaced(kExperiment, "motions: [circle, straight]\n", ""));
+  expect_done({"experiment", "e.yaml", "--set", "placeholders.motion=spin", "--out", "out"});
+}
+
 TEST_F(ConfigurationTest, RefusesPlaceholdersThatNoVariantUses) {
   const auto refuse = [&](const std::string& from, const std::string& to, const char* mark) {
     refuse_experiment(

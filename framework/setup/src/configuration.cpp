@@ -1,5 +1,6 @@
 #include "viwo/setup/configuration.hpp"
 
+#include <algorithm>
 #include <set>
 
 #include "viwo/config/file_kind.hpp"
@@ -201,12 +202,33 @@ void require_file_name(const std::string& name, const config::Mark& mark) {
                          "and '.'");
 }
 
+namespace {
+
+/// InputError for a placeholder on the command line of which each recording has a value of its own.
+void refuse_overruled(const std::vector<std::string>& assignments, const Node& configuration) {
+  const std::vector<Recording> recordings = read_recordings(configuration);
+  for (const std::string& text : assignments) {
+    const config::Assignment assignment = config::parse_assignment(text);
+    constexpr std::string_view kSection = "placeholders.";
+    if (!assignment.path.starts_with(kSection)) continue;
+    const std::string name = assignment.path.substr(kSection.size());
+    const bool is_overruled = std::all_of(recordings.begin(), recordings.end(),
+                                          [&](const auto& r) { return r.labels.contains(name); });
+    if (!is_overruled) continue;
+    config::fail(assignment.value.mark(), "each recording of " + configuration.mark().file +
+                                              " has its own '" + name + "': change the list there");
+  }
+}
+
+}  // namespace
+
 Node load_base(const Node& configuration, const std::vector<std::string>& assignments) {
   const Node* base = configuration.find("base");
   if (base == nullptr) config::fail(configuration.mark(), "required key 'base' is missing");
   const std::filesystem::path file =
       std::filesystem::path(base->mark().file).parent_path() / scalar(*base, "'base'");
   Node run = load_run(file.lexically_normal());
+  refuse_overruled(assignments, configuration);
   std::set<std::string> used;
   config::find_placeholders(run, used);
   if (const Node* overrides = configuration.find("set")) config::merge(run, *overrides);
