@@ -172,7 +172,7 @@ void check_imu(const Recording& recording, Findings& out) {
   const std::vector<Rest> rests = rests_of(recording);
   if (!rests.empty()) return check_rest(recording, rests.front(), label, out);
   const Means means = means_of(recording.imu, 0, recording.imu.size());
-  const Vector3d up = up_of(recording);
+  const Vector3d up = up_of(recording.imu);
   Finding gravity{
       label,
       Severity::kFits,

@@ -299,7 +299,7 @@ void check_poses(const Recording& recording, Findings& out) {
       check_clock(recording, turns_of(poses.poses), label, turns_of(recording.imu),
                   recording.label<ImuSample>(recording.imu_sensor), 0., out);
     } else if (!recording.imu.empty()) {
-      Vector3d up = up_of(recording);
+      Vector3d up = up_of(recording.imu);
       if (up.norm() == 0. && !recording.wheels.empty()) {
         up = recording.wheels.front().prior.wheels.R_ItoO.row(2);
       }

@@ -23,9 +23,8 @@ using Checks = std::span<const std::string_view>;
 /// Of a text "wheels0: turn 57.3 ..." with the key "imu0 rate".
 Finding of_plausibility(const viwo::Finding& found) {
   Finding finding;
-  const std::size_t colon = found.text.find(": ");
-  finding.sensor = found.text.substr(0, colon);
-  finding.what = colon == std::string::npos ? found.text : found.text.substr(colon + 2);
+  finding.sensor = found.sensor();
+  finding.what = found.text.substr(std::min(found.text.size(), finding.sensor.size() + 2));
   // Sensors have no spaces in their names; "imu of simulator0" does.
   std::string key = found.key;
   const std::size_t of = key.find(" of ");

@@ -94,7 +94,7 @@ Series rate_curve(const Recording& recording, const std::string& name,
 Plot rates(const Recording& recording) {
   Plot plot{"Yaw rates", "time [s]", "rate [rad/s]"};
   plot.caption = "Of one base: alike in sign, size and time.";
-  const Eigen::Vector3d up = up_of(recording);
+  const Eigen::Vector3d up = up_of(recording.imu);
   if (up.norm() > 0.) {
     plot.series.push_back(rate_curve(recording, recording.label<ImuSample>(recording.imu_sensor),
                                      about(turns_of(recording.imu), up)));

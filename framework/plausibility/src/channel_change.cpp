@@ -21,18 +21,27 @@ std::vector<ChannelChange> channel_changes(const ModelDescription& description) 
       for (std::size_t b = a + 1; b < n; ++b) changes.push_back({exchanged, a, b});
     }
   };
-  const auto add_channels = [&](std::size_t n, ChannelChange::Kind sign,
-                                ChannelChange::Kind exchanged) {
-    for (std::size_t a = 0; a < n; ++a) changes.push_back({sign, a, a});
-    add_pairs(n, exchanged);
-  };
   const auto n_drive = static_cast<std::size_t>(description.n_drive);
   const auto n_steer = static_cast<std::size_t>(description.n_steer);
-  add_channels(n_drive, ChannelChange::kDriveSign, ChannelChange::kDrivesExchanged);
-  add_channels(n_steer, ChannelChange::kSteerSign, ChannelChange::kSteersExchanged);
+  for (std::size_t a = 0; a < n_drive; ++a) {
+    changes.push_back({ChannelChange::kDriveScale, a, a});
+  }
+  add_pairs(n_drive, ChannelChange::kDrivesExchanged);
+  for (std::size_t a = 0; a < n_steer; ++a) changes.push_back({ChannelChange::kSteerSign, a, a});
+  add_pairs(n_steer, ChannelChange::kSteersExchanged);
   if (n_steer > 1) changes.push_back({ChannelChange::kSteerSigns});
   if (n_steer > 0) changes.push_back({ChannelChange::kSteersInDegrees});
   if (n_steer == n_drive) add_pairs(n_drive, ChannelChange::kWheelsExchanged);
+  return changes;
+}
+
+std::vector<ChannelChange> gear_changes(const ModelDescription& description) {
+  std::vector<ChannelChange> changes;
+  for (std::size_t a = 0; a < static_cast<std::size_t>(description.n_drive); ++a) {
+    for (const double scale : {2., 0.5}) {
+      changes.push_back({ChannelChange::kDriveScale, a, a, 0, scale});
+    }
+  }
   return changes;
 }
 
@@ -60,8 +69,8 @@ void ChannelChange::undo(EncoderSample& sample) const {
   switch (kind) {
     case kNone:
       break;
-    case kDriveSign:
-      sample.drive_rad_per_s[a] *= -1.;
+    case kDriveScale:
+      sample.drive_rad_per_s[a] *= scale;
       break;
     case kDrivesExchanged:
       std::swap(sample.drive_rad_per_s[a], sample.drive_rad_per_s[b]);
@@ -99,8 +108,12 @@ std::string ChannelChange::text() const {
     case kNone:
     case kNoSteering:
       break;
-    case kDriveSign:
-      return "drive_" + first + " turns opposite to what the other wheels say: its sign";
+    case kDriveScale:
+      if (scale < 0.) {
+        return "drive_" + first + " turns opposite to what the other wheels say: its sign";
+      }
+      return "drive_" + first + " turns " + significant(1. / scale, 2) +
+             " times as fast as the other wheels say: its gear ratio, or counts per turn";
     case kDrivesExchanged:
       return "drives contradict each other, and do not with drive_" + first + " and drive_" +
              second + " exchanged: their order";
@@ -132,9 +145,9 @@ std::string ChannelChange::text() const {
 std::vector<Remedy> ChannelChange::remedies(const std::string& sensor, std::size_t n_drive,
                                             std::size_t n_steer) const {
   const std::string section = "sensors." + sensor + ".";
-  const auto sign = [&](std::size_t i) {
-    const bool is_reversed = kind == kSideSign ? (side >> i & 1u) != 0 : i == a;
-    return is_reversed || kind == kSteerSigns ? "-1" : "1";
+  const auto factor = [&](std::size_t i) {
+    const bool is_changed = kind == kSideSign ? (side >> i & 1u) != 0 : i == a;
+    return is_changed || kind == kSteerSigns ? significant(scale, 2) : "1";
   };
   const auto order = [&](std::size_t i) {
     return std::to_string((i == a ? b : i == b ? a : i) + 1);
@@ -145,14 +158,14 @@ std::vector<Remedy> ChannelChange::remedies(const std::string& sensor, std::size
     case kNone:
     case kNoSteering:
       break;
-    case kDriveSign:
+    case kDriveScale:
     case kSideSign:
-      return {{section + "drive_scale", yaml_list(n_drive, sign)}};
+      return {{section + "drive_scale", yaml_list(n_drive, factor)}};
     case kDrivesExchanged:
       return {drives};
     case kSteerSign:
     case kSteerSigns:
-      return {{section + "steer_scale", yaml_list(n_steer, sign)}};
+      return {{section + "steer_scale", yaml_list(n_steer, factor)}};
     case kSteersExchanged:
       return {steers};
     case kWheelsExchanged:

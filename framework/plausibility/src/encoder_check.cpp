@@ -21,6 +21,9 @@ EncoderCheck::EncoderCheck(std::string name, std::string sensor,
   for (const ChannelChange& change : channel_changes(model->description())) {
     changes_.push_back({change});
   }
+  for (const ChannelChange& change : gear_changes(model->description())) {
+    changes_.push_back({change});
+  }
   if (n_steer_ > 0) changes_.push_back({{ChannelChange::kNoSteering}});
   drives_.resize(n_drive());
 }
@@ -107,25 +110,31 @@ void EncoderCheck::find_degrees(Findings& out) const {
 }
 
 /// One change makes the contradictions of the wheels vanish: to a tenth of what they are. Others
-/// that leave less than three times as much explain it as well: then all of them are named.
+/// that leave less than three times as much explain it as well: then all of them are named. Where
+/// no steering at all does, the angles' unit cannot be told: degrees are next to nothing.
 void EncoderCheck::find_change(Findings& out) const {
   if (tried_ < 50) return;
-  const auto best =
-      std::min_element(changes_.begin(), changes_.end(),
-                       [](const Tried& a, const Tried& b) { return a.residual < b.residual; });
+  const auto end = std::find_if(changes_.begin(), changes_.end(), [](const Tried& tried) {
+    return tried.change.kind == ChannelChange::kNoSteering;  // the last, if it is there
+  });
+  const auto best = std::min_element(changes_.begin(), end, [](const Tried& a, const Tried& b) {
+    return a.residual < b.residual;
+  });
   if (best == changes_.begin()) return;
   const double n_rows = solver_.model().n_rows();
   const double least = 1e-4 * n_rows * static_cast<double>(tried_);  // 1 cm/s each
   const Tried& none = changes_.front();
   if (none.residual < least || none.residual < 0.01 * none.signal) return;
   const double most = 0.1 * none.residual;
+  const bool is_degrees = best->change.kind == ChannelChange::kSteersInDegrees;
+  if (is_degrees && end != changes_.end() && end->residual < 3. * best->residual) return;
   std::string texts;
   std::vector<Remedy> remedies = best->change.remedies(sensor_, n_drive(), n_steer());
-  for (const Tried& other : changes_) {
-    if (other.residual >= 3. * best->residual && &other != &*best) continue;
-    if (other.residual >= most || other.change.kind == ChannelChange::kNoSteering) return;
+  for (auto other = changes_.begin(); other != end; ++other) {
+    if (other->residual >= 3. * best->residual && other != best) continue;
+    if (other->residual >= most) return;
     if (!texts.empty()) remedies.clear();
-    texts += (texts.empty() ? "" : " - or, which explains it as well, ") + other.change.text();
+    texts += (texts.empty() ? "" : " - or, which explains it as well, ") + other->change.text();
   }
   out.push_back({name_ + " order", name_ + ": " + texts, false, std::move(remedies)});
 }

@@ -121,10 +121,6 @@ Finding of_another_clock(const std::string& name, double ahead_s) {
 
 }  // namespace
 
-Plausibility::Plausibility(const RunSetup& setup, const Eigen::Vector3d& up) : live_(false) {
-  watch_without_filter(setup, up);
-}
-
 Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
   if (!setup.filter) return;
   const FilterSetup& filter = *setup.filter;
@@ -186,6 +182,44 @@ void Plausibility::watch_without_filter(const RunSetup& setup, const Eigen::Vect
   } catch (const std::exception&) {
     // What its model throws is told by those who need it.
   }
+}
+
+Eigen::Vector3d up_of(std::span<const ImuSample> imu) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : imu) {
+    const Eigen::Vector3d f = to_vector(sample.accel_m_per_s2);
+    if (f.allFinite() && f.norm() > 0.) sum += f.normalized();
+  }
+  // One that is turned over and over has no direction.
+  constexpr double kSteady = 0.9;
+  const auto n = static_cast<double>(imu.size());
+  return sum.norm() > kSteady * n && n > 0. ? Eigen::Vector3d(sum.normalized())
+                                            : Eigen::Vector3d::Zero();
+}
+
+Findings implausible(const RunSetup& setup, const DeadReckoned& data, std::int64_t zero_ns) {
+  Plausibility plausibility(setup);
+  plausibility.watch_without_filter(setup, up_of(data.imu));
+  plausibility.begin_at(zero_ns);
+  const std::string imu = setup.routes.sensor_of(Consumer::kImu);
+  const std::string wheels = setup.routes.sensor_of(Consumer::kWheels);
+  const std::string heading = setup.routes.sensor_of(Consumer::kHeading);
+  std::vector<std::pair<const std::string*, SampleView>> all;
+  const auto include = [&all](const std::string& sensor, const auto& samples) {
+    for (const auto& sample : samples) all.emplace_back(&sensor, sample);
+  };
+  include(imu, data.imu);
+  include(wheels, data.wheels);
+  include(heading, data.headings);
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.second.t_ns() < b.second.t_ns(); });
+  for (const auto& [sensor, sample] : all) plausibility.add(*sensor, sample);
+  plausibility.finish();
+  Findings findings = plausibility.findings();
+  for (Finding& finding : findings) {
+    finding.is_doubt = finding.sensor() == name_of(setup, wheels, "wheels");
+  }
+  return findings;
 }
 
 /// One watch for each kind of each sensor that the estimator takes something from.

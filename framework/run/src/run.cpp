@@ -14,6 +14,7 @@
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/plausibility/plausibility.hpp"
 #include "viwo/run/warnings.hpp"
 
 namespace viwo {
@@ -103,6 +104,15 @@ class PlanarNees {
   int count_ = 0;
 };
 
+/// What the samples alone say against the estimate.
+void look_at_samples(const RunSetup& setup, const RunData& data, RunResult& result) {
+  const std::int64_t begin_ns = data.wheels().front().begin_ns;
+  for (Finding& finding :
+       implausible(setup, {data.imu(), data.wheels(), data.headings()}, begin_ns)) {
+    (finding.is_doubt ? result.doubts : result.warnings).push_back(std::move(finding.text));
+  }
+}
+
 }  // namespace
 
 RunResult run_odometry(const RunSetup& setup, const RunData& data) {
@@ -190,6 +200,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
     result.nees_planar = nees.mean();
     warn_of_gaps(result);
   }
+  look_at_samples(setup, data, result);
   doubt(result);
   return result;
 }

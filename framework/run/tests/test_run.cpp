@@ -14,8 +14,10 @@
 namespace viwo {
 namespace {
 
+using ::testing::Contains;
 using testing::error_of;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using testing::registry;
 using testing::simulated;
 
@@ -198,6 +200,23 @@ TEST(Simulate, WritesALogThatPlaysBackToTheSameBits) {
   EXPECT_EQ(played.total.g, direct.total.g);
   EXPECT_EQ(played.total.P_g, direct.total.P_g);
   EXPECT_EQ(played.accuracy->end_m, direct.accuracy->end_m);
+}
+
+TEST(Run, OfWheelsThatContradictThemselvesIsDoubtful) {
+  const auto doubts = [](const std::string& fault) {
+    std::vector<std::string> assignments;
+    if (!fault.empty()) assignments.push_back("sensors.simulator0." + fault);
+    const RunResult result = testing::run(simulated("icr_sweep", assignments));
+    EXPECT_EQ(result.status, RunStatus::kOk);
+    return result.doubts;
+  };
+  EXPECT_THAT(doubts(""), IsEmpty());
+  EXPECT_THAT(doubts("drive_scale=[1, -1, 1, 1]"),
+              Contains(HasSubstr("drive_2 turns opposite to what the other wheels say")));
+  EXPECT_THAT(doubts("drive_scale=[1, 1, 2, 1]"),
+              Contains(HasSubstr("drive_3 turns 2 times as fast as the other wheels say")));
+  EXPECT_THAT(doubts("steer_scale=[57.3, 57.3, 57.3, 57.3]"),
+              Contains(HasSubstr("they are in degrees")));
 }
 
 TEST(Output, HasTheNamesThatScriptsRelyOn) {

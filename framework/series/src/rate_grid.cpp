@@ -132,7 +132,7 @@ std::vector<Turn> shifted(std::vector<Turn> turns, double seconds) {
 std::vector<YawRates> yaw_rates_of(const Recording& recording, const WheelsPrior& prior) {
   std::vector<YawRates> all;
   if (!recording.imu.empty()) {
-    const Eigen::Vector3d up = up_of(recording);
+    const Eigen::Vector3d up = up_of(recording.imu);
     const Eigen::Vector3d axis = up.norm() > 0. ? up : Eigen::Vector3d(prior.wheels.R_ItoO.row(2));
     all.push_back(
         {recording.label<ImuSample>(recording.imu_sensor), about(turns_of(recording.imu), axis)});

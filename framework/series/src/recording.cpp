@@ -202,27 +202,15 @@ class Gatherer {
     return false;
   }
 
-  /// Only what all of it says tells how the IMU is mounted.
+  /// Only all of it tells how the IMU is mounted.
   void look_without_filter() {
-    struct Sample {
-      std::int64_t t_ns;
-      const std::string* sensor;
-      SampleView view;
-    };
-    std::vector<Sample> all;
-    const auto include = [&all](const std::string& sensor, const auto& samples) {
-      for (const auto& sample : samples) all.push_back({sample.t_ns, &sensor, sample});
-    };
-    include(recording_.imu_sensor, recording_.imu);
-    for (const Wheels& wheels : recording_.wheels) include(wheels.sensor, wheels.samples);
-    for (const Headings& other : recording_.headings) include(other.sensor, other.samples);
-    std::stable_sort(all.begin(), all.end(),
-                     [](const Sample& a, const Sample& b) { return a.t_ns < b.t_ns; });
-    Plausibility plausibility(setup_, up_of(recording_));
-    plausibility.begin_at(recording_.begin_ns());
-    for (const Sample& sample : all) plausibility.add(*sample.sensor, sample.view);
-    plausibility.finish();
-    recording_.implausible = plausibility.findings();
+    DeadReckoned data{recording_.imu, {}, {}};
+    for (const Wheels& wheels : recording_.wheels) data.wheels = wheels.samples;
+    for (const Headings& other : recording_.headings) {
+      if (other.sensor == setup_.routes.sensor_of(Consumer::kHeading))
+        data.headings = other.samples;
+    }
+    recording_.implausible = implausible(setup_, data, recording_.begin_ns());
   }
 
   void add(const std::string& sensor, SampleView sample) {
@@ -353,18 +341,5 @@ std::int64_t Recording::begin_ns() const {
 }
 
 Recording gather(RunSetup& setup) { return Gatherer(setup).gather(); }
-
-Eigen::Vector3d up_of(const Recording& recording) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const ImuSample& sample : recording.imu) {
-    const Eigen::Vector3d f = to_vector(sample.accel_m_per_s2);
-    if (f.norm() > 0.) sum += f.normalized();
-  }
-  // One that is turned over and over has no direction.
-  constexpr double kSteady = 0.9;
-  const auto n = static_cast<double>(recording.imu.size());
-  return sum.norm() > kSteady * n && n > 0. ? Eigen::Vector3d(sum.normalized())
-                                            : Eigen::Vector3d::Zero();
-}
 
 }  // namespace viwo::series

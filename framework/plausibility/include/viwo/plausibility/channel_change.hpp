@@ -1,5 +1,5 @@
-// What may have been done to the channels of encoders on their way to a log: one sign, or two that
-// are exchanged.
+// What may have been done to the channels of encoders on their way to a log: one sign or scale, or
+// two that are exchanged.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ namespace viwo {
 struct ChannelChange {
   enum Kind : std::uint8_t {
     kNone,
-    kDriveSign,
+    kDriveScale,  ///< of one drive: its sign, or twice or half the counts of a turn
     kDrivesExchanged,
     kSteerSign,
     kSteersExchanged,
@@ -30,6 +30,7 @@ struct ChannelChange {
   Kind kind = kNone;
   std::size_t a = 0, b = 0;  ///< channels
   std::uint32_t side = 0;    ///< drives of kSideSign, one bit each
+  double scale = -1.;        ///< that undoes kDriveScale
 
   void undo(EncoderSample& sample) const;
   /// "drive_2 turns opposite to what the other wheels say: its sign"
@@ -40,8 +41,12 @@ struct ChannelChange {
                                std::size_t n_steer) const;
 };
 
-/// All that may have been done, one at a time; the first is none.
+/// Signs, orders and units, one change at a time; the first is none.
 std::vector<ChannelChange> channel_changes(const ModelDescription& description);
+
+/// One drive that tells half or twice of what its wheel turns: what a gyro alone could not tell
+/// from the size of the base.
+std::vector<ChannelChange> gear_changes(const ModelDescription& description);
 
 /// All drives of one side reversed: of those that turn the base to the left when they turn alone,
 /// and of the others. Nothing where a side has one drive, whose sign is among the changes above.

@@ -18,6 +18,9 @@ struct Finding {
   bool is_over = false;               ///< it was so for a while
   std::vector<Remedy> remedies = {};  ///< of a cause that a configuration can undo
   bool is_doubt = false;              ///< no filter makes up for it
+
+  /// Whom the text begins with.
+  std::string sensor() const { return text.substr(0, text.find(": ")); }
 };
 using Findings = std::vector<Finding>;
 

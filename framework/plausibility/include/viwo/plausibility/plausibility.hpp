@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,13 +16,25 @@
 
 namespace viwo {
 
+/// Upwards in I, of length 1: the mean direction of the specific force; zero where that has no
+/// direction, or there is no IMU.
+Eigen::Vector3d up_of(std::span<const ImuSample> imu);
+
+/// What a run without a filter has, of the sensors that its routes name.
+struct DeadReckoned {
+  std::span<const ImuSample> imu;
+  std::span<const EncoderSample> wheels;
+  std::span<const HeadingSample> headings;
+};
+/// What cannot be true of it; of the wheels that is a doubt, as nothing makes up for them. How the
+/// IMU is mounted is not configured: gravity says so, which is upwards on average. Times in texts
+/// count from `zero_ns`.
+Findings implausible(const RunSetup& setup, const DeadReckoned& data, std::int64_t zero_ns);
+
 class Plausibility {
  public:
-  /// `live`: of what happens, in the order of arrival.
+  /// Of a run with a filter; `live`: of what happens, in the order of arrival.
   explicit Plausibility(const RunSetup& setup, bool live = false);
-  /// Of a run without a filter, whose configuration does not say how an IMU is mounted. `up`:
-  /// upwards in I, which is upwards of the base on average; zero where that is not known.
-  Plausibility(const RunSetup& setup, const Eigen::Vector3d& up);
   ~Plausibility();
 
   /// Each sample that goes to the estimator, in its order.
@@ -42,6 +55,7 @@ class Plausibility {
 
  private:
   struct Checks;
+  friend Findings implausible(const RunSetup&, const DeadReckoned&, std::int64_t);
   void watch_streams(const RunSetup& setup);
   void watch_without_filter(const RunSetup& setup, const Eigen::Vector3d& up);
   void watch(const std::string& sensor, SampleView sample);

@@ -92,8 +92,4 @@ struct Recording {
 /// Reads all sensors in the order of their stamps.
 Recording gather(RunSetup& setup);
 
-/// Upwards in I, of length 1: the mean direction of the specific force; zero where that has no
-/// direction, or there is no IMU.
-Eigen::Vector3d up_of(const Recording& recording);
-
 }  // namespace viwo::series

@@ -1,0 +1,86 @@
+// Wheels that contradict each other while the base goes straight on, its steering at rest.
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "encoder_check.hpp"
+#include "simulated.hpp"
+
+namespace viwo {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// What is found of ten seconds along `angle_rad` of a base with four steered wheels, with a fault.
+Findings driven(double angle_rad, const std::function<void(EncoderSample&)>& fault) {
+  const RunSetup setup = read_run(testing::simulated("circle"), testing::registry());
+  WheelsPrior prior;
+  prior.wheels.x_WI = setup.x_WI;
+  prior.sigma_intrinsics = setup.sigma;
+  EncoderCheck check("wheels0", "wheels0", setup.model, prior);
+  std::mt19937_64 engine(1);
+  std::normal_distribution<double> noise(0., 0.02);
+  for (std::int64_t k = 0; k < 1000; ++k) {
+    EncoderSample sample;
+    sample.begin_ns = 10'000'000 * k;
+    sample.t_ns = sample.end_ns = sample.begin_ns + 10'000'000;
+    sample.n_drive = sample.n_steer = 4;
+    const double rate = 10. + 3. * std::sin(0.01 * static_cast<double>(k));
+    for (std::size_t i = 0; i < 4; ++i) {
+      sample.drive_rad_per_s[i] = rate + noise(engine);
+      sample.steer_rad[i] = angle_rad + 0.1 * noise(engine);
+    }
+    fault(sample);
+    check.add(sample);
+  }
+  Findings findings;
+  check.findings(0, findings);
+  return findings;
+}
+
+std::vector<std::string> texts(const Findings& findings) {
+  std::vector<std::string> texts;
+  for (const Finding& finding : findings) texts.push_back(finding.text);
+  return texts;
+}
+
+constexpr double kCrab_rad = std::numbers::pi / 5.;
+
+TEST(EncoderCheck, FindsNothingInWheelsThatAgree) {
+  EXPECT_THAT(driven(0., [](EncoderSample&) {}), IsEmpty());
+  EXPECT_THAT(driven(kCrab_rad, [](EncoderSample&) {}), IsEmpty());
+}
+
+/// No angles at all would fit as well: that is no reason to say nothing.
+TEST(EncoderCheck, NamesASteeringThatIsReversedThoughItStays) {
+  EXPECT_THAT(
+      texts(driven(kCrab_rad, [](EncoderSample& s) { s.steer_rad[1] *= -1.; })),
+      ElementsAre("wheels0: steer_2 turns opposite to what the other wheels say: its sign"));
+}
+
+TEST(EncoderCheck, DoesNotTakeAnglesForDegreesWhereNoneFitAsWell) {
+  EXPECT_THAT(driven(kCrab_rad,
+                     [k = 0](EncoderSample& s) mutable {
+                       s.steer_rad[2] = std::sin(0.37 * ++k);  // whatever it is
+                     }),
+              IsEmpty());
+}
+
+TEST(EncoderCheck, NamesADriveWithAnotherGear) {
+  const Findings twice = driven(0., [](EncoderSample& s) { s.drive_rad_per_s[3] *= 2.; });
+  ASSERT_THAT(texts(twice), ElementsAre(HasSubstr("drive_4 turns 2 times as fast")));
+  EXPECT_EQ(twice[0].remedies.at(0).value, "[1, 1, 1, 0.5]");
+  const Findings half = driven(0., [](EncoderSample& s) { s.drive_rad_per_s[0] *= 0.5; });
+  ASSERT_THAT(texts(half), ElementsAre(HasSubstr("drive_1 turns 0.5 times as fast")));
+  EXPECT_EQ(half[0].remedies.at(0).key, "sensors.wheels0.drive_scale");
+  EXPECT_EQ(half[0].remedies.at(0).value, "[2, 1, 1, 1]");
+}
+
+}  // namespace
+}  // namespace viwo
