@@ -143,8 +143,10 @@ class LandmarkField {
   /// A landmark that the camera sees; false when no pixel was found for it.
   bool create(const Eye& eye) {
     for (int i = 0; i < kTries; ++i) {
-      const Vector2d pixel(stream_.uniform() * (eye.camera->width_px - 1.),
-                           stream_.uniform() * (eye.camera->height_px - 1.));
+      // One after the other: compilers evaluate arguments in either order.
+      const double v_px = stream_.uniform() * (eye.camera->height_px - 1.);
+      const double u_px = stream_.uniform() * (eye.camera->width_px - 1.);
+      const Vector2d pixel(u_px, v_px);
       const double distance =
           options_.landmark_min_m +
           stream_.uniform() * (options_.landmark_max_m - options_.landmark_min_m);

@@ -104,7 +104,8 @@ Base draw_base(Base base, const TrueBaseErrors& sigma, std::uint64_t seed) {
   for (std::size_t j = 0; j < static_cast<std::size_t>(base.n_drive); ++j) {
     Wheel& wheel = base.wheels[j];
     wheel.radius_m += sigma.radius_m * stream.gaussian();
-    const Eigen::Vector2d draw(stream.gaussian(), stream.gaussian());
+    const double y = stream.gaussian(), x = stream.gaussian();  // arguments have no order
+    const Eigen::Vector2d draw(x, y);
     if (swerve && j > 0) wheel.place_m += sigma.position_m * draw;
     if (swerve) base.steerings[j].place_m = wheel.place_m;
   }
