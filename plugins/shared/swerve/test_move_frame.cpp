@@ -15,9 +15,10 @@ TEST(MoveFrame, GivesTheTwistOfTheOtherFrameFromTheSameReadings) {
   std::uniform_real_distribution<double> uniform(-1., 1.);
   for (const char* type : {"four_wis_wid", "four_wis_wid_drive_only"}) {
     const auto model = testing::load_model(testing::swerve(type));
+    int told = 0;
     for (int trial = 0; trial < 20; ++trial) {
-      const Twist xi(uniform(rng), uniform(rng), 2. * uniform(rng));
-      const Eigen::Vector3d g(3. * uniform(rng), 0.3 * uniform(rng), 0.3 * uniform(rng));
+      const Twist xi{uniform(rng), uniform(rng), 2. * uniform(rng)};
+      const Eigen::Vector3d g{3. * uniform(rng), 0.3 * uniform(rng), 0.3 * uniform(rng)};
       EncoderSample sample;
       testing::follow(*model, xi, sample);
       Intrinsics moved = model->nominal();
@@ -26,6 +27,8 @@ TEST(MoveFrame, GivesTheTwistOfTheOtherFrameFromTheSameReadings) {
       solver.set_intrinsics(moved);
       TwistSolution solution;
       ASSERT_EQ(solver.solve(sample, solution), Status::kOk);
+      if (solution.rank_deficient) continue;  // drives of wheels that are nearly parallel
+      ++told;
       // The velocity of the origin of O', written in O'.
       const Eigen::Vector2d v = xi.head<2>() + xi[2] * J2() * g.tail<2>();
       Twist expected;
@@ -33,6 +36,7 @@ TEST(MoveFrame, GivesTheTwistOfTheOtherFrameFromTheSameReadings) {
       EXPECT_LT((solution.xi - expected).norm(), 1e-9);
       EXPECT_LT(solution.e.norm(), 1e-9);
     }
+    EXPECT_GE(told, 15) << type;
   }
 }
 
