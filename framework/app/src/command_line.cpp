@@ -128,6 +128,9 @@ void check_ranges(const Command& command, const po::variables_map& values) {
   if (values.contains("jobs") && values["jobs"].as<int>() > kMostJobs) {
     refuse(command, "--jobs must be at most " + std::to_string(kMostJobs));
   }
+  if (values.contains("max-gap") && !(values["max-gap"].as<double>() > 0.)) {
+    refuse(command, "--max-gap must be above 0");
+  }
   if (values.contains("figures") && values["figures"].as<std::string>() != "svg" &&
       values["figures"].as<std::string>() != "pdf") {
     refuse(command, "--figures takes svg or pdf");

@@ -345,7 +345,6 @@ int evaluate_command(const Arguments& arguments) {
   if (!known) {
     throw InputError("--align " + arguments.align + ": known are none, start, yaw_position, se3");
   }
-  if (!(arguments.max_gap_s > 0.)) throw InputError("--max-gap must be above 0");
   options.max_reference_gap_s = arguments.max_gap_s;
   const Trajectory reference = log::read_tum(arguments.reference);
   const Trajectory estimate = log::read_tum(arguments.estimate);

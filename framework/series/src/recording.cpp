@@ -205,10 +205,10 @@ class Gatherer {
   /// Only all of it tells how the IMU is mounted.
   void look_without_filter() {
     DeadReckoned data{recording_.imu, {}, {}};
-    for (const Wheels& wheels : recording_.wheels) data.wheels = wheels.samples;
+    if (!recording_.wheels.empty()) data.wheels = recording_.wheels.front().samples;
+    const std::string heading = setup_.routes.sensor_of(Consumer::kHeading);
     for (const Headings& other : recording_.headings) {
-      if (other.sensor == setup_.routes.sensor_of(Consumer::kHeading))
-        data.headings = other.samples;
+      if (other.sensor == heading) data.headings = other.samples;
     }
     recording_.implausible = implausible(setup_, data, recording_.begin_ns());
   }

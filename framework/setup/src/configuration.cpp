@@ -106,6 +106,22 @@ void refuse_unused(const std::vector<Definition>& defined, const Node& run,
   errors.throw_if_any();
 }
 
+/// InputError for a placeholder on the command line of which each recording has a value of its own.
+void refuse_overruled(const std::vector<std::string>& assignments, const Node& configuration) {
+  const std::vector<Recording> recordings = read_recordings(configuration);
+  for (const std::string& text : assignments) {
+    const config::Assignment assignment = config::parse_assignment(text);
+    constexpr std::string_view kSection = "placeholders.";
+    if (!assignment.path.starts_with(kSection)) continue;
+    const std::string name = assignment.path.substr(kSection.size());
+    const bool is_overruled = std::all_of(recordings.begin(), recordings.end(),
+                                          [&](const auto& r) { return r.labels.contains(name); });
+    if (!is_overruled) continue;
+    config::fail(assignment.value.mark(), "each recording of " + configuration.mark().file +
+                                              " has its own '" + name + "': change the list there");
+  }
+}
+
 Node load_run(const std::filesystem::path& file) {
   Node run = config::load_file(file);
   if (!run.is_map()) config::fail(run.mark(), "a run configuration is a section of keys");
@@ -201,26 +217,6 @@ void require_file_name(const std::string& name, const config::Mark& mark) {
                          "' must be usable as a file name: letters, digits, '_', '-', '+' "
                          "and '.'");
 }
-
-namespace {
-
-/// InputError for a placeholder on the command line of which each recording has a value of its own.
-void refuse_overruled(const std::vector<std::string>& assignments, const Node& configuration) {
-  const std::vector<Recording> recordings = read_recordings(configuration);
-  for (const std::string& text : assignments) {
-    const config::Assignment assignment = config::parse_assignment(text);
-    constexpr std::string_view kSection = "placeholders.";
-    if (!assignment.path.starts_with(kSection)) continue;
-    const std::string name = assignment.path.substr(kSection.size());
-    const bool is_overruled = std::all_of(recordings.begin(), recordings.end(),
-                                          [&](const auto& r) { return r.labels.contains(name); });
-    if (!is_overruled) continue;
-    config::fail(assignment.value.mark(), "each recording of " + configuration.mark().file +
-                                              " has its own '" + name + "': change the list there");
-  }
-}
-
-}  // namespace
 
 Node load_base(const Node& configuration, const std::vector<std::string>& assignments) {
   const Node* base = configuration.find("base");
