@@ -99,7 +99,8 @@ nlohmann::json calibration_json(const RunResult& result) {
                                {"final", number_or_null(track.estimate.back())},
                                {"sigma", number_or_null(track.sigma.back())},
                                {"truth", number_or_null(track.truth)},
-                               {"error", number_or_null(track.final_error)}};
+                               {"error", number_or_null(track.final_error)},
+                               {"scatter", track.scatter}};
   }
   return calibration;
 }

@@ -68,7 +68,7 @@ VIWO_RECORD(Accuracy, alignment, n_poses, n_outside, n_in_gap, duration_s, path_
 namespace viwo {
 
 VIWO_RECORD(StageTime, mean_ms, p95_ms, p99_ms, max_ms)
-VIWO_RECORD(CalibrationTrack, name, unit, estimate, sigma, truth, final_error)
+VIWO_RECORD(CalibrationTrack, name, unit, estimate, sigma, truth, final_error, scatter)
 VIWO_RECORD(PoseNees, pose, position, orientation, relative, series)
 VIWO_RECORD(PoseError, t_s, position_m, position_sigma_m, yaw_rad, yaw_sigma_rad)
 VIWO_RECORD(UpdateTrack, name, total, failures, applied, rejected)

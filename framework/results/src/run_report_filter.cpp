@@ -257,8 +257,8 @@ void add_calibration_section(const RunResult& result, Document& document) {
   if (result.epoch_t_s.empty()) return;
   Table table;
   table.caption = "Estimated parameters, their truth and what was believed at the end";
-  table.columns = {{"parameter"}, {"unit"},  {"initial"}, {"prior sigma"},    {"final"},
-                   {"sigma"},     {"truth"}, {"|error|"}, {"|error| / sigma"}};
+  table.columns = {{"parameter"}, {"unit"},  {"initial"}, {"prior sigma"},     {"final"},
+                   {"sigma"},     {"truth"}, {"|error|"}, {"|error| / sigma"}, {"scatter / sigma"}};
   std::vector<Block> plots;
   std::string held;
   for (const CalibrationTrack& track : result.calibration) {
@@ -272,14 +272,18 @@ void add_calibration_section(const RunResult& result, Document& document) {
                           unit.scale * track.sigma.front(), unit.scale * track.estimate.back(),
                           unit.scale * sigma, unit.scale * track.truth,
                           std::abs(unit.scale * track.final_error),
-                          std::abs(track.final_error) / sigma});
+                          std::abs(track.final_error) / sigma, track.scatter});
     plots.emplace_back(calibration_plot(result, track));
   }
   if (plots.empty()) return;
   Section section{"Calibration", {std::move(table)}};
   section.blocks.emplace_back(Paragraph{
       "The bands are three of the filter's own sigmas around the estimate. Where a parameter is "
-      "found quickly, its plot shows what comes after that; a double click shows all."});
+      "found quickly, its plot shows what comes after that; a double click shows all. Scatter is "
+      "by "
+      "how many times its sigma a parameter moves as it is learned: where it is not 1, the noise "
+      "of "
+      "what is measured lasts, and calibration.yaml has the sigma times that."});
   if (!held.empty()) {
     section.blocks.emplace_back(
         Paragraph{"Not estimated, held at the configured value: " + held + "."});

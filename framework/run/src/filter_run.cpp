@@ -97,6 +97,9 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
   for (std::string& line : far_from_prior(result.calibration)) {
     result.warnings.push_back(std::move(line));
   }
+  for (std::string& line : too_sure(result.calibration)) {
+    result.warnings.push_back(std::move(line));
+  }
   if (result.status == RunStatus::kOk && !result.reference.empty()) {
     result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);
     warn_of_gaps(result);

@@ -29,7 +29,8 @@ Recorder::Recorder(const RunSetup& setup, const RunData& data, const Filter& fil
     : setup_(*setup.filter),
       calibration_(true_calibration(*setup.filter, data.calibration)),
       result_(result),
-      is_live_(result.live) {
+      is_live_(result.live),
+      scatter_(filter.blocks()) {
   for (const StateSample& state : data.states()) {
     truth_.push_back(
         {state.t_ns, to_vector(state.p_IinG_m), Eigen::Quaterniond(R_GtoI(state).transpose())});
@@ -57,6 +58,7 @@ void Recorder::record(const Estimator& estimator) {
   result_.epoch_t_s.push_back(t_s);
   add_error(filter, t_s);
   add_calibration(filter);
+  scatter_.epoch(filter);
   add_counts(estimator);
   record_monitors(estimator, t_s, result_.monitor);
   const auto stages = estimator.stage_ms();
@@ -88,6 +90,7 @@ void Recorder::add_piece(std::int64_t t_ns) {
 }
 
 void Recorder::end_piece(const Estimator& estimator, const std::string& failure) {
+  scatter_.begin_anew();
   if (std::exchange(in_piece_, false)) {
     result_.pieces.back().failure = failure;
   } else if (!failure.empty()) {
@@ -114,6 +117,7 @@ void Recorder::finish(const Estimator& estimator) {
   }
   result_.noises = estimator.noises();
   result_.final_calibration = calibration_file_of(estimator.filter());
+  add_scatter();
   if (loosened_ > 0) {
     std::string updates;
     for (const UpdateTrack& update : result_.updates) {
@@ -219,6 +223,21 @@ void Recorder::add_calibration(const Filter& filter) {
     ++track;
   }
   compare_calibration(calibration_, filter, result_.calibration);
+}
+
+/// A next run starts from sigmas that are believed.
+void Recorder::add_scatter() {
+  const std::vector<double> factors = scatter_.factors();
+  CalibrationFile& file = *result_.final_calibration;
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    CalibrationTrack& track = result_.calibration[i];
+    track.scatter = factors[i];
+    for (auto* entries : {&file.intrinsics, &file.mount, &file.clock, &file.cameras}) {
+      for (CalibrationEntry& entry : *entries) {
+        if (entry.name == track.name) entry.sigma *= factors[i];
+      }
+    }
+  }
 }
 
 }  // namespace viwo

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration_scatter.hpp"
 #include "viwo/feed/bounded_series.hpp"
 #include "viwo/feed/stage_time.hpp"
 #include "viwo/run/run.hpp"
@@ -32,6 +33,7 @@ class Recorder {
   void add_relative_error(const Filter& filter, const StampedPose& truth);
   void add_counts(const Estimator& estimator);
   void add_calibration(const Filter& filter);
+  void add_scatter();
 
   const FilterSetup& setup_;
   std::map<std::string, double> calibration_;  ///< true values
@@ -40,6 +42,7 @@ class Recorder {
   Trajectory truth_;
   std::int64_t begin_ns_ = 0;
   std::int64_t last_ns_ = 0;
+  CalibrationScatter scatter_;
   std::vector<TimeStatistics> stage_ms_;
   TimeStatistics total_ms_;
   double sum_pose_ = 0., sum_position_ = 0., sum_orientation_ = 0.;

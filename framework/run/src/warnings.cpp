@@ -111,6 +111,27 @@ std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& cal
   return lines;
 }
 
+std::vector<std::string> too_sure(const std::vector<CalibrationTrack>& calibration) {
+  constexpr double kMuch = 2.;
+  std::vector<const CalibrationTrack*> tracks;
+  for (const CalibrationTrack& track : calibration) {
+    if (track.scatter > kMuch) tracks.push_back(&track);
+  }
+  if (tracks.empty()) return {};
+  std::stable_sort(tracks.begin(), tracks.end(),
+                   [](auto* a, auto* b) { return a->scatter > b->scatter; });
+  constexpr std::size_t kNamed = 3;
+  std::string text = "calibration: surer than it ought to be, by the way it moves:";
+  for (std::size_t i = 0; i < std::min(tracks.size(), kNamed); ++i) {
+    text += (i == 0 ? " " : ", ") + tracks[i]->name + " " + significant(tracks[i]->scatter, 2) +
+            " times";
+  }
+  if (tracks.size() > kNamed) text += ", and " + std::to_string(tracks.size() - kNamed) + " more";
+  return {text +
+          " (scatter in summary.json) - what is measured is off for seconds on end: slip, "
+          "tyres, images of one side; calibration.yaml has their sigmas times that"};
+}
+
 namespace {
 
 /// Root mean square distance of the reference from its middle.

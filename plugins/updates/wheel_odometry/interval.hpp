@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 
 #include <Eigen/Core>
 
@@ -41,13 +40,6 @@ struct States {
   Square P;                                            ///< what wanders is in the intrinsics
   GeometryMatrix geometry_P = GeometryMatrix::Zero();  ///< of the geometry, zero where held
 
-  /// The factor's column of the time offset, if that is estimated.
-  std::optional<int> time_offset() const {
-    for (int k = 0; k < n_geometry; ++k) {
-      if (geometry_at(k) == wheel_motion::kTimeOffset) return k;
-    }
-    return {};
-  }
   Eigen::Index n_intrinsics() const { return P.cols() - n_geometry; }
   int geometry_at(int k) const { return geometry[static_cast<std::size_t>(k)]; }
 };

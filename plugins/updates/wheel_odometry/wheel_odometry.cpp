@@ -6,7 +6,6 @@
 #include <span>
 
 #include "checked_encoders.hpp"
-#include "clock_scatter.hpp"
 #include "encoder_intervals.hpp"
 #include "encoders.hpp"
 #include "interval_factor.hpp"
@@ -67,7 +66,6 @@ class WheelOdometry final : public Update {
 
   void start(const UpdateSetup& /*setup*/) override {
     noise_.reset();
-    clock_ = {};
     memory_ = {GroundTilt(params_.motion_sigmas), SmallTurn(params_.motion_sigmas)};
     checked_.start(wheel_model_of(blocks_), params_.wheel_check_probability);
     instrument_.emplace(wheel_model_of(blocks_), options_);
@@ -108,7 +106,6 @@ class WheelOdometry final : public Update {
     const IntervalFactor model(params_, memory_, interval);
     Iterate found = iterate(model, readings, *pose);
     if (params_.second_order_noise) model.add_second_order_noise(found.at, found.factor.R);
-    look_at_clock(interval.states, found);
     fill(found, factor);
     const double yaw = found.pose.g[0];
     const double duration_s = found.pose.duration_s;
@@ -126,7 +123,6 @@ class WheelOdometry final : public Update {
 
   void noises(std::vector<NoiseFound>& out) const override {
     noise_.append_to("noise_scale", "", params_.noise_scale, out);
-    clock_.append_to(out);
   }
 
  private:
@@ -159,19 +155,6 @@ class WheelOdometry final : public Update {
     return best;
   }
 
-  void look_at_clock(const States& states, const Iterate& found) {
-    const std::optional<int> column = states.time_offset();
-    if (!column) return;
-    const Jacobian& H = found.factor.H;
-    const Eigen::Vector3d h = H.col(*column);
-    if (h.isZero(0.)) return;
-    const Jacobian HP = H * states.P;
-    Eigen::Matrix3d S = noise_.variance() * found.factor.R;
-    S.noalias() += HP * H.transpose();
-    const Eigen::Vector3d weights = S.llt().solve(h);
-    clock_.add(found.pose.duration_s, weights.dot(found.moved_back), weights.dot(h));
-  }
-
   void fill(const Iterate& found, ResidualFactor& factor) {
     const Jacobian& H = found.factor.H;
     factor.set_rows(3);
@@ -200,7 +183,6 @@ class WheelOdometry final : public Update {
   std::optional<Instrument> instrument_;
   IntrinsicCurvature curvature_;
   Memory memory_;
-  ClockScatter clock_;
 };
 
 VIWO_REGISTER(Update, WheelOdometry, "wheel_odometry", "1.0.0",

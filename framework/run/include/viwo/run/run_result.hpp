@@ -30,6 +30,8 @@ struct CalibrationTrack {
   double truth = std::numeric_limits<double>::quiet_NaN();
   /// Last estimate minus truth in the filter's own error convention; NaN without truth.
   double final_error = std::numeric_limits<double>::quiet_NaN();
+  /// By how many times its sigma it moves as it is learned (F-42); 1: that may be chance.
+  double scatter = 1.;
 };
 
 /// Mean over the epochs of the squared normalised error, in the filter's own error convention.

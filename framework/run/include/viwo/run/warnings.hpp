@@ -36,6 +36,8 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
 
 /// Warnings of calibration that has gone where its prior does not reach.
 std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration);
+/// Of a calibration that is much surer than it ought to be, one line.
+std::vector<std::string> too_sure(const std::vector<CalibrationTrack>& calibration);
 
 /// An accuracy that most of the estimate has no part in, because the reference has gaps there.
 void warn_of_gaps(RunResult& result);
