@@ -147,7 +147,7 @@ TEST_F(RealWheels, OfACarOnAHighwayAreBelieved) {
 }
 
 /// The highway has no curve that a gyro could tell the direction by; the accelerometer does.
-TEST_F(RealWheels, ThatAreAllReversedAreNamed) {
+TEST_F(RealWheels, ThatAreAllReversedOrTurnedAreNamed) {
   const auto warnings_of = [this](const std::string& configuration, const std::string& set) {
     const nlohmann::json found = run_wrong(configuration, {set});
     EXPECT_EQ(found.at("status"), "doubtful");
@@ -158,6 +158,8 @@ TEST_F(RealWheels, ThatAreAllReversedAreNamed) {
               ::testing::HasSubstr("wheels0: accelerate opposite to imu0 (correlation -0.8"));
   EXPECT_THAT(warnings_of("comma2k19_car.yaml", "wheels.rpy_ItoO_rad=[0, 0, 3.1416]"),
               ::testing::HasSubstr("wheels0: accelerate opposite to imu0"));
+  EXPECT_THAT(warnings_of("comma2k19_car.yaml", "wheels.rpy_ItoO_rad=[0, 0, 1.5708]"),
+              ::testing::ContainsRegex("imu0: accelerates to the left where .* add -1.5708"));
   EXPECT_THAT(warnings_of("ucsd_skid_steer.yaml", reversed), ::testing::HasSubstr("opposite to"));
 }
 

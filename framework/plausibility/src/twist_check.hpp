@@ -92,11 +92,11 @@ class TwistCheck {
   Remedy drives_times(double scale) const;
   Remedy turned_by(const Eigen::Matrix3d& R) const;
   bool finds_gravity(const Eigen::Vector3d& up, double slope, Findings& out) const;
-  void find_opposed(const Eigen::MatrixXd& C, Findings& out) const;
+  void find_turned(const Eigen::MatrixXd& C, Findings& out) const;
   void find_reversed(const Eigen::MatrixXd& C, Findings& out) const;
   void find_axes(const Eigen::MatrixXd& C, Findings& out) const;
   std::array<double, kLags> left_by_lag(const Eigen::Vector4d& information) const;
-  void find_lag(double rate_variance, Findings& out) const;
+  bool find_lag(double rate_variance, Findings& out) const;
 
   std::string imu_, wheels_, drives_;
   Gyro gyro_is_;

@@ -78,6 +78,8 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
   if (gyro_is_ == Gyro::kMounted && finds_gravity(up, slope, out)) return;
   if (windows_ < kFewestWindows) return;
   if (slope != 0.) return find_factor(slope, r, C, out);
+  // A lag of tenths of a second, and they are not alike any more.
+  if (turns && r > 0. && find_lag(C(kGyro, kGyro), out)) return;
   // It turns by next to nothing of what the wheels do.
   constexpr double kStuck = 0.1;
   const double gyro = std::sqrt(C(kGyro, kGyro)), wheels = std::sqrt(C(kWheels, kWheels));
@@ -89,28 +91,45 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
                                        "(signs, order, zeros of the steering)"});
     return;
   }
-  find_opposed(C, out);
+  find_turned(C, out);
 }
 
-/// Where it hardly turns, wheels that are all reversed still accelerate against the IMU.
-void TwistCheck::find_opposed(const Eigen::MatrixXd& C, Findings& out) const {
+/// Where it hardly turns, wheels still accelerate with the IMU, or opposite to it, or across.
+void TwistCheck::find_turned(const Eigen::MatrixXd& C, Findings& out) const {
   if (gyro_is_ != Gyro::kMounted) return;
-  double force = 0., wheels = 0., both = 0.;
+  double force = 0., wheels = 0.;
+  std::array<Entries, 2> of_wheels;
   for (int i = 0; i < 2; ++i) {
-    Entries h = Entries::Zero();
+    Entries& h = of_wheels[static_cast<std::size_t>(i)];
+    h = Entries::Zero();
     h[kChange + i] = h[kTurn + i] = 1.;
     force += C(kForce + i, kForce + i);
     wheels += h.dot(C * h);
-    both += h.dot(C.col(kForce + i));
   }
-  // Slopes are in the force, too, but have no sign: of 40 windows and more it is beyond chance.
-  constexpr double kLeast = kLeastForce * kLeastForce, kOpposed = -0.7;
-  const double r = both / std::sqrt(force * wheels);
-  if (std::min(force, wheels) < kLeast || !(r < kOpposed)) return;
-  out.push_back({imu_ + " axes", wheels_ + ": accelerate opposite to " + imu_ + " (correlation " +
-                                     significant(r, 2) +
-                                     "): sign of all drives, or the IMU is turned: add 3.1416 to "
-                                     "the yaw of wheels.rpy_ItoO_rad"});
+  // Slopes are in the force, too, but have no direction: of 40 windows and more it is beyond
+  // chance.
+  constexpr double kLeast = kLeastForce * kLeastForce, kClear = 0.7;
+  if (std::min(force, wheels) < kLeast) return;
+  const double size = std::sqrt(force * wheels);
+  const double along =
+      (of_wheels[0].dot(C.col(kForce)) + of_wheels[1].dot(C.col(kForce + 1))) / size;
+  const double across =
+      (of_wheels[0].dot(C.col(kForce + 1)) - of_wheels[1].dot(C.col(kForce))) / size;
+  if (along < -kClear) {
+    out.push_back({imu_ + " axes", wheels_ + ": accelerate opposite to " + imu_ + " (correlation " +
+                                       significant(along, 2) +
+                                       "): sign of all drives, or the IMU is turned: add 3.1416 to "
+                                       "the yaw of wheels.rpy_ItoO_rad"});
+  } else if (std::abs(across) > kClear) {
+    const bool is_left = across > 0.;
+    out.push_back({imu_ + " axes",
+                   imu_ + ": accelerates to the " + (is_left ? "left" : "right") + " where " +
+                       wheels_ + " accelerate forwards (correlation " +
+                       significant(std::abs(across), 2) + "): the IMU is turned: add " +
+                       (is_left ? "-" : "") + "1.5708 to the yaw of wheels.rpy_ItoO_rad",
+                   false,
+                   {turned_by(embedded(is_left ? matrix(0, -1, 1, 0) : matrix(0, 1, -1, 0)))}});
+  }
 }
 
 /// The rates are alike but for a factor.
@@ -323,14 +342,14 @@ auto TwistCheck::left_by_lag(const Eigen::Vector4d& information) const
 
 /// By how much the wheels' rate is before the gyro's: where the two differ least, whatever the
 /// bias, and whatever wheels that are not quite as configured make of the base's motion.
-void TwistCheck::find_lag(double rate_variance, Findings& out) const {
+bool TwistCheck::find_lag(double rate_variance, Findings& out) const {
   constexpr double kCell_s = 1e-9 * CellMeans<6>::kCellNs;
   // What makes them differ, slopes of the ground or slip, lasts for half a second.
   constexpr double kSame = 0.5 / kCell_s;
   constexpr double kPart = 0.05;  // of the turn; rad/m of the velocity
   const double n = static_cast<double>(lag_count_);
-  if (gyro_is_ != Gyro::kMounted) return;  // there is no wheels.t_OtoI_s
-  if (n * kCell_s < 10.) return;
+  if (gyro_is_ != Gyro::kMounted) return false;  // there is no wheels.t_OtoI_s
+  if (n * kCell_s < 10.) return false;
   std::array<double, kLags> left = left_by_lag(Eigen::Vector4d::Zero());
   const double noise = *std::min_element(left.begin(), left.end());
   Eigen::Vector4d information = Eigen::Vector4d::Constant(kSame * noise / (kPart * kPart));
@@ -338,17 +357,17 @@ void TwistCheck::find_lag(double rate_variance, Findings& out) const {
   left = left_by_lag(information);
   const auto least =
       static_cast<std::size_t>(std::min_element(left.begin(), left.end()) - left.begin());
-  if (least == 0 || least + 1 == left.size()) return;
+  if (least == 0 || least + 1 == left.size()) return false;
   const double bend = left[least - 1] - 2. * left[least] + left[least + 1];  // per cell^2
   // Without the lag they are alike.
-  if (!(bend > 0.) || left[kMostLag] < 1.5 * left[least] || left[least] > 0.05 * rate_variance) {
-    return;
+  if (!(bend > 0.) || left[kMostLag] < 1.5 * left[least] || left[least] > 0.2 * rate_variance) {
+    return false;
   }
   const double lag_s = kCell_s * (static_cast<double>(least) - kMostLag +
                                   0.5 * (left[least - 1] - left[least + 1]) / bend);
   const double sigma_s = kCell_s * std::sqrt(2. * left[least] / (bend * n / kSame));
   constexpr double kLeastLag_s = 0.01;
-  if (std::abs(lag_s) < kLeastLag_s + 3. * std::hypot(sigma_t_OtoI_s_, sigma_s)) return;
+  if (std::abs(lag_s) < kLeastLag_s + 3. * std::hypot(sigma_t_OtoI_s_, sigma_s)) return false;
   const auto ms = [](double seconds) { return std::to_string(std::lround(1e3 * seconds)) + " ms"; };
   std::string text = wheels_ + (lag_s < 0. ? ": lags behind " : ": is ahead of ") + imu_ + " by " +
                      ms(std::abs(lag_s)) + ", t_OtoI_s says " + ms(t_OtoI_s_);
@@ -356,6 +375,7 @@ void TwistCheck::find_lag(double rate_variance, Findings& out) const {
   text += " - wheels.t_OtoI_s: ";
   const std::string t_OtoI_s = significant(1e-3 * std::round(1e3 * (t_OtoI_s_ + lag_s)), 6);
   out.push_back({wheels_ + " lag", text + t_OtoI_s, false, {{"wheels.t_OtoI_s", t_OtoI_s}}});
+  return true;
 }
 
 }  // namespace viwo

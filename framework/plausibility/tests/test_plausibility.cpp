@@ -312,15 +312,28 @@ TEST(Plausibility, NamesReadingsThatJump) {
 }
 
 TEST(Plausibility, NamesTheLagOfTheWheels) {
-  EXPECT_THAT(found({.wheels =
-                         [](EncoderSample& s) {
-                           for (std::int64_t* t_ns : {&s.t_ns, &s.begin_ns, &s.end_ns}) {
-                             *t_ns += 100'000'000;
-                           }
-                         }}),
+  const auto late_by = [](std::int64_t late_ns, double shaken_rad_per_s) {
+    return found({.imu =
+                      [&](ImuSample& s) {
+                        const double t_s = 1e-9 * static_cast<double>(s.t_ns);
+                        s.gyro_rad_per_s[2] += shaken_rad_per_s * std::sin(50. * t_s);
+                      },
+                  .wheels =
+                      [&](EncoderSample& s) {
+                        for (std::int64_t* t_ns : {&s.t_ns, &s.begin_ns, &s.end_ns}) {
+                          *t_ns += late_ns;
+                        }
+                      }});
+  };
+  EXPECT_THAT(late_by(100'000'000, 0.),
               ElementsAre(::testing::MatchesRegex(
                   "wheels0: lags behind imu0 by (9[0-9]|10[0-9]) ms, t_OtoI_s says 5 ms \\+- 10 ms "
                   "- wheels\\.t_OtoI_s: -0\\.(09[0-9]*|08[0-9]|1[0-9]*)")));
+  // So late that the two rates are hardly alike, on a base that shakes.
+  EXPECT_THAT(late_by(400'000'000, 0.1),
+              ElementsAre(::testing::MatchesRegex(
+                  "wheels0: lags behind imu0 by (39[0-9]|40[0-9]) ms, t_OtoI_s says 5 ms \\+- 10 "
+                  "ms - wheels\\.t_OtoI_s: -0\\.(39[0-9]*|4)")));
 }
 
 TEST(Plausibility, NamesNoLagOfAClockThatWasSetOnTheWay) {
