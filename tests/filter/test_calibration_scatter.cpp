@@ -19,7 +19,7 @@ struct Errors {
 Errors errors_of(const std::string& name) {
   Errors errors;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const RunSetup setup = testing::run_setup(name, {}, seed);
+    RunSetup setup = testing::run_setup(name, {}, seed);
     const RunResult result = run(setup, collect(setup));
     EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
     for (const CalibrationTrack& track : result.calibration) {

@@ -97,7 +97,7 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
   for (std::string& line : far_from_prior(result.calibration)) {
     result.warnings.push_back(std::move(line));
   }
-  for (std::string& line : too_sure(result.calibration)) {
+  for (std::string& line : too_sure(result)) {
     result.warnings.push_back(std::move(line));
   }
   if (result.status == RunStatus::kOk && !result.reference.empty()) {
@@ -148,9 +148,7 @@ class FilterRun {
     // Beside sensors that work while it runs, the filter's own time says little.
     result_.wall_s = data_.streams.empty() && !live_ ? wall_s_ : seconds_since(begin);
     plausibility_.finish();
-    for (const Finding& finding : plausibility_.findings()) {
-      (finding.is_doubt ? result_.doubts : result_.warnings).push_back(finding.text);
-    }
+    add_findings(plausibility_.findings(), result_);
     conclude(setup_, *estimator_, result_);
     return std::move(result_);
   }

@@ -95,6 +95,17 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
   return lines;
 }
 
+void add_findings(const Findings& findings, RunResult& result) {
+  constexpr double kContradicts = 10.;  // no guess of a noise is so bad
+  const bool is_contradicted = std::ranges::any_of(result.noises, [](const NoiseFound& noise) {
+    return noise.count >= kFewestRejections && noise.found > kContradicts * noise.configured;
+  });
+  for (const Finding& finding : findings) {
+    const bool is_doubt = finding.is_doubt || (is_contradicted && !finding.remedies.empty());
+    (is_doubt ? result.doubts : result.warnings).push_back(finding.text);
+  }
+}
+
 std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration) {
   constexpr double kFar = 5.;
   std::vector<std::string> lines;
@@ -111,25 +122,45 @@ std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& cal
   return lines;
 }
 
-std::vector<std::string> too_sure(const std::vector<CalibrationTrack>& calibration) {
+namespace {
+
+/// Whether one of them is of wheels that are taken for constant.
+bool are_of_wheels(std::span<const CalibrationTrack* const> tracks, const RunResult& result) {
+  const auto wanders = [](const CalibrationTrack& track) {
+    return track.name.find("wander_") != std::string::npos;
+  };
+  if (!result.final_calibration || std::ranges::any_of(result.calibration, wanders)) return false;
+  const CalibrationFile& file = *result.final_calibration;
+  return std::ranges::any_of(tracks, [&](const CalibrationTrack* track) {
+    return find(file.intrinsics, track->name) != nullptr ||
+           find(file.mount, track->name) != nullptr;
+  });
+}
+
+}  // namespace
+
+std::vector<std::string> too_sure(const RunResult& result) {
   constexpr double kMuch = 2.;
   std::vector<const CalibrationTrack*> tracks;
-  for (const CalibrationTrack& track : calibration) {
+  for (const CalibrationTrack& track : result.calibration) {
     if (track.scatter > kMuch) tracks.push_back(&track);
   }
   if (tracks.empty()) return {};
-  std::stable_sort(tracks.begin(), tracks.end(),
-                   [](auto* a, auto* b) { return a->scatter > b->scatter; });
+  std::ranges::stable_sort(tracks, [](auto* a, auto* b) { return a->scatter > b->scatter; });
   constexpr std::size_t kNamed = 3;
-  std::string text = "calibration: surer than it ought to be, by the way it moves:";
+  std::string text = "calibration: surer than it ought to be, by the way it moves: ";
   for (std::size_t i = 0; i < std::min(tracks.size(), kNamed); ++i) {
-    text += (i == 0 ? " " : ", ") + tracks[i]->name + " " + significant(tracks[i]->scatter, 2) +
+    text += (i == 0 ? "" : ", ") + tracks[i]->name + " " + significant(tracks[i]->scatter, 2) +
             " times";
   }
   if (tracks.size() > kNamed) text += ", and " + std::to_string(tracks.size() - kNamed) + " more";
-  return {text +
-          " (scatter in summary.json) - what is measured is off for seconds on end: slip, "
-          "tyres, images of one side; calibration.yaml has their sigmas times that"};
+  text +=
+      " (scatter in summary.json; calibration.yaml has their sigmas times that) - what is "
+      "measured is off for seconds on end: slip, tyres, images of one side";
+  if (are_of_wheels(tracks, result)) {
+    text += "; wheels.intrinsics_wander: 0.5 lets the filter reckon with wheels that give way";
+  }
+  return {text};
 }
 
 namespace {

@@ -45,7 +45,9 @@ class Measured {
   void run(std::int64_t begin_ns = 0) {
     for (int i = 0; i < kEpochs; ++i) {
       if (i % kEpochsOfFiveSeconds == 0) offset_ = kSigma * lasting_.cwiseProduct(gaussian());
-      filter_.initialize({.t_ns = begin_ns + 100'000'000LL * i});  // to move on
+      ImuPrior later;
+      later.t_ns = begin_ns + 100'000'000LL * i;
+      filter_.initialize(later);
       measure();
       scatter.epoch(filter_);
     }

@@ -22,8 +22,11 @@
 namespace viwo {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
 using testing::InMemory;
 using testing::registry;
 using testing::set_sensors;
@@ -235,6 +238,40 @@ TEST(Suspicions, AreOfAPartAndHaveTimesSinceTheStartOfTheRun) {
       {"some", 30, "", 31}, {"all", 30, "t = 1", 30}, {"few", 19, "", 19}, {"unsaid", 30, "", 0}};
   EXPECT_THAT(refused_altogether(counts, 0), ElementsAre(HasSubstr("all - 30 of 30, t = 1")));
   EXPECT_THAT(suspicions(counts, {}, 0), ElementsAre(HasSubstr("some - 30 of 31")));
+}
+
+TEST(Warnings, OfSamplesAreDoubtsWhereTheFilterHasFoundTheSame) {
+  const Findings findings{{"a", "imu0: a gap"}, {"b", "imu0: turned", false, {{"rpy", "0"}}}};
+  const auto doubts_with = [&](double found, std::int64_t count) {
+    RunResult result;
+    result.noises = {{"wheels.noise_scale", "", 1., found, count}};
+    add_findings(findings, result);
+    EXPECT_EQ(result.doubts.size() + result.warnings.size(), 2U);
+    return result.doubts;
+  };
+  EXPECT_THAT(doubts_with(5., 1000), IsEmpty());
+  EXPECT_THAT(doubts_with(50., 10), IsEmpty());
+  EXPECT_THAT(doubts_with(50., 1000), ElementsAre("imu0: turned"));
+}
+
+TEST(Warnings, NameTheParametersThatScatterMost) {
+  RunResult result;
+  for (const auto& [name, scatter] :
+       {std::pair{"cam0.fx", 3.}, {"r_1", 1.}, {"x_2", 2.5}, {"y_2", 8.}, {"t_OtoI", 2.1}}) {
+    result.calibration.emplace_back().name = name;
+    result.calibration.back().scatter = scatter;
+  }
+  EXPECT_THAT(
+      too_sure(result),
+      ElementsAre(AllOf(HasSubstr("y_2 8 times, cam0.fx 3 times, x_2 2.5 times, and 1 more"),
+                        Not(HasSubstr("intrinsics_wander")))));
+  // Wheels may be said to give way, unless they are.
+  result.final_calibration.emplace().intrinsics = {{"x_2", 0.1, 0.01, 0.1, "m", {}, {}}};
+  EXPECT_THAT(too_sure(result), ElementsAre(HasSubstr("intrinsics_wander: 0.5")));
+  result.calibration.emplace_back().name = "wander_x_2";
+  EXPECT_THAT(too_sure(result), ElementsAre(Not(HasSubstr("intrinsics_wander"))));
+  for (CalibrationTrack& track : result.calibration) track.scatter = 1.;
+  EXPECT_THAT(too_sure(result), IsEmpty());
 }
 
 }  // namespace

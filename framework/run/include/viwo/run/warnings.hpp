@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "viwo/plausibility/finding.hpp"
 #include "viwo/run/run_result.hpp"
 
 namespace viwo {
@@ -34,10 +35,14 @@ std::vector<std::string> refused_altogether(std::span<const RejectionCount> reje
 std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
                                     std::span<const NoiseFound> noises, std::int64_t begin_ns);
 
+/// What the samples say against the configuration: doubts, where the filter has found by itself
+/// that something is wrong with it.
+void add_findings(const Findings& findings, RunResult& result);
+
 /// Warnings of calibration that has gone where its prior does not reach.
 std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration);
 /// Of a calibration that is much surer than it ought to be, one line.
-std::vector<std::string> too_sure(const std::vector<CalibrationTrack>& calibration);
+std::vector<std::string> too_sure(const RunResult& result);
 
 /// An accuracy that most of the estimate has no part in, because the reference has gaps there.
 void warn_of_gaps(RunResult& result);
