@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "viwo/filter/filter.hpp"
+#include "viwo/estimator/estimator.hpp"
 
 namespace viwo {
 
