@@ -25,9 +25,9 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using testing::InMemory;
 using ::testing::IsEmpty;
 using ::testing::Not;
-using testing::InMemory;
 using testing::registry;
 using testing::set_sensors;
 
