@@ -279,11 +279,9 @@ void add_calibration_section(const RunResult& result, Document& document) {
   Section section{"Calibration", {std::move(table)}};
   section.blocks.emplace_back(Paragraph{
       "The bands are three of the filter's own sigmas around the estimate. Where a parameter is "
-      "found quickly, its plot shows what comes after that; a double click shows all. Scatter is "
-      "by "
-      "how many times its sigma a parameter moves as it is learned: where it is not 1, the noise "
-      "of "
-      "what is measured lasts, and calibration.yaml has the sigma times that."});
+      "found quickly, its plot shows what comes after that; a double click shows all. "
+      "Scatter is by how many times its sigma a parameter moves as it is learned: where it is not "
+      "1, the noise of what is measured lasts, and calibration.yaml has the sigma times that."});
   if (!held.empty()) {
     section.blocks.emplace_back(
         Paragraph{"Not estimated, held at the configured value: " + held + "."});
