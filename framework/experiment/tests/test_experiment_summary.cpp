@@ -79,6 +79,9 @@ TEST_F(Summary, HasEveryMetricInEveryPlaceAlsoOfARunThatWasTakenOver) {
   run.nees_planar = run.nees.pose = run.nees.position = run.nees.orientation = run.nees.relative =
       2.25;
   run.updates = {{"parity", {8, 9}, {}, {}, {}}};
+  CalibrationTrack& track = run.calibration.emplace_back();
+  track.estimate = track.sigma = {0.1, 0.1};
+  track.scatter = 2.25;
   const RunResult kept = from_record(to_record(run));
   const auto summary = summary_of(result);
   const std::string csv = text_of(folder_ / "out" / "runs.csv");

@@ -12,6 +12,16 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
+/// Of the parameter that scatters most (F-42).
+double largest_scatter(const RunResult& run) {
+  double most = kNone;
+  for (const CalibrationTrack& track : run.calibration) {
+    const bool is_estimated = !track.sigma.empty() && track.sigma.back() > 0.;
+    if (is_estimated) most = std::fmax(most, track.scatter);
+  }
+  return most;
+}
+
 const Metric kBeforeRpe[] = {
     {"end_m", "end [mm]", 1e3,
      [](const RunResult& r) { return r.accuracy ? r.accuracy->end_m : kNone; }},
@@ -32,6 +42,7 @@ const Metric kAfterRpe[] = {
     {"nees_orientation", "NEES ori (3)", 1., [](const RunResult& r) { return r.nees.orientation; },
      3.},
     {"nees_relative", "NEES rel (6)", 1., [](const RunResult& r) { return r.nees.relative; }, 6.},
+    {"scatter", "scatter [sigma]", 1., largest_scatter, 1.},
     {"epoch_ms", "epoch [ms]", 1.,
      [](const RunResult& r) { return r.updates.empty() ? kNone : r.total_ms.mean_ms; }},
 };
