@@ -37,6 +37,16 @@ TEST_F(PlanTest, SaysWhatIsMissingOfARun) {
   EXPECT_NE(outcome.out.find(" after another '"), std::string::npos) << outcome.out;
 }
 
+TEST_F(PlanTest, SaysWhatIsMissingThoughTheFilterIsSureOfIt) {
+  // Wheels on tyres: the filter's sigma of each zero is below the goal of 1 mrad, its error is not.
+  const Outcome outcome = expect_done({"run", kPlans + "../runs/viwo_contact.yaml", "--seed", "2",
+                                       "--out", "out", "--plan", kPlans + "swerve.yaml"});
+  EXPECT_NE(outcome.out.find("forecast: delta_o"), std::string::npos) << outcome.out;
+  for (const char* zero : {"delta_o2", "delta_o3", "delta_o4"}) {
+    EXPECT_LT(summary().at("calibration").at(zero).at("sigma").get<double>(), 1e-3) << zero;
+  }
+}
+
 TEST_F(PlanTest, OfAnotherBaseIsRefused) {
   expect_refused({"run", kPlans + "../runs/viwo_skid_steer.yaml", "--out", "out", "--plan",
                   kPlans + "swerve.yaml"},

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "viwo/math/significant.hpp"
+#include "viwo/run/warnings.hpp"
 #include "viwo/setup/calibration_file.hpp"
 
 namespace viwo::app {
@@ -27,6 +28,10 @@ ForecastOutput::ForecastOutput(const std::filesystem::path& plan, const RunSetup
 
 void ForecastOutput::watch(RunHooks& hooks, bool live) {
   live_ = live;
+  hooks.on_epoch = [this, then = hooks.on_epoch](const RunResult& result) {
+    if (then) then(result);
+    calibration_ = &result.calibration;
+  };
   hooks.on_estimate = [this](double t_s, const Filter& filter) {
     if (t_s < next_s_) return;
     next_s_ = t_s + kEvery_s;
@@ -51,7 +56,8 @@ void ForecastOutput::look(double t_s, const Filter& filter) {
     if (found == known.end()) continue;
     names.push_back(entry.name);
     at.push_back(found - known.begin());
-    sigmas.push_back(entry.sigma);
+    // A filter that is surer than it ought to be would call too little enough.
+    sigmas.push_back(entry.sigma * scatter_of(*calibration_, entry.name));
   }
   if (names.empty()) throw InputError("the run estimates no intrinsics of wheels");
   const Eigen::Map<const Eigen::VectorXd> sigma(sigmas.data(),

@@ -26,6 +26,7 @@ class ForecastOutput {
   void look(double t_s, const Filter& filter);
 
   plan::Forecaster forecaster_;
+  const std::vector<CalibrationTrack>* calibration_ = nullptr;  ///< of the run that goes on
   bool live_ = false;
   double next_s_ = 0.;
   std::string said_;  ///< parameter and piece

@@ -32,12 +32,13 @@ CalibrationScatter::CalibrationScatter(const StateBlocks& blocks) {
   entries_.resize(n);
 }
 
-void CalibrationScatter::epoch(const Filter& filter) {
+bool CalibrationScatter::epoch(const Filter& filter) {
   const bool is_due = seconds_between(looked_ns_, filter.t_ns()) >= kLook_s;
-  if (!is_new_ && !is_due) return;
+  if (!is_new_ && !is_due) return false;
   look(filter);
   looked_ns_ = filter.t_ns();
   is_new_ = false;
+  return true;
 }
 
 void CalibrationScatter::look(const Filter& filter) {

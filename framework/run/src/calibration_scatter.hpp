@@ -16,8 +16,8 @@ class CalibrationScatter {
  public:
   explicit CalibrationScatter(const StateBlocks& blocks);
 
-  /// An epoch is done.
-  void epoch(const Filter& filter);
+  /// An epoch is done. Whether the factors may be others than before.
+  bool epoch(const Filter& filter);
   /// Another filter goes on; what was found stays.
   void begin_anew() { is_new_ = true; }
   /// By how many times its sigma each entry scatters, in the order of the blocks; 1 where that may

@@ -15,12 +15,20 @@
 #include "viwo/math/so3.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/run/thin.hpp"
+#include "viwo/run/warnings.hpp"
 
 namespace viwo {
 namespace {
 
 /// Points of each series that a live run keeps: this, to twice as many.
 constexpr std::size_t kLivePoints = 4096;
+
+/// A next run starts from sigmas that are believed.
+void widen(CalibrationFile& file, const std::vector<CalibrationTrack>& tracks) {
+  for (auto* entries : {&file.intrinsics, &file.mount, &file.clock, &file.cameras}) {
+    for (CalibrationEntry& entry : *entries) entry.sigma *= scatter_of(tracks, entry.name);
+  }
+}
 
 }  // namespace
 
@@ -58,7 +66,6 @@ void Recorder::record(const Estimator& estimator) {
   result_.epoch_t_s.push_back(t_s);
   add_error(filter, t_s);
   add_calibration(filter);
-  scatter_.epoch(filter);
   add_counts(estimator);
   record_monitors(estimator, t_s, result_.monitor);
   const auto stages = estimator.stage_ms();
@@ -117,7 +124,7 @@ void Recorder::finish(const Estimator& estimator) {
   }
   result_.noises = estimator.noises();
   result_.final_calibration = calibration_file_of(estimator.filter());
-  add_scatter();
+  widen(*result_.final_calibration, result_.calibration);
   if (loosened_ > 0) {
     std::string updates;
     for (const UpdateTrack& update : result_.updates) {
@@ -223,21 +230,9 @@ void Recorder::add_calibration(const Filter& filter) {
     ++track;
   }
   compare_calibration(calibration_, filter, result_.calibration);
-}
-
-/// A next run starts from sigmas that are believed.
-void Recorder::add_scatter() {
+  if (!scatter_.epoch(filter)) return;
   const std::vector<double> factors = scatter_.factors();
-  CalibrationFile& file = *result_.final_calibration;
-  for (std::size_t i = 0; i < factors.size(); ++i) {
-    CalibrationTrack& track = result_.calibration[i];
-    track.scatter = factors[i];
-    for (auto* entries : {&file.intrinsics, &file.mount, &file.clock, &file.cameras}) {
-      for (CalibrationEntry& entry : *entries) {
-        if (entry.name == track.name) entry.sigma *= factors[i];
-      }
-    }
-  }
+  for (std::size_t i = 0; i < factors.size(); ++i) result_.calibration[i].scatter = factors[i];
 }
 
 }  // namespace viwo

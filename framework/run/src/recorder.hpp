@@ -33,7 +33,6 @@ class Recorder {
   void add_relative_error(const Filter& filter, const StampedPose& truth);
   void add_counts(const Estimator& estimator);
   void add_calibration(const Filter& filter);
-  void add_scatter();
 
   const FilterSetup& setup_;
   std::map<std::string, double> calibration_;  ///< true values

@@ -106,6 +106,11 @@ void add_findings(const Findings& findings, RunResult& result) {
   }
 }
 
+double scatter_of(const std::vector<CalibrationTrack>& calibration, std::string_view name) {
+  const auto found = std::ranges::find(calibration, name, &CalibrationTrack::name);
+  return found != calibration.end() ? found->scatter : 1.;
+}
+
 std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration) {
   constexpr double kFar = 5.;
   std::vector<std::string> lines;
