@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "viwo/math/significant.hpp"
-#include "viwo/run/warnings.hpp"
+#include "viwo/run/calibration_track.hpp"
 #include "viwo/setup/calibration_file.hpp"
 
 namespace viwo::app {
@@ -45,7 +45,8 @@ void ForecastOutput::watch(RunHooks& hooks, bool live) {
 }
 
 void ForecastOutput::look(double t_s, const Filter& filter) {
-  const CalibrationFile file = calibration_file_of(filter);
+  CalibrationFile file = calibration_file_of(filter);
+  widen(file, *calibration_);  // one that is surer than it ought to be would call too little enough
   std::vector<std::string> names;
   std::vector<Eigen::Index> at;
   std::vector<double> sigmas;
@@ -56,8 +57,7 @@ void ForecastOutput::look(double t_s, const Filter& filter) {
     if (found == known.end()) continue;
     names.push_back(entry.name);
     at.push_back(found - known.begin());
-    // A filter that is surer than it ought to be would call too little enough.
-    sigmas.push_back(entry.sigma * scatter_of(*calibration_, entry.name));
+    sigmas.push_back(entry.sigma);
   }
   if (names.empty()) throw InputError("the run estimates no intrinsics of wheels");
   const Eigen::Map<const Eigen::VectorXd> sigma(sigmas.data(),

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "viwo/math/significant.hpp"
+#include "viwo/run/calibration_track.hpp"
 
 namespace viwo::experiment {
 
@@ -97,8 +98,7 @@ bool is_significant(const eval::PairedDifference& difference) {
 }
 
 bool is_estimated(const RunResult& run, const CalibrationTrack& track) {
-  return !run.updates.empty() && !track.sigma.empty() && track.sigma.front() > 0. &&
-         track.sigma.back() > 0.;
+  return !run.updates.empty() && is_estimated(track);
 }
 
 std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,

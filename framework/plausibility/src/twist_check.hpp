@@ -92,6 +92,7 @@ class TwistCheck {
   Remedy drives_times(double scale) const;
   Remedy turned_by(const Eigen::Matrix3d& R) const;
   bool finds_gravity(const Eigen::Vector3d& up, double slope, Findings& out) const;
+  static Eigen::Matrix4d of_forces(const Eigen::MatrixXd& C);
   void find_turned(const Eigen::MatrixXd& C, Findings& out) const;
   void find_reversed(const Eigen::MatrixXd& C, Findings& out) const;
   void find_axes(const Eigen::MatrixXd& C, Findings& out) const;

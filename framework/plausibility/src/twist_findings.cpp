@@ -94,27 +94,27 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
   find_turned(C, out);
 }
 
+/// Covariance of [force, what the wheels say of it].
+Eigen::Matrix4d TwistCheck::of_forces(const Eigen::MatrixXd& C) {
+  Eigen::Matrix<double, 4, kEntries> S = Eigen::Matrix<double, 4, kEntries>::Zero();
+  for (int i = 0; i < 2; ++i) {
+    S(i, kForce + i) = 1.;
+    S(2 + i, kChange + i) = S(2 + i, kTurn + i) = 1.;
+  }
+  return S * C * S.transpose();
+}
+
 /// Where it hardly turns, wheels still accelerate with the IMU, or opposite to it, or across.
 void TwistCheck::find_turned(const Eigen::MatrixXd& C, Findings& out) const {
   if (gyro_is_ != Gyro::kMounted) return;
-  double force = 0., wheels = 0.;
-  std::array<Entries, 2> of_wheels;
-  for (int i = 0; i < 2; ++i) {
-    Entries& h = of_wheels[static_cast<std::size_t>(i)];
-    h = Entries::Zero();
-    h[kChange + i] = h[kTurn + i] = 1.;
-    force += C(kForce + i, kForce + i);
-    wheels += h.dot(C * h);
-  }
+  const Eigen::Matrix4d M = of_forces(C);
+  const double force = M(0, 0) + M(1, 1), wheels = M(2, 2) + M(3, 3);
   // Slopes are in the force, too, but have no direction: of 40 windows and more it is beyond
   // chance.
   constexpr double kLeast = kLeastForce * kLeastForce, kClear = 0.7;
   if (std::min(force, wheels) < kLeast) return;
   const double size = std::sqrt(force * wheels);
-  const double along =
-      (of_wheels[0].dot(C.col(kForce)) + of_wheels[1].dot(C.col(kForce + 1))) / size;
-  const double across =
-      (of_wheels[0].dot(C.col(kForce + 1)) - of_wheels[1].dot(C.col(kForce))) / size;
+  const double along = (M(0, 2) + M(1, 3)) / size, across = (M(1, 2) - M(0, 3)) / size;
   if (along < -kClear) {
     out.push_back({imu_ + " axes", wheels_ + ": accelerate opposite to " + imu_ + " (correlation " +
                                        significant(along, 2) +
@@ -287,12 +287,7 @@ void TwistCheck::find_axes(const Eigen::MatrixXd& C, Findings& out) const {
       {matrix(-1, 0, 0, 1), "sign of the accelerometer's x"},
       {matrix(1, 0, 0, -1), "sign of the accelerometer's y, or of the base's"},
   }};
-  Eigen::Matrix<double, 4, kEntries> S = Eigen::Matrix<double, 4, kEntries>::Zero();
-  for (int i = 0; i < 2; ++i) {
-    S(i, kForce + i) = 1.;
-    S(2 + i, kChange + i) = S(2 + i, kTurn + i) = 1.;
-  }
-  const Eigen::Matrix4d M = S * C * S.transpose();  // force, and what the wheels say of it
+  const Eigen::Matrix4d M = of_forces(C);
   const double all = M(0, 0) + M(1, 1);
   std::array<double, 8> left{};
   for (std::size_t i = 0; i < left.size(); ++i) {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "viwo/eval/accuracy.hpp"
+#include "viwo/run/calibration_track.hpp"
 
 namespace viwo {
 namespace {
@@ -16,8 +17,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 double largest_scatter(const RunResult& run) {
   double most = kNone;
   for (const CalibrationTrack& track : run.calibration) {
-    const bool is_estimated = !track.sigma.empty() && track.sigma.back() > 0.;
-    if (is_estimated) most = std::fmax(most, track.scatter);
+    if (is_estimated(track)) most = std::fmax(most, track.scatter);
   }
   return most;
 }

@@ -8,6 +8,7 @@
 #include "viwo/math/significant.hpp"
 #include "viwo/report/curves.hpp"
 #include "viwo/results/run_output.hpp"
+#include "viwo/run/calibration_track.hpp"
 
 namespace viwo {
 namespace {
@@ -149,10 +150,6 @@ Series rate(const std::string& name, const Bins& bins, const std::vector<double>
     series.y.push_back(sums[i] / bins.width_s);
   }
   return series;
-}
-
-bool is_estimated(const CalibrationTrack& track) {
-  return !track.estimate.empty() && track.sigma.front() > 0.;
 }
 
 report::DisplayUnit unit_of(const CalibrationTrack& track) {

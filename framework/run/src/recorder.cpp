@@ -14,21 +14,14 @@
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/run/calibration_track.hpp"
 #include "viwo/run/thin.hpp"
-#include "viwo/run/warnings.hpp"
 
 namespace viwo {
 namespace {
 
 /// Points of each series that a live run keeps: this, to twice as many.
 constexpr std::size_t kLivePoints = 4096;
-
-/// A next run starts from sigmas that are believed.
-void widen(CalibrationFile& file, const std::vector<CalibrationTrack>& tracks) {
-  for (auto* entries : {&file.intrinsics, &file.mount, &file.clock, &file.cameras}) {
-    for (CalibrationEntry& entry : *entries) entry.sigma *= scatter_of(tracks, entry.name);
-  }
-}
 
 }  // namespace
 

@@ -57,7 +57,12 @@ std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& update
 
 namespace {
 
-constexpr std::int64_t kFewestRejections = 20;
+constexpr std::int64_t kFewestCounted = 20;  ///< rejections, or measurements of a noise
+
+/// What is found of a noise by what is configured; 0 where it is of too little.
+double factor_of(const NoiseFound& noise) {
+  return noise.count < kFewestCounted ? 0. : noise.found / noise.configured;
+}
 
 std::string text_of(const RejectionCount& r, std::int64_t begin_ns) {
   return r.reason + " - " + std::to_string(r.count) + " of " + std::to_string(r.of) + ", " +
@@ -70,7 +75,7 @@ std::vector<std::string> refused_altogether(std::span<const RejectionCount> reje
                                             std::int64_t begin_ns) {
   std::vector<std::string> lines;
   for (const RejectionCount& r : rejections) {
-    if (r.count >= kFewestRejections && r.count == r.of) lines.push_back(text_of(r, begin_ns));
+    if (r.count >= kFewestCounted && r.count == r.of) lines.push_back(text_of(r, begin_ns));
   }
   return lines;
 }
@@ -80,12 +85,11 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
   constexpr double kMostFactor = 3.;  // between a guess and what is found
   std::vector<std::string> lines;
   for (const RejectionCount& r : rejections) {
-    if (r.count < kFewestRejections || 5 * r.count < r.of || r.count >= r.of) continue;
+    if (r.count < kFewestCounted || 5 * r.count < r.of || r.count >= r.of) continue;
     lines.push_back(text_of(r, begin_ns));
   }
   for (const NoiseFound& noise : noises) {
-    const double factor = noise.found / noise.configured;
-    if (noise.count < kFewestRejections || factor < kMostFactor) continue;
+    if (factor_of(noise) < kMostFactor) continue;
     lines.push_back(noise.name + ": " + significant(noise.found, 2) +
                     (noise.unit.empty() ? "" : " ") + noise.unit + " was found, " +
                     significant(noise.configured, 2) +
@@ -97,18 +101,12 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
 
 void add_findings(const Findings& findings, RunResult& result) {
   constexpr double kContradicts = 10.;  // no guess of a noise is so bad
-  const bool is_contradicted = std::ranges::any_of(result.noises, [](const NoiseFound& noise) {
-    return noise.count >= kFewestRejections && noise.found > kContradicts * noise.configured;
-  });
+  const bool is_contradicted = std::ranges::any_of(
+      result.noises, [](const NoiseFound& noise) { return factor_of(noise) > kContradicts; });
   for (const Finding& finding : findings) {
     const bool is_doubt = finding.is_doubt || (is_contradicted && !finding.remedies.empty());
     (is_doubt ? result.doubts : result.warnings).push_back(finding.text);
   }
-}
-
-double scatter_of(const std::vector<CalibrationTrack>& calibration, std::string_view name) {
-  const auto found = std::ranges::find(calibration, name, &CalibrationTrack::name);
-  return found != calibration.end() ? found->scatter : 1.;
 }
 
 std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration) {

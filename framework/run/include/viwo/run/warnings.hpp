@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "viwo/plausibility/finding.hpp"
@@ -42,9 +41,6 @@ void add_findings(const Findings& findings, RunResult& result);
 
 /// Warnings of calibration that has gone where its prior does not reach.
 std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration);
-/// By how many times its sigma a parameter scatters (CalibrationTrack::scatter); 1 for one that is
-/// not there.
-double scatter_of(const std::vector<CalibrationTrack>& calibration, std::string_view name);
 /// Of a calibration that is much surer than it ought to be, one line.
 std::vector<std::string> too_sure(const RunResult& result);
 
