@@ -75,7 +75,8 @@ json calibration_json(const ExperimentResult& result, std::size_t variant, const
                            {"rmse", number_or_null(c.rmse)},
                            {"mean_sigma", number_or_null(c.mean_sigma)},
                            {"prior_sigma", number_or_null(c.prior_sigma)},
-                           {"nees", number_or_null(c.nees)}};
+                           {"nees", number_or_null(c.nees)},
+                           {"widened_nees", number_or_null(c.widened_nees)}};
   }
   return calibration;
 }

@@ -205,15 +205,15 @@ void add_calibration_by(const ExperimentResult& result, const std::string& label
       if (families.size() + 2 != table.columns.size()) continue;
       std::vector<Cell> row{group.value, result.setup.variants[v].name};
       for (const CalibrationFamily& family : families) {
-        row.emplace_back(
-            unbroken(compact(100. * family.left, 3) + " % (" + compact(family.nees, 2) + ")"));
+        row.emplace_back(unbroken(compact(100. * family.left, 3) + " % (" +
+                                  nees_text(family.nees, family.widened_nees) + ")"));
       }
       table.rows.push_back(std::move(row));
     }
   }
   if (table.rows.empty()) return;
   table.caption =
-      "Calibration by " + label + ": rmse at the end / prior sigma (NEES; 1 is consistent)";
+      "Calibration by " + label + ": rmse at the end / prior sigma (NEES" + kWidened + ")";
   section.blocks.emplace_back(std::move(table));
 }
 
@@ -221,8 +221,8 @@ void add_calibration_by(const ExperimentResult& result, const std::string& label
 void add_calibration_table(const ExperimentResult& result, const Group& all, Section& section) {
   Table table;
   table.caption =
-      "Calibration at the end: root mean square error over the runs, in brackets the mean "
-      "normalised squared error (1 is consistent)";
+      std::string("Calibration at the end: root mean square error over the runs (NEES") + kWidened +
+      ")";
   table.columns = {{"parameter"}, {"prior sigma"}};
   std::vector<std::string> names;
   std::vector<std::vector<CalibrationStatistics>> columns;
@@ -254,8 +254,8 @@ void add_calibration_table(const ExperimentResult& result, const Group& all, Sec
         row[0] = unbroken(report::with_unit(parameter, unit->name));
         row[1] = rounded(unit->scale * c->prior_sigma);
       }
-      row.emplace_back(
-          unbroken(compact(unit->scale * c->rmse, 3) + " (" + compact(c->nees, 2) + ")"));
+      row.emplace_back(unbroken(compact(unit->scale * c->rmse, 3) + " (" +
+                                nees_text(c->nees, c->widened_nees) + ")"));
     }
     table.rows.push_back(std::move(row));
   }

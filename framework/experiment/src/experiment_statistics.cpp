@@ -113,11 +113,13 @@ std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult
           std::find_if(all.begin(), all.end(), [&](const auto& c) { return c.name == track.name; });
       if (at == all.end()) at = all.insert(all.end(), {track.name});
       const double e = track.final_error, sigma = track.sigma.back();
+      const double normalised = e * e / (sigma * sigma);
       ++at->runs;
       at->rmse += e * e;
       at->mean_sigma += sigma;
       at->prior_sigma += track.sigma.front();
-      at->nees += e * e / (sigma * sigma);
+      at->nees += normalised;
+      at->widened_nees += normalised / (track.scatter * track.scatter);
     }
   }
   for (CalibrationStatistics& c : all) {
@@ -125,6 +127,7 @@ std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult
     c.mean_sigma /= c.runs;
     c.prior_sigma /= c.runs;
     c.nees /= c.runs;
+    c.widened_nees /= c.runs;
   }
   return all;
 }
@@ -155,11 +158,13 @@ std::vector<CalibrationFamily> calibration_families(const ExperimentResult& resu
     }
     families[i].left += c.rmse * c.rmse / (c.prior_sigma * c.prior_sigma);
     families[i].nees += c.nees;
+    families[i].widened_nees += c.widened_nees;
     ++counts[i];
   }
   for (std::size_t i = 0; i < families.size(); ++i) {
     families[i].left = std::sqrt(families[i].left / counts[i]);
     families[i].nees /= counts[i];
+    families[i].widened_nees /= counts[i];
   }
   return families;
 }
@@ -168,6 +173,10 @@ std::string compact(double value, int digits) {
   const double size = std::abs(value);
   const bool whole = size >= std::pow(10., digits) && size < 1e6;
   return whole ? std::to_string(std::llround(value)) : significant(value, digits);
+}
+
+std::string nees_text(double nees, double widened_nees) {
+  return compact(nees, 2) + (widened_nees < nees ? " / " + compact(widened_nees, 2) : "");
 }
 
 RealtimeFactors realtime_factors(const ExperimentResult& result) {

@@ -57,7 +57,8 @@ struct CalibrationStatistics {
   std::string name;
   int runs = 0;
   double rmse = 0., mean_sigma = 0., prior_sigma = 0.;
-  double nees = 0.;  ///< mean squared normalised error
+  double nees = 0.;          ///< mean squared normalised error
+  double widened_nees = 0.;  ///< likewise, by sigmas times their scatter (F-42)
 };
 std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,
                                                           std::size_t variant, const Group& group);
@@ -65,18 +66,25 @@ std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult
 /// Parameters of one kind, "r" for r_1, r_2, ..., together.
 struct CalibrationFamily {
   std::string name;
-  double left = 0.;  ///< root mean square of rmse / prior sigma
-  double nees = 0.;  ///< mean
+  double left = 0.;                     ///< root mean square of rmse / prior sigma
+  double nees = 0., widened_nees = 0.;  ///< means
 };
 std::vector<CalibrationFamily> calibration_families(const ExperimentResult& result,
                                                     std::size_t variant, const Group& group);
 
+/// A number for a table: `digits` significant digits, and whole from there up to a million.
+std::string compact(double value, int digits);
+
+/// What nees_text() says, for captions.
+inline constexpr const char* kWidened =
+    ", 1 is consistent; behind a slash that of sigmas times their scatter";
+
+/// "2.4"; "54 / 2.3" where sigmas that are widened by their scatter make it smaller.
+std::string nees_text(double nees, double widened_nees);
+
 /// Whether a run of the filter estimated this parameter of its own, and still had a variance at
 /// its end.
 bool is_estimated(const RunResult& run, const CalibrationTrack& track);
-
-/// A number for a table: `digits` significant digits, and whole from there up to a million.
-std::string compact(double value, int digits);
 
 /// How many seconds of the robot's time pass in one second.
 struct RealtimeFactors {

@@ -98,6 +98,21 @@ TEST_F(Summary, HasEveryMetricInEveryPlaceAlsoOfARunThatWasTakenOver) {
   }
 }
 
+/// Mean of (2 / 1)^2 and (6 / 1)^2; of (2 / 1)^2 and (6 / 4)^2.
+TEST_F(Summary, SaysWhatErrorsOfCalibrationAreBySigmasThatAreWidenedByTheirScatter) {
+  ExperimentResult result = with_errors({1., 2.});
+  for (std::size_t i = 0; i < 2; ++i) {
+    RunResult& run = result.runs[i].result;
+    run.updates = {{"parity", {8, 9}, {}, {}, {}}};
+    run.calibration = {{"r_1", "m", {0., 0.}, {10., 1.}, 0., i == 0 ? 2. : 6., i == 0 ? 1. : 4.}};
+  }
+  const auto r = summary_of(result)["variants"]["a"]["calibration"]["r_1"];
+  EXPECT_DOUBLE_EQ(r["nees"], 20.);
+  EXPECT_DOUBLE_EQ(r["widened_nees"], 3.125);
+  EXPECT_THAT(describe(result), HasSubstr("44.7 (20 / 3.1)"));
+  EXPECT_THAT(text_of(folder_ / "out" / "report.html"), HasSubstr("(20\u00a0/\u00a03.1)"));
+}
+
 TEST_F(Summary, PairsTheRunsOfOneRecordingAndSeed) {
   // b - a: 1, 2, 3 and nothing for the last pair; t(0.975, 2) = 4.302653.
   ExperimentResult result = with_errors({1., 2., 3., 6., 2., 4., 6., kNan});
