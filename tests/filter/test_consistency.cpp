@@ -52,8 +52,14 @@ TEST(FilterConsistency, PoseIsConsistentWhileAllOfTheCalibrationIsFound) {
   EXPECT_EQ(inconsistency(testing::paper_runs("bad_init_calib_on", kSeeds, kTwentySeconds)), "");
 }
 
+/// The floors of an interval are ten times the noise of these wheels: where nothing else is unknown
+/// of them, the mean NEES is 4.3 with them, and 6.0 with a tenth of them (60 and 40 seeds).
 TEST(FilterConsistency, PoseIsConsistentWithTheTrueCalibrationHeld) {
-  EXPECT_EQ(inconsistency(testing::paper_runs("true_init_calib_off", kSeeds, kTwentySeconds)), "");
+  EXPECT_EQ(inconsistency(
+                testing::paper_runs("true_init_calib_off", kSeeds,
+                                    with({"updates.wheel_odometry.sigma_floor_yaw_rad=3e-6",
+                                          "updates.wheel_odometry.sigma_floor_position_m=3e-6"}))),
+            "");
 }
 
 TEST(FilterConsistency, CheckSeesPixelsThatAreTwiceAsNoisyAsTheFilterThinks) {

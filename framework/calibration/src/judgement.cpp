@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <boost/math/distributions/students_t.hpp>
+
 #include "recording_name.hpp"
 #include "segment_choice.hpp"
 #include "viwo/math/significant.hpp"
@@ -16,8 +18,6 @@ namespace {
 constexpr double kStrange = 3., kUnbelievable = 5.;
 /// A solution of the search is the only one when every other is worse by this factor.
 constexpr double kOnlyOne = 1.2;
-/// Sigmas by which estimates of two lengths of segments may differ.
-constexpr double kSameEstimate = 3.;
 /// Sigmas of the model that the wheels may contradict each other by.
 constexpr double kQuiet = 3.;
 
@@ -262,7 +262,9 @@ void judge_lengths(CalibrationResult& result) {
         which = i;
       }
     }
-    if (most < kSameEstimate) continue;
+    const int spare = other.residuals - (other.unknowns - other.parity_directions);
+    const int compared = static_cast<int>((other.sigma.array() > 0.).count());
+    if (!other.has_enough_residuals() || most < most_by_chance(spare, compared)) continue;
     result.warnings.push_back("the estimate depends on what is compared: with " +
                               segments_text(other) + " " + specs[which].name + " differs by " +
                               significant(most, 2) + " sigmas from that with " +
@@ -271,6 +273,13 @@ void judge_lengths(CalibrationResult& result) {
 }
 
 }  // namespace
+
+double most_by_chance(int spare_residuals, int estimates) {
+  constexpr double kProbability = 0.0027;  // three sigmas of one that is normal
+  const boost::math::students_t distribution(std::max(1, spare_residuals));
+  return boost::math::quantile(
+      boost::math::complement(distribution, 0.5 * kProbability / std::max(1, estimates)));
+}
 
 void judge(CalibrationResult& result) {
   const CalibrationEstimate& all = result.all;

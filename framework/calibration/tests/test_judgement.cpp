@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "joint_search.hpp"
+#include "judgement.hpp"
 #include "unknown_swerve.hpp"
 
 namespace viwo {
@@ -118,6 +119,13 @@ TEST(Judgement, KnowsNoSideOfADriveThatDoesNotTurn) {
         "type: differential, baseline_m: 0.3, " + kRight, seed, "straight");
     EXPECT_THAT(calibrate(two).doubts, Not(Contains(HasSubstr("turns")))) << seed;
   }
+}
+
+TEST(Judgement, OfFewResidualsKnowsItsSigmasRoughly) {
+  EXPECT_NEAR(most_by_chance(1000000, 1), 3., 1e-3);
+  EXPECT_NEAR(most_by_chance(2, 1), 19.2, 0.1);  // tables of Student's t
+  EXPECT_NEAR(most_by_chance(8, 1), 4.28, 0.02);
+  EXPECT_GT(most_by_chance(8, 10), 5.);
 }
 
 }  // namespace

@@ -30,7 +30,10 @@ json metrics_json(const ExperimentResult& result, std::size_t variant, const Gro
 
 json counts_json(const ExperimentResult& result, std::size_t variant, const Group& group) {
   const RunCounts counts = counts_of(result, variant, group);
-  return {{"runs", counts.runs}, {"diverged", counts.diverged}, {"failed", counts.failed}};
+  return {{"runs", counts.runs},
+          {"diverged", counts.diverged},
+          {"failed", counts.failed},
+          {"doubtful", counts.doubtful}};
 }
 
 json paired_json(const ExperimentResult& result, const Group& group) {

@@ -69,7 +69,7 @@ Table means_table(const ExperimentResult& result, const Group& group) {
   Table table;
   table.caption =
       group.label.empty() ? "Mean over all runs" : "Mean over " + group.label + " " + group.value;
-  table.columns = {{"variant"}, {"runs"}, {"not ok"}};
+  table.columns = {{"variant"}, {"runs"}, {"not ok"}, {"doubtful"}};
   const auto metrics = metrics_of(result);
   for (const Metric& metric : metrics) {
     table.columns.push_back({metric.heading, kThreeDigits,
@@ -77,7 +77,8 @@ Table means_table(const ExperimentResult& result, const Group& group) {
   }
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
     const RunCounts counts = counts_of(result, v, group);
-    std::vector<Cell> row{result.setup.variants[v].name, counts.runs, counts.not_ok()};
+    std::vector<Cell> row{result.setup.variants[v].name, counts.runs, counts.not_ok(),
+                          counts.doubtful};
     for (const Metric& metric : metrics) {
       row.emplace_back(metric.table_scale * eval::mean(values_of(result, v, metric, group)));
     }

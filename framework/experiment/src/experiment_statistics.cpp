@@ -72,6 +72,7 @@ RunCounts counts_of(const ExperimentResult& result, std::size_t variant, const G
     ++counts.runs;
     counts.diverged += run.result.status == RunStatus::kDiverged;
     counts.failed += run.result.status == RunStatus::kFailed;
+    counts.doubtful += run.result.status == RunStatus::kOk && !is_trusted(run.result);
   }
   return counts;
 }

@@ -40,7 +40,7 @@ std::vector<double> values_of(const ExperimentResult& result, std::size_t varian
                               const Metric& metric, const Group& group);
 
 struct RunCounts {
-  int runs = 0, diverged = 0, failed = 0;
+  int runs = 0, diverged = 0, failed = 0, doubtful = 0;
   int not_ok() const { return diverged + failed; }
 };
 RunCounts counts_of(const ExperimentResult& result, std::size_t variant, const Group& group);

@@ -25,12 +25,13 @@ void add_means(const ExperimentResult& result, const Group& group, std::ostream&
   width = std::max(width, group.value.size());
   const auto metrics = metrics_of(result);
   const auto column = [](const Metric& m) { return std::max<std::size_t>(14, m.heading.size()); };
-  out << "\n" << padded(group.value, width) << right("not ok", 6);
+  out << "\n" << padded(group.value, width) << right("not ok", 6) << right("doubtful", 8);
   for (const Metric& metric : metrics) out << right(metric.heading, column(metric));
   out << "\n";
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
-    out << padded(result.setup.variants[v].name, width)
-        << right(std::to_string(counts_of(result, v, group).not_ok()), 6);
+    const RunCounts counts = counts_of(result, v, group);
+    out << padded(result.setup.variants[v].name, width) << right(std::to_string(counts.not_ok()), 6)
+        << right(std::to_string(counts.doubtful), 8);
     for (const Metric& metric : metrics) {
       const double mean = eval::mean(values_of(result, v, metric, group));
       out << right(compact(metric.table_scale * mean, 4), column(metric));

@@ -113,6 +113,15 @@ TEST_F(Summary, SaysWhatErrorsOfCalibrationAreBySigmasThatAreWidenedByTheirScatt
   EXPECT_THAT(text_of(folder_ / "out" / "report.html"), HasSubstr("(20\u00a0/\u00a03.1)"));
 }
 
+TEST_F(Summary, CountsRunsThatAreNotToBeTrusted) {
+  ExperimentResult result = with_errors({1., 2., kNan, 4.});
+  result.runs[1].result.doubts = {"the reference contradicts the estimate"};
+  const auto a = summary_of(result)["variants"]["a"];
+  EXPECT_EQ(a["diverged"], 1);
+  EXPECT_EQ(a["doubtful"], 1);
+  EXPECT_THAT(describe(result), HasSubstr("\na              1         1 "));
+}
+
 TEST_F(Summary, PairsTheRunsOfOneRecordingAndSeed) {
   // b - a: 1, 2, 3 and nothing for the last pair; t(0.975, 2) = 4.302653.
   ExperimentResult result = with_errors({1., 2., 3., 6., 2., 4., 6., kNan});

@@ -272,6 +272,13 @@ void check_overlap(const Recording& recording, Findings& out) {
     all.add(stamps);
     if (moves_the_estimate(stamps)) moving.add(stamps);
   }
+  if (all.latest == nullptr && !recording.stamps.empty()) {
+    out.push_back({"recording",
+                   Severity::kFault,
+                   "overlap",
+                   "no sensor gives " + std::to_string(kFewestStamps) + " samples: nothing shows",
+                   {}});
+  }
   if (all.latest == nullptr || recording.stamps.size() < 2) return;
   const std::vector<Figure> figures = {{"in common", all.common_s(), "s"},
                                        {"shortest", all.shortest_s, "s"},

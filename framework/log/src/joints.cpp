@@ -111,8 +111,8 @@ void JointParams::bind(ParamBinder& b) {
          "of the log, in its order; [] leaves everything as it is"});
   b(VIWO_PARAM(drive_turn),
     {.min = 0.,
-     .help = "angles: after how much a drive reading begins anew (360, 4096, 6.2831853, before "
-             "drive_scale); 0: never"});
+     .help = "angles: after how much a drive reading begins anew (360, 4096, 6.2831853): before "
+             "drive_scale, behind drive_unit where the sensor has that; 0: never"});
   b(VIWO_PARAM(drive_channel),
     {.min = 0.,
      .max = kMaxDrives,

@@ -55,12 +55,10 @@ struct Plausibility::Checks {
     std::string imu, heading, wheels;
   };
   void add(const std::string& sensor, const Names& names, const WheelSet& set, Gyro gyro) {
-    const ModelDescription& description = set.model->description();
-    const std::string drives = "sensors." + sensor + ".drive_scale";
     wheels.push_back(
         {sensor, EncoderCheck(names.wheels, sensor, set.model, set.prior),
-         TwistCheck(names.imu, names.wheels, drives, description, set.prior, gyro),
-         TwistCheck(names.heading, names.wheels, drives, description, set.prior, Gyro::kHeading)});
+         TwistCheck(names.imu, names.wheels, sensor, set.model, set.prior, gyro),
+         TwistCheck(names.heading, names.wheels, sensor, set.model, set.prior, Gyro::kHeading)});
   }
 
   void add(WheelsCheck& check, const EncoderSample& sample) {
@@ -69,9 +67,8 @@ struct Plausibility::Checks {
       constexpr double kLeast = 0.05;  // m/s, rad/s
       moves = xi && xi->norm() > kLeast;
       if (xi) {
-        const SampleExtent extent{sample.t_ns, sample.begin_ns, sample.end_ns};
-        check.twist.add_wheels(extent, *xi, check.encoders.rate_by_prior());
-        check.heading.add_wheels(extent, *xi, check.encoders.rate_by_prior());
+        check.twist.add_wheels(sample, *xi, check.encoders.rate_by_prior());
+        check.heading.add_wheels(sample, *xi, check.encoders.rate_by_prior());
       }
     } catch (const std::exception&) {
       check.has_failed = true;
@@ -217,7 +214,7 @@ Findings implausible(const RunSetup& setup, const DeadReckoned& data, std::int64
   plausibility.finish();
   Findings findings = plausibility.findings();
   for (Finding& finding : findings) {
-    finding.is_doubt = finding.sensor() == name_of(setup, wheels, "wheels");
+    finding.is_doubt = finding.is_doubt || finding.sensor() == name_of(setup, wheels, "wheels");
   }
   return findings;
 }
@@ -310,6 +307,7 @@ void Plausibility::look(bool at_end) {
     wheels.encoders.findings(zero_ns_.value_or(0), findings_);
     // Wheels that contradict themselves say nothing of the IMU.
     if (findings_.size() != before) continue;
+    if (wheels.twist.finds_order(findings_) || wheels.heading.finds_order(findings_)) continue;
     wheels.twist.findings(checks_->imu.up(), findings_);
     wheels.heading.findings(Eigen::Vector3d::Zero(), findings_);
   }

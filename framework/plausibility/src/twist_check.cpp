@@ -33,18 +33,20 @@ auto CellMeans<kSize>::mean(std::int64_t cell) const -> std::optional<Vector> {
   return found.sum / static_cast<double>(found.covered_ns);
 }
 
-TwistCheck::TwistCheck(std::string imu, std::string wheels, std::string drives,
-                       const ModelDescription& description, const WheelsPrior& prior, Gyro gyro)
+TwistCheck::TwistCheck(std::string imu, std::string wheels, const std::string& sensor,
+                       const std::shared_ptr<const WheelModel>& model, const WheelsPrior& prior,
+                       Gyro gyro)
     : imu_(std::move(imu)),
       wheels_(std::move(wheels)),
-      drives_(std::move(drives)),
+      drives_("sensors." + sensor + ".drive_scale"),
       gyro_is_(gyro),
-      n_drive_(description.n_drive),
-      n_steer_(description.n_steer),
+      n_drive_(model->description().n_drive),
+      n_steer_(model->description().n_steer),
       R_ItoO_(prior.wheels.R_ItoO),
       p_IinO_(prior.wheels.p_IinO.head<2>()),
       t_OtoI_s_(prior.wheels.t_OtoI_s),
-      sigma_t_OtoI_s_(prior.sigma_time_offset_s) {}
+      sigma_t_OtoI_s_(prior.sigma_time_offset_s),
+      order_(wheels_, sensor, model, prior.wheels.x_WI) {}
 
 void TwistCheck::add_imu(const ImuSample& sample) {
   if (sample.fault() != nullptr || sample.t_ns < 0) return;
@@ -84,14 +86,17 @@ void TwistCheck::add_heading(const HeadingSample& sample) {
   advance();
 }
 
-void TwistCheck::add_wheels(const SampleExtent& extent, const Twist& xi,
+void TwistCheck::add_wheels(const EncoderSample& sample, const Twist& xi,
                             const Intrinsics& rate_by_prior) {
   const auto offset_ns = static_cast<std::int64_t>(std::llround(1e9 * t_OtoI_s_));
-  if (extent.begin_ns + offset_ns < 0 || !xi.allFinite()) return;
+  if (sample.begin_ns + offset_ns < 0 || !xi.allFinite()) return;
   rate_squares_ += xi[2] * xi[2];
   if (rate_products_.size() == 0) rate_products_.setZero(rate_by_prior.size());
   rate_products_ += xi[2] * rate_by_prior;
-  twist_means_.add(extent.begin_ns + offset_ns, extent.end_ns + offset_ns, xi);
+  if (!last_ && !last_heading_) return;  // nothing to be compared with, perhaps ever
+  Eigen::Matrix<double, 3 + YawOrderCheck::kMost, 1> values;
+  values << xi, order_.rates(sample);
+  twist_means_.add(sample.begin_ns + offset_ns, sample.end_ns + offset_ns, values);
   advance();
 }
 
@@ -101,9 +106,10 @@ void TwistCheck::advance() {
   next_ = std::max(next_, end - CellMeans<6>::kCells);
   for (; next_ < end; ++next_) {
     const auto imu = imu_means_.mean(next_);
-    const auto xi = twist_means_.mean(next_);
-    if (imu && xi) {
-      add_cell(*imu, *xi);
+    const auto wheels = twist_means_.mean(next_);
+    if (imu && wheels) {
+      add_cell(*imu, wheels->head<3>());
+      order_.add((*imu)[2], wheels->tail<YawOrderCheck::kMost>());
     } else {
       window_ = before_ = {};
       lag_cells_ = 0;

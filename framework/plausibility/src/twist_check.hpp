@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -12,6 +13,7 @@
 #include "viwo/api/kinematic_model.hpp"
 #include "viwo/api/rig.hpp"
 #include "viwo/plausibility/finding.hpp"
+#include "yaw_order_check.hpp"
 
 namespace viwo {
 
@@ -50,16 +52,19 @@ enum class Gyro {
 
 class TwistCheck {
  public:
-  /// What texts call gyro and wheels; `drives`: the key of the scales of the drives.
-  TwistCheck(std::string imu, std::string wheels, std::string drives,
-             const ModelDescription& description, const WheelsPrior& prior,
+  /// What texts call gyro and wheels, and what the configuration calls the sensor of the wheels.
+  TwistCheck(std::string imu, std::string wheels, const std::string& sensor,
+             const std::shared_ptr<const WheelModel>& model, const WheelsPrior& prior,
              Gyro gyro = Gyro::kMounted);
 
   void add_imu(const ImuSample& sample);
   void add_heading(const HeadingSample& sample);
-  /// `xi`: twist of O over the time of a sample of the wheels; `rate_by_prior`: by what a
-  /// prior sigma of each intrinsic changes its yaw rate.
-  void add_wheels(const SampleExtent& extent, const Twist& xi, const Intrinsics& rate_by_prior);
+  /// `xi`: twist of O over the time of the sample; `rate_by_prior`: by what a prior sigma of each
+  /// intrinsic changes its yaw rate.
+  void add_wheels(const EncoderSample& sample, const Twist& xi, const Intrinsics& rate_by_prior);
+  /// Whether the gyro says that channels are reversed or exchanged, of wheels that cannot say it of
+  /// each other.
+  bool finds_order(Findings& out) const { return order_.findings(out); }
   /// `up`: direction of the specific force in I (ImuCheck).
   void findings(const Eigen::Vector3d& up, Findings& out) const;
 
@@ -106,8 +111,10 @@ class TwistCheck {
   Eigen::Vector2d p_IinO_;
   double t_OtoI_s_, sigma_t_OtoI_s_;
 
+  YawOrderCheck order_;
   CellMeans<6> imu_means_;
-  CellMeans<3> twist_means_;
+  /// Twist, and the yaw rates that order_ wants.
+  CellMeans<3 + YawOrderCheck::kMost> twist_means_;
   std::optional<ImuSample> last_;
   std::optional<HeadingSample> last_heading_;
   std::int64_t next_ = 0;  ///< cell

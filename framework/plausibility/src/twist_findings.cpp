@@ -162,10 +162,14 @@ void TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
   } else if (slope < -1. / kOpposite && slope > -kOpposite) {
     find_reversed(C, out);
   } else if (std::abs(slope - 1.) > factor_tolerance() && std::abs(r) > kVeryAlike) {
-    out.push_back({key, imu_ + ": the gyro turns " + significant(slope, 3) +
-                            " times as fast as the wheels (correlation " + significant(r, 3) +
-                            "): unit or scale of the drives, radii and track of the kinematics, "
-                            "or scale of the gyro"});
+    out.push_back({key,
+                   imu_ + ": the gyro turns " + significant(slope, 3) +
+                       " times as fast as the wheels (correlation " + significant(r, 3) +
+                       "): unit or scale of the drives, radii and track of the kinematics, "
+                       "or scale of the gyro",
+                   false,
+                   {},
+                   gyro_is_ == Gyro::kLevel});
   } else {
     find_axes(C, out);
     find_lag(C(kGyro, kGyro), out);
@@ -267,6 +271,7 @@ void TwistCheck::find_reversed(const Eigen::MatrixXd& C, Findings& out) const {
                         variances[order[1]] - variances[order[0]] > 0.1 * all;
   Finding finding{imu_ + " rate",
                   imu_ + ": the gyro turns opposite to " + wheels_ + ": " + opposite()};
+  finding.is_doubt = gyro_is_ == Gyro::kLevel;
   if (is_clear) finding.text = texts[order[0]];
   if (is_clear && order[0] == 1) finding.remedies = {drives_times(-1.)};
   out.push_back(std::move(finding));
@@ -365,8 +370,8 @@ bool TwistCheck::find_lag(double rate_variance, Findings& out) const {
   if (std::abs(lag_s) < kLeastLag_s + 3. * std::hypot(sigma_t_OtoI_s_, sigma_s)) return false;
   const auto ms = [](double seconds) { return std::to_string(std::lround(1e3 * seconds)) + " ms"; };
   std::string text = wheels_ + (lag_s < 0. ? ": lags behind " : ": is ahead of ") + imu_ + " by " +
-                     ms(std::abs(lag_s)) + ", t_OtoI_s says " + ms(t_OtoI_s_);
-  if (sigma_t_OtoI_s_ > 0.) text += " +- " + ms(sigma_t_OtoI_s_);
+                     ms(std::abs(lag_s)) + ", beside the " + ms(t_OtoI_s_) + " of t_OtoI_s";
+  if (sigma_t_OtoI_s_ > 0.) text += " (+- " + ms(sigma_t_OtoI_s_) + ")";
   text += " - wheels.t_OtoI_s: ";
   const std::string t_OtoI_s = significant(1e-3 * std::round(1e3 * (t_OtoI_s_ + lag_s)), 6);
   out.push_back({wheels_ + " lag", text + t_OtoI_s, false, {{"wheels.t_OtoI_s", t_OtoI_s}}});

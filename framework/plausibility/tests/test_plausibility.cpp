@@ -327,13 +327,39 @@ TEST(Plausibility, NamesTheLagOfTheWheels) {
   };
   EXPECT_THAT(late_by(100'000'000, 0.),
               ElementsAre(::testing::MatchesRegex(
-                  "wheels0: lags behind imu0 by (9[0-9]|10[0-9]) ms, t_OtoI_s says 5 ms \\+- 10 ms "
-                  "- wheels\\.t_OtoI_s: -0\\.(09[0-9]*|08[0-9]|1[0-9]*)")));
+                  "wheels0: lags behind imu0 by (9[0-9]|10[0-9]) ms, beside the 5 ms of t_OtoI_s "
+                  "\\(\\+- 10 ms\\) - wheels\\.t_OtoI_s: -0\\.(09[0-9]*|08[0-9]|1[0-9]*)")));
   // So late that the two rates are hardly alike, on a base that shakes.
   EXPECT_THAT(late_by(400'000'000, 0.1),
               ElementsAre(::testing::MatchesRegex(
-                  "wheels0: lags behind imu0 by (39[0-9]|40[0-9]) ms, t_OtoI_s says 5 ms \\+- 10 "
-                  "ms - wheels\\.t_OtoI_s: -0\\.(39[0-9]*|4)")));
+                  "wheels0: lags behind imu0 by (39[0-9]|40[0-9]) ms, beside the 5 ms of "
+                  "t_OtoI_s \\(\\+- 10 ms\\) - wheels\\.t_OtoI_s: -0\\.(39[0-9]*|4)")));
+}
+
+/// Two wheels cannot contradict each other.
+TEST(Plausibility, NamesADriveThatOnlyTheGyroKnowsIsReversed) {
+  const auto found_with = [](double left, double right) {
+    return found(robot("viwo_skid_steer"), {.wheels = [=](EncoderSample& wheels) {
+                   wheels.drive_rad_per_s[0] *= left;
+                   wheels.drive_rad_per_s[1] *= right;
+                 }});
+  };
+  EXPECT_THAT(found_with(1., -1.), ElementsAre(AllOf(HasSubstr("drive_2 turns opposite"),
+                                                     HasSubstr("variance of the gyro's rate"))));
+  EXPECT_THAT(found_with(-1., 1.), ElementsAre(HasSubstr("drive_1 turns opposite")));
+  // That may be the gyro's sign as well.
+  EXPECT_THAT(found_with(-1., -1.), ElementsAre(HasSubstr("sign of all drives")));
+}
+
+TEST(Plausibility, NamesStampsOfAnotherUnit) {
+  const auto found_with = [](std::int64_t times) {
+    return found({.wheels = [times](EncoderSample& wheels) {
+      wheels.t_ns *= times;
+      wheels.begin_ns *= times;
+      wheels.end_ns *= times;
+    }});
+  };
+  EXPECT_THAT(found_with(1000), Contains(HasSubstr("sample every 5 s: the unit of its stamps")));
 }
 
 TEST(Plausibility, NamesNoLagOfAClockThatWasSetOnTheWay) {

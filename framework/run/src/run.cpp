@@ -59,8 +59,9 @@ std::vector<std::int64_t> epoch_stamps(const RunSetup& setup, const RunData& dat
     end_ns = std::min(end_ns, data.reference.back().t_ns - offset_ns);
   }
   if (begin_ns >= end_ns) {
-    throw InputError("the encoder samples of '" + data.wheels_name +
-                     "' and the reference have no time in common");
+    throw InputError(
+        "the encoder samples of '" + data.wheels_name + "' " +
+        (data.reference.empty() ? "last no time" : "and the reference have no time in common"));
   }
   const auto period_ns = std::max<std::int64_t>(1, std::llround(setup.epoch_s * 1e9));
   // Many more epochs than samples, and more than memory is for: two clocks.

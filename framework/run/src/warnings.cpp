@@ -99,20 +99,29 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
   return lines;
 }
 
-void add_findings(const Findings& findings, RunResult& result) {
+namespace {
+
+/// The filter has found by itself that something is wrong with the configuration.
+bool is_contradicted(const RunResult& result) {
   constexpr double kContradicts = 10.;  // no guess of a noise is so bad
-  const bool is_contradicted = std::ranges::any_of(
+  return std::ranges::any_of(
       result.noises, [](const NoiseFound& noise) { return factor_of(noise) > kContradicts; });
+}
+
+}  // namespace
+
+void add_findings(const Findings& findings, RunResult& result) {
+  const bool contradicted = is_contradicted(result);
   for (const Finding& finding : findings) {
-    const bool is_doubt = finding.is_doubt || (is_contradicted && !finding.remedies.empty());
+    const bool is_doubt = finding.is_doubt || (contradicted && !finding.remedies.empty());
     (is_doubt ? result.doubts : result.warnings).push_back(finding.text);
   }
 }
 
-std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration) {
+void add_far_from_prior(RunResult& result) {
   constexpr double kFar = 5.;
-  std::vector<std::string> lines;
-  for (const CalibrationTrack& track : calibration) {
+  std::vector<std::string>& lines = is_contradicted(result) ? result.doubts : result.warnings;
+  for (const CalibrationTrack& track : result.calibration) {
     if (track.estimate.empty() || !(track.sigma.front() > 0.)) continue;
     const double sigmas =
         std::abs(track.estimate.back() - track.estimate.front()) / track.sigma.front();
@@ -122,7 +131,6 @@ std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& cal
                     significant(track.estimate.front(), 4) +
                     ": its configuration is wrong, or what is next to it");
   }
-  return lines;
 }
 
 namespace {

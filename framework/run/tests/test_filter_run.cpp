@@ -254,6 +254,18 @@ TEST(Warnings, OfSamplesAreDoubtsWhereTheFilterHasFoundTheSame) {
   EXPECT_THAT(doubts_with(50., 1000), ElementsAre("imu0: turned"));
 }
 
+TEST(Warnings, OfCalibrationFarFromItsPriorAreDoubtsWhereANoiseIsFarOffToo) {
+  RunResult result;
+  result.calibration = {{"r_1", "m", {0.1, 0.16}, {0.01, 0.01}},
+                        {"r_2", "m", {0.1, 0.14}, {0.01, 0.01}}};
+  add_far_from_prior(result);
+  EXPECT_THAT(result.doubts, IsEmpty());
+  EXPECT_THAT(result.warnings, ElementsAre(HasSubstr("r_1: 0.16 m was found, 6 prior sigmas")));
+  result.noises = {{"wheels.noise_scale", "", 1., 50., 1000}};
+  add_far_from_prior(result);
+  EXPECT_THAT(result.doubts, ElementsAre(HasSubstr("r_1: 0.16 m was found")));
+}
+
 TEST(Warnings, NameTheParametersThatScatterMost) {
   RunResult result;
   for (const auto& [name, scatter] :

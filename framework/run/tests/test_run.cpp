@@ -219,6 +219,25 @@ TEST(Run, OfWheelsThatContradictThemselvesIsDoubtful) {
               Contains(HasSubstr("they are in degrees")));
 }
 
+/// Of two wheels neither can contradict the other: the gyro of the log does.
+TEST(Run, OfWheelsThatAGyroContradictsIsDoubtful) {
+  const auto doubts = [](const std::string& assignment) {
+    const RunResult result = testing::run(resolve_placeholders(
+        load_run_configuration(testing::configuration("runs/viwo_skid_steer.yaml"),
+                               {"estimator.type=dead_reckoning", "sensors.simulator0.duration_s=30",
+                                "sensors.simulator0.features=0", assignment})));
+    EXPECT_EQ(result.status, RunStatus::kOk);
+    return result.doubts;
+  };
+  EXPECT_THAT(doubts("sensors.simulator0.drive_scale=[1, 1]"), IsEmpty());
+  EXPECT_THAT(doubts("sensors.simulator0.drive_scale=[1, -1]"),
+              Contains(HasSubstr("drive_2 turns opposite")));
+  EXPECT_THAT(doubts("sensors.simulator0.drive_scale=[-1, -1]"),
+              Contains(HasSubstr("turns opposite to")));
+  EXPECT_THAT(doubts("sensors.simulator0.drive_scale=[7, 7]"),
+              Contains(HasSubstr("unit or scale of the drives")));
+}
+
 TEST(Output, HasTheNamesThatScriptsRelyOn) {
   const auto folder = fresh_folder("run");
   RunSetup setup =

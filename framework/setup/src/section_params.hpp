@@ -279,9 +279,15 @@ struct WheelsParams {
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(sensor),
       {.help = "sensor that gives the encoder samples; needed when there are several"});
-    b(VIWO_PARAM(p_IinO_m), {.unit = "m", .help = "origin of the IMU in the odometry frame O"});
+    b(VIWO_PARAM(p_IinO_m), {.unit = "m",
+                             .min = -20.,  // more are millimetres
+                             .max = 20.,
+                             .help = "origin of the IMU in the odometry frame O"});
     b(VIWO_PARAM(rpy_ItoO_rad),
-      {.unit = "rad", .help = "roll, pitch, yaw of I in O: R_ItoO = Rz(yaw) Ry(pitch) Rx(roll)"});
+      {.unit = "rad",
+       .min = -6.2832,  // more are degrees
+       .max = 6.2832,
+       .help = "roll, pitch, yaw of I in O: R_ItoO = Rz(yaw) Ry(pitch) Rx(roll)"});
     b(VIWO_PARAM(t_OtoI_s),
       {.unit = "s", .min = -10., .max = 10., .help = "t_imu = t_wheel + t_OtoI"});
     b(VIWO_PARAM(sigma_p_IinO_m),

@@ -105,9 +105,10 @@ Status SwerveBase::inverse(const Twist& xi, const Intrinsics& x_WI, const RowVec
         Eigen::Vector2d(xi.x() - x_WI[y(j)] * xi.z(), xi.y() + x_WI[x(j)] * xi.z()) +
         contact_slip(slip, j);
     double v = u.norm();
-    // A wheel at rest keeps its direction; otherwise it turns by at most a quarter, rolling
-    // backwards where that is the shorter way.
-    if (v > 1e-9) {
+    // A wheel at rest keeps its direction, also where a spline makes it creep; otherwise it turns
+    // by at most a quarter, rolling backwards where that is the shorter way.
+    constexpr double kCreep = 1e-6;  // m/s
+    if (v > kCreep) {
       double turn =
           std::remainder(std::atan2(u.y(), u.x()) - delta(sample, x_WI, j), 2. * std::numbers::pi);
       if (std::abs(turn) > std::numbers::pi / 2. + 1e-9) {
@@ -116,7 +117,8 @@ Status SwerveBase::inverse(const Twist& xi, const Intrinsics& x_WI, const RowVec
       }
       sample.steer_rad[channel] += turn / gain(x_WI, j);
     } else {
-      v = 0.;
+      const double direction = delta(sample, x_WI, j);
+      v = u.x() * std::cos(direction) + u.y() * std::sin(direction);
     }
     sample.drive_rad_per_s[channel] = v / x_WI[r(j)];
   }

@@ -1,4 +1,5 @@
-// The intrinsics of a swerve base in another odometry frame.
+// Swerve bases: their intrinsics in another odometry frame, and how they steer.
+#include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -48,6 +49,23 @@ TEST(MoveFrame, ThereAndBackChangesNothing) {
   EXPECT_GT((x - model->nominal()).norm(), 0.1);
   model->model().move_frame(between(g, Eigen::Vector3d::Zero()), x);
   EXPECT_LT((x - model->nominal()).norm(), 1e-14);
+}
+
+/// Splines of motions that pause creep by less than a micrometre per second, in any direction.
+TEST(SwerveInverse, SteersNoWheelOfABaseThatStands) {
+  const auto model = testing::load_model(testing::swerve("four_wis_wid"));
+  EncoderSample sample;
+  testing::follow(*model, {0.5, 0.1, 0.3}, sample);
+  const auto steered = sample.steer_rad;
+  for (const Twist& creeping : {Twist(-1e-7, 3e-7, 1e-7), Twist(2e-7, -4e-7, -3e-7)}) {
+    testing::follow(*model, creeping, sample);
+    EXPECT_EQ(sample.steer_rad, steered);
+    for (int j = 0; j < sample.n_drive; ++j) {
+      EXPECT_LT(std::abs(sample.drive_rad_per_s[static_cast<std::size_t>(j)]), 1e-4);
+    }
+  }
+  testing::follow(*model, {1e-4, 2e-4, 0.}, sample);
+  EXPECT_NE(sample.steer_rad, steered);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ struct Finding {
   std::string text;                   ///< sensor, figure, most likely cause
   bool is_over = false;               ///< it was so for a while
   std::vector<Remedy> remedies = {};  ///< of a cause that a configuration can undo
-  bool is_doubt = false;              ///< no filter makes up for it
+  bool is_doubt = false;              ///< what is made of it is not to be trusted
 
   /// Whom the text begins with.
   std::string sensor() const { return text.substr(0, text.find(": ")); }

@@ -35,12 +35,13 @@ std::vector<std::string> refused_altogether(std::span<const RejectionCount> reje
 std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
                                     std::span<const NoiseFound> noises, std::int64_t begin_ns);
 
-/// What the samples say against the configuration: doubts, where the filter has found by itself
-/// that something is wrong with it.
+/// What the samples say against the configuration: doubts, where the filter has found a noise far
+/// above what is configured.
 void add_findings(const Findings& findings, RunResult& result);
 
-/// Warnings of calibration that has gone where its prior does not reach.
-std::vector<std::string> far_from_prior(const std::vector<CalibrationTrack>& calibration);
+/// Calibration that has gone where its prior does not reach: doubts where a noise, too, is far
+/// above what is configured, else warnings.
+void add_far_from_prior(RunResult& result);
 /// Of a calibration that is much surer than it ought to be, one line.
 std::vector<std::string> too_sure(const RunResult& result);
 

@@ -1,0 +1,55 @@
+#include "viwo/plausibility/yaw_order.hpp"
+
+#include <algorithm>
+
+#include "viwo/math/significant.hpp"
+
+namespace viwo {
+
+void YawDifference::add(double gyro_rad_per_s, double wheels_rad_per_s) {
+  const double off = gyro_rad_per_s - wheels_rad_per_s;
+  n_ += 1.;
+  gyro_ += gyro_rad_per_s;
+  gyro_squares_ += gyro_rad_per_s * gyro_rad_per_s;
+  off_ += off;
+  off_squares_ += off * off;
+}
+
+double YawDifference::variance() const {
+  return n_ < 2. ? 0. : gyro_squares_ / n_ - gyro_ * gyro_ / (n_ * n_);
+}
+
+double YawDifference::part() const {
+  const double all = variance();
+  return all > 0. ? (off_squares_ / n_ - off_ * off_ / (n_ * n_)) / all : 1.;
+}
+
+std::vector<ChannelChange> changes_by_gyro(const std::shared_ptr<const WheelModel>& model,
+                                           const Intrinsics& x_WI) {
+  std::vector<ChannelChange> changes = {{}};
+  if (model->n_rows() <= 3) changes = channel_changes(model->description());
+  const auto sides = side_changes(model, x_WI);
+  changes.insert(changes.end(), sides.begin(), sides.end());
+  return changes;
+}
+
+std::size_t clear_change(std::span<const YawDifference> undone, const YawDifference& opposite) {
+  constexpr double kLeastRate = 0.05;  // rad/s
+  const auto best = std::ranges::min_element(undone, {}, &YawDifference::part);
+  if (best == undone.begin() || best->variance() < kLeastRate * kLeastRate) return 0;
+  const double least = best->part();
+  if (least > 0.1 || least > 0.1 * undone.front().part() || opposite.part() < 3. * least) return 0;
+  for (auto other = undone.begin(); other != undone.end(); ++other) {
+    if (other != best && other->part() <= 3. * least) return 0;
+  }
+  return static_cast<std::size_t>(best - undone.begin());
+}
+
+std::string text_of(const ChannelChange& change, const YawDifference& as_it_is,
+                    const YawDifference& undone) {
+  return change.text() + " (of the variance of the gyro's rate they leave " +
+         significant(100. * as_it_is.part(), 3) + " %, and " +
+         significant(100. * undone.part(), 2) + " % without that)";
+}
+
+}  // namespace viwo
