@@ -42,7 +42,7 @@ std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
   const double length_s = seconds_between(sample.begin_ns, sample.end_ns);
   if (length_s < kShortest_s || length_s > kLongest_s) {
     ++n_odd_;
-    odd_s_ = length_s;
+    odd_s_ = std::max(odd_s_, length_s);  // the first and the last are half as long
   }
   // They cost as many solutions as there are changes.
   constexpr std::int64_t kEvery = 5;

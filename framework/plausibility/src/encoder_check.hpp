@@ -58,7 +58,7 @@ class EncoderCheck {
   std::vector<StuckChannel> drives_;
   std::int64_t samples_ = 0;
   std::int64_t n_odd_ = 0;  ///< samples of a length that no encoder's has
-  double odd_s_ = 0.;       ///< the last of these lengths
+  double odd_s_ = 0.;       ///< the longest of them
   std::int64_t tried_ = 0;
   std::optional<EncoderSample> last_;
   std::int64_t beyond_turn_ = 0, too_fast_ = 0;  ///< samples with such steering angles
