@@ -262,7 +262,7 @@ void judge_lengths(CalibrationResult& result) {
         which = i;
       }
     }
-    const int spare = other.residuals - (other.unknowns - other.parity_directions);
+    const int spare = other.residuals - other.to_be_told();
     const int compared = static_cast<int>((other.sigma.array() > 0.).count());
     if (!other.has_enough_residuals() || most < most_by_chance(spare, compared)) continue;
     result.warnings.push_back("the estimate depends on what is compared: with " +
@@ -286,7 +286,7 @@ void judge(CalibrationResult& result) {
   if (!all.converged) result.doubts.push_back("the fit did not converge");
   if (!all.has_enough_residuals()) {
     result.doubts.push_back("only " + std::to_string(all.residuals) + " residuals for " +
-                            std::to_string(all.unknowns - all.parity_directions) +
+                            std::to_string(all.to_be_told()) +
                             " unknowns that the wheels among themselves do not tell: more or "
                             "longer recordings, or segments: auto");
   }

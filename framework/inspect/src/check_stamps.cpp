@@ -272,14 +272,16 @@ void check_overlap(const Recording& recording, Findings& out) {
     all.add(stamps);
     if (moves_the_estimate(stamps)) moving.add(stamps);
   }
-  if (all.latest == nullptr && !recording.stamps.empty()) {
+  if (recording.stamps.empty()) return;
+  if (all.latest == nullptr) {
     out.push_back({"recording",
                    Severity::kFault,
                    "overlap",
                    "no sensor gives " + std::to_string(kFewestStamps) + " samples: nothing shows",
                    {}});
+    return;
   }
-  if (all.latest == nullptr || recording.stamps.size() < 2) return;
+  if (recording.stamps.size() < 2) return;
   const std::vector<Figure> figures = {{"in common", all.common_s(), "s"},
                                        {"shortest", all.shortest_s, "s"},
                                        {"longest", all.longest_s, "s"}};

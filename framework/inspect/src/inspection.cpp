@@ -4,6 +4,7 @@
 #include <array>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include "checks.hpp"
 #include "plots.hpp"
@@ -70,6 +71,8 @@ constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
 /// What no noise is the remedy of.
 constexpr std::array<std::string_view, 4> kNoNoise = {"contradicted", "parity", "speed", "heading"};
 constexpr std::array<std::string_view, 5> kImuCauses = {"gravity", "rate", "up", "tilt", "channel"};
+/// Of Plausibility: by check_wheel_clocks(), check_yaw_order() and check_stamps().
+constexpr std::array<std::string_view, 3> kToldWithMore = {"lag", "yaw order", "interval"};
 bool is_one_of(const std::string& check, Checks checks) {
   return std::find(checks.begin(), checks.end(), check) != checks.end();
 }
@@ -186,11 +189,9 @@ Inspection inspect(RunSetup& setup) {
   check_camera_clocks(recording, findings);
   check_poses(recording, findings);
   for (const viwo::Finding& found : recording.implausible) {
-    // Told with more figures by check_wheel_clocks(), check_yaw_order() and check_stamps().
-    const bool is_told = found.key.ends_with(" lag") || found.key.ends_with(" yaw order") ||
-                         found.key.ends_with(" interval");
-    if (!is_told && !is_of_unread(recording, found)) {
-      findings.push_back(of_plausibility(found));
+    Finding finding = of_plausibility(found);
+    if (!is_one_of(finding.check, kToldWithMore) && !is_of_unread(recording, found)) {
+      findings.push_back(std::move(finding));
     }
   }
   for (Finding& finding : findings) {

@@ -95,7 +95,7 @@ void TwistCheck::add_wheels(const EncoderSample& sample, const Twist& xi,
   rate_products_ += xi[2] * rate_by_prior;
   if (!last_ && !last_heading_) return;  // nothing to be compared with, perhaps ever
   Eigen::Matrix<double, 3 + YawOrderCheck::kMost, 1> values;
-  values << xi, order_.rates(sample);
+  values << xi, order_.rates(sample, xi[2]);
   twist_means_.add(sample.begin_ns + offset_ns, sample.end_ns + offset_ns, values);
   advance();
 }

@@ -8,7 +8,7 @@ namespace viwo {
 
 void YawDifference::add(double gyro_rad_per_s, double wheels_rad_per_s) {
   const double off = gyro_rad_per_s - wheels_rad_per_s;
-  n_ += 1.;
+  ++n_;
   gyro_ += gyro_rad_per_s;
   gyro_squares_ += gyro_rad_per_s * gyro_rad_per_s;
   off_ += off;
@@ -16,12 +16,13 @@ void YawDifference::add(double gyro_rad_per_s, double wheels_rad_per_s) {
 }
 
 double YawDifference::variance() const {
-  return n_ < 2. ? 0. : gyro_squares_ / n_ - gyro_ * gyro_ / (n_ * n_);
+  const double n = n_;
+  return n_ < 2 ? 0. : gyro_squares_ / n - gyro_ * gyro_ / (n * n);
 }
 
 double YawDifference::part() const {
-  const double all = variance();
-  return all > 0. ? (off_squares_ / n_ - off_ * off_ / (n_ * n_)) / all : 1.;
+  const double n = n_, all = variance();
+  return all > 0. ? (off_squares_ / n - off_ * off_ / (n * n)) / all : 1.;
 }
 
 std::vector<ChannelChange> changes_by_gyro(const std::shared_ptr<const WheelModel>& model,

@@ -17,10 +17,10 @@ YawOrderCheck::YawOrderCheck(std::string name, std::string sensor,
   undone_.resize(changes_.size());
 }
 
-YawOrderCheck::Rates YawOrderCheck::rates(const EncoderSample& sample) {
+YawOrderCheck::Rates YawOrderCheck::rates(const EncoderSample& sample, double as_it_is) {
   Rates rates = Rates::Zero();
-  if (changes_.size() == 1) return rates;  // nothing to choose from
-  for (std::size_t i = 0; i < changes_.size(); ++i) {
+  rates[0] = as_it_is;
+  for (std::size_t i = 1; i < changes_.size(); ++i) {
     EncoderSample changed = sample;
     changes_[i].undo(changed);
     const bool is_told =
@@ -32,17 +32,16 @@ YawOrderCheck::Rates YawOrderCheck::rates(const EncoderSample& sample) {
 }
 
 void YawOrderCheck::add(double gyro_rad_per_s, const Rates& wheels_rad_per_s) {
-  if (changes_.size() == 1 || !wheels_rad_per_s.allFinite()) return;
+  if (!wheels_rad_per_s.allFinite()) return;
   for (std::size_t i = 0; i < undone_.size(); ++i) {
     undone_[i].add(gyro_rad_per_s, wheels_rad_per_s[static_cast<Eigen::Index>(i)]);
   }
   opposite_.add(gyro_rad_per_s, -wheels_rad_per_s[0]);
-  ++n_;
 }
 
 bool YawOrderCheck::findings(Findings& out) const {
-  constexpr int kFewest = 400;
-  if (n_ < kFewest) return false;
+  constexpr int kFewest = 400;  // 8 s
+  if (opposite_.count() < kFewest) return false;
   const std::size_t best = clear_change(undone_, opposite_);
   if (best == 0) return false;
   const ModelDescription& description = solver_.model().description();

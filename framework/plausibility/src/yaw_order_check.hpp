@@ -23,8 +23,9 @@ class YawOrderCheck {
   YawOrderCheck(std::string name, std::string sensor,
                 const std::shared_ptr<const WheelModel>& model, const Intrinsics& x_WI);
 
-  /// Yaw rate of a sample with each of the changes undone, rad/s; NaN: the wheels tell none.
-  Rates rates(const EncoderSample& sample);
+  /// Yaw rate of a sample with each of the changes undone, rad/s, of which `as_it_is` is known;
+  /// NaN: the wheels tell none.
+  Rates rates(const EncoderSample& sample, double as_it_is);
   /// Means over the same time.
   void add(double gyro_rad_per_s, const Rates& wheels_rad_per_s);
   /// Whether one of the changes explains what the gyro says.
@@ -37,7 +38,6 @@ class YawOrderCheck {
   std::vector<ChannelChange> changes_;  ///< the first is none
   std::vector<YawDifference> undone_;
   YawDifference opposite_;
-  int n_ = 0;
 };
 
 }  // namespace viwo

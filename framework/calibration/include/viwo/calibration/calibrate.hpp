@@ -153,8 +153,10 @@ struct CalibrationEstimate {
   bool converged = false;
   std::vector<UndeterminedDirection> undetermined;
 
-  /// Twice as many as there are unknowns that the parity does not tell.
-  bool has_enough_residuals() const { return residuals >= 2 * (unknowns - parity_directions); }
+  /// Unknowns that the parity does not tell.
+  int to_be_told() const { return unknowns - parity_directions; }
+  /// Twice as many as those.
+  bool has_enough_residuals() const { return residuals >= 2 * to_be_told(); }
 };
 
 /// Where a fit begins, and what is known of it: centre and sigmas of the prior.

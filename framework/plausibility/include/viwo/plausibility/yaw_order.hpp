@@ -17,13 +17,15 @@ namespace viwo {
 class YawDifference {
  public:
   void add(double gyro_rad_per_s, double wheels_rad_per_s);
+  int count() const { return n_; }
   /// Of the gyro's rate, (rad/s)^2.
   double variance() const;
   /// What the wheels leave of it; 1 where nothing is to be compared.
   double part() const;
 
  private:
-  double n_ = 0., gyro_ = 0., gyro_squares_ = 0., off_ = 0., off_squares_ = 0.;
+  int n_ = 0;
+  double gyro_ = 0., gyro_squares_ = 0., off_ = 0., off_squares_ = 0.;
 };
 
 /// What wheels cannot say among themselves: with more than three rows, whole sides alone. The first
