@@ -21,8 +21,11 @@ constexpr double kErrorProbability = 0.001;
 const std::vector<double> kInstants{5., 10., 15., 19.5};
 const std::vector<std::string> kTwentySeconds{"sensors.simulator0.duration_s=20"};
 
+enum class MayBeModest { kNo, kYes };
+
 /// Empty when the pose is consistent at all instants, else what is not.
-std::string inconsistency(const std::vector<RunResult>& runs) {
+std::string inconsistency(const std::vector<RunResult>& runs,
+                          MayBeModest modest = MayBeModest::kNo) {
   std::ostringstream out;
   const int n = static_cast<int>(runs.size());
   const auto bounds =
@@ -36,7 +39,7 @@ std::string inconsistency(const std::vector<RunResult>& runs) {
       if (at == series.end()) return "a run ended early: " + run.cause;
       mean += at->second / n;
     }
-    if (mean > bounds.low && mean < bounds.high) continue;
+    if ((modest == MayBeModest::kYes || mean > bounds.low) && mean < bounds.high) continue;
     out << "at " << instant << " s: mean NEES " << mean << " outside of " << bounds.low << " .. "
         << bounds.high << "\n";
   }
@@ -50,6 +53,12 @@ std::vector<std::string> with(std::vector<std::string> more) {
 
 TEST(FilterConsistency, PoseIsConsistentWhileAllOfTheCalibrationIsFound) {
   EXPECT_EQ(inconsistency(testing::paper_runs("bad_init_calib_on", kSeeds, kTwentySeconds)), "");
+}
+
+TEST(FilterConsistency, PoseIsNotTooSureWithTheTrueCalibrationHeld) {
+  EXPECT_EQ(inconsistency(testing::paper_runs("true_init_calib_off", kSeeds, kTwentySeconds),
+                          MayBeModest::kYes),
+            "");
 }
 
 /// The floors of an interval are ten times the noise of these wheels: where nothing else is unknown
