@@ -67,7 +67,8 @@ struct Params : WheelParams, log::ImuUnitParams, log::PoseUnitParams, log::Limit
            "poses of the robot on the field: one entry (Pose2d, Pose3d, numbers x, y, yaw or x, "
            "y, z, qw, qx, qy, qz), or three of numbers x, y, yaw"});
     b(VIWO_PARAM(heading_entry),
-      {.help = "how the robot is turned by its gyro: a number (yaw_unit) or Rotation2d"});
+      {.help = "how the robot is turned by its gyro: a number (yaw_unit), Rotation2d or "
+               "Rotation3d"});
     b(VIWO_PARAM(heading_scale), {.help = "-1 for a gyro that counts clockwise"});
     PoseUnitParams::bind(b);
     log::LimitParams::bind(b);

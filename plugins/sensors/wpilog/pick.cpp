@@ -37,10 +37,10 @@ std::optional<Field> primitive(const std::string& base) {
 }
 
 /// The fields at these paths; nothing when one is missing.
-std::optional<Pick> pick_fields(const Type& type, std::initializer_list<const char*> paths,
+std::optional<Pick> pick_fields(const Type& type, std::initializer_list<std::string> paths,
                                 const Schemas& schemas) {
   Pick pick{{}, schemas.layout(type.base).size, type.many()};
-  for (const char* path : paths) {
+  for (const std::string& path : paths) {
     const auto field = schemas.find(type.base, path);
     if (!field) return std::nullopt;
     pick.fields.push_back(*field);
@@ -97,6 +97,15 @@ std::optional<Pick> pick_number(const std::string& type_text, std::string_view p
   field->offset += index * element;
   return Pick{
       {*field}, (index + 1) * element, type.is_array ? Pick::Many::kOneAndMore : Pick::Many::kOne};
+}
+
+std::optional<Pick> pick_heading(const std::string& type_text, std::string_view path,
+                                 const Schemas& schemas) {
+  if (auto number = pick_number(type_text, path, schemas)) return number;
+  const Type type(type_text);
+  if (!type.is_struct || type.is_array) return std::nullopt;
+  const std::string q = (path.empty() ? "" : std::string(path) + "/") + "q/";
+  return pick_fields(type, {q + "w", q + "x", q + "y", q + "z"}, schemas);
 }
 
 std::optional<ModulePick> pick_modules(const std::string& type_text, const Schemas& schemas) {

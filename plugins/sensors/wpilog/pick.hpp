@@ -35,6 +35,9 @@ struct ModulePick {
 /// within it, or empty. InputError for a struct whose schema is missing or wrong.
 std::optional<Pick> pick_number(const std::string& type, std::string_view path,
                                 const Schemas& schemas);
+/// The same, or the quaternion w, x, y, z of a Rotation3d.
+std::optional<Pick> pick_heading(const std::string& type, std::string_view path,
+                                 const Schemas& schemas);
 /// Swerve modules: structs with speed (or velocity) or distance, and an angle; or, of arrays of
 /// numbers, pairs of angle and speed.
 std::optional<ModulePick> pick_modules(const std::string& type, const Schemas& schemas);

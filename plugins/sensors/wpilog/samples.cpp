@@ -11,6 +11,7 @@
 #include "readings.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/log/cells.hpp"
+#include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/text.hpp"
 
 namespace viwo::wpilog {
@@ -222,17 +223,34 @@ log::ImuRecording read_imu(const Contents& contents, const Params& params) {
   return finish(contents, order, std::move(samples));
 }
 
+/// Of a quaternion w, x, y, z.
+double yaw_of(std::span<const double> q) {
+  return std::atan2(2. * (q[0] * q[3] + q[1] * q[2]), 1. - 2. * (q[2] * q[2] + q[3] * q[3]));
+}
+bool is_unit(std::span<const double> q) {
+  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  return std::abs(norm - 1.) < 1e-3;
+}
+
 log::HeadingRecording read_headings(const Contents& contents, const Params& params) {
-  const auto sources = number_sources(contents, "heading_entry", {params.heading_entry});
+  const Finder find(contents, "heading_entry", "yaw",
+                    [&](const Entry& entry, std::string_view path) {
+                      return pick_heading(entry.type, path, contents.schemas());
+                    });
+  auto [entry, pick] = find(params.heading_entry);
+  const std::vector<Source> sources = {{entry, std::move(pick)}};
   StampOrder order(params.limits());
   std::vector<HeadingSample> samples;
-  for_each_reading(
-      contents, sources, {nullptr, 0, params.max_rejected_fraction}, order,
-      [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
-        const HeadingSample heading{t_ns, params.heading_scale * params.yaw_factor() * numbers[0]};
-        if (const char* const why = heading.fault()) return order.reject(why, where);
-        if (order.accept(t_ns, where)) samples.push_back(heading);
-      });
+  for_each_reading(contents, sources, {nullptr, 0, params.max_rejected_fraction}, order,
+                   [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
+                     const bool is_number = numbers.size() == 1;
+                     const double yaw_rad =
+                         is_number ? params.yaw_factor() * numbers[0] : yaw_of(numbers);
+                     const HeadingSample heading{t_ns, params.heading_scale * yaw_rad};
+                     if (const char* const why = heading.fault()) return order.reject(why, where);
+                     if (!is_number && !is_unit(numbers)) return order.reject(log::kNotUnit, where);
+                     if (order.accept(t_ns, where)) samples.push_back(heading);
+                   });
   return finish(contents, order, std::move(samples));
 }
 

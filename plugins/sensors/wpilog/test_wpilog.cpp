@@ -192,7 +192,12 @@ TEST_F(WpiLog, AGyroOfTheYawIsAHeading) {
   out.geometry();
   out.add("/gyro", "double", 0, number(-90.));
   out.add("/turn", "struct:Rotation2d", 0, numbers({M_PI / 2.}));
-  for (const char* rest : {"/gyro, yaw_unit: deg, heading_scale: -1", "/turn"}) {
+  const double h = std::sqrt(0.5);
+  out.add("/turn3", "struct:Rotation3d", 0, numbers({h, 0., 0., h}));
+  out.add("/turn3", "struct:Rotation3d", 20 * kMs, numbers({0., 0., 0., 0.}));  // not yet known
+  out.add("/pose3", "struct:Pose3d", 0, numbers({1., 2., 3., h, 0., 0., h}));
+  for (const char* rest : {"/gyro, yaw_unit: deg, heading_scale: -1", "/turn",
+                           "/turn3, max_rejected_fraction: 0.6", "/pose3/rotation"}) {
     const auto samples =
         play_only<HeadingSample>(log(out.bytes, std::string("heading_entry: ") + rest));
     ASSERT_EQ(samples.size(), 1U) << rest;
