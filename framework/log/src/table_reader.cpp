@@ -5,8 +5,8 @@
 #include <system_error>
 #include <utility>
 
-#include "viwo/api/stamp_order.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::log {
 namespace {
@@ -184,7 +184,7 @@ std::int64_t TableReader::integer(std::size_t column) const {
 
 std::int64_t TableReader::stamp_ns(std::size_t column) const {
   const std::int64_t stamp = integer(column);
-  if (stamp < -kMaxStampNs || stamp > kMaxStampNs) {
+  if (!is_stamp(stamp)) {
     fail(column, quoted(fields_[column]) + " is no stamp in nanoseconds");
   }
   return stamp;

@@ -1,7 +1,7 @@
 #include "row_reader.hpp"
 
-#include "viwo/api/stamp_order.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::kaist {
 
@@ -27,7 +27,7 @@ void RowReader::require_size(std::size_t n) const {
 
 std::int64_t RowReader::stamp_ns(std::size_t field) const {
   const std::int64_t stamp = integer(field);
-  if (stamp < -kMaxStampNs || stamp > kMaxStampNs) {
+  if (!is_stamp(stamp)) {
     fail(field, log::quoted(fields_[field]) + " is no stamp in nanoseconds");
   }
   return stamp;
