@@ -84,6 +84,7 @@ Table means_table(const ExperimentResult& result, const Group& group) {
     }
     table.rows.push_back(std::move(row));
   }
+  for (const std::string& fewer : means_of_fewer(result, group)) table.caption += "; " + fewer;
   return table;
 }
 

@@ -77,6 +77,27 @@ RunCounts counts_of(const ExperimentResult& result, std::size_t variant, const G
   return counts;
 }
 
+std::vector<std::string> means_of_fewer(const ExperimentResult& result, const Group& group) {
+  std::vector<std::string> all;
+  const auto metrics = metrics_of(result);
+  for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
+    const auto runs = static_cast<std::size_t>(counts_of(result, v, group).runs);
+    std::map<std::size_t, std::vector<std::string>> headings;  // by how many runs have them
+    for (const Metric& metric : metrics) {
+      const std::size_t n = values_of(result, v, metric, group).size();
+      if (n > 0) headings[n].push_back(metric.heading);
+    }
+    for (const auto& [n, of] : headings) {
+      if (n == runs) continue;
+      std::string text = result.setup.variants[v].name + ": ";
+      for (const std::string& heading : of) text += (&heading == &of.front() ? "" : ", ") + heading;
+      if (of.size() == metrics.size()) text = result.setup.variants[v].name + ": all means";
+      all.push_back(text + " of " + std::to_string(n) + " of " + std::to_string(runs) + " runs");
+    }
+  }
+  return all;
+}
+
 eval::PairedDifference paired(const ExperimentResult& result, std::size_t variant,
                               const Metric& metric, const Group& group) {
   std::vector<double> values, baseline;

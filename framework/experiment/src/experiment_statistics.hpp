@@ -45,6 +45,9 @@ struct RunCounts {
 };
 RunCounts counts_of(const ExperimentResult& result, std::size_t variant, const Group& group);
 
+/// Which means are of fewer runs than there are: "drive_only: ATE of 3 of 5 runs".
+std::vector<std::string> means_of_fewer(const ExperimentResult& result, const Group& group);
+
 /// Variant minus baseline over the pairs of runs with the same recording and seed.
 eval::PairedDifference paired(const ExperimentResult& result, std::size_t variant,
                               const Metric& metric, const Group& group);

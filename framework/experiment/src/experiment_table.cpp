@@ -38,6 +38,7 @@ void add_means(const ExperimentResult& result, const Group& group, std::ostream&
     }
     out << "\n";
   }
+  for (const std::string& fewer : means_of_fewer(result, group)) out << "  " << fewer << "\n";
 }
 
 /// A row for each metric: how much more of it each variant has than the baseline.

@@ -122,6 +122,21 @@ TEST_F(Summary, CountsRunsThatAreNotToBeTrusted) {
   EXPECT_THAT(describe(result), HasSubstr("\na              1         1 "));
 }
 
+TEST_F(Summary, SaysOfHowManyRunsAMeanIsIfNotOfAll) {
+  ExperimentResult result = with_errors({1., 2., 3., 6., 1., 1., 1., kNan});
+  const auto is_told = [&](const std::string& what) {
+    write_experiment(folder_ / "out", result);
+    const bool in_table = describe(result).find(what) != std::string::npos;
+    EXPECT_EQ(text_of(folder_ / "out" / "report.html").find(what) != std::string::npos, in_table);
+    return in_table;
+  };
+  EXPECT_TRUE(is_told("b: all means of 3 of 4 runs"));
+  EXPECT_FALSE(is_told("a: all means"));
+  result.runs[0].result.nees_planar = 2.;
+  EXPECT_TRUE(is_told("a: NEES (3) of 1 of 4 runs"));
+  EXPECT_TRUE(is_told("b: end [mm], end yaw [mrad], ATE [mm], ATE [deg] of 3 of 4 runs"));
+}
+
 TEST_F(Summary, PairsTheRunsOfOneRecordingAndSeed) {
   // b - a: 1, 2, 3 and nothing for the last pair; t(0.975, 2) = 4.302653.
   ExperimentResult result = with_errors({1., 2., 3., 6., 2., 4., 6., kNan});
