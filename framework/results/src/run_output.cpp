@@ -253,6 +253,8 @@ std::string describe(const RunResult& result) {
         << significant(a.end_yaw_deg * M_PI / 180., 3) << " rad yaw over "
         << significant(a.path_length_m, 4) << " m; ATE " << significant(1e3 * a.ate_m, 4) << " mm, "
         << significant(a.ate_deg, 3) << " deg\n";
+  } else if (!result.live && result.reference.empty()) {
+    out << "no reference: accuracy unknown\n";
   }
   if (std::isfinite(result.nees.pose)) {
     out << "NEES of the pose " << significant(result.nees.pose, 3) << " (6 is consistent); epoch "
