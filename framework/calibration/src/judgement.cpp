@@ -171,6 +171,21 @@ void judge_scale(CalibrationResult& result) {
       "a distance measured with a tape (distance_m) would tell");
 }
 
+/// What turns the base as drives that are all reversed do, and drives it the other way.
+void judge_signs(CalibrationResult& result) {
+  const auto& signs = result.search.drive_signs;
+  const bool are_all = std::all_of(signs.begin(), signs.end(), [](int sign) { return sign < 0; });
+  const ReferenceKind kind = result.setup->recordings.front().motion.kind;
+  if (signs.size() < 2 || !are_all || kind == ReferenceKind::kPoses) return;
+  const bool steers = result.setup->recordings.front().setup.model->description().n_steer > 0;
+  result.warnings.push_back(
+      steers ? "all drives turn backwards, or all zeros of the steering are off by half a turn, "
+               "which a gyro cannot tell apart: see which way the wheels point"
+             : "all drives turn backwards, or those on the left and on the right are exchanged, "
+               "which a gyro cannot tell apart: turn one wheel by hand and see whose reading "
+               "changes");
+}
+
 void judge_search(CalibrationResult& result) {
   const JointSearch& search = result.search;
   if (search.drive_signs.empty() || search.other_cost > kOnlyOne * search.cost) return;
@@ -294,6 +309,7 @@ void judge(CalibrationResult& result) {
   judge_knowledge(result);
   judge_what_was_given(result);
   judge_search(result);
+  judge_signs(result);
   judge_left_over(result);
   judge_turns(result);
   judge_channels(result);

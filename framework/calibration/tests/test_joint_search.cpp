@@ -42,6 +42,19 @@ TEST(JointSearch, FindsADriveThatTurnsBackwards) {
   }
 }
 
+TEST(JointSearch, SaysWhatAllDrivesReversedMayBeAsWell) {
+  const std::string base =
+      "type: differential, radius_left_m: 0.05, radius_right_m: 0.05, baseline_m: 0.3";
+  CalibrationSetup setup = gyro_setup(base, base, 1);
+  setup.options.find_drive_signs = true;
+  const auto exchanged = ::testing::Contains(::testing::HasSubstr("right are exchanged"));
+  EXPECT_THAT(calibrate(setup).warnings, ::testing::Not(exchanged));
+  reverse_drives(setup, {-1, -1});
+  const auto result = calibrate(setup);
+  EXPECT_THAT(result.search.drive_signs, ::testing::ElementsAre(-1, -1));
+  EXPECT_THAT(result.warnings, exchanged);
+}
+
 TEST(JointSearch, SaysThatADriveWithoutTurnsTellsNoZeros) {
   CalibrationSetup setup = unknown_swerve(1, "straight");
   setup.options.find_steering_zeros = true;
