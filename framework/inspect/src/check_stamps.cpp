@@ -7,6 +7,7 @@
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/plausibility/periods.hpp"
 
 namespace viwo::inspect {
 
@@ -81,20 +82,21 @@ Interval check_interval(const Recording& recording, const Stamps& stamps, double
     return {"a run takes none of it, for " + key + " says " + ms(setup.reference_max_gap_s),
             {{key, significant(kGapPeriods * period_s, 2)}}};
   }
-  constexpr double kShortest_s = 25e-6;  // the fastest gyros give 32 kHz
-  if (period_s < kShortest_s) {
+  const bool is_wheels = *stamps.type == sample_type<EncoderSample>();
+  const bool is_bridged = is_wheels || *stamps.type == sample_type<ImuSample>();
+  const std::string key = "sensors." + stamps.sensor + ".max_gap_s";
+  const config::Node* longest = setup.resolved.at_path(key);
+  if (is_bridged && longest != nullptr && period_s > std::stod(longest->scalar())) {
+    return {"a run takes each interval of " + ms(period_s) + " for a gap (" + key + ": " +
+                longest->scalar() + "): the unit of its stamps is another one (time_unit)?",
+            {}};
+  }
+  if (period_s < kShortestPeriod_s || (is_wheels && period_s > kLongestEncoderPeriod_s)) {
     return {"no sensor of a robot gives a sample every " + ms(period_s) +
                 ": the unit of its stamps is another one (time_unit)",
             {}};
   }
-  const bool is_bridged =
-      *stamps.type == sample_type<EncoderSample>() || *stamps.type == sample_type<ImuSample>();
-  const std::string key = "sensors." + stamps.sensor + ".max_gap_s";
-  const config::Node* longest = setup.resolved.at_path(key);
-  if (!is_bridged || longest == nullptr || period_s <= std::stod(longest->scalar())) return {};
-  return {"a run takes each interval of " + ms(period_s) + " for a gap (" + key + ": " +
-              longest->scalar() + "): the unit of its stamps is another one (time_unit)?",
-          {}};
+  return {};
 }
 
 std::string label_of(const Recording& recording, const Stamps& stamps) {

@@ -72,7 +72,7 @@ constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
 constexpr std::array<std::string_view, 4> kNoNoise = {"contradicted", "parity", "speed", "heading"};
 constexpr std::array<std::string_view, 5> kImuCauses = {"gravity", "rate", "up", "tilt", "channel"};
 /// Of Plausibility: by check_wheel_clocks(), check_yaw_order() and check_stamps().
-constexpr std::array<std::string_view, 3> kToldWithMore = {"lag", "yaw order", "interval"};
+constexpr std::array<std::string_view, 3> kToldWithMore = {"lag", "yaw order", "unit"};
 bool is_one_of(const std::string& check, Checks checks) {
   return std::find(checks.begin(), checks.end(), check) != checks.end();
 }
@@ -153,6 +153,14 @@ void give_to_channels(const config::Node& configuration, Remedy& remedy) {
   remedy.value = "[" + list + "]";
 }
 
+/// A sensor that knows of units takes what it reads for the other one of two; for those that do
+/// not the texts say what to multiply by.
+bool is_other_unit(const config::Node& configuration, const Remedy& remedy) {
+  const config::Node* const there = configuration.at_path(remedy.key);
+  const std::string other = remedy.value == "deg" ? "rad" : remedy.value == "g" ? "m_per_s2" : "g";
+  return there != nullptr && there->is_scalar() && there->scalar() == other;
+}
+
 }  // namespace
 
 const char* name(Severity severity) {
@@ -196,6 +204,9 @@ Inspection inspect(RunSetup& setup) {
   }
   for (Finding& finding : findings) {
     for (Remedy& remedy : finding.remedies) give_to_channels(setup.resolved, remedy);
+    std::erase_if(finding.remedies, [&](const Remedy& remedy) {
+      return remedy.key.ends_with("_unit") && !is_other_unit(setup.resolved, remedy);
+    });
   }
   demote_consequences(recording, findings);
   std::vector<std::string> sensors;

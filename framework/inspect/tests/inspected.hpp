@@ -1,6 +1,7 @@
 // Recordings to inspect: those of simulated configurations, with one thing done to their samples.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <string>
@@ -71,6 +72,10 @@ inline RunSetup changed(RunSetup setup, const Fault& fault) {
   add("states0", sample_type<StateSample>());
   testing::set_sensors(setup, sensors);
   return setup;
+}
+
+inline void scale(std::array<double, 3>& values, double factor) {
+  for (double& value : values) value *= factor;
 }
 
 inline Inspection inspected(RunSetup setup, const Fault& fault) {

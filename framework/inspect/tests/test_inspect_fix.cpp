@@ -1,5 +1,6 @@
 // What is to be written is written, and then it is well.
 #include <cstdlib>
+#include <numbers>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -89,6 +90,38 @@ TEST(FixedConfiguration, GivesScalesToTheChannelsOfTheLog) {
   EXPECT_EQ(remedy_of(finding_of(found, "wheels0", "order"), "sensors.wheels0.drive_scale"),
             "[-1, 1, 1, 1]");
   setup = read_run(setup.resolved, testing::registry());
+  const std::string text = fixed_configuration(setup, found, testing::registry());
+  setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
+  std::filesystem::remove_all(folder);
+}
+
+TEST(FixedConfiguration, WritesTheUnitsOfAnImuThatHasKeysForThem) {
+  const Fault fault = {.imu = [](ImuSample& s) {
+    scale(s.gyro_rad_per_s, 180. / std::numbers::pi);
+    scale(s.accel_m_per_s2, 1. / 9.80665);
+    return true;
+  }};
+  RunSetup without = changed(swerve(), fault);
+  const Inspection told = inspect(without);
+  for (const char* check : {"gravity", "rate"}) {
+    EXPECT_EQ(finding_of(told, "imu0", check).severity, Severity::kFault);
+    EXPECT_THAT(finding_of(told, "imu0", check).remedies, IsEmpty()) << check;
+  }
+  const auto folder = std::filesystem::temp_directory_path() / "viwo_units";
+  RunSetup faulty = changed(swerve(), fault);
+  write_log(faulty, folder);
+  config::Node run = on_log(folder);
+  config::set_path(
+      run, "sensors.imu0",
+      config::parse("{type: csv_table, path: " + (folder / "imu0" / "data.csv").string() +
+                        ", time_column: 1, time_unit: ns, gyro_columns: [2, 3, 4], "
+                        "accel_columns: [5, 6, 7]}",
+                    "test"));
+  RunSetup setup = read_run(run, testing::registry());
+  const Inspection found = inspect(setup);
+  EXPECT_EQ(remedy_of(finding_of(found, "imu0", "gravity"), "sensors.imu0.accel_unit"), "g");
+  EXPECT_EQ(remedy_of(finding_of(found, "imu0", "rate"), "sensors.imu0.gyro_unit"), "deg");
   const std::string text = fixed_configuration(setup, found, testing::registry());
   setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
   EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());

@@ -27,10 +27,6 @@ RunSetup standing(double duration_s) {
                     "sensors.simulator0.duration_s=" + std::to_string(duration_s)});
 }
 
-void scale(std::array<double, 3>& values, double factor) {
-  for (double& value : values) value *= factor;
-}
-
 TEST(InspectStamps, TellsRateAndGapsAndWhatTheFilterCannotDoWithout) {
   const Inspection clean = inspected(swerve(), {});
   EXPECT_THAT(faults_of(clean), IsEmpty());

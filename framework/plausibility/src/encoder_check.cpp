@@ -10,10 +10,10 @@
 
 namespace viwo {
 
-EncoderCheck::EncoderCheck(std::string name, std::string sensor,
-                           std::shared_ptr<const WheelModel> model, const WheelsPrior& prior)
-    : name_(std::move(name)),
-      sensor_(std::move(sensor)),
+EncoderCheck::EncoderCheck(const SensorName& wheels, std::shared_ptr<const WheelModel> model,
+                           const WheelsPrior& prior)
+    : name_(wheels.text),
+      sensor_(wheels.sensor),
       solver_(model, {}),
       sigma_WI_(prior.sigma_intrinsics),
       n_steer_(model->description().n_steer) {
@@ -38,12 +38,6 @@ std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
     drives_[i].add(rate, sample.t_ns, std::abs(rate) > kTurns);
   }
   last_ = sample;
-  constexpr double kShortest_s = 25e-6, kLongest_s = 2.;
-  const double length_s = seconds_between(sample.begin_ns, sample.end_ns);
-  if (length_s < kShortest_s || length_s > kLongest_s) {
-    ++n_odd_;
-    odd_s_ = std::max(odd_s_, length_s);  // the first and the last are half as long
-  }
   // They cost as many solutions as there are changes.
   constexpr std::int64_t kEvery = 5;
   if (samples_++ % kEvery == 0) try_changes(sample);
@@ -80,22 +74,10 @@ void EncoderCheck::try_changes(const EncoderSample& sample) {
 }
 
 void EncoderCheck::findings(std::int64_t zero_ns, Findings& out) const {
-  find_unit_of_stamps(out);
   find_stuck(zero_ns, out);
   const std::size_t before = out.size();
   find_degrees(out);
   if (out.size() == before) find_change(out);
-}
-
-void EncoderCheck::find_unit_of_stamps(Findings& out) const {
-  constexpr std::int64_t kFewest = 20;
-  if (samples_ < kFewest || 10 * n_odd_ < 9 * samples_) return;
-  out.push_back({name_ + " interval",
-                 name_ + ": no encoder gives a sample every " + significant(odd_s_, 3) +
-                     " s: the unit of its stamps is another one (time_unit)",
-                 false,
-                 {},
-                 true});
 }
 
 void EncoderCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {

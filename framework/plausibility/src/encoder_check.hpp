@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sensor_name.hpp"
 #include "stuck_channel.hpp"
 #include "viwo/api/rig.hpp"
 #include "viwo/plausibility/channel_change.hpp"
@@ -18,8 +19,7 @@ namespace viwo {
 
 class EncoderCheck {
  public:
-  /// `name` is what texts call the wheels, `sensor` what the configuration calls it.
-  EncoderCheck(std::string name, std::string sensor, std::shared_ptr<const WheelModel> model,
+  EncoderCheck(const SensorName& wheels, std::shared_ptr<const WheelModel> model,
                const WheelsPrior& prior);
 
   /// Samples in time order; the twist that they say, if they say one.
@@ -44,7 +44,6 @@ class EncoderCheck {
   std::size_t n_steer() const { return static_cast<std::size_t>(n_steer_); }
   void watch_steering(const EncoderSample& sample);
   void try_changes(const EncoderSample& sample);
-  void find_unit_of_stamps(Findings& out) const;
   void find_stuck(std::int64_t zero_ns, Findings& out) const;
   void find_degrees(Findings& out) const;
   void find_change(Findings& out) const;
@@ -57,8 +56,6 @@ class EncoderCheck {
   std::vector<Tried> changes_;  ///< the first is none
   std::vector<StuckChannel> drives_;
   std::int64_t samples_ = 0;
-  std::int64_t n_odd_ = 0;  ///< samples of a length that no encoder's has
-  double odd_s_ = 0.;       ///< the longest of them
   std::int64_t tried_ = 0;
   std::optional<EncoderSample> last_;
   std::int64_t beyond_turn_ = 0, too_fast_ = 0;  ///< samples with such steering angles

@@ -123,8 +123,13 @@ void ImuCheck::find_gravity(Findings& out) const {
                      " m/s^2 (median) where gravity is " + significant(gravity_, 3) + ": ";
   // What is left without gravity changes its direction.
   const bool has_gravity = up().norm() > 0.8;
+  std::vector<Remedy> remedies;
   if (has_gravity && std::abs(force - 1.) < 0.1) {
     text += "it is in g (multiply by 9.80665)";
+    remedies = {{unit_key_, "g"}};
+  } else if (has_gravity && std::abs(force / (kStandardGravity * kStandardGravity) - 1.) < 0.1) {
+    text += "it is in m/s^2, not in g";
+    remedies = {{unit_key_, "m_per_s2"}};
   } else if (has_gravity && std::abs(force / 1000. - 1.) < 0.1) {
     text += "it is in mg (multiply by 0.00980665)";
   } else if (!has_gravity && force < 0.5 * kStandardGravity) {
@@ -134,7 +139,7 @@ void ImuCheck::find_gravity(Findings& out) const {
   } else {
     text += "check its unit and scale, and estimator.gravity_m_per_s2";
   }
-  out.push_back({name_ + " gravity", text});
+  out.push_back({name_ + " gravity", text, false, std::move(remedies)});
 }
 
 void ImuCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {

@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "sensor_name.hpp"
 #include "stuck_channel.hpp"
 #include "viwo/api/measurement.hpp"
 #include "viwo/estimator/imu_watch.hpp"
@@ -29,8 +31,10 @@ class LogMedian {
 
 class ImuCheck {
  public:
-  ImuCheck(std::string name, double gravity_m_per_s2)
-      : name_(std::move(name)), gravity_(gravity_m_per_s2) {}
+  ImuCheck(SensorName imu, double gravity_m_per_s2)
+      : name_(std::move(imu.text)),
+        unit_key_("sensors." + imu.sensor + ".accel_unit"),
+        gravity_(gravity_m_per_s2) {}
 
   /// Readings in time order. `moves`: the wheels turn.
   void add(const ImuSample& sample, bool moves);
@@ -61,7 +65,7 @@ class ImuCheck {
   void find_saturated(Findings& out) const;
   void find_spikes(Findings& out) const;
 
-  std::string name_;
+  std::string name_, unit_key_;
   double gravity_;
   std::int64_t count_ = 0;
   std::int64_t begin_ns_ = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Geometry>
 
@@ -11,6 +12,7 @@
 #include "stream_watch.hpp"
 #include "twist_check.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/plausibility/periods.hpp"
 
 namespace viwo {
 
@@ -41,7 +43,7 @@ struct Plausibility::Checks {
   ImuCheck imu;
   std::vector<WheelsCheck> wheels;
   StereoCheck stereo;
-  std::vector<Watched> streams;  ///< the IMU's first
+  std::vector<Watched> streams;  ///< the IMU's first; without a filter only the wheels'
   bool moves = false;            ///< the wheels turn
 
   /// Nothing of what it gives is of the time of the run.
@@ -50,15 +52,14 @@ struct Plausibility::Checks {
     return std::abs(stream.ahead_s(streams.front().watch)) > kFar_s;
   }
 
-  /// What texts call them.
   struct Names {
-    std::string imu, heading, wheels;
+    SensorName imu, heading, wheels;
   };
-  void add(const std::string& sensor, const Names& names, const WheelSet& set, Gyro gyro) {
+  void add(const Names& names, const WheelSet& set, Gyro gyro) {
     wheels.push_back(
-        {sensor, EncoderCheck(names.wheels, sensor, set.model, set.prior),
-         TwistCheck(names.imu, names.wheels, sensor, set.model, set.prior, gyro),
-         TwistCheck(names.heading, names.wheels, sensor, set.model, set.prior, Gyro::kHeading)});
+        {names.wheels.sensor, EncoderCheck(names.wheels, set.model, set.prior),
+         TwistCheck(names.imu, names.wheels, set.model, set.prior, gyro),
+         TwistCheck(names.heading, names.wheels, set.model, set.prior, Gyro::kHeading)});
   }
 
   void add(WheelsCheck& check, const EncoderSample& sample) {
@@ -118,7 +119,8 @@ Finding of_another_clock(const std::string& name, double ahead_s) {
 
 }  // namespace
 
-Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
+Plausibility::Plausibility(const RunSetup& setup, bool live)
+    : live_(live), has_filter_(setup.filter.has_value()) {
   if (!setup.filter) return;
   const FilterSetup& filter = *setup.filter;
   const std::string imu = setup.routes.sensor_of(Consumer::kImu);
@@ -131,7 +133,7 @@ Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
   checks_ = std::make_unique<Checks>(
       Checks{imu,
              setup.routes.sensor_of(Consumer::kHeading),
-             ImuCheck(told(imu, "imu"), filter.options.filter.gravity_m_per_s2),
+             ImuCheck({told(imu, "imu"), imu}, filter.options.filter.gravity_m_per_s2),
              {},
              StereoCheck(filter.cameras),
              {}});
@@ -141,27 +143,34 @@ Plausibility::Plausibility(const RunSetup& setup, bool live) : live_(live) {
     if (sensor.empty()) sensor = setup.routes.sensor_of(Consumer::kWheels);
     if (sensor.empty()) continue;
     try {
-      checks_->add(sensor, {told(imu, "imu"), checks_->heading_name, told(sensor, "wheels")}, set,
-                   Gyro::kMounted);
+      checks_->add({{told(imu, "imu"), imu},
+                    {checks_->heading_name, checks_->heading_name},
+                    {told(sensor, "wheels"), sensor}},
+                   set, Gyro::kMounted);
     } catch (const std::exception&) {
       continue;
     }
   }
 }
 
-/// Of dead reckoning, which has no streams, and does not say how the IMU is mounted.
+/// Of dead reckoning, of whose streams only the unit of the wheels' stamps is looked at, at the
+/// end, and which does not say how the IMU is mounted.
 void Plausibility::watch_without_filter(const RunSetup& setup, const Eigen::Vector3d& up) {
   const std::string sensor = setup.routes.sensor_of(Consumer::kWheels);
   const std::string imu = setup.routes.sensor_of(Consumer::kImu);
   const std::string heading = setup.routes.sensor_of(Consumer::kHeading);
-  checks_ = std::make_unique<Checks>(
-      Checks{imu,
-             heading,
-             ImuCheck(name_of(setup, imu, "imu"), EstimatorOptions{}.filter.gravity_m_per_s2),
-             {},
-             StereoCheck({}),
-             {}});
+  has_filter_ = false;
+  checks_ = std::make_unique<Checks>(Checks{
+      imu,
+      heading,
+      ImuCheck({name_of(setup, imu, "imu"), imu}, EstimatorOptions{}.filter.gravity_m_per_s2),
+      {},
+      StereoCheck({}),
+      {}});
   if (!setup.model || sensor.empty()) return;
+  checks_->streams.push_back(
+      {sensor, &sample_type<EncoderSample>(),
+       StreamWatch(name_of(setup, sensor, "wheels"), 0., kLongestEncoderPeriod_s)});
   WheelSet set{setup.model, {}};
   set.prior.wheels.x_WI = setup.x_WI;
   set.prior.sigma_intrinsics = setup.sigma;
@@ -172,9 +181,9 @@ void Plausibility::watch_without_filter(const RunSetup& setup, const Eigen::Vect
         Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   }
   try {
-    checks_->add(sensor,
-                 {name_of(setup, imu, "imu"), name_of(setup, heading, "headings"),
-                  name_of(setup, sensor, "wheels")},
+    checks_->add({{name_of(setup, imu, "imu"), imu},
+                  {name_of(setup, heading, "headings"), heading},
+                  {name_of(setup, sensor, "wheels"), sensor}},
                  set, Gyro::kLevel);
   } catch (const std::exception&) {
     // What its model throws is told by those who need it.
@@ -237,8 +246,11 @@ void Plausibility::watch_streams(const RunSetup& setup) {
       return source_of(other->sensor, setup.sensors) == name;
     });
     if (of_it > 1) name = std::string(route->type->name) + " of " + name;
-    checks_->streams.push_back(
-        {route->sensor, route->type, StreamWatch(name, least_gap_s(*route, *setup.filter))});
+    const double longest_s = *route->type == sample_type<EncoderSample>()
+                                 ? kLongestEncoderPeriod_s
+                                 : std::numeric_limits<double>::infinity();
+    checks_->streams.push_back({route->sensor, route->type,
+                                StreamWatch(name, least_gap_s(*route, *setup.filter), longest_s)});
   }
 }
 
@@ -276,7 +288,7 @@ void Plausibility::watch(const std::string& sensor, SampleView sample) {
       now_ns_ = std::max(*now_ns_, stream.watch.newest_ns());
     }
     waited_ns_ = 0;
-    look_now_and_then();
+    if (has_filter_) look_now_and_then();
     return;
   }
 }
@@ -315,6 +327,10 @@ void Plausibility::look(bool at_end) {
   if (!now_ns_ || checks_->streams.empty()) return;
   const StreamWatch& imu = checks_->streams.front().watch;
   for (const auto& stream : checks_->streams) {
+    const std::size_t before = findings_.size();
+    stream.watch.find_unit(findings_);
+    // Gaps of wheels that run alone are counted where they are read.
+    if (findings_.size() != before || !has_filter_) continue;
     if (checks_->is_of_another_clock(stream)) {
       findings_.push_back(of_another_clock(stream.watch.name(), stream.ahead_s(imu)));
     } else if (at_end) {

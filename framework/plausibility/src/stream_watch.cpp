@@ -7,6 +7,7 @@
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/plausibility/periods.hpp"
 
 namespace viwo {
 namespace {
@@ -93,6 +94,8 @@ auto StreamWatch::channel(int number) -> Channel& {
 /// Steps up and down are equally many where it is the median; gaps are no more than others.
 void StreamWatch::watch_period(std::int64_t spacing_ns) {
   const auto spacing = static_cast<double>(spacing_ns);
+  spacings_ns_ += spacing;
+  n_all_spacings_ += 1.;
   if (n_spacings_ == 0) period_ns_ = spacing;
   const double step = n_spacings_ < kFewestSpacings ? 1.2 : 1.02;
   period_ns_ *= spacing > period_ns_ ? step : 1. / step;
@@ -133,14 +136,21 @@ void StreamWatch::find_held_up(Findings& out) const {
                      "stamped when they arrive - stamp them when they are measured"});
 }
 
-/// No sensor of a robot gives a reading every 20 microseconds.
+/// Samples that come in bunches have a usual period of nothing, and a mean one that may well be; a
+/// single long pause weighs little among a hundred.
 void StreamWatch::find_unit(Findings& out) const {
-  constexpr double kShortest_ns = 20e3;
-  if (n_spacings_ < kFewestSpacings || period_ns_ >= kShortest_ns) return;
-  const std::string period = significant(1e-9 * period_ns_, 2);
-  out.push_back({name_ + " unit", name_ + ": a sample every " + period +
-                                      " s: its stamps are not in nanoseconds (multiply those in "
-                                      "microseconds by 1e3, those in milliseconds by 1e6)"});
+  constexpr double kFewest = 100.;
+  if (n_all_spacings_ < kFewest) return;
+  const double mean_ns = spacings_ns_ / n_all_spacings_;
+  const auto [shorter_ns, longer_ns] = std::minmax({period_ns_, mean_ns});
+  if (longer_ns >= 1e9 * kShortestPeriod_s && shorter_ns <= longest_period_ns_) return;
+  out.push_back({name_ + " unit",
+                 name_ + ": a sample every " + significant(1e-9 * mean_ns, 2) +
+                     " s: its stamps are of another unit (time_unit of a csv_table; others are in "
+                     "nanoseconds: microseconds times 1e3, milliseconds times 1e6)",
+                 false,
+                 {},
+                 true});
 }
 
 /// Of several, while others go on.
@@ -161,7 +171,6 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, Findings& 
       out.push_back({name_ + " none", name_ + ": no samples" + kLook});
     return;
   }
-  find_unit(out);
   find_held_up(out);
   if (n_gaps_ > kMostSaid) return;
   const std::string number = std::to_string(n_gaps_);
@@ -186,7 +195,6 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, const char
     out.push_back({name_ + " none", name_ + ": no samples in all of the " + of_what + kLook});
     return;
   }
-  find_unit(out);
   find_held_up(out);
   if (n_gaps_ > 0) {
     const bool several = n_gaps_ > 1;

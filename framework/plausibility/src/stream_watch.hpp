@@ -1,8 +1,9 @@
 // Whether a sensor goes on giving samples: none at all, gaps, an early end, of one of its cameras,
-// too, samples that are held up and then come all at once.
+// too, samples that are held up and then come all at once; and stamps of another unit.
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,8 +20,12 @@ class StreamWatch {
  public:
   /// A gap is longer than `least_gap_s`, which the filter goes on without, and than ten times the
   /// usual period.
-  StreamWatch(std::string name, double least_gap_s)
-      : name_(std::move(name)), least_gap_ns_(static_cast<std::int64_t>(1e9 * least_gap_s)) {}
+  /// No usual period is longer than `longest_period_s`.
+  StreamWatch(std::string name, double least_gap_s,
+              double longest_period_s = std::numeric_limits<double>::infinity())
+      : name_(std::move(name)),
+        least_gap_ns_(static_cast<std::int64_t>(1e9 * least_gap_s)),
+        longest_period_ns_(1e9 * longest_period_s) {}
 
   /// A sample has come, of camera `number` if there are several. `now_ns`: the newest time of all
   /// streams, which begins with the first one.
@@ -32,6 +37,8 @@ class StreamWatch {
   /// Time of the newest sample.
   std::int64_t newest_ns() const { return newest_ns_; }
 
+  /// Stamps in another unit than is taken for theirs: a doubt.
+  void find_unit(Findings& out) const;
   /// What happens at `now_ns`, while more is to come. Times in texts count from `zero_ns`.
   void findings(std::int64_t now_ns, std::int64_t zero_ns, Findings& out) const;
   /// What has happened in all of a "recording" or "run" that ends at `now_ns`.
@@ -49,10 +56,10 @@ class StreamWatch {
   void watch_period(std::int64_t spacing_ns);
   void watch_bursts(std::int64_t spacing_ns);
   void find_held_up(Findings& out) const;
-  void find_unit(Findings& out) const;
 
   std::string name_;
   std::int64_t least_gap_ns_;
+  double longest_period_ns_;
   StampJump jump_{1.};
   bool has_begun_ = false;
   std::int64_t n_samples_ = 0;
@@ -70,6 +77,7 @@ class StreamWatch {
   // The usual period, a running median, is that of the first channel.
   int n_spacings_ = 0;  ///< as far as they matter
   double period_ns_ = 0.;
+  double spacings_ns_ = 0., n_all_spacings_ = 0.;  ///< their sum and number
   std::int64_t n_gaps_ = 0, gaps_ns_ = 0;
   Pause last_gap_, longest_gap_;
   // Samples that a pause lacks, and that came at once after it.

@@ -33,12 +33,13 @@ auto CellMeans<kSize>::mean(std::int64_t cell) const -> std::optional<Vector> {
   return found.sum / static_cast<double>(found.covered_ns);
 }
 
-TwistCheck::TwistCheck(std::string imu, std::string wheels, const std::string& sensor,
+TwistCheck::TwistCheck(const SensorName& imu, const SensorName& wheels,
                        const std::shared_ptr<const WheelModel>& model, const WheelsPrior& prior,
                        Gyro gyro)
-    : imu_(std::move(imu)),
-      wheels_(std::move(wheels)),
-      drives_("sensors." + sensor + ".drive_scale"),
+    : imu_(imu.text),
+      wheels_(wheels.text),
+      gyro_unit_("sensors." + imu.sensor + (gyro == Gyro::kHeading ? ".yaw_unit" : ".gyro_unit")),
+      drive_scale_("sensors." + wheels.sensor + ".drive_scale"),
       gyro_is_(gyro),
       n_drive_(model->description().n_drive),
       n_steer_(model->description().n_steer),
@@ -46,7 +47,7 @@ TwistCheck::TwistCheck(std::string imu, std::string wheels, const std::string& s
       p_IinO_(prior.wheels.p_IinO.head<2>()),
       t_OtoI_s_(prior.wheels.t_OtoI_s),
       sigma_t_OtoI_s_(prior.sigma_time_offset_s),
-      order_(wheels_, sensor, model, prior.wheels.x_WI) {}
+      order_(wheels_, wheels.sensor, model, prior.wheels.x_WI) {}
 
 void TwistCheck::add_imu(const ImuSample& sample) {
   if (sample.fault() != nullptr || sample.t_ns < 0) return;

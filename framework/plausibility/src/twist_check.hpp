@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "sensor_name.hpp"
 #include "viwo/api/kinematic_model.hpp"
 #include "viwo/api/rig.hpp"
 #include "viwo/plausibility/finding.hpp"
@@ -52,10 +53,8 @@ enum class Gyro {
 
 class TwistCheck {
  public:
-  /// What texts call gyro and wheels, and what the configuration calls the sensor of the wheels.
-  TwistCheck(std::string imu, std::string wheels, const std::string& sensor,
-             const std::shared_ptr<const WheelModel>& model, const WheelsPrior& prior,
-             Gyro gyro = Gyro::kMounted);
+  TwistCheck(const SensorName& imu, const SensorName& wheels,
+             const std::shared_ptr<const WheelModel>& model, const WheelsPrior& prior, Gyro gyro);
 
   void add_imu(const ImuSample& sample);
   void add_heading(const HeadingSample& sample);
@@ -104,7 +103,8 @@ class TwistCheck {
   std::array<double, kLags> left_by_lag(const Eigen::Vector4d& information) const;
   bool find_lag(double rate_variance, Findings& out) const;
 
-  std::string imu_, wheels_, drives_;
+  std::string imu_, wheels_;
+  std::string gyro_unit_, drive_scale_;  ///< keys of the configuration
   Gyro gyro_is_;
   int n_drive_, n_steer_;
   Eigen::Matrix3d R_ItoO_;

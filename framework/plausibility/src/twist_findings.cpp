@@ -141,9 +141,12 @@ void TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
   constexpr double kOpposite = 2.;  // a sign, and intrinsics that are to be found
   const std::string key = imu_ + " rate";
   if (is_about(std::abs(slope), kDeg)) {
-    out.push_back({key, imu_ + ": the gyro turns " + fast +
-                            (gyro_is_ == Gyro::kHeading ? ": it is in degrees (yaw_unit: deg)"
-                                                        : ": it is in deg/s")});
+    out.push_back({key,
+                   imu_ + ": the gyro turns " + fast +
+                       (gyro_is_ == Gyro::kHeading ? ": it is in degrees (yaw_unit: deg)"
+                                                   : ": it is in deg/s"),
+                   false,
+                   {{gyro_unit_, "deg"}}});
   } else if (is_about(std::abs(slope), 1. / kDeg)) {
     out.push_back({key,
                    wheels_ + ": turn " + slow + ": drives are in deg/s",
@@ -185,7 +188,7 @@ double TwistCheck::factor_tolerance() const {
 
 Remedy TwistCheck::drives_times(double scale) const {
   const auto entry = [scale](std::size_t) { return significant(scale, 10); };
-  return {drives_, yaml_list(static_cast<std::size_t>(n_drive_), entry)};
+  return {drive_scale_, yaml_list(static_cast<std::size_t>(n_drive_), entry)};
 }
 
 /// The mounting with a turn of the IMU on the base.

@@ -23,7 +23,7 @@ Findings driven(double angle_rad, const std::function<void(EncoderSample&)>& fau
   WheelsPrior prior;
   prior.wheels.x_WI = setup.x_WI;
   prior.sigma_intrinsics = setup.sigma;
-  EncoderCheck check("wheels0", "wheels0", setup.model, prior);
+  EncoderCheck check({"wheels0", "wheels0"}, setup.model, prior);
   std::mt19937_64 engine(1);
   std::normal_distribution<double> noise(0., 0.02);
   for (std::int64_t k = 0; k < 1000; ++k) {

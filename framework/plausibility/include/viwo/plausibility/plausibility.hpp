@@ -63,7 +63,7 @@ class Plausibility {
   void look(bool at_end);
 
   std::unique_ptr<Checks> checks_;
-  bool live_;
+  bool live_, has_filter_;
   std::optional<std::int64_t> now_ns_;  ///< the newest time of all streams
   std::optional<std::int64_t> zero_ns_;
   bool is_begun_at_ = false;

@@ -1,0 +1,13 @@
+// How a sensor is called.
+#pragma once
+
+#include <string>
+
+namespace viwo {
+
+struct SensorName {
+  std::string text;    ///< by texts: with its kind, if it gives several
+  std::string sensor;  ///< by the configuration
+};
+
+}  // namespace viwo
