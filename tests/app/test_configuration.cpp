@@ -266,7 +266,7 @@ TEST_F(ConfigurationTest, RefusesLabelsAndSegmentsOfACalibrationThatAreMeantOthe
     expect_refused({"calibrate", "c.yaml", "--out", "out"}, message);
   };
   refuse("recordings: [{recording: a, distance: 4}]\n",
-         "recording 'a': label 'distance' - did you mean 'distance_m'?");
+         "c.yaml:3:14  recording 'a': label 'distance' - did you mean 'distance_m'?");
   refuse("segment_s: 1e-6\n",
          "c.yaml:3:12  segment_s is shorter than the interval between readings of the wheels, "
          "0.01 s");
@@ -274,7 +274,9 @@ TEST_F(ConfigurationTest, RefusesLabelsAndSegmentsOfACalibrationThatAreMeantOthe
   write("c.yaml", "calibration: c\nbase: run.yaml\n");
   const Outcome none = viwo({"calibrate", "c.yaml", "--set", "reference=gyro", "--out", "out"});
   EXPECT_EQ(none.code, 2);
-  EXPECT_NE(none.err.find("has no gyro to calibrate against"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("c.yaml:1:1  the recording has no gyro to calibrate against"),
+            std::string::npos)
+      << none.err;
 }
 
 TEST_F(ConfigurationTest, RefusesAMissingCalibrationFile) {
@@ -283,7 +285,8 @@ TEST_F(ConfigurationTest, RefusesAMissingCalibrationFile) {
                              "radius_m: 0.02, calibration: none.yaml}"));
   const Outcome outcome = viwo({"run", "run.yaml", "--out", "out"});
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_NE(outcome.err.find("none.yaml  no such file\n"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("kinematics.calibration: no such file: "), std::string::npos)
+      << outcome.err;
   EXPECT_FALSE(std::filesystem::exists(at("out")));
 }
 
@@ -295,7 +298,8 @@ TEST_F(ConfigurationTest, RefusesExperimentsThatAreNone) {
   refuse_experiment(variants, "variants: {}\n", "e.yaml:5:11  " + no_variants);
   refuse_experiment("redundant:", "redundant: 3",
                     "e.yaml:6:14  variant 'redundant' must be a section of overrides");
-  refuse_experiment("base: run.yaml", "base: none.yaml", "none.yaml  no such file");
+  refuse_experiment("base: run.yaml", "base: none.yaml",
+                    "e.yaml:2:7  base: no such file: none.yaml");
   refuse_experiment(
       "base: run.yaml\n", "",
       "e.yaml:1:1  experiment: 'base' is missing (run configuration, relative to this "
@@ -310,7 +314,7 @@ TEST_F(ConfigurationTest, RefusesExperimentsThatAreNone) {
 TEST_F(ConfigurationTest, RefusesVariantsAndRecordingsThatDoNotFit) {
   refuse_experiment("redundant:", "redundant: {kinematics.typ: x}",
                     "e.yaml:6:15  kinematics (four_wis_wid): unknown key 'typ' - did you mean "
-                    "'type'?");
+                    "'type'?\ne.yaml:4:11  while reading recording 'circle'");
   refuse_experiment(
       "redundant:", "drive:", "e.yaml:7:3  key 'drive' appears twice (first at e.yaml:6:3)");
   refuse_experiment("straight", "circle", "e.yaml:4:19  'circle' is in this list twice");
@@ -320,7 +324,7 @@ TEST_F(ConfigurationTest, RefusesVariantsAndRecordingsThatDoNotFit) {
                     "e.yaml:4:10  this must be a list with at least one element");
   refuse_experiment("straight", "strait",
                     "run.yaml:12:13  sensors.sim.motion: unknown value 'strait' - did you mean "
-                    "'straight'?");
+                    "'straight'?\ne.yaml:4:19  while reading recording 'strait'");
   refuse_experiment("motions:", "recordings:",
                     "run.yaml:12:13  unknown placeholder '{motion}' in '{motion}' - known: "
                     "recording");

@@ -68,8 +68,8 @@ void refuse_misspelt_labels(const Recording& recording) {
       const bool is_near = label.starts_with(stem) ||
                            !config::nearest(label, std::vector<std::string>{known}).empty();
       if (label == known || !is_near) continue;
-      throw InputError(name_of(recording) + ": label '" + label + "' - did you mean '" + known +
-                       "'?");
+      config::fail(recording.mark,
+                   name_of(recording) + ": label '" + label + "' - did you mean '" + known + "'?");
     }
   }
 }
@@ -101,8 +101,9 @@ void require_for_smoother(const CalibrationSetup& setup, const Node& file) {
   }
   for (const CalibrationRecording& recording : setup.recordings) {
     if (!recording.motion.distance_m && !recording.motion.turn_rad) continue;
-    throw InputError(name_of(recording.label) +
-                     ": distance_m and turn_deg are not for reference: smoother");
+    config::fail(
+        recording.label.mark,
+        name_of(recording.label) + ": distance_m and turn_deg are not for reference: smoother");
   }
 }
 
@@ -112,7 +113,8 @@ void require_one_kind(const std::vector<CalibrationRecording>& recordings) {
     return r.motion.kind != recordings.front().motion.kind;
   });
   if (other == recordings.end()) return;
-  throw InputError(name_of(recordings.front().label) + " and " + name_of(other->label) +
+  config::fail(other->label.mark,
+               name_of(recordings.front().label) + " and " + name_of(other->label) +
                    ": one has reference poses and one has a gyro only; say reference: gyro");
 }
 
@@ -123,8 +125,11 @@ CalibrationRecording read_recording(const Recording& label, const Node& base, Re
   if (run.find("updates") != nullptr) {
     config::set_path(wheels_alone, "estimator.type", Node::scalar_of("dead_reckoning"));
   }
-  RunSetup setup = read_run(wheels_alone, plugins);
-  RunData data = collect(setup);
+  auto [setup, data] = of_recording(label, [&] {
+    RunSetup read = read_run(wheels_alone, plugins);
+    RunData collected = collect(read);
+    return std::pair(std::move(read), std::move(collected));
+  });
   const bool is_smoothed = kind == ReferenceKind::kSmoother;
   MotionReference motion =
       motion_reference(label, setup, data, is_smoothed ? ReferenceKind::kNone : kind);
@@ -178,7 +183,8 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   if (setup.options.reference == ReferenceKind::kSmoother) require_for_smoother(setup, file);
   require_readings_in_segments(setup, file);
   if (file.find("extrinsics_x_m_y_m_yaw_rad") == nullptr) {
-    setup.options.extrinsics_x_m_y_m_yaw_rad = setup.recordings.front().setup.extrinsics;
+    setup.options.extrinsics_x_m_y_m_yaw_rad =
+        setup.recordings.front().setup.extrinsics.value_or(PlanarExtrinsics::Zero());
   }
   return setup;
 }

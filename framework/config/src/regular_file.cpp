@@ -23,4 +23,12 @@ void require_regular_file(const std::filesystem::path& file) {
   }
 }
 
+void require_file_of_key(const std::string& key, const Node& node,
+                         const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::status(file, ignored).type() != std::filesystem::file_type::not_found)
+    return;
+  fail(node.mark(), key + ": no such file: " + file.lexically_normal().string());
+}
+
 }  // namespace viwo::config

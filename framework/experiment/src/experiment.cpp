@@ -142,8 +142,12 @@ class Runner {
   void check() {
     for (std::size_t v = 0; v < setup_.variants.size(); ++v) {
       for (std::size_t r = 0; r < setup_.recordings.size(); ++r) {
-        RunSetup check = read_run(configuration(v, r), plugins_);
-        if (!options_.collect && (v == 0 || r == 0)) collect(check);
+        const Node run = configuration(v, r);
+        const RunSetup check = of_recording(setup_.recordings[r], [&] {
+          RunSetup read = read_run(run, plugins_);
+          if (!options_.collect && (v == 0 || r == 0)) collect(read);
+          return read;
+        });
         configurations_.push_back(identity_.of(check));
         for (int s = 0; s < setup_.seeds; ++s) {
           const auto seed = setup_.seeds > 1 ? static_cast<std::uint64_t>(s) + 1 : check.seed;

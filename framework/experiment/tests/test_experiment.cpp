@@ -8,6 +8,7 @@ namespace viwo {
 namespace {
 
 using namespace experiment;
+using ::testing::AllOf;
 using testing::error_of;
 using testing::ExperimentFile;
 using ::testing::HasSubstr;
@@ -97,7 +98,8 @@ TEST_F(ExperimentFile, KeepsARunThatFailsAndGoesOn) {
   // A differential drive cannot follow a lateral motion: told before anything runs.
   const auto setup = read_experiment(file, options);
   EXPECT_THAT(error_of([&] { run_experiment(setup, options, registry(), folder_); }),
-              HasSubstr("cannot follow motion 'lateral'"));
+              AllOf(HasSubstr("cannot follow motion 'lateral'"),
+                    HasSubstr("experiment.yaml:3:19  while reading recording 'lateral'")));
 }
 
 TEST_F(ExperimentFile, SaysWhatIsWrongWithItsAxes) {
@@ -128,6 +130,8 @@ TEST_F(ExperimentFile, SaysWhatIsWrongWithItsAxes) {
       "'+' and '.'");
   EXPECT_EQ(error(head + "baseline: b\nvariants: {a: , bb: }\n"),
             "experiment.yaml:3:11  baseline: there is no variant 'b' - did you mean 'bb'?");
+  EXPECT_THAT(error("experiment: test\nbase: wlak.yaml\nvariants: {a: }\n"),
+              HasSubstr("experiment.yaml:2:7  base: no such file: " + folder_.string()));
   EXPECT_EQ(error(head + "variants: {a: 5}\n"),
             "experiment.yaml:3:15  variant 'a' must be a section of overrides");
   EXPECT_EQ(

@@ -264,8 +264,9 @@ ObservabilityReport analyse(const ExperimentSetup& setup, PluginRegistry& plugin
       ObservabilityResult result;
       result.motion = m;
       result.variant = v;
+      const Node cell = configuration_of(setup, setup.variants[v], setup.recordings[m]);
       RunSetup configured =
-          read_run(configuration_of(setup, setup.variants[v], setup.recordings[m]), plugins);
+          of_recording(setup.recordings[m], [&] { return read_run(cell, plugins); });
       Node run = configured.resolved;
       MatrixXd null;
       const Watched held = watch(run, plugins, report.notes);

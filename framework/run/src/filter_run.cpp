@@ -7,11 +7,14 @@
 #include <optional>
 #include <utility>
 
+#include <Eigen/Geometry>
+
 #include "filter_start.hpp"
 #include "recorder.hpp"
 #include "restart.hpp"
 #include "running_warnings.hpp"
 #include "viwo/feed/feed.hpp"
+#include "viwo/math/se2.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/plausibility/plausibility.hpp"
 #include "viwo/run/run.hpp"
@@ -59,11 +62,26 @@ std::string no_epoch(const FilterSetup& setup, const Estimator& estimator) {
             " of " + std::to_string(attempts) + " attempts)";
     separator = ", ";
   }
+  // A start from motion would have no more to begin with.
+  const bool lacks_samples = !obstacles.empty() && obstacles.front().text.starts_with("fewer ");
   if (setup.start.mode == StartMode::kStandstill) {
-    const bool sees_motion = !setup.wheels.empty() || !setup.cameras.empty();
+    const bool sees_motion = !lacks_samples && (!setup.wheels.empty() || !setup.cameras.empty());
     text += sees_motion ? " - choose start: moving, or reference" : " - choose start: reference";
   }
   return text;
+}
+
+/// Measured poses of another body on the base become those of the IMU, seen from above.
+void refer_to_imu(const RunSetup& setup, Trajectory& reference) {
+  if (!setup.extrinsics || !setup.O_in_I) return;
+  const Eigen::Vector3d O_in_B = as_se2(*setup.extrinsics), O_in_I = as_se2(*setup.O_in_I);
+  const Eigen::Vector3d I_in_B = compose(O_in_B, between(O_in_I, Eigen::Vector3d::Zero()));
+  const Eigen::Vector3d p_IinB(I_in_B[1], I_in_B[2], 0.);
+  const Eigen::AngleAxisd R_ItoB(I_in_B[0], Eigen::Vector3d::UnitZ());
+  for (StampedPose& pose : reference) {
+    pose.p_BinW += pose.q_BtoW * p_IinB;
+    pose.q_BtoW = pose.q_BtoW * R_ItoB;
+  }
 }
 
 /// How a run has ended, and how accurate it was.
@@ -178,6 +196,7 @@ class FilterRun {
   void end_feed() {
     FeedReport report = feed_->finish();
     result_.reference = std::move(report.reference);
+    refer_to_imu(setup_, result_.reference);
     if (result_.cause.empty()) result_.cause = std::move(report.cause);
     const auto append = [](auto& to, auto& from) {
       to.insert(to.end(), std::make_move_iterator(from.begin()),

@@ -124,7 +124,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   const auto offset_ns =
       static_cast<std::int64_t>(std::llround(setup.reference_time_offset_s * 1e9));
   const auto stamps = epoch_stamps(setup, data, offset_ns);
-  const Eigen::Vector3d O_in_B(setup.extrinsics[2], setup.extrinsics[0], setup.extrinsics[1]);
+  const Eigen::Vector3d O_in_B = as_se2(setup.extrinsics.value_or(PlanarExtrinsics::Zero()));
   const Eigen::Vector3d B_in_O = between(O_in_B, Eigen::Vector3d::Zero());
   const auto reference_at = [&](std::int64_t t_ns) {
     return interpolate(data.reference, t_ns + offset_ns, setup.reference_max_gap_s);

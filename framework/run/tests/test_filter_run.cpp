@@ -126,6 +126,41 @@ TEST(FilterRun, AStartFromMotionHasTheWheelsWithoutAnyUpdate) {
   EXPECT_GT(result.epochs, 30);
 }
 
+/// B is off the IMU by the lever arm, which a circle turns into another radius.
+TEST(FilterRun, IsComparedWithPosesOfAnotherBodyAtTheImu) {
+  constexpr double kYaw_rad = 0.5;  // of I in B
+  const std::string body =
+      "pose_rate_hz: 20, sigma_pose_position_m: 0, "
+      "sigma_pose_orientation_rad: 0, pose_p_BinI_m: [0.4, -0.3, 0.1], "
+      "pose_rpy_ItoB_rad: [0, 0, 0.5], ";
+  std::string text = testing::swerve_with_camera(10);
+  text.insert(text.find("duration_s: 10"), body);
+  text += "estimator: {type: msckf, start: moving}\nupdates: {wheel_odometry: {}}\n";
+  RunSetup setup = read_run(config::parse(text, "run.yaml"), registry(), 1);
+  const RunData simulated = collect(setup);
+  std::vector<Measurement> samples = testing::in_time_order(simulated.recorded), poses;
+  std::erase_if(samples, [](const Measurement& m) { return m.get_if<FeatureSample>() != nullptr; });
+  testing::append<PoseSample>(simulated.recorded, poses);
+  const auto ate_m = [&] {
+    set_sensors(
+        setup,
+        {{"robot0", std::make_shared<InMemory>(sample_types<ImuSample, EncoderSample>(), samples)},
+         {"poses0", std::make_shared<InMemory>(sample_types<PoseSample>(), poses)}});
+    const RunResult result = viwo::run(setup, collect(setup));
+    EXPECT_TRUE(result.accuracy) << result.cause;
+    return result.accuracy ? result.accuracy->ate_m : 0.;
+  };
+  const double elsewhere_m = ate_m();
+  ASSERT_TRUE(setup.O_in_I);
+  const Eigen::Vector2d p_OinI = setup.O_in_I->head<2>();
+  const Eigen::Vector2d p_OinB =
+      Eigen::Rotation2Dd(kYaw_rad) * (p_OinI - Eigen::Vector2d(0.4, -0.3));
+  setup.extrinsics = PlanarExtrinsics(p_OinB.x(), p_OinB.y(), (*setup.O_in_I)[2] + kYaw_rad);
+  EXPECT_LT(ate_m(), 0.1 * elsewhere_m);
+  (*setup.extrinsics)[2] -= 2. * kYaw_rad;
+  EXPECT_GT(ate_m(), 0.3 * elsewhere_m);
+}
+
 /// The same robot without its wheels.
 std::string swerve_without_wheels(int features) {
   std::string all = testing::swerve_with_camera(features);

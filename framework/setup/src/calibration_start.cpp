@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "viwo/config/regular_file.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/math/so3.hpp"
@@ -197,7 +198,9 @@ std::filesystem::path kinematics_calibration(const Node& kinematics) {
     config::fail(file->mark(), "kinematics.calibration must be the path of a calibration.yaml");
   }
   const std::filesystem::path from = file->mark().line > 0 ? file->mark().file : "";
-  return std::filesystem::absolute(from.parent_path() / file->scalar()).lexically_normal();
+  const auto path = std::filesystem::absolute(from.parent_path() / file->scalar());
+  config::require_file_of_key("kinematics.calibration", *file, path);
+  return path.lexically_normal();
 }
 
 std::optional<CalibrationStart> read_calibration_start(const Node& run,
@@ -213,6 +216,9 @@ std::optional<CalibrationStart> read_calibration_start(const Node& run,
     return std::nullopt;
   }
   if (of_run.empty() && of_wheels.empty()) return std::nullopt;
+  if (!of_run.empty()) {
+    config::require_file_of_key("calibration", *run.find("calibration"), of_run);
+  }
   return CalibrationStart(read_calibration(of_run.empty() ? of_wheels : of_run), of_run.empty());
 }
 

@@ -5,6 +5,7 @@
 
 #include "viwo/config/file_kind.hpp"
 #include "viwo/config/overrides.hpp"
+#include "viwo/config/regular_file.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
 
@@ -20,6 +21,7 @@ const std::string& scalar(const Node& node, const std::string& what) {
 
 Recording read_recording(const Node& item) {
   Recording recording;
+  recording.mark = item.mark();
   if (item.is_scalar()) {
     recording.name = item.scalar();
     recording.labels["recording"] = item.scalar();
@@ -171,7 +173,7 @@ std::vector<Recording> read_recordings(const Node& section) {
     config::fail(motions->mark(), "give either 'recordings' or 'motions', not both");
   }
   const Node* list = recordings != nullptr ? recordings : motions;
-  if (list == nullptr) return {Recording{}};
+  if (list == nullptr) return {Recording{"", {}, section.mark()}};
   if (!list->is_list() || list->items().empty()) {
     config::fail(list->mark(), "this must be a list with at least one element");
   }
@@ -223,6 +225,7 @@ Node load_base(const Node& configuration, const std::vector<std::string>& assign
   if (base == nullptr) config::fail(configuration.mark(), "required key 'base' is missing");
   const std::filesystem::path file =
       std::filesystem::path(base->mark().file).parent_path() / scalar(*base, "'base'");
+  config::require_file_of_key("base", *base, file);
   Node run = load_run(file.lexically_normal());
   refuse_overruled(assignments, configuration);
   std::set<std::string> used;

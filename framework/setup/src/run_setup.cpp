@@ -103,7 +103,9 @@ void take_wheels(CalibrationStart& start, RunSetup& setup, config::Errors& error
   constexpr const char* kPose[] = {"x_OinB", "y_OinB", "yaw_OinB"};
   for (int i = 0; i < 3; ++i) {
     const CalibrationEntry* const entry = find(file.reference, kPose[i]);
-    if (entry != nullptr) setup.extrinsics[i] = entry->estimate;
+    if (entry == nullptr) continue;
+    if (!setup.extrinsics) setup.extrinsics = PlanarExtrinsics::Zero();
+    (*setup.extrinsics)[i] = entry->estimate;
   }
 }
 
@@ -161,6 +163,12 @@ void read_options(const Node& run, const CalibrationStart* start, RunSetup& setu
   setup.evaluation.segment_lengths_m = e.segment_lengths_m;
   setup.evaluation.max_reference_gap_s = e.reference_max_gap_s;
   setup.reference_max_gap_s = e.reference_max_gap_s;
+  if (const auto& place = e.extrinsics_x_m_y_m_yaw_rad; place.size() == 3) {
+    setup.extrinsics = PlanarExtrinsics(place[0], place[1], place[2]);
+  } else if (!place.empty()) {
+    errors.add(evaluation.find("extrinsics_x_m_y_m_yaw_rad")->mark(),
+               "evaluation.extrinsics_x_m_y_m_yaw_rad: three numbers, x [m], y [m] and yaw [rad]");
+  }
   setup.resolved.set("odometry", config::write_section(o));
   setup.resolved.set("evaluation", config::write_section(e));
 }
@@ -196,6 +204,15 @@ PlanarExtrinsics planar_mount(const WheelsView& wheels) {
   const Eigen::Matrix3d R_OtoI = wheels.R_ItoO.transpose();
   const Eigen::Vector3d p_OinI = -(R_OtoI * wheels.p_IinO);
   return {p_OinI.x(), p_OinI.y(), std::atan2(R_OtoI(1, 0), R_OtoI(0, 0))};
+}
+
+/// Where O is in the body of the poses tells where the IMU is by way of the wheels' mount.
+void require_wheels_for_place(const Node& run, const RunSetup& setup, config::Errors& errors) {
+  const Node* const place = run.at_path("evaluation.extrinsics_x_m_y_m_yaw_rad");
+  if (!setup.filter || setup.O_in_I || place == nullptr || place->items().empty()) return;
+  errors.add(place->mark(),
+             "evaluation.extrinsics_x_m_y_m_yaw_rad: this filter has no wheels, whose O it is of: "
+             "errors are of the IMU");
 }
 
 /// Wheels that turn the other way are not those that were calibrated.
@@ -294,6 +311,7 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
     if (has_base) filter.wheels.front().model_name = setup.kinematics.info.name;
     if (wants_filter(run)) setup.filter = std::move(filter);
   }
+  require_wheels_for_place(run, setup, errors);
   read_sensors(run, context, setup, errors);
   if (errors.empty()) setup.routes = read_routes(run, setup, std::move(measuring), errors);
   errors.throw_if_any();

@@ -61,8 +61,14 @@ struct EvaluationParams {
   eval::Alignment alignment = eval::Alignment::kYawPosition;
   std::vector<double> segment_lengths_m;
   double reference_max_gap_s = 0.5;
+  std::vector<double> extrinsics_x_m_y_m_yaw_rad;
 
   void bind(ParamBinder& b) {
+    b(VIWO_PARAM(extrinsics_x_m_y_m_yaw_rad),
+      {.unit = "m, m, rad",
+       .help = "where O is in the body whose measured poses are the reference; none: what the "
+               "calibration file says, else that body is O for the wheels alone, and the IMU for a "
+               "filter"});
     b(VIWO_PARAM(alignment),
       {{"none", eval::Alignment::kNone},
        {"start", eval::Alignment::kStart},

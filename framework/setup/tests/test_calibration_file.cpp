@@ -133,6 +133,15 @@ TEST_F(CalibrationFileTest, IsNamedOnce) {
               HasSubstr("kinematics.calibration: the run has a key 'calibration', too"));
 }
 
+TEST_F(CalibrationFileTest, IsMissedWhereItIsNamed) {
+  for (const char* key : {"calibration", "kinematics.calibration"}) {
+    auto run = config::parse(kRun, "run.yaml");
+    config::set_path(run, key, config::Node::scalar_of("/no/such.yaml", {"run.yaml", 7, 8}));
+    EXPECT_EQ(error_of([&] { read_run(run, registry()); }),
+              "run.yaml:7:8  " + std::string(key) + ": no such file: /no/such.yaml");
+  }
+}
+
 TEST_F(CalibrationFileTest, GivesTheReferenceItsPlaceAndClock) {
   std::ofstream(file_) << kTwoSides
                        << "reference:\n  x_OinB: {estimate: 0.1, sigma: 0.01}\n"

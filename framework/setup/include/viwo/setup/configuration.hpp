@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "viwo/api/status.hpp"
 #include "viwo/config/node.hpp"
 
 namespace viwo {
@@ -15,7 +16,20 @@ namespace viwo {
 struct Recording {
   std::string name;
   std::map<std::string, std::string> labels;
+  config::Mark mark = {};  ///< where it is named
 };
+
+/// What `read` returns; its InputErrors say while which recording is read, where it has a name.
+template <class Read>
+auto of_recording(const Recording& recording, const Read& read) {
+  try {
+    return read();
+  } catch (const InputError& error) {
+    if (recording.name.empty()) throw;
+    throw InputError(std::string(error.what()) + "\n" + recording.mark.text() +
+                     "  while reading recording '" + recording.name + "'");
+  }
+}
 
 /// A run configuration, with `--set` assignments ("path.to.key=VALUE") applied. Placeholders are
 /// still in it. Throws InputError, also for a placeholder that is given a value and used nowhere.

@@ -18,6 +18,8 @@ namespace viwo {
 
 /// Where the reference body B is on the base: pose [x_m, y_m, yaw_rad] of O in B.
 using PlanarExtrinsics = Eigen::Vector3d;
+/// The same as viwo/math/se2.hpp has it: yaw, x, y.
+inline Eigen::Vector3d as_se2(const PlanarExtrinsics& pose) { return {pose[2], pose[0], pose[1]}; }
 
 /// A sensor of a run. Its `input`, if it takes one, is a sensor before it.
 struct SensorEntry {
@@ -34,7 +36,8 @@ struct RunSetup {
   std::shared_ptr<const WheelModel> model;  ///< likewise null
   Intrinsics x_WI;                          ///< to run with: nominal, or from a calibration file
   Intrinsics sigma;  ///< how well they are known; 0 where the gauge holds an entry
-  PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
+  /// Of measured poses, where that is known; else B is O for the wheels alone, I for a filter.
+  std::optional<PlanarExtrinsics> extrinsics;
   std::optional<PlanarExtrinsics> O_in_I;  ///< of the section `wheels`: where states are reference
   double t_OtoI_s = 0.;                    ///< of the section `wheels`: t_imu = t_wheel + t_OtoI
   std::vector<SensorEntry> sensors;        ///< those that take an input behind their input
