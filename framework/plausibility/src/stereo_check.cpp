@@ -58,10 +58,13 @@ void StereoCheck::findings(Findings& out) const {
   const std::int64_t all = before_ + behind_;
   if (all < 200 || 5 * behind_ < 4 * all) return;
   const double share = static_cast<double>(behind_) / static_cast<double>(all);
-  out.push_back(
-      {sensor_ + " stereo", sensor_ + ": points seen by cam0 and cam1 lie behind both (" +
-                                significant(100. * share, 2) +
-                                " %): the two cameras are swapped, or both images upside down"});
+  out.push_back({sensor_ + " stereo",
+                 sensor_ + ": points seen by cam0 and cam1 lie behind both (" +
+                     significant(100. * share, 2) +
+                     " %): the two cameras are swapped, or both images upside down",
+                 false,
+                 {},
+                 true});
 }
 
 }  // namespace viwo
