@@ -4,6 +4,8 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <map>
+#include <string>
 #include <tuple>
 
 #include <tbb/parallel_for.h>
@@ -114,19 +116,22 @@ CalibrationOptions choose_segments(const CalibrationSetup& setup, const FitStart
       progress.done(text);
     } catch (const std::exception& error) {
       failures[i] = error.what();
-      progress.done(text + ": " + error.what());
+      progress.done(text + ": not compared");
     }
   });
   std::vector<CalibrationOptions> fitted;
+  std::map<std::string, std::string> failed;  // which, by what is wrong with them
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (failures[i].empty()) {
       fitted.push_back(all[i]);
       result.lengths.push_back(estimates[i]);
     } else {
-      result.failed_lengths.push_back(segments_text(estimates[i]) + ": " + failures[i]);
+      std::string& which = failed[failures[i]];
+      which += (which.empty() ? "" : ", ") + segments_text(estimates[i]);
     }
   }
   if (fitted.empty()) throw InputError(failures.front());
+  for (const auto& [why, which] : failed) result.failed_lengths.push_back(which + ": " + why);
   const std::vector<CalibrationEstimate>& tried = result.lengths;
   const auto rank = [](const CalibrationEstimate& estimate) {
     return std::tuple(!estimate.converged, !estimate.has_enough_residuals(),
