@@ -144,6 +144,11 @@ void StateBlocks::place(std::size_t block, int& next) {
   views_[block] = {column, size, spec.rotations, &value_[offset_[block]], &first_[offset_[block]]};
 }
 
+std::vector<double> StateBlocks::value(std::size_t block) const {
+  const double* const first = &value_[offset_[block]];
+  return {first, first + specs_[block].value.size()};
+}
+
 void StateBlocks::set_prior(Covariance& covariance, const PriorCorrelations& correlations) const {
   const auto& names = correlations.entries;
   std::vector<std::pair<int, Eigen::Index>> correlated;  // column, index in `correlations`

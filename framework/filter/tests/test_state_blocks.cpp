@@ -154,6 +154,7 @@ TEST(StateBlocks, ShowRotationVectorsNumbersAndSigmas) {
     EXPECT_NEAR(all[i].value, expected[i], 1e-14) << i;
     EXPECT_EQ(all[i].sigma, i < 8 ? 0.1 : 0.) << i;
   }
+  EXPECT_EQ(blocks.value(1), spec.value);
 }
 
 TEST(StateBlocks, PriorIsTheSquareOfTheSigmasAndCorrelatesNothing) {

@@ -26,14 +26,7 @@ HealthyState::HealthyState(const Filter& filter)
 HealthyState::State HealthyState::state_of(const Filter& filter) const {
   State state{filter.t_ns(), {filter.imu().R_GtoI, filter.imu().p_IinG}, {}};
   for (std::size_t i = 0; i < declared_.size(); ++i) {
-    const BlockView& view = filter.blocks().view({static_cast<int>(i)});
-    std::vector<double>& value = state.blocks.emplace_back();
-    for (int k = 0; k < declared_[i].rotations; ++k) {
-      const Eigen::Matrix3d R = view.rotation(k);
-      value.insert(value.end(), R.data(), R.data() + R.size());
-    }
-    const Eigen::VectorXd numbers = view.numbers();
-    value.insert(value.end(), numbers.data(), numbers.data() + numbers.size());
+    state.blocks.push_back(filter.blocks().value(i));
   }
   return state;
 }

@@ -4,18 +4,6 @@
 
 namespace viwo::smoother {
 
-std::vector<double> value_of(const StateBlocks& blocks, std::size_t block) {
-  const BlockView& view = blocks.view({static_cast<int>(block)});
-  std::vector<double> value;
-  for (int k = 0; k < blocks.specs()[block].rotations; ++k) {
-    const Eigen::Matrix3d R = view.rotation(k);
-    value.insert(value.end(), R.data(), R.data() + R.size());
-  }
-  const Eigen::VectorXd numbers = view.numbers();
-  value.insert(value.end(), numbers.data(), numbers.data() + numbers.size());
-  return value;
-}
-
 void retract(const BlockSpec& spec, const Eigen::Ref<const Eigen::VectorXd>& dx,
              std::vector<double>& value) {
   for (int k = 0; k < spec.rotations; ++k) {

@@ -5,12 +5,9 @@
 
 #include <Eigen/Core>
 
-#include "viwo/filter/state_blocks.hpp"
+#include "viwo/api/block.hpp"
 
 namespace viwo::smoother {
-
-/// A declared block as it stands, in the layout of BlockSpec::value.
-std::vector<double> value_of(const StateBlocks& blocks, std::size_t block);
 
 /// `value` moved by an error `dx` of its entries: R = Exp(-dtheta) R_hat, numbers add.
 void retract(const BlockSpec& spec, const Eigen::Ref<const Eigen::VectorXd>& dx,

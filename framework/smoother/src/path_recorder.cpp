@@ -1,6 +1,6 @@
 #include "path_recorder.hpp"
 
-#include "block_values.hpp"
+#include "viwo/filter/filter.hpp"
 
 namespace viwo::smoother {
 
@@ -35,7 +35,7 @@ void PathRecorder::on_epoch(const Filter& filter, const EpochData& /*data*/) {
     state.p_IinG = clone.p_IinG;
   }
   blocks_.resize(prior_.specs.size());
-  for (std::size_t i = 0; i < blocks_.size(); ++i) blocks_[i] = value_of(filter.blocks(), i);
+  for (std::size_t i = 0; i < blocks_.size(); ++i) blocks_[i] = filter.blocks().value(i);
 }
 
 }  // namespace viwo::smoother

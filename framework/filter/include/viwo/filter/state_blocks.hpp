@@ -55,6 +55,8 @@ class StateBlocks {
   /// All: the declared ones, then those of the rooms.
   std::span<const BlockView> views() const { return views_; }
   const BlockView& view(BlockId id) const { return views_[index(id)]; }
+  /// A declared block as it stands, in the layout of BlockSpec::value.
+  std::vector<double> value(std::size_t block) const;
   std::span<const BlockGroup> groups() const { return groups_; }
   int first_column() const { return first_column_; }
   int columns() const { return columns_; }
