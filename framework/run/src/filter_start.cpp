@@ -44,10 +44,9 @@ ImuPrior start_from_reference(const FilterSetup& setup, const StateSample& truth
   return prior;
 }
 
-/// What both ways to start without a reference are told.
-template <class Options>
-Options start_options(const FilterSetup& setup) {
-  Options options;
+/// What all ways to start without a reference are told.
+StartOptions start_options(const FilterSetup& setup) {
+  StartOptions options;
   options.window_s = setup.start.window_s;
   options.noise = setup.options.filter.imu_noise;
   options.gravity_m_per_s2 = setup.options.filter.gravity_m_per_s2;
@@ -62,7 +61,7 @@ Options start_options(const FilterSetup& setup) {
 Initializer from_standstill(const Estimator& estimator, const FilterSetup& setup) {
   std::vector<StreamId> wheels;
   for (std::size_t i = 0; i < setup.wheels.size(); ++i) wheels.push_back(estimator.extra(i));
-  auto options = start_options<StandstillOptions>(setup);
+  StandstillOptions options{start_options(setup)};
   for (const CameraPrior& camera : setup.cameras) {
     options.t_CtoI_s.push_back(camera.camera.t_CtoI_s);
   }
@@ -79,7 +78,7 @@ Initializer from_standstill(const Estimator& estimator, const FilterSetup& setup
 
 /// From the motion of the first wheel set.
 Initializer from_wheels(const Estimator& estimator, const FilterSetup& setup) {
-  auto options = start_options<MovingStartOptions>(setup);
+  MovingStartOptions options{start_options(setup)};
   options.sigma_velocity_m_per_s = setup.start.sigma_velocity_m_per_s;
   options.model = setup.wheels.front().model;
   options.wheels = setup.wheels.front().prior;
@@ -91,7 +90,7 @@ Initializer from_wheels(const Estimator& estimator, const FilterSetup& setup) {
 /// Without wheels: from a rest, which images do not need to have a scale for, or else from what
 /// they say of the motion.
 Initializer from_images(const Estimator& estimator, const FilterSetup& setup) {
-  auto options = start_options<VisualStartOptions>(setup);
+  VisualStartOptions options{start_options(setup)};
   options.cameras = setup.cameras;
   // It takes as long as some images.
   constexpr std::int64_t kPeriodNs = 200'000'000;

@@ -8,24 +8,18 @@
 
 #include "viwo/api/rig.hpp"
 #include "viwo/estimator/start_search.hpp"
+#include "viwo/start/start_options.hpp"
 #include "viwo/wheel/wheel_model.hpp"
 
 namespace viwo {
 
-struct MovingStartOptions {
-  double window_s = 1.;
-  ImuNoise noise;
-  double gravity_m_per_s2 = 9.81;
-  double sigma_position_m = 0.01;  ///< of the origin, a matter of definition
-  double sigma_yaw_rad = 0.01;     ///< likewise
-  double sigma_gyro_bias_rad_per_s = 0.02;
-  double sigma_accel_bias_m_per_s2 = 0.05;
+struct MovingStartOptions : StartOptions {
   /// What encoder noise and the prior of the calibration do not explain: slip, and the ground.
-  double sigma_velocity_m_per_s = 0.02;     ///< of O, each axis, the normal of the ground too
-  double sigma_yaw_rate_rad_per_s = 0.002;  ///< mean over the window
-  double sigma_tilt_rate_rad_per_s = 0.02;  ///< the same about the other two axes of O
-  std::shared_ptr<const WheelModel> model;  ///< of the wheel set
-  WheelsPrior wheels;                       ///< its calibration, and how well it is known
+  double sigma_velocity_m_per_s = 0.02;          ///< of O, each axis, the normal of the ground too
+  double sigma_yaw_rate_rad_per_s = 0.002;       ///< mean over the window
+  double sigma_tilt_rate_rad_per_s = 0.02;       ///< the same about the other two axes of O
+  std::shared_ptr<const WheelModel> model = {};  ///< of the wheel set
+  WheelsPrior wheels = {};                       ///< its calibration, and how well it is known
 };
 
 /// The state shortly (0.05 s) before the end of the measurements, from the last `window_s` before

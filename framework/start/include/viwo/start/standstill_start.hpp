@@ -6,18 +6,12 @@
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/estimator/start_search.hpp"
+#include "viwo/start/start_options.hpp"
 
 namespace viwo {
 
-struct StandstillOptions {
-  double window_s = 1.;
-  ImuNoise noise;
-  double gravity_m_per_s2 = 9.81;
-  double sigma_position_m = 0.01;           ///< of the origin, a matter of definition
-  double sigma_yaw_rad = 0.01;              ///< likewise
-  double sigma_gyro_bias_rad_per_s = 0.02;  ///< a mean rate beyond three of these is a motion
-  double sigma_accel_bias_m_per_s2 = 0.05;  ///< tilts the estimate of gravity (F-10)
-  std::vector<double> t_CtoI_s = {};        ///< by camera: t_imu = t_camera + t_CtoI
+struct StandstillOptions : StartOptions {
+  std::vector<double> t_CtoI_s = {};  ///< by camera: t_imu = t_camera + t_CtoI
 };
 
 /// The state at the end of the last `window_s` of the IMU (5 % less will do) if the base stood

@@ -9,18 +9,12 @@
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/rig.hpp"
 #include "viwo/estimator/start_search.hpp"
+#include "viwo/start/start_options.hpp"
 
 namespace viwo {
 
-struct VisualStartOptions {
-  double window_s = 1.;
-  ImuNoise noise;
-  double gravity_m_per_s2 = 9.81;
-  double sigma_position_m = 0.01;  ///< of the origin, a matter of definition
-  double sigma_yaw_rad = 0.01;     ///< likewise
-  double sigma_gyro_bias_rad_per_s = 0.02;
-  double sigma_accel_bias_m_per_s2 = 0.05;
-  std::vector<CameraPrior> cameras;  ///< by FeatureSample::camera
+struct VisualStartOptions : StartOptions {
+  std::vector<CameraPrior> cameras = {};  ///< by FeatureSample::camera
 };
 
 /// The state at the last image, from the images of the last `window_s` before it, or of twice that
