@@ -71,13 +71,7 @@ Bench::Bench(std::shared_ptr<const KinematicModel> model) : model_(std::move(mod
   }
 }
 
-Intrinsics Bench::nominal() const {
-  Intrinsics x(n_x());
-  for (int k = 0; k < n_x(); ++k) {
-    x[k] = description_.intrinsics[static_cast<std::size_t>(k)].nominal;
-  }
-  return x;
-}
+Intrinsics Bench::nominal() const { return nominal_intrinsics(description_); }
 
 Intrinsics Bench::unequal(std::mt19937_64& rng) const {
   std::uniform_real_distribution<double> uniform(-1., 1.);

@@ -91,7 +91,7 @@ WheelsPrior wheels_prior(Calibration calibration) {
   prior.wheels.model = &base();
   prior.wheels.R_ItoO = mounting().R_ItoO;
   prior.wheels.p_IinO = mounting().p_IinO;
-  prior.wheels.x_WI = sim::nominal_intrinsics(description);
+  prior.wheels.x_WI = nominal_intrinsics(description);
   prior.sigma_intrinsics.setZero(prior.wheels.x_WI.size());
   if (calibration == Calibration::kHeld) return prior;
   prior.sigma_extrinsics.setConstant(0.01);
@@ -230,7 +230,7 @@ Drive simulate_drive(const char* motion, double duration_s) {
   encoders.start_ns = kStart;
   encoders.sliding_m_per_s = 0.01;
   for (const EncoderSample& sample : sim::simulate_encoders(
-           base(), sim::nominal_intrinsics(base_description()),
+           base(), nominal_intrinsics(base_description()),
            [&](double t_s) { return trajectory.twist(t_s); }, motion, encoders, kSeed)) {
     drive.measurements.emplace_back(sample);
   }

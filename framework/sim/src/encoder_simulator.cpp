@@ -260,14 +260,6 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
       seed);
 }
 
-Intrinsics nominal_intrinsics(const ModelDescription& description) {
-  Intrinsics x(static_cast<Eigen::Index>(description.intrinsics.size()));
-  for (Eigen::Index i = 0; i < x.size(); ++i) {
-    x[i] = description.intrinsics[static_cast<std::size_t>(i)].nominal;
-  }
-  return x;
-}
-
 Intrinsics perturbed_intrinsics(const ModelDescription& description, double scale,
                                 std::uint64_t seed) {
   RandomStream stream(seed, Stream::kIntrinsics);

@@ -46,13 +46,7 @@ WheelModel::WheelModel(std::shared_ptr<const KinematicModel> model) : model_(std
   }
 }
 
-Intrinsics WheelModel::nominal() const {
-  Intrinsics x(n_intrinsics());
-  for (int i = 0; i < n_intrinsics(); ++i) {
-    x[i] = description_.intrinsics[static_cast<std::size_t>(i)].nominal;
-  }
-  return x;
-}
+Intrinsics WheelModel::nominal() const { return nominal_intrinsics(description_); }
 
 Intrinsics WheelModel::prior_sigma() const {
   Intrinsics sigma(n_intrinsics());

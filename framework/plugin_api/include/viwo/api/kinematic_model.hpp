@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -85,6 +86,15 @@ struct ModelDescription {
   std::vector<IntrinsicSpec> intrinsics;  ///< order of x_WI
   std::vector<NoiseSpec> noises;          ///< drive and steering sources first, slip last
 };
+
+/// The nominal values of x_WI, each in its unit.
+inline Intrinsics nominal_intrinsics(const ModelDescription& description) {
+  Intrinsics x(static_cast<Eigen::Index>(description.intrinsics.size()));
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    x[i] = description.intrinsics[static_cast<std::size_t>(i)].nominal;
+  }
+  return x;
+}
 
 /// A, b and whatever the model wants to keep from rows() for the calls that follow on this sample.
 struct RowSystem {

@@ -68,9 +68,6 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
                                              const PlanarMotion& motion,
                                              const EncoderSimulation& options, std::uint64_t seed);
 
-/// The nominal intrinsics.
-Intrinsics nominal_intrinsics(const ModelDescription& description);
-
 /// nominal + scale * prior_sigma * gaussian for every entry that is not held by the gauge. The draw
 /// of an entry depends on seed and index alone.
 Intrinsics perturbed_intrinsics(const ModelDescription& description, double scale,
