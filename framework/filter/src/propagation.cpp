@@ -96,6 +96,21 @@ Step integrate(const ImuSample& from, const ImuSample& to, double gravity, ImuSt
 
 }  // namespace
 
+ImuVector difference(const ImuState& to, const ImuState& from) {
+  ImuVector dx;
+  dx << -log_so3(to.R_GtoI * from.R_GtoI.transpose()), to.p_IinG - from.p_IinG,
+      to.v_IinG - from.v_IinG, to.gyro_bias - from.gyro_bias, to.accel_bias - from.accel_bias;
+  return dx;
+}
+
+void retract(const ImuVector& dx, ImuState& imu) {
+  imu.R_GtoI = normalized_rotation(exp_so3(-dx.segment<3>(kThetaColumn)) * imu.R_GtoI);
+  imu.p_IinG += dx.segment<3>(kPositionColumn);
+  imu.v_IinG += dx.segment<3>(kVelocityColumn);
+  imu.gyro_bias += dx.segment<3>(kGyroBiasColumn);
+  imu.accel_bias += dx.segment<3>(kAccelBiasColumn);
+}
+
 ImuSample interpolate(const ImuSample& before, const ImuSample& after, std::int64_t t_ns) {
   const double ratio =
       seconds_between(before.t_ns, t_ns) / seconds_between(before.t_ns, after.t_ns);

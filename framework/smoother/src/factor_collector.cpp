@@ -7,15 +7,14 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "viwo/filter/propagation.hpp"
 #include "viwo/math/chi2.hpp"
-#include "viwo/math/so3.hpp"
 
 namespace viwo::smoother {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using ImuVector = Eigen::Matrix<double, kImuSize, 1>;
 
 /// The inverse of a covariance whose units differ by many orders of magnitude. What has no noise at
 /// all (a bias that does not walk) gets a little.
@@ -31,21 +30,6 @@ ImuMatrix information_of(const ImuMatrix& covariance) {
 }
 
 }  // namespace
-
-ImuVector difference(const ImuState& to, const ImuState& from) {
-  ImuVector dx;
-  dx << -log_so3(to.R_GtoI * from.R_GtoI.transpose()), to.p_IinG - from.p_IinG,
-      to.v_IinG - from.v_IinG, to.gyro_bias - from.gyro_bias, to.accel_bias - from.accel_bias;
-  return dx;
-}
-
-void retract(const Eigen::Ref<const Eigen::VectorXd>& dx, ImuState& state) {
-  state.R_GtoI = normalized_rotation(exp_so3(-dx.segment<3>(kThetaColumn)) * state.R_GtoI);
-  state.p_IinG += dx.segment<3>(kPositionColumn);
-  state.v_IinG += dx.segment<3>(kVelocityColumn);
-  state.gyro_bias += dx.segment<3>(kGyroBiasColumn);
-  state.accel_bias += dx.segment<3>(kAccelBiasColumn);
-}
 
 FactorCollector::FactorCollector(const PathRecorder& run, const ImuState& start, std::size_t epochs,
                                  const BlockColumns& columns, int n_shared)

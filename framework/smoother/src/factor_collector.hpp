@@ -67,9 +67,4 @@ class FactorCollector final : public EstimatorObserver {
   long rows_ = 0, weighed_down_ = 0;
 };
 
-/// The error that moves `from` to `to`, in the order of the columns of the inertial state.
-Eigen::Matrix<double, kImuSize, 1> difference(const ImuState& to, const ImuState& from);
-/// Moves it by such an error.
-void retract(const Eigen::Ref<const Eigen::VectorXd>& dx, ImuState& state);
-
 }  // namespace viwo::smoother

@@ -18,7 +18,6 @@ using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using ImuVector = Eigen::Matrix<double, kImuSize, 1>;
 
 constexpr double kHuber = 3.;              ///< sigmas from where on a sight counts less
 constexpr double kFarthestInverse = 1e-4;  ///< 1/m
@@ -85,13 +84,7 @@ VisualEstimate VisualProblem::moved(const VisualEstimate& x, const VectorXd& dx,
                                     const VisualNormals& n) const {
   VisualEstimate y = x;
   for (std::size_t k = 0; k < y.keys.size(); ++k) {
-    const ImuVector d = dx.segment<kImuSize>(kImuSize * static_cast<Eigen::Index>(k));
-    ImuState& key = y.keys[k];
-    key.R_GtoI = normalized_rotation(exp_so3(-d.segment<3>(kThetaColumn)) * key.R_GtoI);
-    key.p_IinG += d.segment<3>(kPositionColumn);
-    key.v_IinG += d.segment<3>(kVelocityColumn);
-    key.gyro_bias += d.segment<3>(kGyroBiasColumn);
-    key.accel_bias += d.segment<3>(kAccelBiasColumn);
+    retract(dx.segment<kImuSize>(kImuSize * static_cast<Eigen::Index>(k)), y.keys[k]);
   }
   y.calibration += dx.tail(y.calibration.size());
   for (std::size_t i = 0; i < y.points.size(); ++i) {
@@ -132,13 +125,7 @@ void VisualProblem::add_priors(const VisualEstimate& x, VisualNormals& n) const 
 
 void VisualProblem::add_imu(const VisualEstimate& x, std::size_t k, VisualNormals& n) const {
   const Prediction p = predict(x.keys[k - 1], k);
-  const ImuState& key = x.keys[k];
-  ImuVector r;
-  r.segment<3>(kThetaColumn) = -log_so3(key.R_GtoI * p.state.R_GtoI.transpose());
-  r.segment<3>(kPositionColumn) = key.p_IinG - p.state.p_IinG;
-  r.segment<3>(kVelocityColumn) = key.v_IinG - p.state.v_IinG;
-  r.segment<3>(kGyroBiasColumn) = key.gyro_bias - p.state.gyro_bias;
-  r.segment<3>(kAccelBiasColumn) = key.accel_bias - p.state.accel_bias;
+  const ImuVector r = difference(x.keys[k], p.state);
   // An IMU that is said to have no noise has rounding errors. Of dynamic size: GCC 14 warns of a
   // loop in Eigen's factorisation of a fixed one.
   Eigen::MatrixXd Q = p.transition.Q;

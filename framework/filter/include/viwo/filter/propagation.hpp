@@ -11,6 +11,12 @@
 namespace viwo {
 
 using ImuMatrix = Eigen::Matrix<double, kImuSize, kImuSize>;
+using ImuVector = Eigen::Matrix<double, kImuSize, 1>;
+
+/// The error that moves `from` to `to`, in the order of the columns of the inertial state.
+ImuVector difference(const ImuState& to, const ImuState& from);
+/// Moves it by such an error: R = Exp(-dtheta) R_hat, the rest adds. First estimates stay.
+void retract(const ImuVector& dx, ImuState& imu);
 
 /// The reading at `t_ns` on the straight line between two others.
 ImuSample interpolate(const ImuSample& before, const ImuSample& after, std::int64_t t_ns);
