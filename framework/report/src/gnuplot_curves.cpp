@@ -7,26 +7,13 @@
 
 #include "gnuplot.hpp"
 #include "gnuplot_format.hpp"
+#include "viwo/report/curves.hpp"
 
 namespace viwo::report {
 namespace {
 
 constexpr double kPageLineWidth = 1.8;  ///< Series::width that is one pixel here
 constexpr double kBandOpacity = 0.16;   ///< as in report.js
-
-/// The limits of finite values.
-struct Range {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-
-  void add(double value) {
-    if (!std::isfinite(value)) return;
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-  bool empty() const { return !(low <= high); }
-  double size() const { return empty() ? 0. : high - low; }
-};
 
 /// A series of the page with what gnuplot needs to know about it.
 struct Curve {

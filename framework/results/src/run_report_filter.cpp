@@ -1,7 +1,6 @@
 // The parts of a run's page that tell what the estimator did.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "run_report.hpp"
 #include "viwo/eval/consistency.hpp"
@@ -29,18 +28,6 @@ Series coloured(Series series, int colour) {
   series.colour = colour;
   return series;
 }
-
-/// The limits of finite values.
-struct Span {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-
-  void add(double value) {
-    if (!std::isfinite(value)) return;
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-};
 
 /// Largest of errors and bands; the unit of their axis follows from it.
 double largest(const std::vector<double>& errors, const std::vector<double>& sigmas) {
@@ -100,7 +87,7 @@ Plot nees_plot(const PoseNees& nees) {
   plot.series.push_back(coloured(std::move(mean), kSecondColour));
   plot.lines = {{ReferenceLine::Direction::kHorizontal, low, "2.5 %"},
                 {ReferenceLine::Direction::kHorizontal, high, "97.5 %"}};
-  Span shown;
+  Range shown;
   for (const double value : values) {
     if (value > 0.) shown.add(value);
   }
@@ -160,7 +147,7 @@ report::DisplayUnit unit_of(const CalibrationTrack& track) {
 /// there is little to gain over showing everything.
 std::optional<std::pair<double, double>> settled_range(const Series& series, double truth) {
   constexpr double kStartPart = 0.2, kMargin = 0.3, kMinGain = 2.5;
-  Span all, settled;
+  Range all, settled;
   const double settled_s = series.x.front() + kStartPart * (series.x.back() - series.x.front());
   for (std::size_t i = 0; i < series.x.size(); ++i) {
     for (const double end : {series.y_low[i], series.y_high[i]}) {

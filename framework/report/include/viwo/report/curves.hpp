@@ -1,7 +1,10 @@
 // Curves of the plots of a page, and the units that they are shown in.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <string>
 
@@ -26,6 +29,20 @@ DisplayUnit display_unit(const std::string& si_unit, double magnitude);
 
 /// "heading [unit]"; the heading alone without a unit.
 std::string with_unit(const std::string& heading, const std::string& unit);
+
+/// The limits of finite values.
+struct Range {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void add(double value) {
+    if (!std::isfinite(value)) return;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  bool empty() const { return !(low <= high); }
+  double size() const { return empty() ? 0. : high - low; }
+};
 
 /// Half the width of the bands of a page.
 inline constexpr double kBandSigmas = 3.;
