@@ -37,12 +37,6 @@ double relative_nees(const ErringPose& from, const ErringPose& to,
   return nees(error, H * cov * H.transpose());
 }
 
-double chi2_quantile(double p, double dof) {
-  if (!(p >= 0. && p < 1.)) throw std::invalid_argument("chi2_quantile: p must be in [0, 1)");
-  if (!(dof > 0.)) throw std::invalid_argument("chi2_quantile: dof must be positive");
-  return viwo::chi2_quantile(p, dof);
-}
-
 NeesBounds mean_nees_bounds(int dof, int runs, double confidence) {
   if (dof <= 0 || runs <= 0) {
     throw std::invalid_argument("mean_nees_bounds: dof and runs must be positive");

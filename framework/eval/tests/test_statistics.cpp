@@ -12,6 +12,7 @@
 
 #include "viwo/eval/consistency.hpp"
 #include "viwo/eval/statistics.hpp"
+#include "viwo/math/chi2.hpp"
 
 namespace viwo::eval {
 namespace {
@@ -94,8 +95,6 @@ TEST(ChiSquare, QuantilesAreThoseOfTheTable) {
   EXPECT_NEAR(chi2_quantile(0.025, 100), 74.222, 5e-4);
   EXPECT_NEAR(chi2_quantile(0.975, 100), 129.561, 5e-4);
   EXPECT_NEAR(chi2_quantile(0.5, 2), 2. * std::log(2.), 1e-12);
-  EXPECT_THROW(chi2_quantile(1., 2), std::invalid_argument);
-  EXPECT_THROW(chi2_quantile(0.5, 0), std::invalid_argument);
 }
 
 TEST(MeanNees, BoundsAreTheTableValuesOfTheSumOverTheRuns) {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "run_report.hpp"
-#include "viwo/eval/consistency.hpp"
+#include "viwo/math/chi2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/report/curves.hpp"
 #include "viwo/results/run_output.hpp"
@@ -65,8 +65,8 @@ std::vector<ErrorTrack> error_tracks(const RunResult& result) {
 
 Plot nees_plot(const PoseNees& nees) {
   constexpr double kDegreesOfFreedom = 6., kOutside = 0.05;
-  const double low = eval::chi2_quantile(kOutside / 2., kDegreesOfFreedom);
-  const double high = eval::chi2_quantile(1. - kOutside / 2., kDegreesOfFreedom);
+  const double low = chi2_quantile(kOutside / 2., kDegreesOfFreedom);
+  const double high = chi2_quantile(1. - kOutside / 2., kDegreesOfFreedom);
   std::vector<double> t_s, values;
   for (const auto& [t, value] : nees.series) {
     t_s.push_back(t);

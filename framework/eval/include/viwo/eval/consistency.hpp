@@ -22,10 +22,6 @@ struct ErringPose {
 double relative_nees(const ErringPose& from, const ErringPose& to,
                      const Eigen::Matrix<double, 12, 12>& cov);
 
-/// The value below which a chi-square variable with `dof` degrees of freedom stays with probability
-/// `p`. Throws std::invalid_argument unless 0 <= p < 1 and dof > 0.
-double chi2_quantile(double p, double dof);
-
 /// Two-sided interval for a mean NEES.
 struct NeesBounds {
   double low = 0.;
