@@ -92,16 +92,8 @@ Scale scale_of(const ExperimentResult& result, std::size_t recording, const std:
 
 std::vector<Block> calibration_plots(const ExperimentResult& result) {
   constexpr std::size_t kFirst = 0;  // a page with the plots of all recordings is not readable
-  std::vector<std::string> names;
-  for (const ExperimentRun& run : result.runs) {
-    if (run.recording != kFirst) continue;
-    for (const CalibrationTrack& track : run.result.calibration) {
-      if (is_estimated(run.result, track) &&
-          std::find(names.begin(), names.end(), track.name) == names.end()) {
-        names.push_back(track.name);
-      }
-    }
-  }
+  const auto names =
+      estimated(result, [](const ExperimentRun& run) { return run.recording == kFirst; });
   if (names.empty()) return {};
   const Recording& recording = result.setup.recordings[kFirst];
   std::string text =

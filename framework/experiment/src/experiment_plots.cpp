@@ -210,22 +210,6 @@ double sigma_ratio(const ExperimentResult& result, std::size_t variant, const st
   return eval::mean(ratios);
 }
 
-/// Names of the parameters that a variant estimated, or any of them.
-std::vector<std::string> estimated(const ExperimentResult& result,
-                                   std::optional<std::size_t> variant) {
-  std::vector<std::string> names;
-  for (const ExperimentRun& run : result.runs) {
-    if (variant && run.variant != *variant) continue;
-    for (const CalibrationTrack& track : run.result.calibration) {
-      if (is_estimated(run.result, track) &&
-          std::find(names.begin(), names.end(), track.name) == names.end()) {
-        names.push_back(track.name);
-      }
-    }
-  }
-  return names;
-}
-
 struct MapColumn {
   std::string name;
   std::size_t variant;
@@ -310,15 +294,13 @@ std::vector<Section> recording_sections(const ExperimentResult& result) {
 std::vector<Block> sigma_ratio_maps(const ExperimentResult& result) {
   std::vector<std::string> motions;
   for (const Recording& recording : result.setup.recordings) {
-    const std::string& motion = motion_of(result.setup, recording);
-    if (std::find(motions.begin(), motions.end(), motion) == motions.end()) {
-      motions.push_back(motion);
-    }
+    add_once(motions, motion_of(result.setup, recording));
   }
   std::vector<Block> maps;
   std::vector<MapColumn> variants;
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
-    const auto parameters = estimated(result, v);
+    const auto parameters =
+        estimated(result, [v](const ExperimentRun& run) { return run.variant == v; });
     if (parameters.empty()) continue;
     const std::string& name = result.setup.variants[v].name;
     variants.push_back({name, v, motions.front()});
@@ -331,7 +313,8 @@ std::vector<Block> sigma_ratio_maps(const ExperimentResult& result) {
   }
   if (motions.size() == 1 && !variants.empty()) {
     maps.emplace_back(ratio_map(result, "Observability, final sigma / prior sigma",
-                                estimated(result, {}), variants));
+                                estimated(result, [](const ExperimentRun&) { return true; }),
+                                variants));
   }
   return maps;
 }
@@ -340,9 +323,7 @@ std::vector<Block> stage_plots(const ExperimentResult& result) {
   std::vector<std::string> stages;
   for (const ExperimentRun& run : result.runs) {
     if (run.result.updates.empty()) continue;
-    for (const auto& [stage, time] : run.result.stages) {
-      if (std::find(stages.begin(), stages.end(), stage) == stages.end()) stages.push_back(stage);
-    }
+    for (const auto& [stage, time] : run.result.stages) add_once(stages, stage);
   }
   Plot plot{"Time per epoch", "", "mean [ms]"};
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {

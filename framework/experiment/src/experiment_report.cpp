@@ -235,9 +235,7 @@ void add_calibration_table(const ExperimentResult& result, const Group& all, Sec
       continue;
     }
     table.columns.push_back({result.setup.variants[v].name});
-    for (const auto& c : columns.back()) {
-      if (std::find(names.begin(), names.end(), c.name) == names.end()) names.push_back(c.name);
-    }
+    for (const auto& c : columns.back()) add_once(names, c.name);
   }
   if (columns.empty()) return;
   for (const std::string& parameter : names) {
@@ -268,11 +266,7 @@ void add_calibration_table(const ExperimentResult& result, const Group& all, Sec
 void add_gate_table(const ExperimentResult& result, Section& section) {
   std::vector<std::string> updates;
   for (const ExperimentRun& run : result.runs) {
-    for (const UpdateTrack& update : run.result.updates) {
-      if (std::find(updates.begin(), updates.end(), update.name) == updates.end()) {
-        updates.push_back(update.name);
-      }
-    }
+    for (const UpdateTrack& update : run.result.updates) add_once(updates, update.name);
   }
   if (updates.empty()) return;
   Table table;

@@ -33,6 +33,12 @@ std::vector<Metric> metrics_of(const ExperimentResult& result) {
   return metrics;
 }
 
+bool add_once(std::vector<std::string>& names, const std::string& name) {
+  const bool is_new = std::find(names.begin(), names.end(), name) == names.end();
+  if (is_new) names.push_back(name);
+  return is_new;
+}
+
 std::vector<Group> groups_of(const ExperimentResult& result) {
   std::vector<Group> groups{{"", "all", [](const ExperimentRun&) { return true; }}};
   const auto& recordings = result.setup.recordings;
@@ -41,8 +47,7 @@ std::vector<Group> groups_of(const ExperimentResult& result) {
     for (const Recording& recording : recordings) {
       const auto found = recording.labels.find(label);
       if (found == recording.labels.end()) continue;
-      if (std::find(seen.begin(), seen.end(), found->second) != seen.end()) continue;
-      seen.push_back(found->second);
+      if (!add_once(seen, found->second)) continue;
       groups.push_back({label, found->second,
                         [&recordings, label, value = found->second](const ExperimentRun& run) {
                           const auto& labels = recordings[run.recording].labels;
@@ -121,6 +126,18 @@ bool is_significant(const eval::PairedDifference& difference) {
 
 bool is_estimated(const RunResult& run, const CalibrationTrack& track) {
   return !run.updates.empty() && is_estimated(track);
+}
+
+std::vector<std::string> estimated(const ExperimentResult& result,
+                                   const std::function<bool(const ExperimentRun&)>& passes) {
+  std::vector<std::string> names;
+  for (const ExperimentRun& run : result.runs) {
+    if (!passes(run)) continue;
+    for (const CalibrationTrack& track : run.result.calibration) {
+      if (is_estimated(run.result, track)) add_once(names, track.name);
+    }
+  }
+  return names;
 }
 
 std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,

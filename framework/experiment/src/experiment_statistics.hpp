@@ -25,6 +25,9 @@ std::vector<Metric> all_metrics(const ExperimentResult& result);
 /// Those that at least one run has.
 std::vector<Metric> metrics_of(const ExperimentResult& result);
 
+/// Appends `name` unless it is there already; whether it has.
+bool add_once(std::vector<std::string>& names, const std::string& name);
+
 /// Some of the runs, with a name. Must not outlive the result that it is of.
 struct Group {
   std::string label;  ///< one of report_by; empty: all runs
@@ -88,6 +91,10 @@ std::string nees_text(double nees, double widened_nees);
 /// Whether a run of the filter estimated this parameter of its own, and still had a variance at
 /// its end.
 bool is_estimated(const RunResult& run, const CalibrationTrack& track);
+
+/// Names of the parameters that some of the runs estimated, in order of appearance.
+std::vector<std::string> estimated(const ExperimentResult& result,
+                                   const std::function<bool(const ExperimentRun&)>& passes);
 
 /// How many seconds of the robot's time pass in one second.
 struct RealtimeFactors {
