@@ -11,6 +11,7 @@
 #include "viwo/math/chi2.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -23,10 +24,6 @@ constexpr double kPathPiece_s = 0.05;
 constexpr double kBelievable = 0.999;
 /// Longest piece whose parity gradient is told.
 constexpr double kParityPiece_s = 1.;
-
-std::int64_t to_ns(double seconds) {
-  return static_cast<std::int64_t>(std::llround(seconds * 1e9));
-}
 
 PreintegrationOptions preintegration_of(const CalibrationRecording& recording,
                                         const CalibrationOptions& options) {

@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "viwo/math/se2.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -28,7 +29,7 @@ struct TurningSample {
 
 std::optional<double> rate_at(const MotionReference& motion, std::int64_t t_ns) {
   const auto half_ns = static_cast<std::int64_t>(0.5e9 * kTurn_s);
-  const std::int64_t at_ns = t_ns + static_cast<std::int64_t>(std::llround(1e9 * motion.offset_s));
+  const std::int64_t at_ns = t_ns + to_ns(motion.offset_s);
   const auto before = interpolate(motion.poses, at_ns - half_ns, motion.max_gap_s);
   const auto after = interpolate(motion.poses, at_ns + half_ns, motion.max_gap_s);
   if (!before || !after) return std::nullopt;

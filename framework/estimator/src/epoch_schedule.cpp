@@ -1,16 +1,13 @@
 #include "viwo/estimator/epoch_schedule.hpp"
 
 #include <algorithm>
-#include <cmath>
+
+#include "viwo/math/stamp.hpp"
 
 namespace viwo {
 namespace {
 
 constexpr std::int64_t kLeastEpochNs = 1'000'000;
-
-std::int64_t to_ns(double seconds) {
-  return static_cast<std::int64_t>(std::llround(seconds * 1e9));
-}
 
 /// Whether no further sample of the instant `t_ns` is to be expected; `newest_ns`: of the IMU and
 /// of all streams that end epochs.

@@ -11,6 +11,7 @@
 #include "viwo/filter/health.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo {
 namespace {
@@ -159,7 +160,7 @@ bool Estimator::step() {
     return false;
   }
   if (silent_s > kSilenceToNameS && filter_.t_ns() >= silence_.end_ns) {
-    silence_ = {silent_s, filter_.t_ns() + std::llround(1e9 * silent_s)};
+    silence_ = {silent_s, filter_.t_ns() + to_ns(silent_s)};
   }
   const auto t_ns = intake_.next_epoch_ns(options_.schedule, filter_.t_ns(), filter_.blocks());
   if (!t_ns) return false;

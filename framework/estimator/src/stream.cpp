@@ -47,7 +47,7 @@ std::int64_t Stream::offset_ns(int channel, const StateBlocks& blocks) const {
   // An estimate that has gone wild is found out at the end of the epoch (failure_of()).
   constexpr double kMostS = 1e8;
   const double offset_s = clock.constant_s + estimated_s;
-  return std::llround(1e9 * (std::abs(offset_s) <= kMostS ? offset_s : 0.));
+  return to_ns(std::abs(offset_s) <= kMostS ? offset_s : 0.);
 }
 
 std::int64_t Stream::imu_time_ns(std::size_t i, const StateBlocks& blocks) const {

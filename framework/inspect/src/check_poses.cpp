@@ -10,6 +10,7 @@
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/plausibility/channel_change.hpp"
 #include "viwo/series/lag.hpp"
 #include "viwo/wheel/twist_solver.hpp"
@@ -59,7 +60,7 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
   // As long as it takes to get somewhere: where few windows of a slow robot were long enough,
   // errors of its poses would be taken for way.
   constexpr double kWindow_s = 1., kLongest_s = 30., kLeast_m = 0.03;
-  const auto clock_ns = static_cast<std::int64_t>(std::llround(1e9 * wheels.prior.wheels.t_OtoI_s));
+  const auto clock_ns = to_ns(wheels.prior.wheels.t_OtoI_s);
   const double gap_s = std::max(0.5, 2.5 * period_of(turns_of(poses)));
   double path = 0., time_s = 0.;
   Eigen::Vector2d along = Eigen::Vector2d::Zero();

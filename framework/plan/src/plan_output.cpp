@@ -10,6 +10,7 @@
 #include "viwo/log/tum.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/math/text_stream.hpp"
 #include "viwo/plan/plan.hpp"
 #include "viwo/report/document.hpp"
@@ -59,7 +60,7 @@ void write_motion(const std::filesystem::path& folder, const Plan& plan) {
     for (const double value : {g[1], g[2], g[0], xi[0], xi[1], xi[2]}) table << "," << value;
     table << "\n";
     StampedPose& pose = trajectory.emplace_back();
-    pose.t_ns = std::llround(t_s * 1e9);
+    pose.t_ns = to_ns(t_s);
     pose.p_BinW = {g[1], g[2], 0.};
     pose.q_BtoW = Eigen::AngleAxisd(g[0], Eigen::Vector3d::UnitZ());
   }

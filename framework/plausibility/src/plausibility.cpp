@@ -12,6 +12,7 @@
 #include "stream_watch.hpp"
 #include "twist_check.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/plausibility/periods.hpp"
 
 namespace viwo {
@@ -295,7 +296,7 @@ void Plausibility::watch(const std::string& sensor, SampleView sample) {
 
 void Plausibility::wait(double seconds) {
   if (!checks_ || !now_ns_) return;
-  waited_ns_ += std::llround(1e9 * seconds);
+  waited_ns_ += to_ns(seconds);
   look_now_and_then();
 }
 

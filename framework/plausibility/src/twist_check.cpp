@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/plausibility/heading_rate.hpp"
 
 namespace viwo {
@@ -89,7 +90,7 @@ void TwistCheck::add_heading(const HeadingSample& sample) {
 
 void TwistCheck::add_wheels(const EncoderSample& sample, const Twist& xi,
                             const Intrinsics& rate_by_prior) {
-  const auto offset_ns = static_cast<std::int64_t>(std::llround(1e9 * t_OtoI_s_));
+  const auto offset_ns = to_ns(t_OtoI_s_);
   if (sample.begin_ns + offset_ns < 0 || !xi.allFinite()) return;
   rate_squares_ += xi[2] * xi[2];
   if (rate_products_.size() == 0) rate_products_.setZero(rate_by_prior.size());

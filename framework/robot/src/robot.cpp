@@ -10,6 +10,7 @@
 #include "viwo/estimator/estimator.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/rig_simulator.hpp"
 
@@ -118,7 +119,7 @@ PoseSample pose_at(const sim::BodyTrajectory& trajectory, double t_s) {
   const sim::BodyMotion motion = trajectory.imu(t_s, mounting());
   const Eigen::Quaterniond q(motion.R_BtoG);
   PoseSample pose;
-  pose.t_ns = kStart + static_cast<std::int64_t>(std::llround(1e9 * t_s));
+  pose.t_ns = kStart + to_ns(t_s);
   pose.p_BinW_m = {motion.p_BinG.x(), motion.p_BinG.y(), motion.p_BinG.z()};
   pose.q_BtoW_xyzw = {q.x(), q.y(), q.z(), q.w()};
   return pose;

@@ -1,7 +1,6 @@
 // A run of the filter: feed, record, evaluate.
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <iterator>
 #include <memory>
 #include <optional>
@@ -15,6 +14,7 @@
 #include "running_warnings.hpp"
 #include "viwo/feed/feed.hpp"
 #include "viwo/math/se2.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/plausibility/plausibility.hpp"
 #include "viwo/run/run.hpp"
@@ -188,7 +188,7 @@ class FilterRun {
   /// A live run is ended by its feed.
   bool is_interrupted() {
     if (live_ || !hooks_.interrupted || !hooks_.interrupted()) return false;
-    result_.warnings.push_back("interrupted at " + time_text(std::llround(1e9 * now_s())) +
+    result_.warnings.push_back("interrupted at " + time_text(to_ns(now_s())) +
                                ": the rest of the recording was not used");
     return true;
   }

@@ -13,6 +13,7 @@
 #include "viwo/eval/consistency.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/plausibility/plausibility.hpp"
 #include "viwo/run/warnings.hpp"
@@ -63,7 +64,7 @@ std::vector<std::int64_t> epoch_stamps(const RunSetup& setup, const RunData& dat
         "the encoder samples of '" + data.wheels_name + "' " +
         (data.reference.empty() ? "last no time" : "and the reference have no time in common"));
   }
-  const auto period_ns = std::max<std::int64_t>(1, std::llround(setup.epoch_s * 1e9));
+  const auto period_ns = std::max<std::int64_t>(1, to_ns(setup.epoch_s));
   // Many more epochs than samples, and more than memory is for: two clocks.
   constexpr std::int64_t kMost = 100'000, kMostPerSample = 100;
   const auto samples = static_cast<std::int64_t>(data.wheels().size());
@@ -121,8 +122,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   result.rejections = data.rejections;
   result.warnings = setup.warnings;
   result.reference = data.reference;
-  const auto offset_ns =
-      static_cast<std::int64_t>(std::llround(setup.reference_time_offset_s * 1e9));
+  const auto offset_ns = to_ns(setup.reference_time_offset_s);
   const auto stamps = epoch_stamps(setup, data, offset_ns);
   const Eigen::Vector3d O_in_B = as_se2(setup.extrinsics.value_or(PlanarExtrinsics::Zero()));
   const Eigen::Vector3d B_in_O = between(O_in_B, Eigen::Vector3d::Zero());

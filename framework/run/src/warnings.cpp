@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "viwo/math/significant.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
 
 namespace viwo {
@@ -24,7 +25,7 @@ std::string since(std::int64_t begin_ns, const std::string& place) {
   for (std::size_t at = 0; (at = place.find("t = ", done)) != std::string::npos;) {
     char* end = nullptr;
     const double t_s = std::strtod(place.c_str() + at + 4, &end);
-    text += place.substr(done, at - done) + time_text(std::llround(1e9 * t_s) - begin_ns);
+    text += place.substr(done, at - done) + time_text(to_ns(t_s) - begin_ns);
     done = std::min(place.size(), static_cast<std::size_t>(end - place.c_str()) + 2);
   }
   return text + place.substr(done);

@@ -1,12 +1,12 @@
 #include "viwo/series/rate_grid.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/plausibility/heading_rate.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
@@ -98,7 +98,7 @@ std::vector<Turn> twists_of(const Wheels& wheels) {
   TwistSolver solver(wheels.model, {});
   solver.set_intrinsics(wheels.prior.wheels.x_WI);
   TwistSolution solution;
-  const auto clock_ns = static_cast<std::int64_t>(std::llround(1e9 * wheels.prior.wheels.t_OtoI_s));
+  const auto clock_ns = to_ns(wheels.prior.wheels.t_OtoI_s);
   for (const EncoderSample& sample : wheels.samples) {
     if (solver.solve(sample, solution) != Status::kOk || solution.rank_deficient) continue;
     turns.push_back({sample.begin_ns + clock_ns, sample.end_ns + clock_ns, solution.xi});
@@ -121,7 +121,7 @@ std::vector<Turn> about(std::vector<Turn> turns, const Eigen::Vector3d& axis) {
 }
 
 std::vector<Turn> shifted(std::vector<Turn> turns, double seconds) {
-  const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * seconds));
+  const auto shift_ns = to_ns(seconds);
   for (Turn& turn : turns) {
     turn.begin_ns += shift_ns;
     turn.end_ns += shift_ns;

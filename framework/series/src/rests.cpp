@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::series {
 namespace {
@@ -23,8 +24,7 @@ class StillWheels {
     int still = -1;
     for (std::size_t w = 0; w < next_.size(); ++w) {
       const Wheels& wheels = recording_->wheels[w];
-      const auto clock_ns =
-          static_cast<std::int64_t>(std::llround(1e9 * wheels.prior.wheels.t_OtoI_s));
+      const auto clock_ns = to_ns(wheels.prior.wheels.t_OtoI_s);
       // As the start from a rest has it: what turns slower is noise of an encoder.
       constexpr double kStill_rad_per_s = 0.05;
       constexpr std::int64_t kAroundNs = 300'000'000;

@@ -11,6 +11,7 @@
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/cells.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/sim/random.hpp"
 
 namespace viwo::sim {
@@ -236,7 +237,7 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
   Twist at_start = twist(std::max(options.time_offset_s, 0.) + 0.05);
   base.follow(at_start, options.sliding_m_per_s);
   std::vector<EncoderSample> samples;
-  const std::int64_t end_ns = std::llround(options.duration_s * 1e9);
+  const std::int64_t end_ns = to_ns(options.duration_s);
   for (std::int64_t k = 0, t_ns = 0; t_ns <= end_ns; t_ns = sample_time_ns(++k, options.rate_hz)) {
     const double t = static_cast<double>(t_ns) * 1e-9 + options.time_offset_s;
     Twist xi = twist(t);

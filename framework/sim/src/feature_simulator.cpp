@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "viwo/camera/camera_model.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/random.hpp"
 #include "viwo/sim/true_cameras.hpp"
@@ -203,8 +204,8 @@ class PointErrors {
 }  // namespace
 
 std::vector<std::int64_t> image_times_ns(const FeatureSimulation& options) {
-  const std::int64_t phase_ns = std::llround(options.phase_s * 1e9);
-  const std::int64_t end_ns = std::llround(options.duration_s * 1e9);
+  const std::int64_t phase_ns = to_ns(options.phase_s);
+  const std::int64_t end_ns = to_ns(options.duration_s);
   std::vector<std::int64_t> out;
   for (std::int64_t k = 0, t_ns = phase_ns; t_ns <= end_ns;
        t_ns = phase_ns + sample_time_ns(++k, options.rate_hz)) {

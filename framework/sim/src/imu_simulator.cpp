@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "viwo/math/stamp.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/sim/random.hpp"
 
@@ -33,7 +34,7 @@ std::array<double, 3> to_array(const Vector3d& v) { return {v.x(), v.y(), v.z()}
 /// Number of the last sample.
 std::int64_t last_sample(const ImuSimulation& options) {
   std::int64_t k = static_cast<std::int64_t>(options.duration_s * options.rate_hz);
-  const std::int64_t end_ns = std::llround(options.duration_s * 1e9);
+  const std::int64_t end_ns = to_ns(options.duration_s);
   while (sample_time_ns(k, options.rate_hz) < end_ns) ++k;
   return k;
 }

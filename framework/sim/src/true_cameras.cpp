@@ -1,9 +1,8 @@
 #include "viwo/sim/true_cameras.hpp"
 
-#include <cmath>
-
 #include "viwo/log/kalibr.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/sim/random.hpp"
 
 namespace viwo::sim {
@@ -70,7 +69,7 @@ std::vector<CalibrationSample> camera_truth(std::span<const CameraView> cameras,
 }
 
 std::int64_t camera_stamp_ns(const CameraView& camera, std::int64_t t_imu_ns) {
-  return t_imu_ns - std::llround(camera.t_CtoI_s * 1e9);
+  return t_imu_ns - to_ns(camera.t_CtoI_s);
 }
 
 }  // namespace viwo::sim

@@ -11,6 +11,7 @@
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/wheel/preintegration.hpp"
 
 namespace viwo {
@@ -184,7 +185,6 @@ class Window {
     options.parity = false;
     return options;
   }
-  static std::int64_t to_ns(double seconds) { return std::llround(seconds * 1e9); }
   Vector3d gyro(std::size_t i) const { return to_vector(imu_[i].gyro_rad_per_s); }
   Vector3d accel(std::size_t i) const { return to_vector(imu_[i].accel_m_per_s2); }
 

@@ -5,6 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "viwo/math/stamp.hpp"
+
 namespace viwo {
 namespace {
 
@@ -48,7 +50,7 @@ Stillness stillness_of(std::span<const FeatureSample> tracks, std::span<const do
                        std::int64_t begin_ns, std::int64_t end_ns) {
   const auto imu_ns = [&](const FeatureSample& sample) {
     const auto camera = static_cast<std::size_t>(sample.camera);
-    return sample.t_ns + (camera < t_CtoI_s.size() ? std::llround(1e9 * t_CtoI_s[camera]) : 0);
+    return sample.t_ns + (camera < t_CtoI_s.size() ? to_ns(t_CtoI_s[camera]) : 0);
   };
   std::vector<const FeatureSample*> images;  // of the camera of the first one
   for (const FeatureSample& sample : tracks) {

@@ -6,6 +6,7 @@
 
 #include "viwo/camera/camera_model.hpp"
 #include "viwo/filter/propagation.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo {
 namespace {
@@ -20,7 +21,7 @@ constexpr std::string_view kTooFewImages = "fewer images than start_window_s ask
 
 std::int64_t imu_stamp(const FeatureSample& sample, std::span<const CameraPrior> cameras) {
   const auto camera = static_cast<std::size_t>(sample.camera);
-  return sample.t_ns + std::llround(1e9 * cameras[camera].camera.t_CtoI_s);
+  return sample.t_ns + to_ns(cameras[camera].camera.t_CtoI_s);
 }
 
 /// Stamps of the images of the first camera that has any, from `begin_ns` to `end_ns`, thinned out
@@ -98,7 +99,7 @@ std::string_view find_visual_window(std::span<const ImuSample> imu,
   const std::int64_t end_ns = imu.back().t_ns;
   auto stamps = choose_keys(tracks, imu.front().t_ns, end_ns, cameras);
   if (stamps.empty()) return kTooFewImages;
-  const std::int64_t begin_ns = stamps.back() - std::llround(1e9 * window_s) - kSameInstantNs;
+  const std::int64_t begin_ns = stamps.back() - to_ns(window_s) - kSameInstantNs;
   // Images are a tenth of the window apart at most, or it has too few of them anyway.
   if (seconds_between(stamps.front(), stamps.back()) < 0.9 * window_s) return kTooFewImages;
   stamps = choose_keys(tracks, std::max(begin_ns, imu.front().t_ns), end_ns, cameras);

@@ -2,7 +2,6 @@
 // KAIST Complex Urban dataset (model.md).
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -18,6 +17,7 @@
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/sensor_params.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo {
 namespace {
@@ -59,10 +59,6 @@ struct Params : log::JointParams, log::LimitParams {
     log::LimitParams::bind(b);
   }
 };
-
-std::int64_t nanoseconds(double seconds) {
-  return static_cast<std::int64_t>(std::llround(1e9 * seconds));
-}
 
 /// What a sample stands for: an instant, or the cell of an encoder sample.
 template <class Sample>
@@ -161,12 +157,12 @@ class KaistUrban final : public Sensor {
       first_ns = std::min(first_ns, extent(track.samples.front()).first);
       last_ns = std::max(last_ns, extent(track.samples.back()).second);
     });
-    const std::int64_t from_ns = first_ns + nanoseconds(start_s);
-    const std::int64_t to_ns = duration_s > 0. ? from_ns + nanoseconds(duration_s) : last_ns;
+    const std::int64_t from_ns = first_ns + to_ns(start_s);
+    const std::int64_t until_ns = duration_s > 0. ? from_ns + to_ns(duration_s) : last_ns;
     for_each_track([&](auto& track) {
       std::erase_if(track.samples, [&](const auto& sample) {
         const auto [begin_ns, end_ns] = extent(sample);
-        return begin_ns < from_ns || end_ns > to_ns;
+        return begin_ns < from_ns || end_ns > until_ns;
       });
     });
     if (earliest()) return;

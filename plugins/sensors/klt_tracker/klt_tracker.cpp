@@ -12,6 +12,7 @@
 #include "params.hpp"
 #include "viwo/image/image_file.hpp"
 #include "viwo/log/kalibr.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::klt {
 namespace {
@@ -94,7 +95,7 @@ KltTracker::KltTracker(const Params& params, const HostServices& services)
       followed_.push_back(i);
     }
   }
-  groups_.emplace(static_cast<int>(cameras_.size()), std::llround(max_camera_dt_s_ * 1e9));
+  groups_.emplace(static_cast<int>(cameras_.size()), to_ns(max_camera_dt_s_));
 }
 
 void KltTracker::read_one(const ImageSource* source, std::size_t camera, Eye& eye) const {

@@ -8,6 +8,7 @@
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
 #include "viwo/log/sensor_params.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/sim/drive_params.hpp"
 #include "viwo/sim/encoder_params.hpp"
 #include "viwo/sim/planar_motion.hpp"
@@ -84,7 +85,7 @@ std::vector<PoseSample> poses(const Params& params, const sim::PlanarMotion& mot
   sim::PoseIntegrator integrator(motion);
   std::vector<PoseSample> out;
   const double rate_hz = params.reference_rate_hz;
-  const std::int64_t end_ns = std::llround(params.duration_s * 1e9);
+  const std::int64_t end_ns = to_ns(params.duration_s);
   for (std::int64_t k = 0, t_ns = 0; t_ns <= end_ns; t_ns = sim::sample_time_ns(++k, rate_hz)) {
     const Eigen::Vector3d& g = integrator.advance_to(static_cast<double>(t_ns) * 1e-9);
     out.push_back({params.start_ns + t_ns,

@@ -10,6 +10,7 @@
 #include "viwo/log/recording.hpp"
 #include "viwo/log/ros_text.hpp"
 #include "viwo/log/sensor_params.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/rig_simulator.hpp"
 #include "viwo/sim/true_cameras.hpp"
@@ -56,11 +57,11 @@ void report(const HostServices& services, const sim::FitResidual& residual) {
 
 log::Recording<Measurement> simulate(const Params& params, const HostServices& services) {
   auto recorded = log::read_ros_poses(params.path, params.ros_clock(), params.limits());
-  const std::int64_t offset_ns = std::llround(params.time_offset_s * 1e9);
+  const std::int64_t offset_ns = to_ns(params.time_offset_s);
   for (PoseSample& pose : recorded.samples) pose.t_ns += offset_ns;
   // The spline is poor at its ends, where it has samples on one side only.
   const double margin_s = params.knot_spacing_s;
-  const std::int64_t start_ns = recorded.samples.front().t_ns + std::llround(margin_s * 1e9);
+  const std::int64_t start_ns = recorded.samples.front().t_ns + to_ns(margin_s);
   const sim::BodyTrajectory trajectory = sim::BodyTrajectory::through(
       recorded.samples, start_ns, params.planar, params.knot_spacing_s);
   report(services, sim::fit_residual(trajectory, recorded.samples, start_ns));

@@ -1,7 +1,6 @@
 #include "bag_samples.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <initializer_list>
 #include <limits>
@@ -12,6 +11,7 @@
 #include "topic_readers.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::bag {
 namespace {
@@ -109,17 +109,15 @@ Readers make_readers(const std::shared_ptr<const Bag>& bag, const BagOptions& op
   return all;
 }
 
-std::int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
-
 }  // namespace
 
 BagSamples read_samples(const std::shared_ptr<const Bag>& bag, const BagOptions& options) {
   const Readers all = make_readers(bag, options);
   std::int64_t from_ns = std::numeric_limits<std::int64_t>::min();
-  std::int64_t to_ns = std::numeric_limits<std::int64_t>::max();
-  if (options.start_s > 0.) from_ns = bag->begin_ns() + nanoseconds(options.start_s);
+  std::int64_t until_ns = std::numeric_limits<std::int64_t>::max();
+  if (options.start_s > 0.) from_ns = bag->begin_ns() + to_ns(options.start_s);
   if (options.duration_s > 0.) {
-    to_ns = bag->begin_ns() + nanoseconds(options.start_s) + nanoseconds(options.duration_s);
+    until_ns = bag->begin_ns() + to_ns(options.start_s) + to_ns(options.duration_s);
   }
   Rejections damage;
   const auto take = [&](const Message& message) {
@@ -130,7 +128,7 @@ BagSamples read_samples(const std::shared_ptr<const Bag>& bag, const BagOptions&
       reader.reject(std::string("broken message: ") + broken.what(), message);
     }
   };
-  bag->read(all.wanted, from_ns, to_ns, take, damage);
+  bag->read(all.wanted, from_ns, until_ns, take, damage);
   BagSamples out;
   damage.append_to(out.rejections);
   std::string lost;

@@ -3,7 +3,6 @@
 // offset is being estimated (wheel_odometry/model.md).
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -13,6 +12,7 @@
 
 #include "tally.hpp"
 #include "viwo/api/update.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/wheel/preintegration.hpp"
 
 namespace viwo {
@@ -37,7 +37,7 @@ class EncoderIntervals {
                                       std::span<const EncoderSample> encoders,
                                       double at_least_s = 0.) {
     const CloneState& now = filter.clones.back();
-    const std::int64_t cut_ns = now.t_ns - std::llround(1e9 * t_OtoI_s);  // (WO-1)
+    const std::int64_t cut_ns = now.t_ns - to_ns(t_OtoI_s);  // (WO-1)
     if (!started_) {
       start_at(now, cut_ns);
       return std::nullopt;

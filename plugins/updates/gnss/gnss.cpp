@@ -18,6 +18,7 @@
 #include "tally.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/chi2.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo {
 namespace {
@@ -170,7 +171,7 @@ class Gnss final : public Update {
   }
 
   std::optional<Place> place_of(const FilterView& filter, const GnssSample& fix) {
-    const std::int64_t t_ns = fix.t_ns + std::llround(1e9 * options_.t_AtoI_s);
+    const std::int64_t t_ns = fix.t_ns + to_ns(options_.t_AtoI_s);
     const auto clones = filter.clones;
     if (clones.size() < 2 || t_ns < clones.front().t_ns || t_ns > clones.back().t_ns) {
       too_late_.add(1, t_ns);

@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::visual {
 namespace {
@@ -133,7 +134,7 @@ void Window::set_columns() {
 std::optional<int> Window::take_image(int camera, std::int64_t stamp_ns) {
   const double offset_s = cameras_[static_cast<std::size_t>(camera)].view.t_CtoI_s;
   if (!std::isfinite(offset_s)) return std::nullopt;
-  const std::int64_t t_ns = stamp_ns + std::llround(1e9 * offset_s);
+  const std::int64_t t_ns = stamp_ns + to_ns(offset_s);
   const WindowClone* nearest = nullptr;
   for (const WindowClone& clone : clones_) {
     if (nearest == nullptr || std::abs(clone.t_ns - t_ns) < std::abs(nearest->t_ns - t_ns)) {

@@ -11,6 +11,7 @@
 #include "relative_pose.hpp"
 #include "tally.hpp"
 #include "viwo/api/plugin.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo {
 namespace {
@@ -119,7 +120,7 @@ class WheelRelativePose final : public Update {
   /// g between two clones, at the present estimate of calibration and clock (RP-1).
   bool measure(const WheelsView& wheels, const CloneState& first, const CloneState& last,
                std::span<const EncoderSample> encoders) {
-    const std::int64_t offset_ns = std::llround(1e9 * wheels.t_OtoI_s);
+    const std::int64_t offset_ns = to_ns(wheels.t_OtoI_s);
     integrator_->set_intrinsics(wheels.x_WI);
     if (!integrator_->integrate(encoders, first.t_ns - offset_ns, last.t_ns - offset_ns,
                                 increment_)) {

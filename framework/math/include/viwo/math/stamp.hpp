@@ -1,6 +1,7 @@
-// Which integers are stamps.
+// Which integers are stamps, and seconds as stamps have them.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "viwo/api/stamp_order.hpp"
@@ -12,5 +13,8 @@ namespace viwo {
 inline constexpr bool is_stamp(std::int64_t t_ns) {
   return t_ns >= -kMaxStampNs && t_ns <= kMaxStampNs;
 }
+
+/// Seconds as whole nanoseconds, the nearest.
+inline std::int64_t to_ns(double seconds) { return std::llround(1e9 * seconds); }
 
 }  // namespace viwo
