@@ -142,15 +142,13 @@ bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& la
       return f.sensor == label && f.check == "order" && f.severity == Severity::kFault;
     });
     if (!is_known) {
-      out.push_back(
-          {label,
-           Severity::kFault,
-           "order",
-           change.text() + " (without that they go " + significant(ratio, 3) + " times as far as " +
-               other + ")",
-           {{"wheels by poses", ratio, ""}},
-           change.remedies(wheels.sensor,
-                           static_cast<std::size_t>(wheels.model->description().n_drive), 0)});
+      out.push_back({label,
+                     Severity::kFault,
+                     "order",
+                     change.text() + " (without that they go " + significant(ratio, 3) +
+                         " times as far as " + other + ")",
+                     {{"wheels by poses", ratio, ""}},
+                     change.remedies(wheels.sensor, wheels.model->description())});
     }
     return true;
   }

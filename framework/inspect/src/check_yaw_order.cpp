@@ -41,15 +41,13 @@ bool check_order(const Recording& recording, const Wheels& wheels, const RateGri
   const std::size_t best =
       clear_change(undone, between(gyro, RateGrid(span.begin_ns, span.end_ns, opposite)));
   if (best == 0) return false;
-  const ModelDescription& description = wheels.model->description();
   out.push_back(
       {label,
        Severity::kFault,
        "order",
        text_of(changes[best], undone.front(), undone[best]),
        {{"left as it is", undone.front().part(), ""}, {"left without it", undone[best].part(), ""}},
-       changes[best].remedies(wheels.sensor, static_cast<std::size_t>(description.n_drive),
-                              static_cast<std::size_t>(description.n_steer))});
+       changes[best].remedies(wheels.sensor, wheels.model->description())});
   return true;
 }
 

@@ -142,8 +142,10 @@ std::string ChannelChange::text() const {
   return "";
 }
 
-std::vector<Remedy> ChannelChange::remedies(const std::string& sensor, std::size_t n_drive,
-                                            std::size_t n_steer) const {
+std::vector<Remedy> ChannelChange::remedies(const std::string& sensor,
+                                            const ModelDescription& description) const {
+  const auto n_drive = static_cast<std::size_t>(description.n_drive);
+  const auto n_steer = static_cast<std::size_t>(description.n_steer);
   const std::string section = "sensors." + sensor + ".";
   const auto factor = [&](std::size_t i) {
     const bool is_changed = kind == kSideSign ? (side >> i & 1u) != 0 : i == a;

@@ -25,7 +25,7 @@ EncoderCheck::EncoderCheck(const SensorName& wheels, std::shared_ptr<const Wheel
     changes_.push_back({change});
   }
   if (n_steer_ > 0) changes_.push_back({{ChannelChange::kNoSteering}});
-  drives_.resize(n_drive());
+  drives_.resize(static_cast<std::size_t>(model->description().n_drive));
 }
 
 std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
@@ -129,7 +129,7 @@ void EncoderCheck::find_change(Findings& out) const {
   const bool is_degrees = best->change.kind == ChannelChange::kSteersInDegrees;
   if (is_degrees && end != changes_.end() && end->residual < 3. * best->residual) return;
   std::string texts;
-  std::vector<Remedy> remedies = best->change.remedies(sensor_, n_drive(), n_steer());
+  std::vector<Remedy> remedies = best->change.remedies(sensor_, solver_.model().description());
   for (auto other = changes_.begin(); other != end; ++other) {
     if (other->residual >= 3. * best->residual && other != best) continue;
     if (other->residual >= most) return;

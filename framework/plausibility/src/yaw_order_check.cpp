@@ -44,11 +44,9 @@ bool YawOrderCheck::findings(Findings& out) const {
   if (opposite_.count() < kFewest) return false;
   const std::size_t best = clear_change(undone_, opposite_);
   if (best == 0) return false;
-  const ModelDescription& description = solver_.model().description();
   out.push_back({name_ + " yaw order",
                  name_ + ": " + text_of(changes_[best], undone_.front(), undone_[best]), false,
-                 changes_[best].remedies(sensor_, static_cast<std::size_t>(description.n_drive),
-                                         static_cast<std::size_t>(description.n_steer))});
+                 changes_[best].remedies(sensor_, solver_.model().description())});
   return true;
 }
 

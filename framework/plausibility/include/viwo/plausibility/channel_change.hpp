@@ -37,8 +37,8 @@ struct ChannelChange {
   std::string text() const;
   /// What undoes it in the section of a sensor: signs as lists with -1 for what is reversed, an
   /// order as lists that say which channel of the model each channel of the log is, from 1.
-  std::vector<Remedy> remedies(const std::string& sensor, std::size_t n_drive,
-                               std::size_t n_steer) const;
+  std::vector<Remedy> remedies(const std::string& sensor,
+                               const ModelDescription& description) const;
 };
 
 /// Signs, orders and units, one change at a time; the first is none.
