@@ -69,16 +69,11 @@ void EstimateOutput::watch(RunHooks& hooks) {
 
 void EstimateOutput::on_epoch(const Filter& filter, const EpochData& data) {
   if (next_ != nullptr) next_->on_epoch(filter, data);  // pictures look at nothing else
-  for (const SampleSpan& stream : data.streams) {
-    if (stream.type == nullptr || !(*stream.type == sample_type<FeatureSample>())) continue;
-    for (const FeatureSample& image :
-         std::span(static_cast<const FeatureSample*>(stream.data), stream.size)) {
-      const auto index = static_cast<std::size_t>(image.camera);
-      if (index >= tracks_.size()) continue;
-      tracks_[index].add(image.points);
-      seen_.push_back(seen_image(image, tracks_[index]));
-    }
-    return;  // others take the same
+  for (const FeatureSample& image : view::images_of(data)) {
+    const auto index = static_cast<std::size_t>(image.camera);
+    if (index >= tracks_.size()) continue;
+    tracks_[index].add(image.points);
+    seen_.push_back(seen_image(image, tracks_[index]));
   }
 }
 

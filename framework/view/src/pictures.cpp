@@ -152,16 +152,7 @@ void RunPictures::watch(RunHooks& hooks) {
 void RunPictures::on_epoch(const Filter& filter, const EpochData& data) {
   sigma_position_m_ =
       std::sqrt(filter.imu_covariance().diagonal().segment<3>(kPositionColumn).sum());
-  for (const SampleSpan& stream : data.streams) {
-    if (stream.type != nullptr && *stream.type == sample_type<FeatureSample>()) {
-      see({static_cast<const FeatureSample*>(stream.data), stream.size});
-      return;  // others take the same
-    }
-  }
-}
-
-void RunPictures::see(std::span<const FeatureSample> images) {
-  for (const FeatureSample& image : images) {
+  for (const FeatureSample& image : images_of(data)) {
     const auto index = static_cast<std::size_t>(image.camera);
     if (index >= cameras_.size()) continue;
     cameras_[index].t_ns = image.t_ns;

@@ -5,6 +5,15 @@
 
 namespace viwo::view {
 
+std::span<const FeatureSample> images_of(const EpochData& data) {
+  for (const SampleSpan& stream : data.streams) {
+    if (stream.type != nullptr && *stream.type == sample_type<FeatureSample>()) {
+      return {static_cast<const FeatureSample*>(stream.data), stream.size};
+    }
+  }
+  return {};
+}
+
 void Tracks::add(std::span<const FeaturePoint> points) {
   std::vector<Track> now;
   now.reserve(points.size());

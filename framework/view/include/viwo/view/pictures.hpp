@@ -52,7 +52,6 @@ class RunPictures final : public EstimatorObserver {
     std::vector<ImageSample> images;  ///< of a recorded run, in time order
   };
 
-  void see(std::span<const FeatureSample> images);
   void after_epoch(const RunResult& result);
   void make_pictures(const RunResult& result);
   bool snapshot_due(double t_s);

@@ -7,9 +7,13 @@
 #include <span>
 #include <vector>
 
+#include "viwo/api/filter_view.hpp"
 #include "viwo/api/measurement.hpp"
 
 namespace viwo::view {
+
+/// What cameras saw in an epoch, of the first stream that has it: others take the same.
+std::span<const FeatureSample> images_of(const EpochData& data);
 
 /// Images over which the trail of a point goes back.
 inline constexpr std::size_t kTrailImages = 10;
