@@ -76,14 +76,8 @@ Series trajectory_series(const std::string& name, const Trajectory& trajectory,
 
 Series error_series(const std::string& name, const eval::Accuracy& accuracy,
                     std::size_t max_points) {
-  Series series;
-  series.name = name;
-  series.group = name;
-  thinned(accuracy.series.path_length_m.size(), max_points, [&](std::size_t i) {
-    series.x.push_back(accuracy.series.path_length_m[i]);
-    series.y.push_back(1e3 * accuracy.series.position_error_m[i]);
-  });
-  return series;
+  const eval::ErrorSeries& errors = accuracy.series;
+  return curve(name, {errors.path_length_m, errors.position_error_m, {}, 1e3}, max_points);
 }
 
 }  // namespace viwo::report
