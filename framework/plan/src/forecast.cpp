@@ -35,13 +35,9 @@ Forecaster::Forecaster(PlanSetup setup)
       pieces_(make_pieces(wheels_, setup_.params)) {}
 
 Eigen::Index Forecaster::require(const std::string& intrinsic) const {
-  const auto& specs = setup_.model->description().intrinsics;
-  const auto spec = std::find_if(specs.begin(), specs.end(),
-                                 [&](const IntrinsicSpec& one) { return one.name == intrinsic; });
-  if (spec == specs.end()) {
-    throw InputError("the plan is for another base: it has no intrinsic '" + intrinsic + "'");
-  }
-  return spec - specs.begin();
+  const int found = setup_.model->find(intrinsic);
+  if (found >= 0) return found;
+  throw InputError("the plan is for another base: it has no intrinsic '" + intrinsic + "'");
 }
 
 Forecast Forecaster::of(std::span<const std::string> names, const Eigen::MatrixXd& P) {
