@@ -172,11 +172,7 @@ void Plausibility::watch_without_filter(const RunSetup& setup, const Eigen::Vect
   checks_->streams.push_back(
       {sensor, &sample_type<EncoderSample>(),
        StreamWatch(name_of(setup, sensor, "wheels"), 0., kLongestEncoderPeriod_s)});
-  WheelSet set{setup.model, {}};
-  set.prior.wheels.x_WI = setup.x_WI;
-  set.prior.sigma_intrinsics = setup.sigma;
-  set.prior.wheels.R_ItoO = Eigen::Matrix3d::Identity();
-  set.prior.wheels.p_IinO = Eigen::Vector3d::Zero();
+  WheelSet set = wheels_alone(setup);
   if (up.norm() > 0.) {
     set.prior.wheels.R_ItoO =
         Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();

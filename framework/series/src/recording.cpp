@@ -145,10 +145,7 @@ class Gatherer {
         recording_.wheels.push_back({sensor, set.model, set.prior, {}, ""});
     };
     if (!setup.filter) {
-      WheelSet set{setup.model, {}};
-      set.prior.wheels.x_WI = setup.x_WI;
-      set.prior.sigma_intrinsics = setup.sigma;
-      add_wheels(wheels, set);
+      add_wheels(wheels, wheels_alone(setup));
       return;
     }
     for (const WheelSet& set : setup.filter->wheels) {

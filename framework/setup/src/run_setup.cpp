@@ -275,6 +275,13 @@ std::vector<int> drive_signs(const RunSetup& setup) {
   return signs;
 }
 
+WheelSet wheels_alone(const RunSetup& setup) {
+  WheelSet set{setup.model, {}};
+  set.prior.wheels.x_WI = setup.x_WI;
+  set.prior.sigma_intrinsics = setup.sigma;
+  return set;
+}
+
 RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::uint64_t> seed,
                   bool exact) {
   RunSetup setup;

@@ -56,6 +56,9 @@ struct RunSetup {
 /// Signs of the drives, 1 or -1, by `drive_scale` of the sensor that gives the wheels.
 std::vector<int> drive_signs(const RunSetup& setup);
 
+/// The wheels of a run without a filter, with O where the IMU is; without a model if it has none.
+WheelSet wheels_alone(const RunSetup& setup);
+
 /// Reads a run configuration without placeholders. `seed` overrules the configured one; `exact`:
 /// without noise and wrong starts (HostServices::exact). Throws InputError with everything that is
 /// wrong in it.
