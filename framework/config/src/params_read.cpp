@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "parse_text.hpp"
+#include "path.hpp"
 #include "scalars.hpp"
 #include "units.hpp"
 #include "viwo/api/status.hpp"
@@ -18,10 +19,6 @@ namespace {
 
 bool is_allowed(const std::string& text, const std::vector<std::string>& choices) {
   return choices.empty() || std::find(choices.begin(), choices.end(), text) != choices.end();
-}
-
-std::string join(std::string_view path, std::string_view key) {
-  return path.empty() ? std::string(key) : std::string(path) + "." + std::string(key);
 }
 
 const char* type_text(ParamType type) {

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace viwo::config {
@@ -14,6 +15,11 @@ inline std::string_view take_component(std::string_view& path) {
   const std::string_view component = path.substr(0, dot);
   path = dot == std::string_view::npos ? std::string_view{} : path.substr(dot + 1);
   return component;
+}
+
+/// `path` and a component behind it.
+inline std::string join(std::string_view path, std::string_view component) {
+  return path.empty() ? std::string(component) : std::string(path) + "." + std::string(component);
 }
 
 /// A component as the index of a list element, if it is one.

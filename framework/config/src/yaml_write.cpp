@@ -4,6 +4,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "path.hpp"
 #include "viwo/config/yaml.hpp"
 
 namespace viwo::config {
@@ -13,10 +14,6 @@ namespace {
 bool needs_quotes(const std::string& text) {
   return text.empty() || text == "<<" || text == "~" || text == "null" || text == "Null" ||
          text == "NULL";
-}
-
-std::string join(const std::string& path, const std::string& key) {
-  return path.empty() ? key : path + "." + key;
 }
 
 void emit_text(YAML::Emitter& out, const std::string& text, bool quoted) {
