@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "viwo/estimator/start_search.hpp"
 #include "viwo/filter/propagation.hpp"
 #include "viwo/math/stamp.hpp"
 
@@ -125,7 +126,6 @@ void ImuBuffer::forget_before(std::int64_t t_ns) {
 
 void ImuBuffer::forget_before_start() {
   // A base that waits for hours before it moves; moving few samples is not worth while.
-  constexpr std::int64_t kMaxStartWindowNs = 60'000'000'000;
   if (empty() || newest_ns() - samples().front().t_ns < 2 * kMaxStartWindowNs) return;
   forget_before(newest_ns() - kMaxStartWindowNs);
 }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "viwo/estimator/start_search.hpp"
 #include "viwo/math/stamp.hpp"
 
 namespace viwo {
@@ -18,8 +19,6 @@ constexpr const char* kFarAhead = "stamp more than 10 s ahead of the IMU";
 constexpr std::int64_t kMarginNs = 500'000'000;
 /// Moving fewer samples than this is not worth while.
 constexpr std::size_t kFewestToForget = 64;
-/// No start looks at more than this before it (estimator.start_window_s has that bound).
-constexpr std::int64_t kMaxStartWindowNs = 60'000'000'000;
 /// A sample of a channel beyond has a number that is broken: the order of its stamps is not
 /// watched.
 constexpr std::size_t kMostChannels = 64;

@@ -14,6 +14,9 @@
 
 namespace viwo {
 
+/// No start looks at more than this before it (estimator.start_window_s has that bound).
+inline constexpr std::int64_t kMaxStartWindowNs = 60'000'000'000;
+
 /// A state to start from, or what is in the way of one so far.
 struct StartAttempt {
   std::optional<ImuPrior> prior;
