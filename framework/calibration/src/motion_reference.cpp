@@ -106,7 +106,7 @@ MotionReference motion_reference(const Recording& label, const RunSetup& setup, 
     if (data.reference.empty()) has_no("no reference poses to calibrate against");
     out.poses = data.reference;
     out.offset_s = setup.reference_time_offset_s;
-    out.max_gap_s = setup.reference_max_gap_s;
+    out.max_gap_s = setup.evaluation.max_reference_gap_s;
   } else if (out.kind == ReferenceKind::kGyro) {
     if (!has_gyro) has_no("no gyro to calibrate against");
     out.poses = data.imu().empty() ? yaw_of_headings(data.headings()) : yaw_of_gyro(data.imu());

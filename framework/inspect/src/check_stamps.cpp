@@ -77,10 +77,11 @@ Interval check_interval(const Recording& recording, const Stamps& stamps, double
   const bool is_reference =
       (*stamps.type == sample_type<PoseSample>() && is_of(Consumer::kReferencePoses)) ||
       (*stamps.type == sample_type<StateSample>() && is_of(Consumer::kReferenceStates));
-  if (is_reference && period_s > setup.reference_max_gap_s) {
+  if (is_reference && period_s > setup.evaluation.max_reference_gap_s) {
     const std::string key = "evaluation.reference_max_gap_s";
-    return {"a run takes none of it, for " + key + " says " + ms(setup.reference_max_gap_s),
-            {{key, significant(kGapPeriods * period_s, 2)}}};
+    return {
+        "a run takes none of it, for " + key + " says " + ms(setup.evaluation.max_reference_gap_s),
+        {{key, significant(kGapPeriods * period_s, 2)}}};
   }
   const bool is_wheels = *stamps.type == sample_type<EncoderSample>();
   const bool is_bridged = is_wheels || *stamps.type == sample_type<ImuSample>();

@@ -127,7 +127,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   const Eigen::Vector3d O_in_B = as_se2(setup.extrinsics.value_or(PlanarExtrinsics::Zero()));
   const Eigen::Vector3d B_in_O = between(O_in_B, Eigen::Vector3d::Zero());
   const auto reference_at = [&](std::int64_t t_ns) {
-    return interpolate(data.reference, t_ns + offset_ns, setup.reference_max_gap_s);
+    return interpolate(data.reference, t_ns + offset_ns, setup.evaluation.max_reference_gap_s);
   };
   const auto start = reference_at(stamps.front());
   const Eigen::Vector3d B_start = start ? planar(*start) : Eigen::Vector3d::Zero();

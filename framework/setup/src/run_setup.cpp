@@ -162,7 +162,6 @@ void read_options(const Node& run, const CalibrationStart* start, RunSetup& setu
   setup.evaluation.alignment = e.alignment;
   setup.evaluation.segment_lengths_m = e.segment_lengths_m;
   setup.evaluation.max_reference_gap_s = e.reference_max_gap_s;
-  setup.reference_max_gap_s = e.reference_max_gap_s;
   if (const auto& place = e.extrinsics_x_m_y_m_yaw_rad; place.size() == 3) {
     setup.extrinsics = PlanarExtrinsics(place[0], place[1], place[2]);
   } else if (!place.empty()) {

@@ -44,7 +44,6 @@ struct RunSetup {
   PreintegrationOptions preintegration;
   double epoch_s = 0.1;
   double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
-  double reference_max_gap_s = 0.5;
   eval::Options evaluation;
   std::optional<FilterSetup> filter;           ///< nothing: dead reckoning from the wheels alone
   Routes routes;                               ///< who gets what the sensors give
