@@ -18,7 +18,6 @@ class Subject {
   Subject(const std::filesystem::path& file, const Options& options);
 
   const PluginInfo& info() const { return info_; }
-  PluginRegistry& registry() const { return *registry_; }
 
   /// The section that the checks use: that of `options.config`, or one with made-up values for what
   /// has no default. Throws InputError if there is none.

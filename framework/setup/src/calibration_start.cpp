@@ -133,8 +133,8 @@ void CalibrationStart::take_mount_and_clock(WheelsPrior& prior, Errors& errors) 
   }
 }
 
-bool CalibrationStart::take_camera(std::size_t index, CameraPrior& prior, Errors& errors) {
-  if (only_wheels_ || index >= file_.camera_models.size()) return false;
+void CalibrationStart::take_camera(std::size_t index, CameraPrior& prior, Errors& errors) {
+  if (only_wheels_ || index >= file_.camera_models.size()) return;
   CameraView& camera = prior.camera;
   const CalibratedCamera& model = file_.camera_models[index];
   if (model.distortion != camera.distortion || model.width_px != camera.width_px ||
@@ -142,7 +142,7 @@ bool CalibrationStart::take_camera(std::size_t index, CameraPrior& prior, Errors
     errors.add(model.mark, "cam" + std::to_string(index) +
                                ": distortion_model or resolution is another than in cameras.kalibr "
                                "of the run: is it the same camera?");
-    return false;
+    return;
   }
   const std::string cam = "cam" + std::to_string(index) + ".";
   BlockSpec extrinsics;
@@ -175,7 +175,6 @@ bool CalibrationStart::take_camera(std::size_t index, CameraPrior& prior, Errors
     camera.t_CtoI_s = t[0];
     prior.sigma_clock_s = sigma[0];
   }
-  return true;
 }
 
 PriorCorrelations CalibrationStart::correlations() const {

@@ -26,8 +26,7 @@ class CalibrationStart {
                        const std::string& model_name, Intrinsics& x_WI, Intrinsics& sigma,
                        config::Errors& errors);
   void take_mount_and_clock(WheelsPrior& prior, config::Errors& errors);
-  /// True if it had anything of it.
-  bool take_camera(std::size_t index, CameraPrior& prior, config::Errors& errors);
+  void take_camera(std::size_t index, CameraPrior& prior, config::Errors& errors);
   /// Of what was taken.
   PriorCorrelations correlations() const;
   bool took_anything() const { return !taken_.empty(); }

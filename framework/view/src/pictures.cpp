@@ -88,10 +88,9 @@ std::vector<std::size_t> chosen(const std::vector<CalibrationTrack>& tracks) {
 
 /// The error with three sigmas around zero where the truth is known, else the change since the
 /// start with three sigmas around it.
-view::Curve curve_of(const CalibrationTrack& track, const std::string& si_unit,
-                     const std::vector<double>& t_s) {
+view::Curve curve_of(const CalibrationTrack& track, const std::vector<double>& t_s) {
   const report::DisplayUnit unit =
-      report::display_unit(si_unit, report::kBandSigmas * track.sigma.back());
+      report::display_unit(track.unit, report::kBandSigmas * track.sigma.back());
   const bool known = std::isfinite(track.truth);
   const double origin = known ? track.truth : track.estimate.front();
   view::Curve curve;
@@ -289,7 +288,7 @@ std::vector<view::Path> RunPictures::paths_of(const RunResult& result) const {
 std::vector<view::Curve> RunPictures::curves_of(const RunResult& result) const {
   std::vector<view::Curve> curves;
   for (const std::size_t i : chosen(result.calibration)) {
-    curves.push_back(curve_of(result.calibration[i], result.calibration[i].unit, result.epoch_t_s));
+    curves.push_back(curve_of(result.calibration[i], result.epoch_t_s));
   }
   return curves;
 }
