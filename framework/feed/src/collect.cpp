@@ -6,7 +6,6 @@
 #include "viwo/feed/inputs.hpp"
 #include "viwo/feed/run_data.hpp"
 #include "viwo/math/arrays.hpp"
-#include "viwo/math/se2.hpp"
 
 namespace viwo {
 namespace {

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "checks.hpp"
-#include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/series/allan.hpp"
 #include "viwo/series/rests.hpp"

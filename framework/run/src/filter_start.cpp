@@ -4,8 +4,6 @@
 #include <optional>
 #include <string_view>
 
-#include <Eigen/Dense>
-
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/setup/start_streams.hpp"

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "viwo/api/filter_view.hpp"
+#include "viwo/api/rig.hpp"
 #include "viwo/wheel/wheel_model.hpp"
 
 namespace viwo {

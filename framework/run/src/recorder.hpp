@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "calibration_scatter.hpp"
-#include "viwo/feed/bounded_series.hpp"
 #include "viwo/feed/stage_time.hpp"
 #include "viwo/run/run.hpp"
 

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cinttypes>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 
 #include <Eigen/Dense>
@@ -14,7 +11,6 @@
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
-#include "viwo/math/time_text.hpp"
 #include "viwo/plausibility/plausibility.hpp"
 #include "viwo/run/warnings.hpp"
 

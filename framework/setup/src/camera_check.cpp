@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
-
-#include <Eigen/Geometry>
 
 #include "viwo/log/kalibr.hpp"
 #include "viwo/math/significant.hpp"
