@@ -147,13 +147,6 @@ std::string Routes::sensor_of(Consumer consumer) const {
   return "";
 }
 
-std::string Routes::sensor_of_stream(std::size_t stream) const {
-  for (const Route& route : routes_) {
-    if (route.consumer == Consumer::kStream && route.stream == stream) return route.sensor;
-  }
-  return "";
-}
-
 void Routes::require_yielded(const std::string& sensor, const SampleType& type) const {
   for (const SensorYield& known : sensors_) {
     if (known.name == sensor && yields(known, type)) return;

@@ -56,8 +56,6 @@ class Routes {
   std::span<const Route> all() const { return routes_; }
   /// The sensor that `consumer` gets its samples from; "" for none.
   std::string sensor_of(Consumer consumer) const;
-  /// The sensor of a stream; "" for none.
-  std::string sensor_of_stream(std::size_t stream) const;
   /// Calls `take(route)` for everybody who gets samples of this kind from this sensor. InputError
   /// when the sensor gives what it does not yield.
   template <class Take>
