@@ -245,7 +245,6 @@ Piece drive(const Shape& shape, const LimitParams& limits) {
   Piece piece;
   piece.name = shape.name;
   const auto [T, rise] = fastest(shape, limits);
-  piece.drive_s = T;
   piece.duration_s = T + whole_samples(limits.pause_s, limits);
   piece.twist = [shape, T = T, rise = rise](double t_s) -> Twist {
     if (t_s <= 0. || t_s >= T) return Twist::Zero();

@@ -67,11 +67,14 @@ TEST(Pieces, CostTheWayOfTheFastestPoint) {
   LimitParams limits;
   limits.base_radius_m = 0.3;
   limits.pause_s = 1.;
-  const Piece straight = drive({"", [](double) { return Twist(0.6, 0.8, 0.); }}, limits);
+  const plan::Shape line{"", [](double) { return Twist(0.6, 0.8, 0.); }};
+  const Piece straight = drive(line, limits);
   EXPECT_NEAR(straight.cost_m, 1., 1e-6);
   EXPECT_NEAR(straight.path_m, 1., 1e-6);
   EXPECT_LT((straight.end() - Eigen::Vector3d(0., 0.6, 0.8)).norm(), 1e-9);
-  EXPECT_NEAR(straight.duration_s - straight.drive_s, 1., 1e-12);
+  LimitParams unpaused = limits;
+  unpaused.pause_s = 0.;
+  EXPECT_NEAR(straight.duration_s - drive(line, unpaused).duration_s, 1., 1e-12);
   const Piece spin = drive({"", [](double) { return Twist(0., 0., 2.); }}, limits);
   EXPECT_NEAR(spin.cost_m, 0.6, 1e-6);
   EXPECT_EQ(spin.path_m, 0.);
@@ -90,29 +93,29 @@ TEST(Pieces, GoTheSameWayFastAndSlowly) {
 }
 
 TEST(Pieces, AreThoseThatTheBaseCanFollow) {
-  const auto sideways = [](const std::vector<Piece>& pieces) {
-    return std::count_if(pieces.begin(), pieces.end(), [](const Piece& piece) {
-      return std::abs(piece.twist(0.5 * piece.drive_s)[1]) > 1e-9;
+  const auto sideways = [](const std::vector<Piece>& pieces, const LimitParams& limits) {
+    return std::count_if(pieces.begin(), pieces.end(), [&](const Piece& piece) {
+      return std::abs(piece.twist(0.5 * (piece.duration_s - limits.pause_s))[1]) > 1e-9;
     });
   };
   const plan::PlanSetup swerve = testing::swerve_plan();
   plan::WheelInformation swerve_wheels(swerve.model, swerve.params);
   const auto of_swerve = make_pieces(swerve_wheels, swerve.params);
   EXPECT_EQ(of_swerve.size(), plan::shapes_for(0.2).size());
-  EXPECT_GT(sideways(of_swerve), 50);
+  EXPECT_GT(sideways(of_swerve, swerve.params), 50);
 
   const plan::PlanSetup differential = testing::differential_plan();
   plan::WheelInformation wheels(differential.model, differential.params);
   const auto pieces = make_pieces(wheels, differential.params);
   EXPECT_GT(pieces.size(), 20u);
   EXPECT_LT(pieces.size(), of_swerve.size());
-  EXPECT_EQ(sideways(pieces), 0);
+  EXPECT_EQ(sideways(pieces, differential.params), 0);
 
   const plan::PlanSetup car = testing::differential_plan({"min_turn_radius_m=0.5"});
   const auto wide = make_pieces(wheels, car.params);
   EXPECT_LT(wide.size(), pieces.size());
   for (const Piece& piece : wide) {
-    for (double t_s = 0.; t_s < piece.drive_s; t_s += 0.05) {
+    for (double t_s = 0.; t_s < piece.duration_s; t_s += 0.05) {
       const Twist xi = piece.twist(t_s);
       EXPECT_GE(xi.head<2>().norm(), 0.5 * std::abs(xi[2]) * (1. - 1e-9)) << piece.name;
     }

@@ -36,8 +36,7 @@ struct Shape {
 struct Piece {
   std::string name;
   std::function<Twist(double t_s)> twist;  ///< zero before and after
-  double drive_s = 0.;                     ///< without the pause
-  double duration_s = 0.;                  ///< with it
+  double duration_s = 0.;                  ///< with the pause
   double cost_m = 0.;                      ///< path of the fastest point of the base (PL-3)
   double path_m = 0.;                      ///< path of O
   std::vector<Eigen::Vector3d> poses;      ///< [yaw, x, y] on the way, of O from its start
