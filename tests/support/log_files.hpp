@@ -11,9 +11,11 @@
 #include <zlib.h>
 
 #include "in_folder.hpp"
-#include "viwo/api/status.hpp"
+#include "message_of.hpp"
 
 namespace viwo::log {
+
+using testing::error_of;
 
 class InFolder : public testing::InFolder {
  protected:
@@ -29,16 +31,5 @@ class InFolder : public testing::InFolder {
     return {std::istreambuf_iterator<char>(stream), {}};
   }
 };
-
-/// The text of the exception that `f` throws; empty when it throws none.
-template <class Exception = InputError, class F>
-std::string message_of(F&& f) {
-  try {
-    f();
-  } catch (const Exception& error) {
-    return error.what();
-  }
-  return {};
-}
 
 }  // namespace viwo::log

@@ -53,15 +53,4 @@ inline RunResult run(const config::Node& configuration, std::uint64_t seed = 1) 
   return run_odometry(setup, data);
 }
 
-/// Text of the InputError that `f` throws.
-template <class F>
-std::string error_of(const F& f) {
-  try {
-    f();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "(no error)";
-}
-
 }  // namespace viwo::testing

@@ -23,7 +23,7 @@ class AslTables : public InFolder {
   template <class Read>
   std::string refusal(const std::string& text, Read&& read) const {
     const auto file = write("t.csv", text);
-    const std::string what = message_of([&] { read(file); });
+    const std::string what = error_of([&] { read(file); });
     EXPECT_TRUE(what.starts_with(file.string())) << what;
     return what.substr(std::min(what.size(), file.string().size()));
   }

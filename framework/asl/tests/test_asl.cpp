@@ -59,7 +59,7 @@ TEST_F(AslTest, AFolderGivesItsTablePlainOrGzippedButNotBoth) {
   ASSERT_EQ(read.samples.size(), 2U);
   EXPECT_EQ(read.samples[1].drive_rad_per_s[0], 3.);
   write("wheels0/data.csv", text);
-  EXPECT_EQ(message_of([&] { read_asl_encoders(folder_ / "wheels0", {}); }),
+  EXPECT_EQ(error_of([&] { read_asl_encoders(folder_ / "wheels0", {}); }),
             (folder_ / "wheels0").string() +
                 "  holds both data.csv and data.csv.gz: name the file "
                 "that is meant, or remove the other");
@@ -76,7 +76,7 @@ TEST_F(AslTest, ReadsAnglesAndTheEurocStampColumn) {
   ASSERT_EQ(read.samples.size(), 2U);
   EXPECT_EQ(read.samples[1].t_ns, 750'000'000);
   EXPECT_EQ(read.samples[1].drive_rad_per_s[0], 6.);
-  EXPECT_EQ(message_of([&] { read_asl_encoders(file, {}); }),
+  EXPECT_EQ(error_of([&] { read_asl_encoders(file, {}); }),
             file.string() +
                 ":1  column 'drive_1 [rad]' has another unit than 'drive_1 [rad/s]': it is read "
                 "with drive_input: angle");
@@ -96,7 +96,7 @@ TEST_F(AslTest, CountsWhatItDropsWithReasonAndFirstPlace) {
                           "value that is not finite | 2 | w.csv:34",
                           "gap longer than 0.2 s | 1 | w.csv:36"));
   options.limits.max_rejected_fraction = 0.11;
-  EXPECT_EQ(message_of([&] { read_asl_encoders(file, options); }),
+  EXPECT_EQ(error_of([&] { read_asl_encoders(file, options); }),
             file.string() +
                 "  4 of 35 data rejected, allowed is a fraction of 0.11: stamp not after the "
                 "previous one (2, first at w.csv:32); value that is not finite (2, first at "
@@ -106,7 +106,7 @@ TEST_F(AslTest, CountsWhatItDropsWithReasonAndFirstPlace) {
 TEST_F(AslTest, RefusesTablesWithoutTheirColumnsOrData) {
   const auto message = [&](const std::string& text) {
     const auto file = write("w.csv", text);
-    const std::string what = message_of([&] { read_asl_encoders(file, {}); });
+    const std::string what = error_of([&] { read_asl_encoders(file, {}); });
     return what.substr(std::min(what.size(), file.string().size()));
   };
   EXPECT_EQ(message("time,drive_1\n"), ":1  no column 'timestamp_ns' - there are: time, drive_1");
@@ -127,11 +127,11 @@ TEST_F(AslTest, OneAngleIsTooLittleForARate) {
   const auto file = write("w.csv", "timestamp_ns,drive_1\n1,1\n");
   EncoderRecordingOptions options;
   options.drive_is_angle = true;
-  EXPECT_EQ(message_of([&] { read_asl_encoders(file, options); }),
+  EXPECT_EQ(error_of([&] { read_asl_encoders(file, options); }),
             file.string() + "  has too few readings without a gap for a rate");
   const auto slow = write("slow.csv", "timestamp_ns,drive_1\n1,1\n800000001,2\n1600000001,3\n");
   options.limits.max_gap_s = 0.2;
-  EXPECT_EQ(message_of([&] { read_asl_encoders(slow, options); }),
+  EXPECT_EQ(error_of([&] { read_asl_encoders(slow, options); }),
             slow.string() +
                 "  has too few readings without a gap for a rate: they are 0.8 s apart, and "
                 "max_gap_s is 0.2");
@@ -251,19 +251,19 @@ TEST_F(AslTest, RefusesAFolderThatHoldsSomethingElseAndLeavesItAlone) {
   const std::string log = (folder_ / "log").string();
   write("log/wheels0/data.csv", "mine");
   write("log/wheels0/notes.txt", "mine");
-  EXPECT_EQ(message_of([&] { AslWriter{log}; }),
+  EXPECT_EQ(error_of([&] { AslWriter{log}; }),
             log +
                 "  already holds wheels0/notes.txt, which is no part of a log written here: "
                 "choose an empty folder");
   std::filesystem::remove(folder_ / "log/wheels0/notes.txt");
   write("log/thesis.tex", "mine");
-  EXPECT_EQ(message_of([&] { AslWriter{log}; }),
+  EXPECT_EQ(error_of([&] { AslWriter{log}; }),
             log +
                 "  already holds thesis.tex, which is no part of a log written here: choose an "
                 "empty folder");
   EXPECT_EQ(content(folder_ / "log/wheels0/data.csv"), "mine");
   const auto file = write("file", "mine");
-  EXPECT_EQ(message_of([&] { AslWriter{file}; }), file.string() + "  is a file, not a folder");
+  EXPECT_EQ(error_of([&] { AslWriter{file}; }), file.string() + "  is a file, not a folder");
 }
 
 }  // namespace

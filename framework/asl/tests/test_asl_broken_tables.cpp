@@ -45,7 +45,7 @@ TEST_F(AslTables, NameTheColumnOfAStateThatIsNotFinite) {
   const auto message = [&](const std::string& row) {
     const auto file = folder_ / "states.csv";
     std::ofstream(file) << header << row;
-    return message_of([&] { read_asl_states(file, {}); });
+    return error_of([&] { read_asl_states(file, {}); });
   };
   EXPECT_THAT(message("5,1,2,3,1,0,0,0,1,nan,nan,0,0,0,0,0,0\n"),
               HasSubstr("column 'v_RS_R_y [m s^-1]': 'nan' is not finite (the poses alone are read "
@@ -115,7 +115,7 @@ TEST_F(AslTables, ReadsGzipAndRefusesATruncatedOne) {
   const auto file = write_gz("imu.csv.gz", text);
   EXPECT_EQ(read_asl_imu(file, {}).samples.size(), 5000U);
   std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
-  const std::string what = message_of([&] { read_asl_imu(file, {}); });
+  const std::string what = error_of([&] { read_asl_imu(file, {}); });
   EXPECT_THAT(what, ::testing::HasSubstr("the gzip data end early: the file is truncated"));
 }
 
@@ -136,7 +136,7 @@ TEST_F(AslTables, PointsThatCannotBeUsedAreCountedByRow) {
                                    "value that is not finite | 1 | f.csv:99",
                                    "stamp not after the previous one | 1 | f.csv:100"));
   limits.max_rejected_fraction = 0.029;
-  EXPECT_THAT(message_of([&] { read_asl_features(folder_ / "f.csv", limits); }),
+  EXPECT_THAT(error_of([&] { read_asl_features(folder_ / "f.csv", limits); }),
               ::testing::HasSubstr("3 of 100 data rejected"));
 }
 

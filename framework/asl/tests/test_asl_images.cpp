@@ -33,7 +33,7 @@ class AslImagesTest : public InFolder {
   }
 
   static std::string refusal(const std::vector<fs::path>& folders, const LogLimits& limits = {}) {
-    return message_of([&] { read_asl_images(folders, limits); });
+    return error_of([&] { read_asl_images(folders, limits); });
   }
 };
 
@@ -115,10 +115,10 @@ TEST_F(AslImagesTest, AnImageThatBreaksLaterIsAnErrorOfItsReading) {
   const fs::path file = folders[0] / "data" / "image1.png";
   Image pixels;
   fs::resize_file(file, 30);
-  EXPECT_EQ(message_of([&] { read.samples[1].source->read(pixels); }),
+  EXPECT_EQ(error_of([&] { read.samples[1].source->read(pixels); }),
             file.string() + ": the image is cut short");
   fs::remove(file);
-  EXPECT_EQ(message_of([&] { read.samples[1].source->read(pixels); }),
+  EXPECT_EQ(error_of([&] { read.samples[1].source->read(pixels); }),
             file.string() + ": the image is missing or cannot be read");
 }
 

@@ -194,13 +194,13 @@ TEST_F(AslTables, WritesTheDocumentedTables) {
 }
 
 TEST_F(AslTables, RefusesToWriteWhatWouldNotReadBack) {
-  EXPECT_EQ(message_of([&] {
+  EXPECT_EQ(error_of([&] {
               write_log({PoseSample{}, StateSample{}});
             }),
             "reference poses and reference states share a table of a log: keep the sensors of one "
             "kind only");
   for (const char* name : {"", "a,b", " a", "a\n"}) {
-    EXPECT_NE(message_of<std::logic_error>([&] {
+    EXPECT_NE(error_of<std::logic_error>([&] {
                 write_log({CalibrationSample{0, name, 1.}});
               }),
               "")
@@ -213,7 +213,7 @@ TEST_F(AslTables, ALogOfPosesIsNoLogOfStates) {
   const auto table = folder_ / "log/state_groundtruth_estimate0";
   EXPECT_EQ(read_asl_poses(table, {}).samples.size(), 1U);
   EXPECT_EQ(
-      message_of([&] { read_asl_states(table, {}); }),
+      error_of([&] { read_asl_states(table, {}); }),
       (table / "data.csv").string() +
           "  1 of 1 data rejected, allowed is a fraction of 0.1: row that cannot be read "
           "(1, first at data.csv:2  column 'v_RS_R_x [m s^-1]': 'nan' is not finite (the poses "

@@ -27,8 +27,8 @@ TEST_F(HostileFile, AHeaderHasAThousandColumnsAndNotAHundredThousand) {
   EXPECT_EQ(TableReader(write("a.csv", header(4096))).columns().size(), 4096U);
   const auto file = write("b.csv", header(90'000));
   const std::string what = file.string() + ":1  90000 columns, at most 4096 are read";
-  EXPECT_EQ(message_of([&] { TableReader reader(file); }), what);
-  EXPECT_EQ(message_of([&] { TableReader reader(file, TableLayout{}); }), what);
+  EXPECT_EQ(error_of([&] { TableReader reader(file); }), what);
+  EXPECT_EQ(error_of([&] { TableReader reader(file, TableLayout{}); }), what);
 }
 
 /// 1.5 MB became 6 GB of samples.
@@ -37,7 +37,7 @@ TEST_F(HostileFile, GzipDataDoNotBecomeAThousandTimesAsLong) {
   const std::string row = "1,r_1,0\n";
   for (int i = 0; i < 4'000'000; ++i) text += row;
   const auto file = write_gz("data.csv.gz", text);
-  EXPECT_THAT(message_of([&] { read_asl_calibration(file, 1.); }),
+  EXPECT_THAT(error_of([&] { read_asl_calibration(file, 1.); }),
               HasSubstr("  the gzip data become more than 100 times as long, as those of no "
                         "recording do"));
 }
@@ -68,7 +68,7 @@ TEST_F(HostileFile, ImagesAreThoseOfTheRecording) {
        {outside.string(), std::string("../../secret.png"), std::string("a/../../../secret.png")}) {
     write("cam0/data.csv", "#timestamp [ns],filename\n1," + name + "\n");
     const std::vector<fs::path> folders{folder_ / "cam0"};
-    EXPECT_THAT(message_of([&] { read_asl_images(folders, {}); }),
+    EXPECT_THAT(error_of([&] { read_asl_images(folders, {}); }),
                 HasSubstr(" leads out of the folder of the images"))
         << name;
   }

@@ -1,7 +1,7 @@
 // Command line assignments, variants, placeholders, suggestions, collected errors.
 #include <gtest/gtest.h>
 
-#include "viwo/api/status.hpp"
+#include "message_of.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
@@ -9,15 +9,7 @@
 namespace viwo::config {
 namespace {
 
-template <class F>
-std::string error_of(F&& f) {
-  try {
-    f();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
-}
+using testing::error_of;
 
 TEST(Merge, ReplacesASectionByOneThatNamesItsType) {
   Node base = parse("k: {type: a, p: 1}\nother: {type: a, p: 1}", "base.yaml");
@@ -141,17 +133,11 @@ TEST(Suggestions, ListWhatIsKnownIfNothingIsNear) {
 }
 
 TEST(Assignment, RefusesWhatMakesNoEndOfValues) {
-  const auto error_of = [](const std::string& text) -> std::string {
-    try {
-      parse_assignment(text);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "no error";
-  };
-  EXPECT_EQ(error_of("name=,"), "--set name  not valid YAML: ',' does not belong here");
+  EXPECT_EQ(error_of([] { parse_assignment("name=,"); }),
+            "--set name  not valid YAML: ',' does not belong here");
   // Each value of the list would keep the path.
-  EXPECT_EQ(error_of(std::string(1001, 'a') + "=[1, 2]"), "--set  a path of 1001 characters");
+  EXPECT_EQ(error_of([] { parse_assignment(std::string(1001, 'a') + "=[1, 2]"); }),
+            "--set  a path of 1001 characters");
 }
 
 }  // namespace

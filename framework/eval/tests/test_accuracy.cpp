@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "trajectories.hpp"
-#include "viwo/api/status.hpp"
 #include "viwo/eval/accuracy.hpp"
 
 namespace viwo::eval {
@@ -191,13 +191,8 @@ TEST(Accuracy, WithoutNumbersIsNullInJson) {
 
 TEST(Accuracy, RefusesOptionsOutOfRange) {
   const Trajectory path = arc(0., 0.1, 50);
-  const auto message = [&](const Options& options) -> std::string {
-    try {
-      evaluate(path, path, options);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "nothing thrown";
+  const auto message = [&](const Options& options) {
+    return testing::error_of([&] { evaluate(path, path, options); });
   };
   Options options;
   options.segment_lengths_m = {10., -2.5};

@@ -7,13 +7,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "trajectories.hpp"
-#include "viwo/api/status.hpp"
 #include "viwo/eval/alignment.hpp"
 #include "viwo/eval/association.hpp"
 
 namespace viwo::eval {
 namespace {
+
+using testing::error_of;
 
 constexpr double kGap_s = 1.5;
 
@@ -23,15 +25,6 @@ double cost(const Association& common, const RigidTransform& T_EtoR) {
     sum += ((T_EtoR * pair.estimate).p_BinW - pair.reference.p_BinW).squaredNorm();
   }
   return sum;
-}
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "nothing thrown";
 }
 
 TEST(Association, InterpolatesTheReferenceAndCountsWhatIsLeftOut) {
@@ -55,7 +48,7 @@ TEST(Association, WithoutOverlapNamesBothTimeRanges) {
   Trajectory reference = arc(0., 1., 21);
   Trajectory estimate = arc(0., 1., 11);
   for (StampedPose& pose : estimate) pose.t_ns += 1'700'000'000'250'000'000;
-  EXPECT_EQ(message_of([&] { associate(reference, estimate, kGap_s); }),
+  EXPECT_EQ(error_of([&] { associate(reference, estimate, kGap_s); }),
             "no pose of the estimate lies in the time of the reference: reference from 0.000 s to "
             "2.000 s, estimate from 1700000000.250 s to 1700000001.250 s");
 }
@@ -65,7 +58,7 @@ TEST(Association, WithNothingButGapsSaysSo) {
                              {10'000'000'000, {1., 0., 0.}, Eigen::Quaterniond::Identity()}};
   const Trajectory estimate{{-500'000'000, {0., 0., 0.}, Eigen::Quaterniond::Identity()},
                             {5'000'000'000, {0., 0., 0.}, Eigen::Quaterniond::Identity()}};
-  EXPECT_EQ(message_of([&] { associate(reference, estimate, kGap_s); }),
+  EXPECT_EQ(error_of([&] { associate(reference, estimate, kGap_s); }),
             "the reference has no pose near any pose of the estimate: its gaps are longer "
             "than 1.5 s (reference from 0.000 s to 10.000 s, estimate from -0.500 s to 5.000 s) - "
             "viwo evaluate --max-gap SECONDS, evaluation.reference_max_gap_s of a run");
@@ -73,19 +66,19 @@ TEST(Association, WithNothingButGapsSaysSo) {
 
 TEST(Association, RefusesTrajectoriesThatAreNotOnes) {
   const Trajectory good = arc(0., 1., 5);
-  EXPECT_EQ(message_of([&] { associate({}, good, kGap_s); }), "the reference trajectory is empty");
-  EXPECT_EQ(message_of([&] { associate(good, {}, kGap_s); }), "the estimate trajectory is empty");
+  EXPECT_EQ(error_of([&] { associate({}, good, kGap_s); }), "the reference trajectory is empty");
+  EXPECT_EQ(error_of([&] { associate(good, {}, kGap_s); }), "the estimate trajectory is empty");
   Trajectory bad = good;
   bad[2].p_BinW.y() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(message_of([&] { associate(good, bad, kGap_s); }),
+  EXPECT_EQ(error_of([&] { associate(good, bad, kGap_s); }),
             "pose 3 of the estimate is not finite");
   bad = good;
   bad[3].t_ns = bad[2].t_ns;
-  EXPECT_EQ(message_of([&] { associate(bad, good, kGap_s); }),
+  EXPECT_EQ(error_of([&] { associate(bad, good, kGap_s); }),
             "pose 4 of the reference is not later than the one before it (0.200 s after 0.200 s)");
   bad = good;
   bad[1].q_BtoW.coeffs().setZero();
-  EXPECT_EQ(message_of([&] { associate(good, bad, kGap_s); }),
+  EXPECT_EQ(error_of([&] { associate(good, bad, kGap_s); }),
             "the quaternion of pose 2 of the estimate does not have unit norm");
 }
 
@@ -175,7 +168,7 @@ TEST(Alignment, OfARobotThatStandsTakesTheYawFromTheOrientations) {
 TEST(Alignment, InSixDegreesRefusesAStraightLine) {
   const Trajectory reference = moved(arc(0., 0.1, 50), about_z(0.3), {1., 1., 0.});
   const Association common = associate(reference, arc(0., 0.1, 50), kGap_s);
-  EXPECT_EQ(message_of([&] { align(common.pairs, Alignment::kSe3); }),
+  EXPECT_EQ(error_of([&] { align(common.pairs, Alignment::kSe3); }),
             "alignment 'se3' is not determined: all positions are in one point or on one line; use "
             "'yaw_position' or 'start'");
   EXPECT_LT(align(common.pairs, Alignment::kYawPosition).q_EtoR.angularDistance(about_z(0.3)),

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "experiment_file.hpp"
+#include "message_of.hpp"
 
 namespace viwo {
 namespace {

@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "calibration_files.hpp"
+#include "message_of.hpp"
 #include "simulated.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/export/export_calibration.hpp"

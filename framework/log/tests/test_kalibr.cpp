@@ -34,7 +34,7 @@ class Kalibr : public InFolder {
   template <class Read>
   std::string stripped(const std::string& text, Read&& read) const {
     const auto file = write("k.yaml", text);
-    std::string what = message_of([&] { read(file); });
+    std::string what = error_of([&] { read(file); });
     for (std::size_t at = 0; (at = what.find(file.string(), at)) != std::string::npos;) {
       what.replace(at, file.string().size(), "F");
     }
@@ -163,7 +163,7 @@ TEST_F(Kalibr, RefusesFilesWithoutCamerasOrWithGapsInTheirNumbers) {
   EXPECT_EQ(refusal(""), "F:1  the file is empty");
   EXPECT_EQ(refusal("cam0: [\n").substr(0, 22), "F:2:1  not valid YAML:");
   const auto absent = folder_ / "absent.yaml";
-  EXPECT_EQ(message_of([&] { read_kalibr_cameras(absent); }),
+  EXPECT_EQ(error_of([&] { read_kalibr_cameras(absent); }),
             absent.string() + "  cannot be read: No such file or directory");
 }
 
@@ -173,7 +173,7 @@ TEST_F(Kalibr, ReadsNoMoreOfAFileThanAnyHas) {
   for (int i = 0; i < 1'000'000; ++i) comments += "# 1\n";
   EXPECT_EQ(refusal(comments), "F" + too_large);
   const auto packed = write_gz("k.yaml.gz", comments);
-  EXPECT_EQ(message_of([&] { read_kalibr_cameras(packed); }), packed.string() + too_large);
+  EXPECT_EQ(error_of([&] { read_kalibr_cameras(packed); }), packed.string() + too_large);
 }
 
 TEST_F(Kalibr, ReadsImuNoisesWithAndWithoutALevel) {

@@ -20,7 +20,7 @@ class RosTextTest : public InFolder {
 
   std::string message(const std::string& rows) const {
     const auto file = joints(rows);
-    const std::string what = message_of([&] { read_ros_encoders(file, options_); });
+    const std::string what = error_of([&] { read_ros_encoders(file, options_); });
     return what.substr(std::min(what.size(), file.string().size()));
   }
 
@@ -85,9 +85,9 @@ TEST_F(RosTextTest, NamesTheParameterOfAJointThatDoesNotExist) {
               "no joint 'R_Positoin' in " + file.string() + " - did you mean 'R_Position'?");
   }
   options_.drive = {};
-  EXPECT_EQ(message_of([&] { read_ros_encoders(file, options_); }), "0 joints, must be 1 to 8");
+  EXPECT_EQ(error_of([&] { read_ros_encoders(file, options_); }), "0 joints, must be 1 to 8");
   options_.drive = {"L_Wheel", "L_Wheel"};
-  EXPECT_EQ(message_of([&] { read_ros_encoders(file, options_); }),
+  EXPECT_EQ(error_of([&] { read_ros_encoders(file, options_); }),
             "joint 'L_Wheel' is listed twice");
 }
 

@@ -56,7 +56,7 @@ TEST_F(TextReaderTest, RefusesATruncatedGzipAtTheLineWhereItEnds) {
   for (const std::size_t size : {bytes.size() / 2, bytes.size() - 1, bytes.size() - 8}) {
     const auto file = write("cut.gz", bytes.substr(0, size));
     std::int64_t last = 0;
-    const std::string message = message_of([&] {
+    const std::string message = error_of([&] {
       TextReader reader(file);
       for (std::string_view line; reader.next(line);) last = reader.line_number();
     });
@@ -69,7 +69,7 @@ TEST_F(TextReaderTest, RefusesAGzipWithAFlippedBit) {
   std::string bytes = content(write_gz("whole.gz", noise_text(300'000)));
   bytes[bytes.size() - 7] = static_cast<char>(bytes[bytes.size() - 7] ^ 1);  // in the checksum
   const auto file = write("bad.gz", bytes);
-  const std::string message = message_of([&] { lines_of(file); });
+  const std::string message = error_of([&] { lines_of(file); });
   EXPECT_NE(message.find("  the gzip data are corrupt: "), std::string::npos) << message;
   EXPECT_TRUE(message.ends_with(": incorrect data check")) << message;
   EXPECT_EQ(message.find(file.string()), message.rfind(file.string())) << "the file twice";
@@ -77,13 +77,13 @@ TEST_F(TextReaderTest, RefusesAGzipWithAFlippedBit) {
 
 TEST_F(TextReaderTest, RefusesWhatIsNoReadableTextFile) {
   const auto empty = write("empty", "");
-  EXPECT_EQ(message_of([&] { lines_of(empty); }), empty.string() + ":1  the file is empty");
+  EXPECT_EQ(error_of([&] { lines_of(empty); }), empty.string() + ":1  the file is empty");
   const auto none = folder_ / "none";
-  EXPECT_EQ(message_of([&] { lines_of(none); }),
+  EXPECT_EQ(error_of([&] { lines_of(none); }),
             none.string() + "  cannot be read: No such file or directory");
-  EXPECT_EQ(message_of([&] { lines_of(folder_); }), folder_.string() + "  is a folder, not a file");
+  EXPECT_EQ(error_of([&] { lines_of(folder_); }), folder_.string() + "  is a folder, not a file");
   const auto wide = write("wide", std::string(2'000'000, 'x'));
-  EXPECT_EQ(message_of([&] { lines_of(wide); }),
+  EXPECT_EQ(error_of([&] { lines_of(wide); }),
             wide.string() + ":1  a line of more than 1 MiB: not a text log");
 }
 
@@ -176,23 +176,23 @@ TEST_F(TableReaderTest, SaysFileLineAndColumnOfWhatIsWrong) {
                          std::string("4000000000000000001,\x01") + std::string(50, 'y') + "\n");
   const std::string at = file.string() + ":";
   TableReader table(file);
-  EXPECT_EQ(message_of([&] { table.column("tt"); }), at + "1  no column 'tt' - did you mean 't'?");
-  EXPECT_EQ(message_of([&] { table.column("drive_1", "rad/s"); }),
+  EXPECT_EQ(error_of([&] { table.column("tt"); }), at + "1  no column 'tt' - did you mean 't'?");
+  EXPECT_EQ(error_of([&] { table.column("drive_1", "rad/s"); }),
             at + "1  column 'drive_1 [rpm]' has another unit than 'drive_1 [rad/s]'");
-  EXPECT_EQ(message_of([&] { table.column("steer_1", "rad"); }),
+  EXPECT_EQ(error_of([&] { table.column("steer_1", "rad"); }),
             at + "1  no column 'steer_1 [rad]' - there are: t, drive_1 [rpm]");
   ASSERT_TRUE(table.next());
-  EXPECT_EQ(message_of([&] { table.next(); }), at + "3  1 field where the header has 2");
-  EXPECT_EQ(message_of([&] { table.next(); }), at + "4  3 fields where the header has 2");
+  EXPECT_EQ(error_of([&] { table.next(); }), at + "3  1 field where the header has 2");
+  EXPECT_EQ(error_of([&] { table.next(); }), at + "4  3 fields where the header has 2");
   ASSERT_TRUE(table.next());
-  EXPECT_EQ(message_of([&] { table.number(1); }),
+  EXPECT_EQ(error_of([&] { table.number(1); }),
             at + "5  column 'drive_1 [rpm]': 'abc' is not a number");
   ASSERT_TRUE(table.next());
-  EXPECT_EQ(message_of([&] { table.stamp_ns(0); }), at + "6  column 't': '1.5' is not an integer");
+  EXPECT_EQ(error_of([&] { table.stamp_ns(0); }), at + "6  column 't': '1.5' is not an integer");
   ASSERT_TRUE(table.next());
-  EXPECT_EQ(message_of([&] { table.stamp_ns(0); }),
+  EXPECT_EQ(error_of([&] { table.stamp_ns(0); }),
             at + "7  column 't': '4000000000000000001' is no stamp in nanoseconds");
-  EXPECT_EQ(message_of([&] { table.number(1); }),
+  EXPECT_EQ(error_of([&] { table.number(1); }),
             at + "7  column 'drive_1 [rpm]': '?" + std::string(39, 'y') + "...' is not a number");
 }
 
@@ -212,31 +212,31 @@ TEST_F(TableReaderTest, LeavesOutALastLineThatIsCutShort) {
   }
   EXPECT_EQ(rows("", "1,2\n2,\n"), std::pair(2, false));
   // THEN wrong lines stay errors that power loss does not explain
-  EXPECT_THAT(message_of([&] { rows("2\n"); }), EndsWith(":3  1 field where the header has 2"));
-  EXPECT_THAT(message_of([&] { rows("2,3,4"); }), EndsWith(":3  3 fields where the header has 2"));
+  EXPECT_THAT(error_of([&] { rows("2\n"); }), EndsWith(":3  1 field where the header has 2"));
+  EXPECT_THAT(error_of([&] { rows("2,3,4"); }), EndsWith(":3  3 fields where the header has 2"));
 }
 
 TEST_F(TableReaderTest, RefusesAHeaderWithAmbiguousColumns) {
   const auto twice = write("twice.csv", "a,b,a\n");
-  EXPECT_EQ(message_of([&] { TableReader{twice}; }),
+  EXPECT_EQ(error_of([&] { TableReader{twice}; }),
             twice.string() + ":1  the header has the column 'a' twice");
   const auto nameless = write("nameless.csv", "a,,b\n");
-  EXPECT_EQ(message_of([&] { TableReader{nameless}; }),
+  EXPECT_EQ(error_of([&] { TableReader{nameless}; }),
             nameless.string() + ":1  the header has a column without a name");
   const auto numbers = write("numbers.csv", "1298445274541884928,0.5,nan\n");
-  EXPECT_EQ(message_of([&] { TableReader{numbers}; }),
+  EXPECT_EQ(error_of([&] { TableReader{numbers}; }),
             numbers.string() +
                 ":1  numbers where the header is expected: the first line names the columns");
 }
 
 TEST_F(TextWriterTest, ReportsAFullDiskAndAMissingFolder) {
-  EXPECT_EQ(message_of<std::runtime_error>([] {
+  EXPECT_EQ(error_of<std::runtime_error>([] {
               TextWriter out("/dev/full");
               out << "text";
               out.close();
             }),
             "cannot write /dev/full: No space left on device");
-  EXPECT_EQ(message_of<std::runtime_error>([&] { TextWriter{folder_ / "none" / "a"}; }),
+  EXPECT_EQ(error_of<std::runtime_error>([&] { TextWriter{folder_ / "none" / "a"}; }),
             "cannot write " + (folder_ / "none" / "a").string() + ": No such file or directory");
 }
 

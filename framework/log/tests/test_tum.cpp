@@ -11,7 +11,7 @@ class TumTest : public InFolder {
  protected:
   std::string message(const std::string& line) const {
     const auto file = write("bad.tum", "# comment\n1 0 0 0 0 0 0 1\n" + line + "\n");
-    const std::string text = message_of([&] { read_tum(file); });
+    const std::string text = error_of([&] { read_tum(file); });
     EXPECT_EQ(text.rfind(file.string(), 0), 0U) << text;
     return text.substr(std::min(text.size(), file.string().size()));
   }
@@ -84,11 +84,11 @@ TEST_F(TumTest, SaysLineAndWhatIsWrong) {
   EXPECT_EQ(message("2 0 0 0 0 0 0 0.5"), ":3  the quaternion has the norm 0.5, not 1");
   EXPECT_EQ(message("1 0 0 0 0 0 0 1"), ":3  the stamp is not after the previous one");
   const auto file = write("comments.tum", "# nothing\n");
-  EXPECT_EQ(message_of([&] { read_tum(file); }), file.string() + "  holds no pose");
+  EXPECT_EQ(error_of([&] { read_tum(file); }), file.string() + "  holds no pose");
 }
 
 TEST_F(TumTest, AFailedWriteIsAnError) {
-  EXPECT_EQ(message_of<std::runtime_error>([] { write_tum("/dev/full", Trajectory(1)); }),
+  EXPECT_EQ(error_of<std::runtime_error>([] { write_tum("/dev/full", Trajectory(1)); }),
             "cannot write /dev/full: No space left on device");
 }
 

@@ -9,13 +9,14 @@
 #include <gtest/gtest.h>
 
 #include "in_folder.hpp"
-#include "viwo/api/status.hpp"
+#include "message_of.hpp"
 
 namespace viwo {
 
 inline const std::filesystem::path kBadPlugins =
     std::filesystem::path(VIWO_TEST_BINARY_DIR) / "tests/plugins_bad";
 
+using testing::error_of;
 using FolderTest = testing::InFolder;
 
 inline std::string read_bytes(const std::filesystem::path& file) {
@@ -32,17 +33,6 @@ inline std::string replaced(std::string text, const std::string& from, const std
     text.replace(at, from.size(), to);
   }
   return text;
-}
-
-/// what() of the InputError that `f` throws.
-template <class F>
-std::string error_of(F&& f) {
-  try {
-    f();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 }  // namespace viwo

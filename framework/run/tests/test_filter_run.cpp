@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "held_gauge.hpp"
+#include "message_of.hpp"
 #include "sensors_in_memory.hpp"
 #include "simulated.hpp"
 #include "viwo/math/so3.hpp"

@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "live_device.hpp"
+#include "message_of.hpp"
 #include "pictures_of_points.hpp"
 #include "sensors_in_memory.hpp"
 #include "simulated.hpp"

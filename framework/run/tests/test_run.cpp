@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "simulated.hpp"
 #include "viwo/eval/consistency.hpp"
 #include "viwo/log/tum.hpp"

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "simulated.hpp"
 #include "viwo/setup/routes.hpp"
 

@@ -14,6 +14,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "allocations.hpp"
+#include "message_of.hpp"
 #include "sensors_in_memory.hpp"
 #include "simulated.hpp"
 #include "viwo/results/run_output.hpp"
