@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "viwo/api/kinematic_model.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/params.hpp"
@@ -317,17 +318,12 @@ TEST(Params, ReportANestedModelThatIsNoSection) {
 }
 
 std::string spec_error(const std::vector<ParamSpec>& specs) {
-  try {
-    check_specs(specs);
-  } catch (const std::logic_error& error) {
-    return error.what();
-  }
-  return "no error";
+  return testing::error_of<std::logic_error>([&] { check_specs(specs); });
 }
 
 TEST(Params, TablesAreChecked) {
   const ParamSpec a = spec("a", ParamType::kInt, std::int64_t{1});
-  EXPECT_EQ(spec_error(param_specs<Section>()), "no error");
+  EXPECT_EQ(spec_error(param_specs<Section>()), "");
   EXPECT_EQ(spec_error({spec("", ParamType::kInt, std::int64_t{1})}), "a parameter without a name");
   EXPECT_EQ(spec_error({a, a}), "parameter 'a' is in the table twice");
   EXPECT_EQ(spec_error({spec("r_m", ParamType::kNumber, -1., {.min = 0.})}),

@@ -7,19 +7,16 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "viwo/api/status.hpp"
+#include "message_of.hpp"
 #include "viwo/config/yaml.hpp"
 
 namespace viwo::config {
 namespace {
 
+using testing::error_of;
+
 std::string parse_error(std::string_view text) {
-  try {
-    parse(text, "f.yaml");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
+  return error_of([&] { parse(text, "f.yaml"); });
 }
 
 TEST(Yaml, KnowsWhereEveryKeyAndValueIsWritten) {
@@ -190,39 +187,21 @@ TEST(Yaml, ReadsNothingAsNull) {
 }
 
 TEST(Yaml, SaysWhichFileIsMissing) {
-  try {
-    load_file("/no/such/file.yaml");
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "/no/such/file.yaml  no such file");
-  }
+  EXPECT_EQ(error_of([] { load_file("/no/such/file.yaml"); }), "/no/such/file.yaml  no such file");
 }
 
 TEST(Yaml, SaysThatAFolderIsNotAFile) {
   const auto folder = std::filesystem::temp_directory_path();
-  try {
-    load_file(folder);
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.what(), folder.string() + "  is a folder, not a file");
-  }
+  EXPECT_EQ(error_of([&] { load_file(folder); }), folder.string() + "  is a folder, not a file");
 }
 
 TEST(Yaml, ReadsNoPipesAndDevices) {
-  const auto error_of = [](const std::filesystem::path& file) -> std::string {
-    try {
-      load_file(file);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "no error";
-  };
   const auto pipe = std::filesystem::temp_directory_path() / "viwo_test_yaml_pipe";
   std::filesystem::remove(pipe);
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_EQ(error_of(pipe), pipe.string() + "  is a pipe, not a file");
+  EXPECT_EQ(error_of([&] { load_file(pipe); }), pipe.string() + "  is a pipe, not a file");
   std::filesystem::remove(pipe);
-  EXPECT_EQ(error_of("/dev/zero"), "/dev/zero  is a device, not a file");
+  EXPECT_EQ(error_of([] { load_file("/dev/zero"); }), "/dev/zero  is a device, not a file");
 }
 
 TEST(Yaml, LoadsAFile) {

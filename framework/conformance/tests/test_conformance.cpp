@@ -1,8 +1,8 @@
 // The kit around its checks: configuration, refusals, texts, names.
 #include <fstream>
 
+#include "message_of.hpp"
 #include "support.hpp"
-#include "viwo/api/status.hpp"
 
 namespace viwo::conformance {
 namespace {
@@ -10,12 +10,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string error_of(const fs::path& file, const Options& options) {
-  try {
-    check_plugin(file, options);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "(no error)";
+  return testing::error_of([&] { check_plugin(file, options); });
 }
 
 TEST(Conformance, RefusesWhatTheHostRefuses) {

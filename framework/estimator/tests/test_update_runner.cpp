@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "estimator_fixture.hpp"
+#include "message_of.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/estimator/estimator.hpp"
 #include "viwo/plugin_host/plugin_info.hpp"
@@ -21,6 +22,7 @@ namespace {
 using testing::Bench;
 using testing::CellSample;
 using testing::Counts;
+using testing::error_of;
 using testing::FakeUpdate;
 using testing::FixSample;
 using testing::imu_at;
@@ -80,27 +82,18 @@ TEST(UpdateRunner, EndsWhenAKinematicModelThrows) {
       Bench::started({}, [&](auto&, auto&) { throw PluginFailure(info, "rows", "seven legs"); });
   bench.imu(-10, 200);
   bench.tick(100);
-  try {
-    bench.steps();
-    FAIL() << "nothing thrown";
-  } catch (const PluginFailure& failure) {
-    EXPECT_STREQ(failure.what(), "kinematics plugin 'odd' 1 (odd.so) failed in rows: seven legs");
-  }
+  EXPECT_EQ(error_of<PluginFailure>([&] { bench.steps(); }),
+            "kinematics plugin 'odd' 1 (odd.so) failed in rows: seven legs");
 }
 
 TEST(UpdateRunner, NamesTheUpdateThatThrewInAnAnalysis) {
-  const auto failure_of = [](const FakeUpdate::Emit& emit) -> std::string {
+  const auto failure_of = [](const FakeUpdate::Emit& emit) {
     EstimatorOptions options;
     options.runner.frozen = true;
     Bench bench = Bench::started({}, emit, options);
     bench.imu(-10, 200);
     bench.tick(100);
-    try {
-      bench.steps();
-    } catch (const UpdateFailure& failure) {
-      return failure.what();
-    }
-    return "(nothing thrown)";
+    return error_of<UpdateFailure>([&] { bench.steps(); });
   };
   EXPECT_EQ(failure_of([](auto&, auto&) { throw std::runtime_error("nothing to see here"); }),
             "update 'fake' failed: nothing to see here");

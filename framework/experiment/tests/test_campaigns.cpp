@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "experiment_file.hpp"
+#include "message_of.hpp"
 #include "run_identity.hpp"
 #include "viwo/experiment/folder_lock.hpp"
 
@@ -14,16 +15,12 @@ namespace {
 namespace fs = std::filesystem;
 using namespace experiment;
 using ::testing::AllOf;
+using testing::error_of;
 using ::testing::HasSubstr;
 using testing::registry;
 
 std::string refusal(const std::string& text) {
-  try {
-    read_shard(text);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return error_of([&] { read_shard(text); });
 }
 
 TEST(Shard, IsTwoNumbersOrTheVariablesThatHaveThem) {
@@ -85,12 +82,7 @@ class Campaign : public testing::ExperimentFile {
   }
 
   std::string missing(const fs::path& out) {
-    try {
-      collected(out);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+    return error_of([&] { collected(out); });
   }
 
   ExperimentOptions options_;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "experiment_file.hpp"
+#include "message_of.hpp"
 #include "run_journal.hpp"
 #include "viwo/results/run_record.hpp"
 #include "viwo/run/thin.hpp"
@@ -14,6 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace experiment;
+using testing::error_of;
 using ::testing::HasSubstr;
 using testing::kVariants;
 using testing::registry;
@@ -21,17 +23,6 @@ using testing::registry;
 int files_in(const fs::path& folder) {
   if (!fs::exists(folder)) return 0;
   return static_cast<int>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
-}
-
-/// What an Interrupted says.
-template <class F>
-std::string interruption_of(const F& f) {
-  try {
-    f();
-  } catch (const Interrupted& error) {
-    return error.what();
-  }
-  return "(not interrupted)";
 }
 
 /// A result with one of everything, and with numbers that text does not carry.
@@ -172,7 +163,7 @@ class Resume : public testing::ExperimentFile {
   std::string interrupt_after(int runs, ExperimentOptions options, const fs::path& out) {
     options.jobs = 1;
     options.interrupted = [=] { return files_in(out / "journal") >= runs; };
-    return interruption_of([&] { run(options, out); });
+    return error_of<Interrupted>([&] { run(options, out); });
   }
 
   void expect_same_results(const fs::path& a, const fs::path& b) {
@@ -235,7 +226,7 @@ TEST_F(Resume, EndsARunOfTheFilterInItsMiddle) {
   // Once for each variant before the first run, once when it starts, then at each epoch.
   int asked = 0;
   options.interrupted = [&] { return ++asked > 6 + 1 + 10; };
-  EXPECT_EQ(interruption_of([&] { run(options, {}); }), "interrupted after 0 of 6 runs");
+  EXPECT_EQ(error_of<Interrupted>([&] { run(options, {}); }), "interrupted after 0 of 6 runs");
   EXPECT_EQ(asked, 18 + 5);  // and the other runs do not start
 }
 

@@ -13,6 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <zlib.h>
 
+#include "message_of.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/image/image_file.hpp"
 
@@ -41,12 +42,7 @@ class ImageFileTest : public ::testing::Test {
 
 std::string failure(const fs::path& file) {
   Image image;
-  try {
-    read_image(file, image);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return testing::error_of([&] { read_image(file, image); });
 }
 
 TEST_F(ImageFileTest, PngComesBackToTheBit) {
@@ -237,13 +233,8 @@ std::vector<std::uint8_t> with_number(std::vector<std::uint8_t> bytes, std::size
 
 TEST_F(ImageFileTest, TheSizeIsReadBeforeThePixels) {
   Image image;
-  const auto refusal = [&image](const std::vector<std::uint8_t>& bytes) -> std::string {
-    try {
-      decode_image(bytes, "a", image);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+  const auto refusal = [&image](const std::vector<std::uint8_t>& bytes) {
+    return testing::error_of([&] { decode_image(bytes, "a", image); });
   };
   const std::string most = " pixels, at most 32 Mi are read";
   const cv::Mat grey(20, 30, CV_8UC1, cv::Scalar(90));

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis.hpp"
+#include "message_of.hpp"
 #include "viwo/results/run_output.hpp"
 
 namespace viwo {
@@ -64,12 +65,7 @@ TEST(ObservabilityOutput, DoesNotChangeFromCallToCall) {
 
 TEST(ObservabilityOutput, RefusesWhatHasNoFilterOrNoTruth) {
   const auto error = [](const std::string& name, const std::vector<std::string>& assignments) {
-    try {
-      testing::analyse(name, assignments);
-    } catch (const InputError& e) {
-      return std::string(e.what());
-    }
-    return std::string();
+    return testing::error_of([&] { testing::analyse(name, assignments); });
   };
   EXPECT_THAT(error("runs/simulated_swerve.yaml", {}),
               HasSubstr("observability is that of the filter: the run needs a section 'updates'"));

@@ -41,7 +41,7 @@ inline std::string browser() {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = testing::TempDir() + "viwo_browser_XXXXXX";
+    std::string name = ::testing::TempDir() + "viwo_browser_XXXXXX";
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot create a folder");
     path_ = name;
   }

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "assets.hpp"
+#include "message_of.hpp"
 #include "plots.hpp"
 #include "sample.hpp"
 #include "text.hpp"
@@ -42,13 +43,8 @@ nlohmann::json first_plot(const Document& document) {
   return nlohmann::json::parse(data_text(own_part(document))).at("plots").at(0);
 }
 
-std::string message_of(const Document& document) {
-  try {
-    to_html(document);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "nothing thrown";
+std::string refusal_of(const Document& document) {
+  return testing::error_of<std::invalid_argument>([&] { to_html(document); });
 }
 
 TEST(Text, EscapesWhatHtmlCouldTakeForItsOwn) {
@@ -264,23 +260,23 @@ TEST(Colours, BelongToTheGroupInAllPlots) {
 }
 
 TEST(Report, NamesWhatDoesNotFit) {
-  EXPECT_EQ(message_of(one_block(Table{"Accuracy", {{"a"}, {"b"}}, {{1.}}})),
+  EXPECT_EQ(refusal_of(one_block(Table{"Accuracy", {{"a"}, {"b"}}, {{1.}}})),
             "report: table 'Accuracy': a row does not have one cell per column");
   Plot plot{.title = "Path", .x_label = "", .y_label = ""};
   plot.series = {{.name = "s", .x = {1., 2.}, .y = {1.}}};
-  EXPECT_EQ(message_of(one_block(plot)),
+  EXPECT_EQ(refusal_of(one_block(plot)),
             "report: plot 'Path', series 's': x, y and the band differ in size");
   plot.series = {{.name = "s", .x = {1.}, .y = {1.}, .y_low = {0.}}};
-  EXPECT_EQ(message_of(one_block(plot)),
+  EXPECT_EQ(refusal_of(one_block(plot)),
             "report: plot 'Path', series 's': x, y and the band differ in size");
   plot.series = {{.name = "s", .x = {1.}, .y = {1.}, .categories = {"both"}}};
-  EXPECT_EQ(message_of(one_block(plot)),
+  EXPECT_EQ(refusal_of(one_block(plot)),
             "report: plot 'Path', series 's': x, y and the band differ in size");
   plot.series.clear();
   plot.heat_map = HeatMap{.x = {"a", "b"}, .y = {"c"}, .z = {{1.}}, .text = {}};
-  EXPECT_EQ(message_of(one_block(plot)),
+  EXPECT_EQ(refusal_of(one_block(plot)),
             "report: plot 'Path': z and text of the heat map need a row per y and a column per x");
-  EXPECT_EQ(message_of(one_block(Image{"I", "", "text/html", ""})),
+  EXPECT_EQ(refusal_of(one_block(Image{"I", "", "text/html", ""})),
             "report: image 'I' is of type 'text/html', not PNG, JPEG or SVG");
 }
 

@@ -266,12 +266,7 @@ TEST(LiveFeed, EndsWithTheErrorOfItsSensor) {
   RunSetup setup = standing_then_driving();
   RunData data;
   data.live.push_back(stream("device", std::make_shared<Broken>()));
-  try {
-    run_filter(setup, data);
-    FAIL() << "no error";
-  } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "the cable is out");
-  }
+  EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }), "the cable is out");
 }
 
 TEST(LiveFeed, EndsWithTheErrorOfItsSensorThoughThatCannotBeStopped) {
@@ -284,12 +279,7 @@ TEST(LiveFeed, EndsWithTheErrorOfItsSensorThoughThatCannotBeStopped) {
   RunSetup setup = standing_then_driving();
   RunData data;
   data.live.push_back(stream("device", std::make_shared<Broken>()));
-  try {
-    run_filter(setup, data);
-    FAIL() << "no error";
-  } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "the cable is out");
-  }
+  EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }), "the cable is out");
 }
 
 TEST(LiveFeed, KeepsTheResultsOfASensorThatCannotBeStopped) {

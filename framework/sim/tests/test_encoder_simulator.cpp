@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "two_wheels.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
@@ -230,15 +231,12 @@ TEST(EncoderSimulator, SaysWhichMotionABaseCannotFollow) {
   model.can_crab = false;
   MotionOptions fast;
   fast.ramp_s = 0.;
-  try {
-    simulate_encoders(model, nominal_intrinsics(description_of(model)),
-                      PlanarMotion("lateral", fast), silent(), 1);
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_EQ(std::string(error.what()),
-              "this base cannot follow motion 'lateral' (v = [0, 0.5] m/s, omega = 0 rad/s after "
-              "0 s)");
-  }
+  EXPECT_EQ(testing::error_of([&] {
+              simulate_encoders(model, nominal_intrinsics(description_of(model)),
+                                PlanarMotion("lateral", fast), silent(), 1);
+            }),
+            "this base cannot follow motion 'lateral' (v = [0, 0.5] m/s, omega = 0 rad/s after "
+            "0 s)");
 }
 
 TEST(PerturbedIntrinsics, AreDrawnWithThePriorSigmaAroundTheNominalValues) {

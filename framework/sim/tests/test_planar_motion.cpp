@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "viwo/api/status.hpp"
+#include "message_of.hpp"
 #include "viwo/sim/planar_motion.hpp"
 
 namespace viwo::sim {
@@ -216,15 +216,10 @@ TEST(PlanarMotion, MixedIsAllOfThemByTurnsAndSmoothBetween) {
 }
 
 TEST(PlanarMotion, UnknownNamesAreRefusedWithTheKnownOnes) {
-  try {
-    PlanarMotion("sideways");
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_EQ(std::string(error.what()),
-              "no motion 'sideways' - there are: icr_sweep, straight, lateral, circle, stationary, "
-              "figure_eight, crab_varying, spin, constant_steering, pivot, "
-              "sweep_then_straight, mixed");
-  }
+  EXPECT_EQ(testing::error_of([] { PlanarMotion("sideways"); }),
+            "no motion 'sideways' - there are: icr_sweep, straight, lateral, circle, stationary, "
+            "figure_eight, crab_varying, spin, constant_steering, pivot, "
+            "sweep_then_straight, mixed");
 }
 
 }  // namespace

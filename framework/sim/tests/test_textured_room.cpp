@@ -7,8 +7,8 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "some_room.hpp"
-#include "viwo/api/status.hpp"
 
 namespace viwo::sim {
 namespace {
@@ -60,12 +60,7 @@ TEST(TexturedRoom, BlocksStandClearOfThePathInsideTheRoomAndFollowFromTheSeed) {
 TEST(TexturedRoom, RefusesAMotionThatLeavesItAndSaysHowLargeItMustBe) {
   const std::vector<Vector3d> path{{0., 0., 0.2}, {3.95, 1., 0.2}};
   const auto refusal = [&](const RoomOptions& options) {
-    try {
-      make_room(options, path);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return testing::error_of([&] { make_room(options, path); });
   };
   RoomOptions options;
   options.texture_size = 8;

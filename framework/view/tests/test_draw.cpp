@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "canvas.hpp"
+#include "message_of.hpp"
 #include "viwo/view/scene.hpp"
 
 namespace viwo::view {
@@ -263,19 +264,14 @@ TEST(Draw, TakesCurvesOfNoneOneAndNotFinitePoints) {
 }
 
 TEST(Draw, RefusesSizesThatDoNotFit) {
-  const auto message_of = [](const Scene& scene, PictureSize size) -> std::string {
-    try {
-      draw(scene, size);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "";
+  const auto refusal = [](const Scene& scene, PictureSize size) {
+    return testing::error_of<std::invalid_argument>([&] { draw(scene, size); });
   };
-  EXPECT_EQ(message_of({}, {319, 720}), "view: a picture has at least 320 x 240 pixels");
-  EXPECT_EQ(message_of({}, {320, 240}), "");
+  EXPECT_EQ(refusal({}, {319, 720}), "view: a picture has at least 320 x 240 pixels");
+  EXPECT_EQ(refusal({}, {320, 240}), "");
   Scene scene;
   scene.curves = {{"r_1", {0., 1.}, {0., 1.}, {0., 1.}, {0.}}};
-  EXPECT_EQ(message_of(scene, kSize), "view: sizes of the curve 'r_1' do not fit");
+  EXPECT_EQ(refusal(scene, kSize), "view: sizes of the curve 'r_1' do not fit");
 }
 
 TEST(Draw, GivesTheSamePictureForTheSameScene) {

@@ -14,6 +14,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "message_of.hpp"
 #include "show/video_file.hpp"
 #include "viwo/api/status.hpp"
 
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 
 constexpr int kWidth = 320, kHeight = 240;
 
-class VideoFileTest : public testing::Test {
+class VideoFileTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string pattern = (fs::temp_directory_path() / "viwo_video_XXXXXX").string();
@@ -39,15 +40,10 @@ class VideoFileTest : public testing::Test {
   }
   /// What an InputError of the constructor says, with the folder as TMP.
   std::string refusal_of(const fs::path& file) const {
-    try {
-      const VideoFile video(file);
-    } catch (const InputError& error) {
-      std::string text = error.what();
-      const auto begin = text.find(folder_.string());
-      if (begin != std::string::npos) text.replace(begin, folder_.string().size(), "TMP");
-      return text;
-    }
-    return "(no error)";
+    std::string text = testing::error_of([&] { const VideoFile video(file); });
+    const auto begin = text.find(folder_.string());
+    if (begin != std::string::npos) text.replace(begin, folder_.string().size(), "TMP");
+    return text;
   }
 
   fs::path folder_;
@@ -201,11 +197,7 @@ TEST_F(VideoFileTest, SaysSoWhenTheDiskIsFullAndLeavesNoHalfOne) {
         for (std::uint8_t& pixel : noise.bgr) pixel = static_cast<std::uint8_t>(random());
         video.add(noise, 0.1 * k);
       }
-      try {
-        video.close();
-      } catch (const std::runtime_error& error) {
-        message = error.what();
-      }
+      message = testing::error_of<std::runtime_error>([&] { video.close(); });
     }
     EXPECT_EQ(message, "video " + at(name).string() +
                            ": not all of it was written (60 pictures; is the disk full?)");

@@ -12,8 +12,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "message_of.hpp"
 #include "show/window.hpp"
-#include "viwo/api/status.hpp"
 #ifdef VIWO_TEST_USER_INPUT
 #include "user_input.hpp"
 #endif
@@ -28,14 +28,7 @@ TEST(Window, SaysThatThereIsNoScreen) {
   const char* display = std::getenv("DISPLAY");
   const std::string before = display != nullptr ? display : "";
   unsetenv("WAYLAND_DISPLAY");
-  const auto message = [] {
-    try {
-      const Window window("none");
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string("(no error)");
-  };
+  const auto message = [] { return testing::error_of([] { const Window window("none"); }); };
   unsetenv("DISPLAY");
   EXPECT_EQ(message(),
             "no screen to show pictures on: neither DISPLAY nor WAYLAND_DISPLAY is set; a video "
@@ -101,7 +94,7 @@ class Screen {
   std::string number_;
 };
 
-class WindowTest : public testing::Test {
+class WindowTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() { screen_ = new Screen; }
   static void TearDownTestSuite() {

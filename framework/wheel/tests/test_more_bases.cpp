@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "more_bases.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/testing/jacobian.hpp"
@@ -296,16 +297,9 @@ TEST(MoveFrameOfMoreBases, IsNotOfferedWhereTheModelPlacesTheFrame) {
 }
 
 TEST(MoreBasesParameters, AreRefusedWithAReason) {
-  const auto message_of = [](const std::string& yaml) -> std::string {
-    try {
-      load_model(yaml);
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "accepted";
-  };
-  const auto says = [&](const std::string& yaml, const std::string& text) {
-    EXPECT_NE(message_of(yaml).find(text), std::string::npos) << message_of(yaml);
+  const auto says = [](const std::string& yaml, const std::string& text) {
+    const std::string what = testing::error_of<std::exception>([&] { load_model(yaml); });
+    EXPECT_NE(what.find(text), std::string::npos) << what;
   };
   says("{type: ackermann, wheel_base_m: 0.3, track_m: 0.2, radius_m: [0.05, 0.05, 0.05]}",
        "radius_m: has 3 values for 2 measured wheels");

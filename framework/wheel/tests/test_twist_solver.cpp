@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "more_bases.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/testing/jacobian.hpp"
@@ -371,14 +372,9 @@ TEST(WheelModel, NamesBothCountsWhenASampleHasOtherChannels) {
   EncoderSample y;
   y.n_drive = 2;
   y.n_steer = 0;
-  try {
-    model->require_channels(y, "sensors.wheels0");
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(),
-                 "sensors.wheels0 has 2 drive and 0 steering channels, but the kinematic model has "
-                 "4 driven and 4 steered wheels");
-  }
+  EXPECT_EQ(testing::error_of([&] { model->require_channels(y, "sensors.wheels0"); }),
+            "sensors.wheels0 has 2 drive and 0 steering channels, but the kinematic model has "
+            "4 driven and 4 steered wheels");
 }
 
 }  // namespace
