@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "filter_runs.hpp"
+#include "message_of.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/setup/calibration_file.hpp"
 
@@ -209,15 +210,11 @@ TEST_F(CalibrationStartTest, RefusesWhatHasDivergedAndTellsOfDoubts) {
   bad.reasons = {"a speed: of 200 m/s"};
   auto changed = write(calibration_text(bad, "a test"));
   const std::string from = "calibration=" + changed.string();
-  try {
-    setup({from});
-    FAIL() << "it was taken";
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.what(), changed.string() +
-                                ":4:9  this calibration is not to be used: what it is from has "
-                                "diverged (a speed: of 200 m/s) - calibrate again, or, if you know "
-                                "it to be right, write status: doubtful");
-  }
+  EXPECT_EQ(testing::error_of([&] { setup({from}); }),
+            changed.string() +
+                ":4:9  this calibration is not to be used: what it is from has diverged (a speed: "
+                "of 200 m/s) - calibrate again, or, if you know it to be right, write status: "
+                "doubtful");
   bad.status = CalibrationFile::Status::kDoubtful;
   write(calibration_text(bad, "a test"));
   const RunSetup doubtful = setup({from});

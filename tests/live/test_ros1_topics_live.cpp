@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "ros_system.hpp"
 #include "sensor_under_test.hpp"
 #include "viwo/api/status.hpp"
@@ -36,12 +37,7 @@ class Ros1Topics : public testing::LiveTest {
     return {std::istreambuf_iterator<char>(in), {}};
   }
   static std::string error_of(const std::string& rest) {
-    try {
-      make_ros1_topics(rest);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "no error";
+    return testing::error_of([&] { make_ros1_topics(rest); });
   }
 };
 

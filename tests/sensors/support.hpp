@@ -11,7 +11,8 @@
 
 #include <gtest/gtest.h>
 
-#include "../support/in_folder.hpp"
+#include "in_folder.hpp"
+#include "message_of.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/plugin_host/registry.hpp"
 
@@ -40,12 +41,7 @@ inline std::shared_ptr<Sensor> make_sensor(const std::string& yaml, std::uint64_
 }
 
 inline std::string error_of(const std::string& yaml) {
-  try {
-    make_sensor(yaml);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return {};
+  return testing::error_of([&] { make_sensor(yaml); });
 }
 
 /// "reason | count | first", one each.

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "message_of.hpp"
 #include "support.hpp"
 #include "viwo/log/kalibr.hpp"
 #include "viwo/math/so3.hpp"
@@ -69,12 +70,7 @@ std::vector<ImageSample> images(const std::string& yaml, std::vector<Measurement
 }
 
 std::string refusal(const std::string& yaml, const std::vector<Measurement>& input) {
-  try {
-    images(yaml, input);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return {};
+  return testing::error_of([&] { images(yaml, input); });
 }
 
 Image pixels_of(const ImageSample& sample) {

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include "message_of.hpp"
 #include "support.hpp"
 #include "test_sequence.hpp"
 
@@ -264,12 +265,7 @@ TEST_F(KaistUrban, FindsABrokenImageWhenItIsRead) {
   const auto why = [&] {
     const auto images = play_only<ImageSample>(only_yaml("images"));
     Image image;
-    try {
-      images.at(0).source->read(image);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return testing::error_of([&] { images.at(0).source->read(image); });
   };
   EXPECT_EQ(why(), "");
   fs::resize_file(file, fs::file_size(file) - 20);

@@ -20,6 +20,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "message_of.hpp"
 #include "support.hpp"
 #include "test_scene.hpp"
 #include "viwo/image/image_file.hpp"
@@ -160,12 +161,7 @@ inline Played track(std::vector<Measurement> measurements, const std::string& ya
 }
 
 inline std::string failure_of(std::vector<Measurement> measurements, const std::string& yaml) {
-  try {
-    track(std::move(measurements), yaml);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return {};
+  return testing::error_of([&] { track(std::move(measurements), yaml); });
 }
 
 inline std::set<std::int64_t> ids_of(const FeatureSample& sample) {

@@ -2,6 +2,7 @@
 #include <limits>
 #include <random>
 
+#include "message_of.hpp"
 #include "test_fixture.hpp"
 #include "viwo/image/image_file.hpp"
 
@@ -106,13 +107,8 @@ TEST_F(Ros1Bag, ABrokenImageIsAnErrorWhenItIsRead) {
   }
   const auto images = play_only<ImageSample>(section("image_topics: [/cam0, /cam1]"));
   ASSERT_EQ(images.size(), 2U);
-  const auto error = [](const ImageSample& sample) -> std::string {
-    try {
-      read_image(sample);
-    } catch (const InputError& broken) {
-      return broken.what();
-    }
-    return {};
+  const auto error = [](const ImageSample& sample) {
+    return testing::error_of([&] { read_image(sample); });
   };
   EXPECT_EQ(error(images[0]), file() +
                                   ": /cam0 message 1: an image of 3 x 2 mono8 in rows of 4 "

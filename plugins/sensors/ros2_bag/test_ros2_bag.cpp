@@ -4,6 +4,7 @@
 
 #include <sys/stat.h>
 
+#include "message_of.hpp"
 #include "test_fixture.hpp"
 
 namespace viwo {
@@ -211,14 +212,10 @@ TEST_F(Ros2Bag, ABrokenImageIsAnErrorWhenItIsRead) {
   const auto images = play_only<ImageSample>(section("image_topics: [/cam0]"));
   ASSERT_EQ(images.size(), 1U);
   Image out;
-  try {
-    images[0].source->read(out);
-    FAIL() << "no error";
-  } catch (const InputError& error) {
-    EXPECT_EQ(error.what(), file() +
-                                ": /cam0 message 1: an image of 3 x 2 mono8 in rows of 3 "
-                                "bytes has 5 bytes of pixels");
-  }
+  EXPECT_EQ(testing::error_of([&] { images[0].source->read(out); }),
+            file() +
+                ": /cam0 message 1: an image of 3 x 2 mono8 in rows of 3 bytes has 5 bytes of "
+                "pixels");
 }
 
 TEST_F(Ros2Bag, NamesTheJointThatIsNotFinite) {

@@ -6,7 +6,7 @@
 
 #include "dds_names.hpp"
 #include "dds_settings.hpp"
-#include "viwo/api/status.hpp"
+#include "message_of.hpp"
 
 namespace viwo::ros2 {
 namespace {
@@ -40,12 +40,7 @@ class Settings : public ::testing::Test {
     }
   }
   static std::string error_of(const DdsParams& params) {
-    try {
-      params.settings();
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "no error";
+    return testing::error_of<std::exception>([&] { params.settings(); });
   }
 };
 

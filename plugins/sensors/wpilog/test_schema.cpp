@@ -1,6 +1,7 @@
 // Schemas of packed structs: the layouts of the specification's examples, refusals.
 #include <gmock/gmock.h>
 
+#include "message_of.hpp"
 #include "schema.hpp"
 #include "test_writer.hpp"
 #include "viwo/api/status.hpp"
@@ -29,12 +30,7 @@ std::string layout_of(const std::string& schema) {
 }
 
 std::string refusal_of(const std::string& schema) {
-  try {
-    layout_of(schema);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return {};
+  return testing::error_of([&] { layout_of(schema); });
 }
 
 TEST(Schema, PutsMembersOneBehindTheOther) {

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "message_of.hpp"
 #include "messages.hpp"
 
 namespace viwo::bag {
@@ -25,12 +26,7 @@ ImageHead head(const std::string& encoding, std::uint32_t width_px, std::uint32_
 }
 
 std::string error_of(const ImageHead& bad, const Bytes& pixels) {
-  try {
-    grey(bad, pixels);
-  } catch (const BrokenMessage& broken) {
-    return broken.what();
-  }
-  return {};
+  return testing::error_of<BrokenMessage>([&] { grey(bad, pixels); });
 }
 
 TEST(ToGrey, LeavesOutThePaddingOfRows) {

@@ -9,6 +9,7 @@
 #include <sys/resource.h>
 
 #include "mcap_output.hpp"
+#include "message_of.hpp"
 #include "ros2_file.hpp"
 
 namespace viwo::live {
@@ -16,7 +17,7 @@ namespace {
 
 constexpr std::int64_t kStart = 1'700'000'000'000'000'000, kStep = 100'000'000;
 
-class McapOutputTest : public testing::Test {
+class McapOutputTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string pattern = (std::filesystem::temp_directory_path() / "viwo_mcap_XXXXXX").string();
@@ -65,11 +66,11 @@ TEST_F(McapOutputTest, HasEachEpochThePathEachFiveSecondsAndTheLastState) {
   write(out, 101);
   out.close("");
   // The path at 0, 5 and 10 s, and at the end.
-  EXPECT_THAT(counts(),
-              testing::UnorderedElementsAre(
-                  testing::Pair("/viwo/odometry", 101), testing::Pair("/tf", 101),
-                  testing::Pair("/viwo/calibration", 101), testing::Pair("/viwo/cam1/tracks", 101),
-                  testing::Pair("/viwo/path", 4), testing::Pair("/diagnostics", 12)));
+  EXPECT_THAT(counts(), ::testing::UnorderedElementsAre(
+                            ::testing::Pair("/viwo/odometry", 101), ::testing::Pair("/tf", 101),
+                            ::testing::Pair("/viwo/calibration", 101),
+                            ::testing::Pair("/viwo/cam1/tracks", 101),
+                            ::testing::Pair("/viwo/path", 4), ::testing::Pair("/diagnostics", 12)));
 }
 
 TEST_F(McapOutputTest, WhatIsCutOffIsReadUpToThere) {
@@ -88,14 +89,11 @@ TEST_F(McapOutputTest, ADiskThatIsFullIsAnErrorAndWhatWasWrittenIsRead) {
   getrlimit(RLIMIT_FSIZE, &before);
   const rlimit limit{200'000, before.rlim_max};
   setrlimit(RLIMIT_FSIZE, &limit);
-  std::string failure;
-  try {
+  const std::string failure = testing::error_of<std::runtime_error>([&] {
     McapOutput out(file_);
     write(out, 5000);
     out.close("");
-  } catch (const std::runtime_error& error) {
-    failure = error.what();
-  }
+  });
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   EXPECT_EQ(failure, file_.string() + "  cannot be written: File too large");

@@ -5,6 +5,7 @@
 
 #include "allocations.hpp"
 #include "filter_fixture.hpp"
+#include "message_of.hpp"
 #include "planar_pair.hpp"
 #include "plane_and_gnss_runs.hpp"
 #include "viwo/sim/planar_motion.hpp"
@@ -216,12 +217,8 @@ TEST(PlanarMotionUpdate, DoesNotAllocate) {
 TEST(PlanarMotionUpdate, WantsAWheelSet) {
   const auto update = testing::load_update("{type: planar_motion}");
   testing::UpdateHost no_wheels;
-  try {
-    update->declare(no_wheels);
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "needs wheels: there is no section 'kinematics'");
-  }
+  EXPECT_EQ(testing::error_of([&] { update->declare(no_wheels); }),
+            "needs wheels: there is no section 'kinematics'");
 }
 
 TEST(PlanarMotionRuns, AreConsistentOnAFloorAndDriftFarLess) {

@@ -9,6 +9,7 @@
 #include "allocations.hpp"
 #include "filter_fixture.hpp"
 #include "fix.hpp"
+#include "message_of.hpp"
 #include "plane_and_gnss_runs.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/yaml.hpp"
@@ -328,12 +329,7 @@ class PoseConfiguration : public ::testing::Test {
     return read_run(run, registry, 1);
   }
   static std::string error(const std::vector<std::string>& assignments) {
-    try {
-      read(run(assignments));
-    } catch (const InputError& failure) {
-      return failure.what();
-    }
-    return "(no error)";
+    return testing::error_of([&] { read(run(assignments)); });
   }
 };
 

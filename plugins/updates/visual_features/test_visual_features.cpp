@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "message_of.hpp"
 #include "test_support.hpp"
 #include "viwo/math/chi2.hpp"
 
@@ -327,12 +328,8 @@ TEST(VisualFeatures, RefusesImpossibleConfigurations) {
   Scene scene = testing::make_scene({.n_clones = 5}, 0, random);
   VisualFeatures update = update_with([](Params&) {});
   Scene blind;
-  try {
-    update.declare(blind);
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "needs a camera: there is no section 'cameras'");
-  }
+  EXPECT_EQ(viwo::testing::error_of([&] { update.declare(blind); }),
+            "needs a camera: there is no section 'cameras'");
   update.declare(scene);
   EXPECT_THROW(update.start({.max_clones = 65, .max_state_size = 500}), InputError);
 }

@@ -3,6 +3,7 @@
 
 #include "allocations.hpp"
 #include "filter_fixture.hpp"
+#include "message_of.hpp"
 #include "viwo/testing/jacobian.hpp"
 
 namespace viwo {
@@ -265,12 +266,8 @@ TEST(ZeroVelocity, DoesNotAllocateInTheSteadyState) {
 TEST(ZeroVelocity, WantsAWheelSetForTheDetectorWheels) {
   const auto update = testing::load_update("{type: zero_velocity, detector: wheels}");
   testing::UpdateHost no_wheels;
-  try {
-    update->declare(no_wheels);
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "needs wheels: there is no section 'kinematics'");
-  }
+  EXPECT_EQ(testing::error_of([&] { update->declare(no_wheels); }),
+            "needs wheels: there is no section 'kinematics'");
 }
 
 }  // namespace

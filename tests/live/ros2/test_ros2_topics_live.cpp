@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "dds_system.hpp"
+#include "message_of.hpp"
 #include "sensor_under_test.hpp"
 #include "viwo/api/status.hpp"
 
@@ -35,12 +36,7 @@ class Ros2Topics : public testing::DdsTest {
     return make_sensor("ros2_topics", ", " + dds_->parameters() + rest);
   }
   static std::string error_of(const std::string& rest) {
-    try {
-      make(rest);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "no error";
+    return testing::error_of([&] { make(rest); });
   }
   static bool wait_until_said(const std::string& text) {
     const auto deadline = steady_clock::now() + 20s;

@@ -15,6 +15,7 @@
 #include "alignment.hpp"
 #include "allocations.hpp"
 #include "filter_fixture.hpp"
+#include "message_of.hpp"
 #include "viwo/sim/planar_motion.hpp"
 #include "viwo/testing/jacobian.hpp"
 
@@ -284,12 +285,7 @@ TEST_F(Fixes, DoNotAllocate) {
 }
 
 std::string error_of(const std::string& parameters) {
-  try {
-    testing::load_update("{type: gnss, " + parameters + "}");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "(no error)";
+  return testing::error_of([&] { testing::load_update("{type: gnss, " + parameters + "}"); });
 }
 
 TEST(GnssParameters, SayWhatContradictsWhat) {
