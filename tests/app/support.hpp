@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include "in_folder.hpp"
 
 namespace viwo {
 
@@ -24,7 +25,7 @@ struct Outcome {
 
 /// A fresh folder per test, removed afterwards. In every text the program prints, the folder is
 /// replaced by TMP.
-class CommandLineTest : public testing::Test {
+class CommandLineTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string pattern = (std::filesystem::temp_directory_path() / "viwo_app_XXXXXX").string();
@@ -43,11 +44,7 @@ class CommandLineTest : public testing::Test {
     ASSERT_TRUE(file) << at(name);
   }
 
-  std::string read(const std::string& name) const {
-    std::ifstream file(at(name), std::ios::binary);
-    EXPECT_TRUE(file) << at(name);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string read(const std::string& name) const { return testing::text_of(at(name)); }
 
   nlohmann::json summary(const std::string& folder = "out") const {
     return nlohmann::json::parse(read(folder + "/summary.json"));

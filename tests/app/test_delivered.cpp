@@ -54,8 +54,7 @@ TEST_F(DeliveredForTheRecordingsTest, ExperimentWithSimulatedCameras) {
 
 // Without those left out: framework/calibration/tests/test_recordings.cpp does it as delivered.
 TEST_F(DeliveredForTheRecordingsTest, Calibration) {
-  std::ifstream file(kConfigFolder + "calibrations/recordings.yaml");
-  const std::string config{std::istreambuf_iterator<char>(file), {}};
+  const std::string config = testing::text_of(kConfigFolder + "calibrations/recordings.yaml");
   const std::string fewer = replaced(config, "leave_out_by: [repetition, motion]\n", "");
   ASSERT_LT(fewer.size(), config.size());
   write("calibrations/recordings.yaml", replaced(fewer, "../runs/", kConfigFolder + "runs/"));
@@ -238,8 +237,7 @@ TEST_F(DeliveredTest, TheJobFilesOfClustersRunShards) {
   }
   expect_done({"experiment", experiment, "--out", out, "--collect"});
   // What the other one starts, word by word.
-  std::ifstream in(kConfigFolder + "cluster/kubernetes.yaml");
-  const std::string job{std::istreambuf_iterator<char>(in), {}};
+  const std::string job = testing::text_of(kConfigFolder + "cluster/kubernetes.yaml");
   EXPECT_NE(job.find("[viwo, experiment, configs/experiments/paper_accuracy.yaml, --out,"),
             std::string::npos);
   EXPECT_NE(job.find("--shard, JOB_COMPLETION_INDEX/8]"), std::string::npos);

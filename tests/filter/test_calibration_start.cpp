@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "filter_runs.hpp"
+#include "in_folder.hpp"
 #include "message_of.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/setup/calibration_file.hpp"
@@ -84,10 +85,6 @@ class CalibrationStartTest : public ::testing::Test {
     return calibration_file_of(make_estimator(*setup.filter).filter());
   }
 
-  static std::string text_of(const std::filesystem::path& file) {
-    std::ifstream in(file);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
   std::filesystem::path write(const std::string& text) const {
     std::ofstream(folder_ / "changed.yaml") << text;
     return folder_ / "changed.yaml";
@@ -169,7 +166,7 @@ TEST_F(CalibrationStartTest, OfSeveralWheelSetsTakesEachByItsName) {
 
 TEST_F(CalibrationStartTest, ShowsWhereSigmasOrCorrelationsAreNotRead) {
   const auto file = first_run();
-  const std::string text = text_of(file);
+  const std::string text = testing::text_of(file);
   CalibrationFile without = read_calibration(file);
   without.correlations = {};
   auto changed = write(calibration_text(without, "a test"));

@@ -1,14 +1,22 @@
-// A fixture for tests of files.
+// A fixture for tests of files, and what a file holds.
 #pragma once
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <string_view>
 
 #include <gtest/gtest.h>
 
 namespace viwo::testing {
+
+/// All that a file holds.
+inline std::string text_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  EXPECT_TRUE(stream) << file;
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
 
 /// An empty folder of the running test's own, as tests run side by side; removed with the fixture.
 class InFolder : public ::testing::Test {

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <string_view>
 
@@ -16,6 +14,7 @@
 namespace viwo::log {
 
 using testing::error_of;
+using testing::text_of;
 
 class InFolder : public testing::InFolder {
  protected:
@@ -24,11 +23,6 @@ class InFolder : public testing::InFolder {
     gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
     gzclose(file);
     return folder_ / name;
-  }
-
-  static std::string content(const std::filesystem::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
   }
 };
 

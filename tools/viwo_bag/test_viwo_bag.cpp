@@ -38,8 +38,7 @@ class ViwoBag : public ::testing::Test {
     const std::string output = path("output.txt");
     const int status = std::system(
         (VIWO_TEST_BINARY_DIR "/bin/viwo_bag " + arguments + " > " + output + " 2>&1").c_str());
-    std::ifstream in(output);
-    output_.assign(std::istreambuf_iterator<char>(in), {});
+    output_ = testing::text_of(output);
     return WEXITSTATUS(status);
   }
 
@@ -238,10 +237,7 @@ TEST_F(ViwoBag, RefusesWrongInputAndWritesNothing) {
 }
 
 TEST_F(ViwoBag, KeepsTheBagThatIsThereUntilThereIsAnother) {
-  const auto content = [this] {
-    std::ifstream in(path("a.bag"), std::ios::binary);
-    return std::string(std::istreambuf_iterator<char>(in), {});
-  };
+  const auto content = [this] { return testing::text_of(path("a.bag")); };
   write_log("log");
   ASSERT_EQ(run(path("log") + " " + path("a.bag")), 0) << output_;
   const std::string whole = content();

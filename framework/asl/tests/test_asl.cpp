@@ -219,9 +219,9 @@ TEST_F(AslTest, WritesTheDocumentedColumns) {
   pose.p_BinW_m = {1., 2., 0.5};
   EXPECT_TRUE(writer.write(pose));
   writer.close();
-  EXPECT_EQ(content(folder_ / "log/wheels0/data.csv"),
+  EXPECT_EQ(text_of(folder_ / "log/wheels0/data.csv"),
             "timestamp_ns,drive_1 [rad/s],drive_2 [rad/s],steer_1 [rad]\n7,0.1,-2,0\n");
-  EXPECT_EQ(content(folder_ / "log/state_groundtruth_estimate0/data.csv"),
+  EXPECT_EQ(text_of(folder_ / "log/state_groundtruth_estimate0/data.csv"),
             "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], "
             "q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], "
             "b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1], "
@@ -261,7 +261,7 @@ TEST_F(AslTest, RefusesAFolderThatHoldsSomethingElseAndLeavesItAlone) {
             log +
                 "  already holds thesis.tex, which is no part of a log written here: choose an "
                 "empty folder");
-  EXPECT_EQ(content(folder_ / "log/wheels0/data.csv"), "mine");
+  EXPECT_EQ(text_of(folder_ / "log/wheels0/data.csv"), "mine");
   const auto file = write("file", "mine");
   EXPECT_EQ(error_of([&] { AslWriter{file}; }), file.string() + "  is a file, not a folder");
 }

@@ -72,7 +72,7 @@ TEST_F(AslImagesTest, WhatTheWriterWroteIsReadBackToTheBit) {
 
 TEST_F(AslImagesTest, TheTableOfACameraMayBeGzipped) {
   const fs::path folder = camera("cam0", {10, 20});
-  write_gz("cam0/data.csv.gz", content(folder / "data.csv"));
+  write_gz("cam0/data.csv.gz", text_of(folder / "data.csv"));
   EXPECT_THAT(refusal({folder}), ::testing::HasSubstr("holds both data.csv and data.csv.gz"));
   fs::remove(folder / "data.csv");
   EXPECT_EQ(read_asl_images(std::vector<fs::path>{folder}, {}).samples.size(), 2U);

@@ -181,12 +181,12 @@ TEST_F(AslTables, CellsAtMidPointsReadBackAlsoAroundAGapAndWithUnevenStamps) {
 TEST_F(AslTables, WritesTheDocumentedTables) {
   write_log({ImuSample{5, {1., 2., 3.}, {4., 5., 9.81}}, FeatureSample{5, 1, {{17, 310.25, 200.5}}},
              FeatureSample{6, 0, {}}, CalibrationSample{0, "r_1", 0.0254}});
-  EXPECT_EQ(content(folder_ / "log/imu0/data.csv"),
+  EXPECT_EQ(text_of(folder_ / "log/imu0/data.csv"),
             "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
             "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n5,1,2,3,4,5,9.81\n");
-  EXPECT_EQ(content(folder_ / "log/features0/data.csv"),
+  EXPECT_EQ(text_of(folder_ / "log/features0/data.csv"),
             "timestamp_ns,camera,id,u [px],v [px]\n5,1,17,310.25,200.5\n6,0,,,\n");
-  EXPECT_EQ(content(folder_ / "log/calibration_groundtruth0/data.csv"),
+  EXPECT_EQ(text_of(folder_ / "log/calibration_groundtruth0/data.csv"),
             "timestamp_ns,name,value\n0,r_1,0.0254\n");
   write_log({CalibrationSample{0, "r_1", 0.0254}});  // a later log replaces all tables
   EXPECT_FALSE(std::filesystem::exists(folder_ / "log/imu0"));

@@ -3,11 +3,11 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "in_folder.hpp"
 #include "simulated.hpp"
 #include "told.hpp"
 #include "viwo/experiment/experiment.hpp"
@@ -28,11 +28,6 @@ class ExperimentFile : public ::testing::Test {
   std::filesystem::path write(const std::string& text) {
     std::ofstream(folder_ / "experiment.yaml") << text;
     return folder_ / "experiment.yaml";
-  }
-
-  static std::string text_of(const std::filesystem::path& file) {
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
   }
 
   /// Writes the results as if every computation had taken no time.

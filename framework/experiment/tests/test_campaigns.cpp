@@ -18,6 +18,7 @@ using ::testing::AllOf;
 using testing::error_of;
 using ::testing::HasSubstr;
 using testing::registry;
+using testing::text_of;
 
 std::string refusal(const std::string& text) {
   return error_of([&] { read_shard(text); });

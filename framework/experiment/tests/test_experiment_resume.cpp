@@ -19,6 +19,7 @@ using testing::error_of;
 using ::testing::HasSubstr;
 using testing::kVariants;
 using testing::registry;
+using testing::text_of;
 
 int files_in(const fs::path& folder) {
   if (!fs::exists(folder)) return 0;

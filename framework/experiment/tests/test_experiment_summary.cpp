@@ -17,6 +17,7 @@ using namespace experiment;
 using ::testing::HasSubstr;
 using testing::kVariants;
 using testing::registry;
+using testing::text_of;
 
 /// Two variants on two recordings with two seeds; ATE in metres as given, by variant, recording,
 /// seed.

@@ -52,7 +52,7 @@ TEST_F(TextReaderTest, ReadsTheSameFromPlainAndGzippedFilesOfManyBlocks) {
 }
 
 TEST_F(TextReaderTest, RefusesATruncatedGzipAtTheLineWhereItEnds) {
-  const std::string bytes = content(write_gz("whole.gz", noise_text(300'000)));
+  const std::string bytes = text_of(write_gz("whole.gz", noise_text(300'000)));
   for (const std::size_t size : {bytes.size() / 2, bytes.size() - 1, bytes.size() - 8}) {
     const auto file = write("cut.gz", bytes.substr(0, size));
     std::int64_t last = 0;
@@ -66,7 +66,7 @@ TEST_F(TextReaderTest, RefusesATruncatedGzipAtTheLineWhereItEnds) {
 }
 
 TEST_F(TextReaderTest, RefusesAGzipWithAFlippedBit) {
-  std::string bytes = content(write_gz("whole.gz", noise_text(300'000)));
+  std::string bytes = text_of(write_gz("whole.gz", noise_text(300'000)));
   bytes[bytes.size() - 7] = static_cast<char>(bytes[bytes.size() - 7] ^ 1);  // in the checksum
   const auto file = write("bad.gz", bytes);
   const std::string message = error_of([&] { lines_of(file); });
@@ -246,11 +246,11 @@ TEST_F(TextWriterTest, WritesUtf8WhateverTheTexts) {
   out << "caf\xe9,"
       << "caf\xc3\xa9\n";
   out.close();
-  EXPECT_EQ(content(file), "caf\xef\xbf\xbd,caf\xc3\xa9\n");
+  EXPECT_EQ(text_of(file), "caf\xef\xbf\xbd,caf\xc3\xa9\n");
   write_text(file, "na\xefve");
-  EXPECT_EQ(content(file), "na\xef\xbf\xbdve");
+  EXPECT_EQ(text_of(file), "na\xef\xbf\xbdve");
   write_bytes(file, "na\xefve");
-  EXPECT_EQ(content(file), "na\xefve");
+  EXPECT_EQ(text_of(file), "na\xefve");
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ TEST_F(TumTest, WritesSecondsWithNineDecimals) {
   trajectory[0].p_BinW << 0.1, -2., 0.;
   trajectory[1].t_ns = 1'000'000'042;
   write_tum(folder_ / "a.tum", trajectory);
-  EXPECT_EQ(content(folder_ / "a.tum"),
+  EXPECT_EQ(text_of(folder_ / "a.tum"),
             "# t[s] x[m] y[m] z[m] qx qy qz qw\n"
             "-0.000000007 0.1 -2 0 0 0 0 1\n"
             "1.000000042 0 0 0 0 0 0 1\n");

@@ -3,26 +3,23 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <regex>
 #include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "in_folder.hpp"
 #include "viwo/api/build_record.hpp"
 
 namespace viwo {
 namespace {
 
+using testing::text_of;
+
 namespace fs = std::filesystem;
 
 const fs::path kHeaders = fs::path(VIWO_TEST_SOURCE_DIR) / "framework/plugin_api/include";
-
-std::string read(const fs::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 std::string output_of(const std::string& command) {
   FILE* const pipe = ::popen(command.c_str(), "r");
@@ -63,7 +60,7 @@ std::string difference(const std::string& recorded, const std::string& present) 
 }
 
 TEST(PluginApi, IsThatOfTheRecordOfItsVersion) {
-  const std::string recorded = read(fs::path(VIWO_TEST_SOURCE_DIR) / record_name(kApiVersion));
+  const std::string recorded = text_of(fs::path(VIWO_TEST_SOURCE_DIR) / record_name(kApiVersion));
   ASSERT_NE(recorded, "") << "no " << record_name(kApiVersion) << ": " << VIWO_API_RECORD
                           << " prints it";
   EXPECT_EQ(difference(recorded, output_of(VIWO_API_RECORD)), "");
@@ -76,7 +73,7 @@ TEST(PluginApi, HasNoTypeThatTheRecordDoesNotKnow) {
   for (const auto& entry : fs::directory_iterator(kHeaders / "viwo/api")) {
     // A helper that is compiled into the plugin.
     if (entry.path().filename() == "auto_kinematics.hpp") continue;
-    const std::string text = read(entry.path());
+    const std::string text = text_of(entry.path());
     for (std::sregex_iterator at(text.begin(), text.end(), declared), end; at != end; ++at) {
       const std::string name = (*at)[1];
       // Of the library's own that uses them.
@@ -101,7 +98,7 @@ class ChangedApi : public ::testing::Test {
     fs::create_directories(folder_);
     fs::copy(kHeaders, folder_ / "include", fs::copy_options::recursive);
     const fs::path file = folder_ / "include/viwo/api" / header;
-    std::string text = read(file);
+    std::string text = text_of(file);
     const std::size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
     if (at == std::string::npos) return "";

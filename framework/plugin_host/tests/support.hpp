@@ -17,13 +17,8 @@ inline const std::filesystem::path kBadPlugins =
     std::filesystem::path(VIWO_TEST_BINARY_DIR) / "tests/plugins_bad";
 
 using testing::error_of;
+using testing::text_of;
 using FolderTest = testing::InFolder;
-
-inline std::string read_bytes(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  EXPECT_TRUE(stream) << file;
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 /// `text` with every `from` replaced; there must be one.
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {

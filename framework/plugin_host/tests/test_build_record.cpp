@@ -95,7 +95,7 @@ class BuildRecordFile : public FolderTest {};
 
 TEST_F(BuildRecordFile, OfAPluginIsThatOfTheApiButForTheDigest) {
   const fs::path file = kBadPlugins / "libviwo_kinematics_moody.so";
-  const std::string record = build_record_in(read_bytes(file), file);
+  const std::string record = build_record_in(text_of(file), file);
   EXPECT_NE(record, api_build_record());
   EXPECT_TRUE(compare_build_records(api_build_record(), record).empty());
 }

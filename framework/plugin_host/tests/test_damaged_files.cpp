@@ -36,9 +36,9 @@ class DamagedFile : public FolderTest {
 
   /// Runs a program on a copy of the plugin; its bytes then.
   std::string after(const std::string& command) {
-    const fs::path file = write("after.so", read_bytes(kMoody));
+    const fs::path file = write("after.so", text_of(kMoody));
     EXPECT_EQ(std::system((command + " '" + file.string() + "'").c_str()), 0) << command;
-    return read_bytes(file);
+    return text_of(file);
   }
 
  private:
@@ -50,13 +50,13 @@ constexpr const char* kDamaged =
     "other bytes - copy or build it again";
 
 TEST_F(DamagedFile, WithoutADigestIsRefused) {
-  EXPECT_EQ(refusal(read_bytes(kBadPlugins / "libviwo_kinematics_unsealed.so")),
+  EXPECT_EQ(refusal(text_of(kBadPlugins / "libviwo_kinematics_unsealed.so")),
             "has no digest in its build record - build it with viwo_add_plugin(), or run "
             "viwo_seal FILE after the link");
 }
 
 TEST_F(DamagedFile, IsRefusedForOneBitInItsCode) {
-  std::string bytes = read_bytes(kMoody);
+  std::string bytes = text_of(kMoody);
   EXPECT_EQ(refusal(bytes), "");
   const std::size_t at = bytes.find("one wheel");
   ASSERT_NE(at, std::string::npos);
@@ -65,7 +65,7 @@ TEST_F(DamagedFile, IsRefusedForOneBitInItsCode) {
 }
 
 TEST_F(DamagedFile, IsRefusedForAnotherDigest) {
-  std::string bytes = read_bytes(kMoody);
+  std::string bytes = text_of(kMoody);
   const std::size_t at = bytes.find(";digest=") + 8;
   bytes[at] = bytes[at] == '0' ? '1' : '0';
   EXPECT_EQ(refusal(bytes), kDamaged);
@@ -73,7 +73,7 @@ TEST_F(DamagedFile, IsRefusedForAnotherDigest) {
 
 // Without a digest one of four such files ended the program.
 TEST_F(DamagedFile, NeverReachesTheLoaderWhateverIsWrongWithIt) {
-  const std::string whole = read_bytes(kMoody);
+  const std::string whole = text_of(kMoody);
   std::mt19937 random(7);
   int refused = 0;
   constexpr int kMutations = 300;
@@ -101,7 +101,7 @@ TEST_F(DamagedFile, NeverReachesTheLoaderWhateverIsWrongWithIt) {
 TEST_F(DamagedFile, IsAcceptedWhenItIsStripped) {
   EXPECT_EQ(refusal(after(VIWO_TEST_STRIP)), "");
   EXPECT_EQ(refusal(after(VIWO_TEST_STRIP " --strip-unneeded --remove-section=.comment")), "");
-  EXPECT_LT(after(VIWO_TEST_STRIP).size(), read_bytes(kMoody).size());
+  EXPECT_LT(after(VIWO_TEST_STRIP).size(), text_of(kMoody).size());
 }
 
 TEST_F(DamagedFile, IsAcceptedWithAnotherSearchPathOrNone) {
@@ -109,20 +109,20 @@ TEST_F(DamagedFile, IsAcceptedWithAnotherSearchPathOrNone) {
       write("change.cmake", "file(RPATH_SET FILE \"${FILE}\" NEW_RPATH \"${TO}\")\n");
   const std::string cmake = VIWO_TEST_CMAKE " -DTO=";
   const auto with = [&](const std::string& path) {
-    const fs::path file = write("after.so", read_bytes(kMoody));
+    const fs::path file = write("after.so", text_of(kMoody));
     const std::string command =
         cmake + "'" + path + "' -DFILE='" + file.string() + "' -P '" + script.string() + "'";
     EXPECT_EQ(std::system(command.c_str()), 0) << command;
-    return read_bytes(file);
+    return text_of(file);
   };
   const std::string other = with("$ORIGIN/..");
-  EXPECT_NE(other, read_bytes(kMoody));
+  EXPECT_NE(other, text_of(kMoody));
   EXPECT_EQ(refusal(other), "");
   EXPECT_EQ(refusal(with("")), "");
 }
 
 TEST_F(DamagedFile, OverwrittenWhileItIsUsedChangesNothing) {
-  const std::string bytes = read_bytes(kMoody);
+  const std::string bytes = text_of(kMoody);
   const fs::path file = write("libviwo_kinematics_moody.so", bytes);
   PluginRegistry registry({folder_});
   const PluginInfo info = registry.check(file);

@@ -45,7 +45,7 @@ class Registry : public FolderTest {
   /// A copy of the good plugin with some of its bytes replaced.
   fs::path doctored(const std::string& from, const std::string& to) const {
     EXPECT_EQ(from.size(), to.size());
-    return write("libviwo_kinematics_moody.so", replaced(read_bytes(bad("moody")), from, to));
+    return write("libviwo_kinematics_moody.so", replaced(text_of(bad("moody")), from, to));
   }
 };
 
@@ -102,7 +102,7 @@ TEST_F(Registry, NamesThePackageOfAPluginThatIsElsewhere) {
 }
 
 TEST_F(Registry, RefusesTwoFilesForOnePlugin) {
-  const auto a = write("a/libviwo_kinematics_moody.so", read_bytes(bad("moody")));
+  const auto a = write("a/libviwo_kinematics_moody.so", text_of(bad("moody")));
   const auto b = write("b/libviwo_kinematics_moody.so", "not even a library");
   PluginRegistry registry({folder_ / "a", folder_ / "b", kBadPlugins});
   EXPECT_EQ(error_of([&] { registry.find("kinematics", "moody"); }),
@@ -213,7 +213,7 @@ TEST_F(Registry, RefusesATextFile) {
 }
 
 TEST_F(Registry, RefusesATruncatedLibraryAtAnyLength) {
-  const std::string bytes = read_bytes(bad("moody"));
+  const std::string bytes = text_of(bad("moody"));
   const std::string expected = "is truncated - copy or build it again";
   for (const std::size_t size : {std::size_t{20}, std::size_t{70}, bytes.size() / 4}) {
     EXPECT_EQ(reason(write("libviwo_kinematics_moody.so", bytes.substr(0, size))), expected)
@@ -222,14 +222,14 @@ TEST_F(Registry, RefusesATruncatedLibraryAtAnyLength) {
 }
 
 TEST_F(Registry, RefusesALibraryForAnotherProcessor) {
-  std::string bytes = read_bytes(bad("moody"));
+  std::string bytes = text_of(bad("moody"));
   bytes[18] = static_cast<char>(bytes[18] ^ 0x40);  // e_machine
   EXPECT_EQ(reason(write("libviwo_kinematics_moody.so", bytes)),
             "is built for another processor - rebuild it on this machine");
 }
 
 TEST_F(Registry, RefusesAProgram) {
-  std::string bytes = read_bytes(bad("moody"));
+  std::string bytes = text_of(bad("moody"));
   bytes[16] = 2;  // e_type = ET_EXEC
   EXPECT_EQ(reason(write("libviwo_kinematics_moody.so", bytes)),
             "is not a shared library but an object file or a program - a plugin is built with "
@@ -316,7 +316,7 @@ TEST_F(Registry, RefusesAChangeOfTheFloatingPointModeAndUndoesIt) {
 
 #if defined(__SSE__)
 TEST_F(Registry, LeavesMxcsrAloneWhenItLoadsAGoodPlugin) {
-  const auto file = write("libviwo_kinematics_moody.so", read_bytes(bad("moody")));
+  const auto file = write("libviwo_kinematics_moody.so", text_of(bad("moody")));
   const unsigned before = floating_point_mode();
   PluginRegistry({folder_}).check(file);
   EXPECT_EQ(floating_point_mode(), before);
@@ -351,9 +351,9 @@ TEST_F(Registry, TwoRegistrationsInOneLibraryDoNotLink) {
                               (folder_ / "two.so").string() + " > " + (folder_ / "log").string() +
                               " 2>&1";
   EXPECT_NE(std::system(command.c_str()), 0);
-  EXPECT_NE(read_bytes(folder_ / "log").find("multiple definition of `viwo_plugin'"),
+  EXPECT_NE(text_of(folder_ / "log").find("multiple definition of `viwo_plugin'"),
             std::string::npos)
-      << read_bytes(folder_ / "log");
+      << text_of(folder_ / "log");
   EXPECT_FALSE(fs::exists(folder_ / "two.so"));
 }
 
@@ -379,7 +379,7 @@ TEST_F(Registry, RefusesAnotherNameThanThatOfTheFile) {
   const std::string expected =
       "registers 'moody' of kind 'kinematics' - its file must be named libviwo_kinematics_moody.so";
   EXPECT_EQ(reason(bad("misnamed")), expected);
-  const std::string bytes = read_bytes(bad("moody"));
+  const std::string bytes = text_of(bad("moody"));
   EXPECT_EQ(reason(write("libviwo_sensor_moody.so", bytes)), expected);
   EXPECT_EQ(reason(write("moody.so", bytes)), expected);
   fs::create_symlink(bad("moody"), folder_ / "libviwo_kinematics_alias.so");

@@ -45,8 +45,8 @@ class Kinds : public ::testing::Test {
 };
 
 TEST_F(Kinds, OfViwoAreKnownAll) {
-  const std::string header = read_bytes(std::filesystem::path(VIWO_TEST_SOURCE_DIR) /
-                                        "framework/plugin_api/include/viwo/api/measurement.hpp");
+  const std::string header = text_of(std::filesystem::path(VIWO_TEST_SOURCE_DIR) /
+                                     "framework/plugin_api/include/viwo/api/measurement.hpp");
   std::size_t registered = 0;
   for (std::size_t at = 0; (at = header.find("\nVIWO_SAMPLE(", at)) != std::string::npos; ++at) {
     ++registered;

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <regex>
 #include <sstream>
@@ -22,6 +21,7 @@
 #include "browser.hpp"
 #include "gnuplot.hpp"
 #include "gnuplot_format.hpp"
+#include "in_folder.hpp"
 #include "message_of.hpp"
 #include "sample.hpp"
 #include "viwo/report/figures.hpp"
@@ -31,6 +31,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using testing::text_of;
 
 constexpr const char* kBlue = "rgb(  0, 114, 178)";
 constexpr const char* kVermillion = "rgb(213,  94,   0)";
@@ -41,11 +42,6 @@ bool has_gnuplot() { return !output_of("command -v gnuplot").empty(); }
   if (!has_gnuplot()) GTEST_SKIP() << "no gnuplot in PATH (Debian: gnuplot-nox)"
 
 Document with_plot(Plot plot) { return {"T", "", {{"S", {std::move(plot)}}}}; }
-
-std::string text_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 std::vector<std::string> file_names(const std::filesystem::path& folder) {
   std::vector<std::string> names;

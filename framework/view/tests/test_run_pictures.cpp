@@ -14,6 +14,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "allocations.hpp"
+#include "in_folder.hpp"
 #include "message_of.hpp"
 #include "sensors_in_memory.hpp"
 #include "simulated.hpp"
@@ -45,7 +46,7 @@ struct Grey final : ImageSource {
 std::string late_camera() {
   const auto file = std::filesystem::path(::testing::TempDir()) / "viwo_late_camera.yaml";
   std::ofstream out(file);
-  out << std::ifstream(testing::configuration("cameras/pinhole.yaml")).rdbuf()
+  out << testing::text_of(testing::configuration("cameras/pinhole.yaml"))
       << "  timeshift_cam_imu: 0.02\n";
   return file.string();
 }

@@ -3,8 +3,6 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <thread>
 
@@ -12,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "in_folder.hpp"
 #include "message_of.hpp"
 #include "show/window.hpp"
 #ifdef VIWO_TEST_USER_INPUT
@@ -77,8 +76,7 @@ class Screen {
 
   /// Pixels of one colour (X stores them as blue, green, red, 0).
   int count(unsigned char blue, unsigned char green, unsigned char red) const {
-    std::ifstream file(folder_ / "Xvfb_screen0", std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    const std::string bytes = testing::text_of(folder_ / "Xvfb_screen0");
     const std::string colour{static_cast<char>(blue), static_cast<char>(green),
                              static_cast<char>(red)};
     int n = 0;

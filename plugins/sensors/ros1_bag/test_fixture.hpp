@@ -57,10 +57,7 @@ class Ros1Bag : public ::testing::Test {
     std::ofstream(file(name), std::ios::binary) << content;
   }
 
-  std::string read(const std::string& name = "a.bag") const {
-    std::ifstream in(file(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
+  std::string read(const std::string& name = "a.bag") const { return testing::text_of(file(name)); }
 
   /// n samples of IMU at 5 ms and wheels at 10 ms, images of two cameras at 50 ms, poses at 20 ms.
   void write_drive(int n = 40, const std::string& compression = "none",

@@ -2,7 +2,6 @@
 // stamps that no clock has. Each was an endless run, or one that took all memory.
 #include <cstdint>
 #include <limits>
-#include <sstream>
 
 #include "test_fixture.hpp"
 
@@ -31,12 +30,7 @@ class HostileDatabase : public Ros2Bag {
   std::string error(const std::string& rest = "imu_topic: /imu0") const {
     return error_of(section(rest));
   }
-  std::string bytes() const {
-    std::ifstream in(file(), std::ios::binary);
-    std::ostringstream out;
-    out << in.rdbuf();
-    return out.str();
-  }
+  std::string bytes() const { return testing::text_of(file()); }
 };
 
 TEST_F(HostileDatabase, ViewsAreRefused) {

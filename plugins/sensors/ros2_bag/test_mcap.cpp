@@ -11,6 +11,8 @@
 namespace viwo {
 namespace {
 
+using testing::text_of;
+
 constexpr const char* kTopics =
     "imu_topic: /imu0, joint_topic: /joints, drive_joints: [drive], steer_joints: [steer], "
     "image_topics: [/cam0], pose_topic: /pose";
@@ -56,10 +58,6 @@ class Mcap : public Ros2Bag {
   }
   static std::string section_of(const std::string& path, const std::string& rest = kTopics) {
     return "{type: ros2_bag, path: " + path + ", " + rest + "}";
-  }
-  static std::string bytes_of(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
   }
   std::string store(const std::string& content) const {
     std::ofstream(file("a.mcap"), std::ios::binary) << content;
@@ -116,7 +114,7 @@ TEST_F(Mcap, GivesWhatIsBeforeACutAndSaysWhere) {
   const auto whole = play(*make_sensor(section(kTopics)));
   for (const char* name :
        {"plain.mcap", "lz4.mcap", "zstd.mcap", "unchunked.mcap", "no_summary.mcap"}) {
-    const std::string content = bytes_of(data(name));
+    const std::string content = text_of(data(name));
     std::size_t most = 20;
     for (std::size_t size = content.size() - 1; size > content.size() / 2; size -= 97) {
       SCOPED_TRACE(std::string(name) + " of " + std::to_string(size));
@@ -149,7 +147,7 @@ TEST_F(Mcap, GivesThePartOfAChunkThatIsBeforeACut) {
     out.write_imu("/imu0", {kStart + k * kMs, kStart + k * kMs}, {0.1 * k, 1. / (k + 1), 0.}, {});
   }
   out.close();
-  const std::string content = bytes_of(file("one.mcap"));
+  const std::string content = text_of(file("one.mcap"));
   const auto imu = play_only<ImuSample>(
       section_of(store(content.substr(0, content.size() / 2)), "imu_topic: /imu0"));
   EXPECT_GT(imu.size(), 5'000U);
@@ -158,7 +156,7 @@ TEST_F(Mcap, GivesThePartOfAChunkThatIsBeforeACut) {
 }
 
 TEST_F(Mcap, AFileThatEndsWithZerosIsOneThatWasCut) {
-  const std::string content = bytes_of(data("plain.mcap"));
+  const std::string content = text_of(data("plain.mcap"));
   const auto sensor = make_sensor(section_of(
       store(content.substr(0, content.size() / 2) + std::string(5000, '\0')), "imu_topic: /imu0"));
   EXPECT_GT(play(*sensor).size(), 4U);
@@ -172,7 +170,7 @@ TEST_F(Mcap, AFileThatEndsWithZerosIsOneThatWasCut) {
 TEST_F(Mcap, CountsTheMessagesOfAChunkThatIsDamaged) {
   for (const char* name : {"plain.mcap", "zstd.mcap"}) {
     SCOPED_TRACE(name);
-    std::string content = bytes_of(data(name));
+    std::string content = text_of(data(name));
     const std::size_t at = third_chunk(content);
     content[at + 200] = static_cast<char>(content[at + 200] ^ 0x10);
     const auto sensor = make_sensor(section_of(store(content), "imu_topic: /imu0"));
@@ -192,7 +190,7 @@ TEST_F(Mcap, CountsTheMessagesOfAChunkThatCannotBeDecompressed) {
     out.write_imu("/imu0", {kStart + k * kMs, kStart + k * kMs}, {0.1 * k, 1. / (k + 1), 0.}, {});
   }
   out.close();
-  std::string content = bytes_of(file("one.mcap"));
+  std::string content = text_of(file("one.mcap"));
   const std::size_t at = third_chunk(content);
   std::fill_n(&content[at + 53], 16, '\xff');  // where the compressed bytes begin
   const auto sensor = make_sensor(section_of(store(content), "imu_topic: /imu0"));
@@ -216,7 +214,7 @@ TEST_F(Mcap, CountsTheMessagesOfAChunkThatCannotBeDecompressed) {
 }
 
 TEST_F(Mcap, NamesTheDamageOfChunksThatDescribeTheChannels) {
-  std::string content = bytes_of(data("plain.mcap"));
+  std::string content = text_of(data("plain.mcap"));
   content[content.size() - 60] = static_cast<char>(content[content.size() - 60] ^ 1);  // summary
   for (std::size_t at = content.find("/imu0"); at != std::string::npos;
        at = content.find("/imu0", at + 1)) {
@@ -229,7 +227,7 @@ TEST_F(Mcap, NamesTheDamageOfChunksThatDescribeTheChannels) {
 }
 
 TEST_F(Mcap, NamesTheDamageWhereNoMessageIsLeft) {
-  std::string content = bytes_of(data("plain.mcap"));
+  std::string content = text_of(data("plain.mcap"));
   for (std::size_t at = 8; content[at] != '\x0f';) {  // up to the end of the data
     std::uint64_t length = 0;
     std::memcpy(&length, &content[at + 1], sizeof(length));
@@ -243,7 +241,7 @@ TEST_F(Mcap, NamesTheDamageWhereNoMessageIsLeft) {
 }
 
 TEST_F(Mcap, ReadsWithoutASummaryThatIsDamaged) {
-  std::string content = bytes_of(data("lz4.mcap"));
+  std::string content = text_of(data("lz4.mcap"));
   content[content.size() - 60] = static_cast<char>(content[content.size() - 60] ^ 1);
   const auto sensor = make_sensor(section_of(store(content), "imu_topic: /imu0"));
   EXPECT_EQ(play(*sensor).size(), 20U);

@@ -224,10 +224,8 @@ TEST_F(McapBroken, CountsMessagesOfAChannelThatIsDescribedNowhere) {
 
 TEST_F(McapBroken, SurvivesAByteThatIsWrongAnywhere) {
   for (const char* name : {"plain.mcap", "lz4.mcap", "zstd.mcap", "unchunked.mcap"}) {
-    std::ifstream in(
-        std::string(VIWO_TEST_SOURCE_DIR) + "/plugins/sensors/ros2_bag/test_data/" + name,
-        std::ios::binary);
-    const std::string whole{std::istreambuf_iterator<char>(in), {}};
+    const std::string whole = testing::text_of(std::string(VIWO_TEST_SOURCE_DIR) +
+                                               "/plugins/sensors/ros2_bag/test_data/" + name);
     std::mt19937_64 random(5);
     int refused = 0;
     for (int k = 0; k < 300; ++k) {

@@ -138,8 +138,7 @@ TEST_F(Ros2Bag, RefusesADatabaseThatWasCutShort) {
 
 TEST_F(Ros2Bag, SurvivesBytesThatAreWrongAnywhere) {
   write_drive();
-  std::ifstream in(file(), std::ios::binary);
-  const std::string whole{std::istreambuf_iterator<char>(in), {}};
+  const std::string whole = testing::text_of(file());
   std::mt19937_64 random(5);
   int refused = 0;
   for (int k = 0; k < 200; ++k) {

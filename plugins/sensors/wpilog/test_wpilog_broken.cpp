@@ -52,8 +52,7 @@ TEST_F(WpiLog, AGzippedLogThatIsCutIsReadUpToThereAndACorruptOneIsNot) {
     out.add("/d", "double", 20 * k * kMs, number(1e-16 * static_cast<double>(random())));
   }
   const std::string file = gzipped(out.bytes);
-  std::ifstream in(file, std::ios::binary);
-  const std::string packed{std::istreambuf_iterator<char>(in), {}};
+  const std::string packed = testing::text_of(file);
   const auto sensor = make_sensor(log(packed.substr(0, packed.size() / 2), kDrive));
   EXPECT_GT(play(*sensor).size(), 1000U);
   EXPECT_THAT(rejections_of(*sensor), ElementsAre(HasSubstr("log cut short | 1 | ")));

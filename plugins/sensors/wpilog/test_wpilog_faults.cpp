@@ -142,8 +142,7 @@ TEST_F(WpiLog, CorruptGzipDataAreAnErrorAlsoWhereTheyCanBeInflated) {
   gzFile stored = gzopen(file.c_str(), "wb0");
   gzwrite(stored, out.bytes.data(), static_cast<unsigned>(out.bytes.size()));
   gzclose(stored);
-  std::ifstream in(file, std::ios::binary);
-  std::string packed{std::istreambuf_iterator<char>(in), {}};
+  std::string packed = testing::text_of(file);
   EXPECT_THAT(error_of(log(packed, kOneDrive)), IsEmpty());
   int stopped = 0;
   for (std::size_t at = packed.size() / 2; at < packed.size() / 2 + 30; ++at) {
