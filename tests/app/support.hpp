@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -25,24 +24,9 @@ struct Outcome {
 
 /// A fresh folder per test, removed afterwards. In every text the program prints, the folder is
 /// replaced by TMP.
-class CommandLineTest : public ::testing::Test {
+class CommandLineTest : public testing::InFolder {
  protected:
-  void SetUp() override {
-    std::string pattern = (std::filesystem::temp_directory_path() / "viwo_app_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   std::filesystem::path at(const std::string& name) const { return folder_ / name; }
-
-  void write(const std::string& name, const std::string& text) const {
-    std::filesystem::create_directories(at(name).parent_path());
-    std::ofstream file(at(name), std::ios::binary);
-    file << text;
-    file.close();
-    ASSERT_TRUE(file) << at(name);
-  }
 
   std::string read(const std::string& name) const { return testing::text_of(at(name)); }
 
@@ -100,9 +84,6 @@ class CommandLineTest : public ::testing::Test {
     EXPECT_EQ(outcome.code, 0) << outcome.out << outcome.err;
     return outcome;
   }
-
- private:
-  std::filesystem::path folder_;
 };
 
 /// A simulated swerve robot that drives a circle for five seconds. Line numbers matter.

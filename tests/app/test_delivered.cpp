@@ -30,7 +30,6 @@ TEST_F(DeliveredTest, SimulatedConfigurations) {
 class DeliveredForTheRecordingsTest : public DeliveredTest {
  protected:
   void SetUp() override {
-    DeliveredTest::SetUp();
     const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/4wis4wid";
     if (!fs::exists(data)) GTEST_SKIP() << "the recordings are not here";
     set_ = "placeholders.data=" + fs::canonical(data).string();

@@ -46,7 +46,6 @@ const std::string kConfigs = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/";
 class FilterTest : public CommandLineTest {
  protected:
   void SetUp() override {
-    CommandLineTest::SetUp();
     fs::copy_file(kConfigs + "cameras/pinhole.yaml", at("cam.yaml"));
     write("run.yaml", kVio);
   }

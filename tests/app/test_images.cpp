@@ -45,10 +45,7 @@ cam1:
 
 class ImagesTest : public CommandLineTest {
  protected:
-  void SetUp() override {
-    CommandLineTest::SetUp();
-    write("cameras.yaml", kCameras);
-  }
+  void SetUp() override { write("cameras.yaml", kCameras); }
 
   /// Words of a run on simulated images of `seconds`.
   std::vector<std::string> simulated(const std::string& command, const std::string& seconds,

@@ -16,7 +16,6 @@ constexpr const char* kWheels = "log/wheels0/data.csv";
 class LogTest : public CommandLineTest {
  protected:
   void SetUp() override {
-    CommandLineTest::SetUp();
     write("run.yaml", kRun);
     expect_done({"simulate", "run.yaml", "--out", "log"});
     std::istringstream text(read(kWheels));

@@ -16,7 +16,6 @@ namespace fs = std::filesystem;
 class PicturesTest : public CommandLineTest {
  protected:
   void SetUp() override {
-    CommandLineTest::SetUp();
     unsetenv("DISPLAY");
     unsetenv("WAYLAND_DISPLAY");
   }

@@ -23,7 +23,6 @@ const std::filesystem::path kData = std::filesystem::path(VIWO_TEST_SHARED_DIR) 
 class RealWheels : public CommandLineTest {
  protected:
   void SetUp() override {
-    CommandLineTest::SetUp();
     if (!std::filesystem::exists(kData)) GTEST_SKIP() << "the recordings are not here";
   }
 

@@ -1,7 +1,6 @@
 // A run that starts from the calibration.yaml of another one begins where that has ended.
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -52,15 +51,8 @@ std::vector<std::string> differences(const CalibrationFile& end, const Calibrati
   return found;
 }
 
-class CalibrationStartTest : public ::testing::Test {
+class CalibrationStartTest : public testing::InFolder {
  protected:
-  void SetUp() override {
-    std::string pattern = (std::filesystem::temp_directory_path() / "viwo_start_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   /// A short run of the swerve robot with two cameras, all of it calibrated.
   static RunSetup setup(const std::vector<std::string>& more = {}, const char* scale = "0") {
     std::vector<std::string> assignments{
@@ -86,11 +78,9 @@ class CalibrationStartTest : public ::testing::Test {
   }
 
   std::filesystem::path write(const std::string& text) const {
-    std::ofstream(folder_ / "changed.yaml") << text;
-    return folder_ / "changed.yaml";
+    return InFolder::write("changed.yaml", text);
   }
 
-  std::filesystem::path folder_;
   CalibrationFile end_;
 };
 

@@ -20,17 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-class ViwoBag : public ::testing::Test {
+class ViwoBag : public testing::InFolder {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              (std::string("viwo_bag_") +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
   /// The exit code; what it printed is in output_.
@@ -79,7 +70,6 @@ class ViwoBag : public ::testing::Test {
     return all;
   }
 
-  fs::path folder_;
   std::string output_;
 };
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -14,20 +13,12 @@
 
 namespace viwo::testing {
 
-class ExperimentFile : public ::testing::Test {
+class ExperimentFile : public InFolder {
  protected:
-  void SetUp() override {
-    folder_ =
-        std::filesystem::path(::testing::TempDir()) /
-        ("viwo_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-    std::ofstream(folder_ / "run.yaml") << config::to_yaml(simulated("'{motion}'"));
-  }
+  void SetUp() override { InFolder::write("run.yaml", config::to_yaml(simulated("'{motion}'"))); }
 
-  std::filesystem::path write(const std::string& text) {
-    std::ofstream(folder_ / "experiment.yaml") << text;
-    return folder_ / "experiment.yaml";
+  std::filesystem::path write(const std::string& text) const {
+    return InFolder::write("experiment.yaml", text);
   }
 
   /// Writes the results as if every computation had taken no time.
@@ -42,8 +33,6 @@ class ExperimentFile : public ::testing::Test {
     }
     write_experiment(out, result);
   }
-
-  std::filesystem::path folder_;
 };
 
 inline constexpr const char* kVariants =

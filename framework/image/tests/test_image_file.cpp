@@ -13,6 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <zlib.h>
 
+#include "in_folder.hpp"
 #include "message_of.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/image/image_file.hpp"
@@ -22,22 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class ImageFileTest : public ::testing::Test {
+class ImageFileTest : public testing::InFolder {
  protected:
-  ImageFileTest() {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(::testing::TempDir()) / ("viwo_image_" + std::string(info->name()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~ImageFileTest() override { fs::remove_all(folder_); }
-
   static Image pattern() {
     Image image{7, 5, {}};
     for (int i = 0; i < 35; ++i) image.pixels.push_back(static_cast<std::uint8_t>(7 * i));
     return image;
   }
-  fs::path folder_;
 };
 
 std::string failure(const fs::path& file) {

@@ -1,11 +1,11 @@
 // What is to be written is written, and then it is well.
-#include <cstdlib>
 #include <numbers>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "in_folder.hpp"
 #include "inspected.hpp"
 #include "viwo/run/simulate.hpp"
 
@@ -15,13 +15,15 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
+class FixedConfiguration : public testing::InFolder {};
+
 /// A configuration of viwo_swerve that has clock and mounting wrong.
 RunSetup wrong() {
   return simulated("viwo_swerve", {"sensors.simulator0.duration_s=40", "wheels.t_OtoI_s=0.1",
                                    "wheels.rpy_ItoO_rad=[3.14159265, 0, 0]"});
 }
 
-TEST(FixedConfiguration, HasNoFindingsAnyMore) {
+TEST_F(FixedConfiguration, HasNoFindingsAnyMore) {
   RunSetup setup = wrong();
   EXPECT_TRUE(inspect(setup).has_faults());
   // What an IMU that is upside down hides shows when it is mended.
@@ -47,17 +49,14 @@ config::Node on_log(const std::filesystem::path& folder) {
   return resolve_placeholders(run, {{"log", folder.string()}});
 }
 
-TEST(FixedConfiguration, MendsTheJointsOfALog) {
-  std::string pattern = (std::filesystem::temp_directory_path() / "viwo_fix_XXXXXX").string();
-  ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-  const std::filesystem::path folder = pattern;
+TEST_F(FixedConfiguration, MendsTheJointsOfALog) {
   RunSetup faulty = changed(swerve(), {.wheels = [](EncoderSample& s) {
                               s.drive_rad_per_s[1] *= -1.;
                               s.steer_rad[2] += 0.3;
                               return true;
                             }});
-  write_log(faulty, folder);
-  RunSetup setup = read_run(on_log(folder), testing::registry());
+  write_log(faulty, folder_);
+  RunSetup setup = read_run(on_log(folder_), testing::registry());
   const bool has_keys = setup.resolved.at_path("sensors.wheels0.drive_scale") != nullptr;
   EXPECT_TRUE(inspect(setup).has_faults());
   constexpr int kRounds = 2;  // the sign hides the offset
@@ -67,23 +66,19 @@ TEST(FixedConfiguration, MendsTheJointsOfALog) {
     setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
   }
   const Inspection mended = inspect(setup);
-  std::filesystem::remove_all(folder);
   if (!has_keys) GTEST_SKIP() << "sensors have no key drive_scale";
   EXPECT_THAT(faults_of(mended), IsEmpty());
 }
 
-TEST(FixedConfiguration, GivesScalesToTheChannelsOfTheLog) {
-  std::string pattern = (std::filesystem::temp_directory_path() / "viwo_fix_XXXXXX").string();
-  ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-  const std::filesystem::path folder = pattern;
+TEST_F(FixedConfiguration, GivesScalesToTheChannelsOfTheLog) {
   // The first channel is the second drive, and turns backwards.
   RunSetup faulty = changed(swerve(), {.wheels = [](EncoderSample& s) {
                               std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[1]);
                               s.drive_rad_per_s[0] *= -1.;
                               return true;
                             }});
-  write_log(faulty, folder);
-  config::Node run = on_log(folder);
+  write_log(faulty, folder_);
+  config::Node run = on_log(folder_);
   config::set_path(run, "sensors.wheels0.drive_channel", config::parse("[2, 1, 3, 4]", "test"));
   RunSetup setup = read_run(run, testing::registry());
   const Inspection found = inspect(setup);
@@ -93,10 +88,9 @@ TEST(FixedConfiguration, GivesScalesToTheChannelsOfTheLog) {
   const std::string text = fixed_configuration(setup, found, testing::registry());
   setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
   EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
-  std::filesystem::remove_all(folder);
 }
 
-TEST(FixedConfiguration, WritesTheUnitsOfAnImuThatHasKeysForThem) {
+TEST_F(FixedConfiguration, WritesTheUnitsOfAnImuThatHasKeysForThem) {
   const Fault fault = {.imu = [](ImuSample& s) {
     scale(s.gyro_rad_per_s, 180. / std::numbers::pi);
     scale(s.accel_m_per_s2, 1. / 9.80665);
@@ -108,13 +102,12 @@ TEST(FixedConfiguration, WritesTheUnitsOfAnImuThatHasKeysForThem) {
     EXPECT_EQ(finding_of(told, "imu0", check).severity, Severity::kFault);
     EXPECT_THAT(finding_of(told, "imu0", check).remedies, IsEmpty()) << check;
   }
-  const auto folder = std::filesystem::temp_directory_path() / "viwo_units";
   RunSetup faulty = changed(swerve(), fault);
-  write_log(faulty, folder);
-  config::Node run = on_log(folder);
+  write_log(faulty, folder_);
+  config::Node run = on_log(folder_);
   config::set_path(
       run, "sensors.imu0",
-      config::parse("{type: csv_table, path: " + (folder / "imu0" / "data.csv").string() +
+      config::parse("{type: csv_table, path: " + (folder_ / "imu0" / "data.csv").string() +
                         ", time_column: 1, time_unit: ns, gyro_columns: [2, 3, 4], "
                         "accel_columns: [5, 6, 7]}",
                     "test"));
@@ -125,10 +118,9 @@ TEST(FixedConfiguration, WritesTheUnitsOfAnImuThatHasKeysForThem) {
   const std::string text = fixed_configuration(setup, found, testing::registry());
   setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
   EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
-  std::filesystem::remove_all(folder);
 }
 
-TEST(FixedConfiguration, SaysWhyAKeyIsChangedAndWhatItHasNoKeyFor) {
+TEST_F(FixedConfiguration, SaysWhyAKeyIsChangedAndWhatItHasNoKeyFor) {
   RunSetup setup = swerve();
   Inspection inspection;
   inspection.name = setup.name;

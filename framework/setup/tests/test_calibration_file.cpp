@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "in_folder.hpp"
 #include "message_of.hpp"
 #include "simulated.hpp"
 #include "viwo/setup/calibration_file.hpp"
@@ -17,15 +18,8 @@ using testing::error_of;
 using ::testing::HasSubstr;
 using testing::registry;
 
-class CalibrationFileTest : public ::testing::Test {
+class CalibrationFileTest : public testing::InFolder {
  protected:
-  void SetUp() override {
-    std::string pattern = (std::filesystem::temp_directory_path() / "viwo_file_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    file_ = std::filesystem::path(pattern) / "calibration.yaml";
-  }
-  void TearDown() override { std::filesystem::remove_all(file_.parent_path()); }
-
   /// Error of reading such a file, without its name.
   std::string error_of_file(const std::string& text) {
     return without_name(error_of([&] { read(text); }));
@@ -52,7 +46,7 @@ class CalibrationFileTest : public ::testing::Test {
   static constexpr const char* kRun =
       "sensors: {s: {type: planar_simulator, motion: circle, robot: &robot {type: differential, "
       "radius_left_m: 0.05, radius_right_m: 0.05, baseline_m: 0.4}}}\nkinematics: *robot\n";
-  std::filesystem::path file_;
+  const std::filesystem::path file_ = folder_ / "calibration.yaml";
 };
 
 const std::string kTwoSidesHead = "model: differential\ntwist: plain\nintrinsics:\n";

@@ -14,6 +14,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "in_folder.hpp"
 #include "message_of.hpp"
 #include "show/video_file.hpp"
 #include "viwo/api/status.hpp"
@@ -25,14 +26,8 @@ namespace fs = std::filesystem;
 
 constexpr int kWidth = 320, kHeight = 240;
 
-class VideoFileTest : public ::testing::Test {
+class VideoFileTest : public testing::InFolder {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "viwo_video_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   fs::path at(const std::string& name) const { return folder_ / name; }
   std::size_t files() const {
     return static_cast<std::size_t>(std::distance(fs::recursive_directory_iterator(folder_),
@@ -45,8 +40,6 @@ class VideoFileTest : public ::testing::Test {
     if (begin != std::string::npos) text.replace(begin, folder_.string().size(), "TMP");
     return text;
   }
-
-  fs::path folder_;
 };
 
 Picture grey(int value) {
@@ -55,7 +48,7 @@ Picture grey(int value) {
 }
 
 /// Mean of a picture's pixels is 40 + 4 k for the k-th.
-void write(const fs::path& file, int pictures, double period_s) {
+void write_video(const fs::path& file, int pictures, double period_s) {
   VideoFile video(file);
   for (int k = 0; k < pictures; ++k) video.add(grey(40 + 4 * k), 100. + period_s * k);
   video.close();
@@ -81,7 +74,7 @@ ReadVideo read(const fs::path& file) {
 TEST_F(VideoFileTest, HasEveryPictureAtTheRateOfTheRun) {
   for (const char* name : {"a.mp4", "a.avi"}) {
     for (const auto& [period_s, rate_hz] : {std::pair{0.1, 10.}, {1. / 29.97, 30.}, {0.4, 2.5}}) {
-      write(at(name), 30, period_s);
+      write_video(at(name), 30, period_s);
       const ReadVideo video = read(at(name));
       EXPECT_EQ(video.size, cv::Size(kWidth, kHeight)) << name;
       EXPECT_NEAR(video.rate_hz, rate_hz, 0.01) << name;
@@ -99,7 +92,7 @@ TEST_F(VideoFileTest, HasEveryPictureAtTheRateOfTheRun) {
 
 TEST_F(VideoFileTest, MayBeShorterThanTheRateNeeds) {
   for (const int pictures : {1, 2, 10, 11, 12}) {
-    write(at("short.mp4"), pictures, 0.05);
+    write_video(at("short.mp4"), pictures, 0.05);
     const ReadVideo video = read(at("short.mp4"));
     EXPECT_EQ(video.means.size(), static_cast<std::size_t>(pictures));
     EXPECT_NEAR(video.rate_hz, pictures == 1 ? 10. : 20., 0.01);
@@ -107,7 +100,7 @@ TEST_F(VideoFileTest, MayBeShorterThanTheRateNeeds) {
 }
 
 TEST_F(VideoFileTest, TakesTimesThatStandStill) {
-  write(at("still.mp4"), 15, 0.);
+  write_video(at("still.mp4"), 15, 0.);
   EXPECT_EQ(read(at("still.mp4")).means.size(), 15U);
 }
 
@@ -119,7 +112,7 @@ TEST_F(VideoFileTest, IsNotThereWithoutPictures) {
 }
 
 TEST_F(VideoFileTest, LeavesAnOlderOneAloneUntilItIsWhole) {
-  write(at("run.mp4"), 5, 0.1);
+  write_video(at("run.mp4"), 5, 0.1);
   {
     VideoFile video(at("run.mp4"));
     for (int k = 0; k < 20; ++k) video.add(grey(k), 0.1 * k);
@@ -127,19 +120,19 @@ TEST_F(VideoFileTest, LeavesAnOlderOneAloneUntilItIsWhole) {
   }
   EXPECT_EQ(read(at("run.mp4")).means.size(), 5U);
   EXPECT_EQ(files(), 1U);
-  write(at("run.mp4"), 7, 0.1);
+  write_video(at("run.mp4"), 7, 0.1);
   EXPECT_EQ(read(at("run.mp4")).means.size(), 7U);
 }
 
 TEST_F(VideoFileTest, MakesItsFolder) {
-  write(at("new/folder/a.avi"), 3, 0.1);
+  write_video(at("new/folder/a.avi"), 3, 0.1);
   EXPECT_EQ(read(at("new/folder/a.avi")).means.size(), 3U);
 }
 
 TEST_F(VideoFileTest, MayBeInTheFolderOfTheProcess) {
   const fs::path before = fs::current_path();
   fs::current_path(folder_);
-  write("here.mp4", 3, 0.1);
+  write_video("here.mp4", 3, 0.1);
   fs::current_path(before);
   EXPECT_EQ(read(at("here.mp4")).means.size(), 3U);
 }

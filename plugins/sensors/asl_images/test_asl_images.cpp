@@ -6,13 +6,9 @@
 namespace viwo {
 namespace {
 
-class AslImages : public ::testing::Test {
+class AslImages : public testing::InFolder {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              ("viwo_asl_images_" +
-               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    std::filesystem::remove_all(folder_);
     log::AslWriter writer(folder_);
     for (int i = 0; i < 20; ++i) {
       for (const int camera : {0, 1}) {
@@ -23,14 +19,11 @@ class AslImages : public ::testing::Test {
     }
     writer.close();
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   static std::uint8_t grey(int i, int camera) { return static_cast<std::uint8_t>(10 * i + camera); }
   std::string config(const std::string& rest) const {
     return "{type: asl_images, path: " + folder_.string() + rest + "}";
   }
-
-  std::filesystem::path folder_;
 };
 
 TEST_F(AslImages, GivesTheImagesOfItsCamerasInTimeOrder) {

@@ -16,17 +16,12 @@ namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class KaistUrban : public ::testing::Test {
+class KaistUrban : public testing::InFolder {
  protected:
   void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              (std::string("viwo_kaist_") +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
     sequence_.duration_s = 1.;
     sequence_.write(folder_);
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   std::string yaml(const std::string& rest = "") const {
     return "{type: kaist_urban, path: " + folder_.string() + rest + "}";
@@ -38,10 +33,6 @@ class KaistUrban : public ::testing::Test {
       if (other != kind) text += std::string(", ") + other + ": false";
     }
     return yaml(text + rest);
-  }
-
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
   }
 
   std::vector<std::string> rejections(const std::string& section) const {
@@ -65,7 +56,6 @@ class KaistUrban : public ::testing::Test {
   }
 
   kaist::TestSequence sequence_;
-  fs::path folder_;
 };
 
 TEST_F(KaistUrban, TurnsCountsIntoTheMeanRatesBetweenTheRows) {

@@ -22,17 +22,8 @@ using ::testing::HasSubstr;
 inline constexpr std::int64_t kStart = 1'700'000'000'123'456'789;  // a double would round it
 inline constexpr std::int64_t kMs = 1'000'000;
 
-class Ros1Bag : public ::testing::Test {
+class Ros1Bag : public testing::InFolder {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              (std::string("viwo_ros1_") +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   std::string file(const std::string& name = "a.bag") const { return (folder_ / name).string(); }
 
   std::string section(const std::string& rest, const std::string& name = "a.bag") const {
@@ -96,8 +87,6 @@ class Ros1Bag : public ::testing::Test {
       "imu_topic: /imu0, image_topics: [/cam0/image_raw, /cam1/image_raw], joint_topic: "
       "/joint_states, drive_joints: [drive_1, drive_2], steer_joints: [steer_1], pose_topic: "
       "/truth";
-
-  fs::path folder_;
 };
 
 }  // namespace viwo

@@ -105,17 +105,8 @@ class Writer {
   std::unique_ptr<sqlite3, Close> database_;
 };
 
-class Ros2Bag : public ::testing::Test {
+class Ros2Bag : public testing::InFolder {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              (std::string("viwo_ros2_") +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   std::string file(const std::string& name = "bag_0.db3") const {
     return (folder_ / name).string();
   }
@@ -168,8 +159,6 @@ class Ros2Bag : public ::testing::Test {
   static constexpr const char* kAll =
       "imu_topic: /imu0, joint_topic: /joints, drive_joints: [drive], steer_joints: [steer], "
       "image_topics: [/cam0, /png], pose_topic: /pose";
-
-  fs::path folder_;
 };
 
 }  // namespace viwo

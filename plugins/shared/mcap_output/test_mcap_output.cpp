@@ -1,6 +1,5 @@
 // What `viwo run --mcap` writes, read back by the reader of bags.
 #include <csignal>
-#include <cstdlib>
 #include <limits>
 #include <map>
 
@@ -8,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include "in_folder.hpp"
 #include "mcap_output.hpp"
 #include "message_of.hpp"
 #include "ros2_file.hpp"
@@ -17,16 +17,8 @@ namespace {
 
 constexpr std::int64_t kStart = 1'700'000'000'000'000'000, kStep = 100'000'000;
 
-class McapOutputTest : public ::testing::Test {
+class McapOutputTest : public testing::InFolder {
  protected:
-  void SetUp() override {
-    std::string pattern = (std::filesystem::temp_directory_path() / "viwo_mcap_XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-    file_ = folder_ / "run.mcap";
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   static void write(McapOutput& out, int epochs) {
     EstimateSample estimate;
     estimate.calibration_names = {"r_1", "cam0.fx"};
@@ -58,7 +50,7 @@ class McapOutputTest : public ::testing::Test {
     return counts;
   }
 
-  std::filesystem::path folder_, file_;
+  const std::filesystem::path file_ = folder_ / "run.mcap";
 };
 
 TEST_F(McapOutputTest, HasEachEpochThePathEachFiveSecondsAndTheLastState) {
