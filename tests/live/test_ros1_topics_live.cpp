@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "message_of.hpp"
+#include "rejections.hpp"
 #include "ros_system.hpp"
 #include "sensor_under_test.hpp"
 #include "viwo/api/status.hpp"
@@ -88,9 +89,7 @@ TEST_F(Ros1Topics, GivesAllThatIsPublishedInOrderAndEndsWhenNothingComes) {
     const auto level = static_cast<std::uint8_t>(k / 2 + (k % 2 == 0 ? 100 : 0));
     EXPECT_EQ(image.pixels, std::vector<std::uint8_t>(32, level));
   }
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  for (const RejectionCount& r : rejections) ADD_FAILURE() << r.reason << " " << r.count;
+  EXPECT_THAT(testing::rejections_of(*sensor), ::testing::IsEmpty());
 }
 
 TEST_F(Ros1Topics, EndsSoonAfterStop) {

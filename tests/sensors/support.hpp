@@ -13,10 +13,13 @@
 
 #include "in_folder.hpp"
 #include "message_of.hpp"
+#include "rejections.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/plugin_host/registry.hpp"
 
 namespace viwo {
+
+using testing::rejections_of;
 
 class SensorsInFolder : public testing::InFolder {
  protected:
@@ -42,17 +45,6 @@ inline std::shared_ptr<Sensor> make_sensor(const std::string& yaml, std::uint64_
 
 inline std::string error_of(const std::string& yaml) {
   return testing::error_of([&] { make_sensor(yaml); });
-}
-
-/// "reason | count | first", one each.
-inline std::vector<std::string> rejections_of(const Sensor& sensor) {
-  std::vector<RejectionCount> counts;
-  sensor.rejections(counts);
-  std::vector<std::string> out;
-  for (const RejectionCount& r : counts) {
-    out.push_back(r.reason + " | " + std::to_string(r.count) + " | " + r.first);
-  }
-  return out;
 }
 
 /// The names of the kinds of samples that a sensor says it yields.

@@ -1,4 +1,6 @@
 // The sensors that play logs back: parameters, data, errors at construction.
+#include <gmock/gmock.h>
+
 #include "support.hpp"
 
 namespace viwo {
@@ -20,11 +22,8 @@ TEST_F(LogSensors, AslEncodersYieldRatesAndReportWhatWasDropped) {
   ASSERT_EQ(samples.size(), 3U);
   EXPECT_EQ(samples[2].drive_rad_per_s[0], 4.);
   EXPECT_EQ(samples[1].begin_ns, 5);
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  ASSERT_EQ(rejections.size(), 1U);
-  EXPECT_EQ(rejections[0].reason, "stamp not after the previous one");
-  EXPECT_EQ(rejections[0].first, "data.csv:4");
+  EXPECT_THAT(rejections_of(*sensor),
+              ::testing::ElementsAre("stamp not after the previous one | 1 | data.csv:4"));
 }
 
 TEST_F(LogSensors, AslEncodersTakeAnglesWithAStride) {
@@ -79,12 +78,9 @@ TEST_F(LogSensors, AslEncodersCountWhatLeavesTurnsOpenOnce) {
   const auto cells = only<EncoderSample>(play(*sensor));
   ASSERT_EQ(cells.size(), 17U);
   for (const EncoderSample& cell : cells) EXPECT_NEAR(cell.drive_rad_per_s[0], 1000., 1e-9);
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  ASSERT_EQ(rejections.size(), 1U);
-  EXPECT_EQ(rejections[0].reason,
-            "reading that leaves open how many turns a joint has gone (drive_turn, steer_turn)");
-  EXPECT_EQ(rejections[0].first, "data.csv:11");
+  EXPECT_THAT(rejections_of(*sensor),
+              ::testing::ElementsAre("reading that leaves open how many turns a joint has gone "
+                                     "(drive_turn, steer_turn) | 1 | data.csv:11"));
   const std::string error = error_of(section + ", max_rejected_fraction: 0.04}");
   EXPECT_NE(error.find("  1 of 20 data rejected"), std::string::npos) << error;
 }

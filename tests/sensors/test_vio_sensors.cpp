@@ -95,10 +95,8 @@ TEST_F(VioSensors, LogTablesFailAtConstructionAndReportWhatTheyDropped) {
                        "image already has (1, first at f.csv:3)"));
   const auto sensor =
       make_sensor("{type: asl_features, max_rejected_fraction: 0.5, path: " + path + "}");
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  ASSERT_EQ(rejections.size(), 1U);
-  EXPECT_EQ(rejections[0].first, "f.csv:3");
+  EXPECT_THAT(rejections_of(*sensor),
+              ElementsAre("point whose id the image already has | 1 | f.csv:3"));
 }
 
 TEST_F(VioSensors, VioCsvMergesInTimeOrderWithExactStamps) {
@@ -206,9 +204,7 @@ TEST_P(OpenVinsSim, HasTheExpectedCountsAndFirstValues) {
   std::size_t points = 0;
   for (const FeatureSample& image : images) points += image.points.size();
   EXPECT_EQ(points, stereo() ? 599497U : 299747U);
-  std::vector<RejectionCount> rejections;
-  sensor_->rejections(rejections);
-  EXPECT_TRUE(rejections.empty());
+  EXPECT_THAT(rejections_of(*sensor_), ElementsAre());
   EXPECT_EQ(imu[0].t_ns, 1'521'753'106'736'427'500);
   EXPECT_EQ(imu[1].t_ns, 1'521'753'106'741'427'700);
   EXPECT_EQ(imu[0].gyro_rad_per_s[0], -0.15840140594325761);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "log_files.hpp"
+#include "rejections.hpp"
 #include "viwo/asl/asl.hpp"
 
 namespace viwo::log {
@@ -25,14 +26,6 @@ namespace {
 using ::testing::ElementsAre;
 
 class AslTest : public InFolder {};
-
-std::vector<std::string> texts_of(const std::vector<RejectionCount>& rejections) {
-  std::vector<std::string> out;
-  for (const RejectionCount& r : rejections) {
-    out.push_back(r.reason + " | " + std::to_string(r.count) + " | " + r.first);
-  }
-  return out;
-}
 
 TEST_F(AslTest, ReadsEncoderRatesFromAFileOrItsFolder) {
   const auto file = write("wheels0/data.csv",
@@ -91,7 +84,7 @@ TEST_F(AslTest, CountsWhatItDropsWithReasonAndFirstPlace) {
   options.limits.max_rejected_fraction = 0.12;  // 4 of 35
   const EncoderRecording read = read_asl_encoders(file, options);
   EXPECT_EQ(read.samples.size(), 31U);
-  EXPECT_THAT(texts_of(read.rejections),
+  EXPECT_THAT(testing::rejections_of(read.rejections),
               ElementsAre("stamp not after the previous one | 2 | w.csv:32",
                           "value that is not finite | 2 | w.csv:34",
                           "gap longer than 0.2 s | 1 | w.csv:36"));
@@ -148,7 +141,7 @@ TEST_F(AslTest, ReadsEurocGroundTruthAndRejectsWrongQuaternions) {
   ASSERT_EQ(read.samples.size(), 2U);
   EXPECT_EQ(read.samples[0].p_BinW_m, (std::array{1., 2., 3.}));
   EXPECT_EQ(read.samples[0].q_BtoW_xyzw, (std::array{0., 0., 0.6, 0.8}));
-  EXPECT_THAT(texts_of(read.rejections),
+  EXPECT_THAT(testing::rejections_of(read.rejections),
               ElementsAre("quaternion that is not of unit norm | 1 | gt.csv:3"));
 }
 

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "log_files.hpp"
+#include "rejections.hpp"
 #include "viwo/asl/asl.hpp"
 #include "viwo/asl/asl_images.hpp"
 #include "viwo/image/image_file.hpp"
@@ -99,14 +100,11 @@ TEST_F(AslImagesTest, MissingImagesStampsThatGoBackAndGapsAreCountedWithTheirPla
   const std::vector<fs::path> folders{camera("cam0", stamps, {7, 9}), camera("cam1", {1, 2})};
   const ImageRecording read = read_asl_images(folders, {});
   EXPECT_EQ(read.samples.size(), 27U + 2U);
-  std::vector<std::string> texts;
-  for (const RejectionCount& r : read.rejections) {
-    texts.push_back(r.reason + " | " + std::to_string(r.count) + " | " + r.first);
-  }
   EXPECT_THAT(
-      texts, ::testing::ElementsAre("image file that is missing | 2 | cam0/data.csv:9 (image7.png)",
-                                    "stamp not after the previous one | 1 | cam0/data.csv:14",
-                                    "gap longer than 0.2 s | 1 | cam0/data.csv:31"));
+      testing::rejections_of(read.rejections),
+      ::testing::ElementsAre("image file that is missing | 2 | cam0/data.csv:9 (image7.png)",
+                             "stamp not after the previous one | 1 | cam0/data.csv:14",
+                             "gap longer than 0.2 s | 1 | cam0/data.csv:31"));
 }
 
 TEST_F(AslImagesTest, AnImageThatBreaksLaterIsAnErrorOfItsReading) {

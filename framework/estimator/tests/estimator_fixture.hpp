@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -13,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "filter_fixture.hpp"
+#include "rejections.hpp"
 #include "viwo/estimator/estimator.hpp"
 
 namespace viwo::testing {
@@ -164,12 +164,9 @@ inline CellSample cell_at(std::int64_t end_ns) {
   return {end_ns - 5 * kMs, end_ns - 10 * kMs, end_ns, 1.};
 }
 
-using Counts = std::map<std::string, std::int64_t>;
-
 /// What an estimator has rejected, without what its fake update says of itself.
-inline Counts counts_of(const Estimator& estimator) {
-  Counts counts;
-  for (const RejectionCount& r : estimator.rejections()) counts[r.reason] += r.count;
+inline Counts rejected_by(const Estimator& estimator) {
+  Counts counts = counts_of(estimator);
   counts.erase("fake: a reason of its own");
   return counts;
 }
@@ -220,7 +217,7 @@ struct Bench {
     while (estimator.step()) ++n;
     return n;
   }
-  Counts rejected() const { return counts_of(estimator); }
+  Counts rejected() const { return rejected_by(estimator); }
 
  private:
   int find(const SampleType& type) const {

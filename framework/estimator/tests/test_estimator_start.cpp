@@ -274,7 +274,7 @@ TEST(EstimatorStart, CanLookAtAStreamThatNoUpdateTakes) {
   // THEN it is shown them, and nobody is in their way later.
   EXPECT_EQ(shown, 11u);
   EXPECT_EQ(update->seen.size(), 19u);
-  EXPECT_EQ(testing::counts_of(estimator), Counts{});
+  EXPECT_EQ(testing::rejected_by(estimator), Counts{});
 }
 
 }  // namespace

@@ -26,11 +26,7 @@ struct ImuBench {
   explicit ImuBench(const std::vector<std::int64_t>& t_ms) {
     for (const std::int64_t t : t_ms) buffer.add(imu_at(kStart + t * kMs), rejections);
   }
-  Counts rejected() const {
-    Counts counts;
-    for (const RejectionCount& r : rejections.counts()) counts[r.reason] = r.count;
-    return counts;
-  }
+  Counts rejected() const { return testing::counts_of(rejections); }
   /// Times of a cut, ms; its readings are those of the straight lines.
   std::vector<std::int64_t> cut(std::int64_t begin_ms, std::int64_t end_ms) {
     std::vector<std::int64_t> t_ms;

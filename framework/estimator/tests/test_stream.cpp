@@ -61,11 +61,7 @@ struct StreamBench {
   std::vector<std::int64_t> taken(Given given = Given::kOnce) const {
     return stamps<T>(stream.taken(given));
   }
-  Counts rejected() const {
-    Counts counts;
-    for (const RejectionCount& r : rejections.counts()) counts[r.reason] = r.count;
-    return counts;
-  }
+  Counts rejected() const { return testing::counts_of(rejections); }
 };
 
 using Stamps = std::vector<std::int64_t>;

@@ -1,4 +1,6 @@
 // Sensor asl_images as the host loads it; the reader has its own tests.
+#include <gmock/gmock.h>
+
 #include "support.hpp"
 #include "viwo/asl/asl.hpp"
 #include "viwo/image/image_file.hpp"
@@ -46,12 +48,9 @@ TEST_F(AslImages, ReportsFilesThatAreMissing) {
   std::filesystem::remove(folder_ / "cam1" / "data" / "500000000.png");
   const auto sensor = make_sensor(config(", cameras: [cam0, cam1]"));
   EXPECT_EQ(play(*sensor).size(), 39U);
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  ASSERT_EQ(rejections.size(), 1U);
-  EXPECT_EQ(rejections[0].reason, "image file that is missing");
-  EXPECT_EQ(rejections[0].count, 1);
-  EXPECT_EQ(rejections[0].first, "cam1/data.csv:7 (500000000.png)");
+  EXPECT_THAT(
+      rejections_of(*sensor),
+      ::testing::ElementsAre("image file that is missing | 1 | cam1/data.csv:7 (500000000.png)"));
 }
 
 TEST_F(AslImages, SaysWhatItDoesNotFind) {

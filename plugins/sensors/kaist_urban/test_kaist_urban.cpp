@@ -35,16 +35,6 @@ class KaistUrban : public testing::InFolder {
     return yaml(text + rest);
   }
 
-  std::vector<std::string> rejections(const std::string& section) const {
-    std::vector<RejectionCount> counts;
-    make_sensor(section)->rejections(counts);
-    std::vector<std::string> out;
-    for (const RejectionCount& count : counts) {
-      out.push_back(count.reason + " x" + std::to_string(count.count) + " " + count.first);
-    }
-    return out;
-  }
-
   /// The message, with TMP for the sequence's folder.
   std::string refusal(const std::string& section) const {
     std::string text = error_of(section);
@@ -173,7 +163,7 @@ TEST_F(KaistUrban, PlaysEverythingInTheOrderOfTime) {
   // Left before right at the same stamp; nothing was dropped.
   EXPECT_EQ(only<ImageSample>(all)[0].camera, 0);
   EXPECT_EQ(only<ImageSample>(all)[1].camera, 1);
-  EXPECT_THAT(rejections(yaml()), ElementsAre());
+  EXPECT_THAT(rejections_of(*make_sensor(yaml())), ElementsAre());
 }
 
 TEST_F(KaistUrban, CutsAWholePartOut) {
@@ -197,8 +187,8 @@ TEST_F(KaistUrban, CutsAWholePartOut) {
 TEST_F(KaistUrban, CountsWhatItDrops) {
   const std::string image = std::to_string(sequence_.image_stamp_ns(3)) + ".png";
   fs::remove(folder_ / "image/stereo_right" / image);
-  EXPECT_THAT(rejections(only_yaml("images")),
-              ElementsAre("image that is missing in stereo_right x1 stereo_stamp.csv:4"));
+  EXPECT_THAT(rejections_of(*make_sensor(only_yaml("images"))),
+              ElementsAre("image that is missing in stereo_right | 1 | stereo_stamp.csv:4"));
   const auto images = play_only<ImageSample>(only_yaml("images"));
   EXPECT_EQ(images.size(), 19U);
 
@@ -209,11 +199,11 @@ TEST_F(KaistUrban, CountsWhatItDrops) {
     poses += row;
   }
   write("global_pose.csv", poses);
-  EXPECT_THAT(rejections(only_yaml("reference", ", max_rejected_fraction: 0.8")),
-              ElementsAre("pose whose matrix is no rotation x3 global_pose.csv:2",
-                          "value that is not finite x1 global_pose.csv:5",
-                          "stamp not after the previous one x1 global_pose.csv:6",
-                          "gap longer than 0.2 s x1 global_pose.csv:7"));
+  EXPECT_THAT(rejections_of(*make_sensor(only_yaml("reference", ", max_rejected_fraction: 0.8"))),
+              ElementsAre("pose whose matrix is no rotation | 3 | global_pose.csv:2",
+                          "value that is not finite | 1 | global_pose.csv:5",
+                          "stamp not after the previous one | 1 | global_pose.csv:6",
+                          "gap longer than 0.2 s | 1 | global_pose.csv:7"));
   EXPECT_THAT(refusal(only_yaml("reference")),
               HasSubstr("TMP/global_pose.csv  5 of 7 data rejected, allowed is a fraction of 0.1: "
                         "pose whose matrix is no rotation (3, first at global_pose.csv:2); value "
@@ -233,8 +223,8 @@ TEST_F(KaistUrban, DropsPosesWithoutANumberAnywhereInTheMatrix) {
   }
   write("global_pose.csv", poses);
   const std::string yaml = only_yaml("reference", ", max_rejected_fraction: 0.95");
-  EXPECT_THAT(rejections(yaml),
-              ElementsAre("pose whose matrix is no rotation x9 global_pose.csv:2"));
+  EXPECT_THAT(rejections_of(*make_sensor(yaml)),
+              ElementsAre("pose whose matrix is no rotation | 9 | global_pose.csv:2"));
   EXPECT_EQ(play_only<PoseSample>(yaml).size(), 1U);
 }
 

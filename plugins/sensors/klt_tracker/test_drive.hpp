@@ -21,6 +21,7 @@
 #include <unistd.h>
 
 #include "message_of.hpp"
+#include "rejections.hpp"
 #include "support.hpp"
 #include "test_scene.hpp"
 #include "viwo/image/image_file.hpp"
@@ -152,9 +153,7 @@ inline Played track(std::vector<Measurement> measurements, const std::string& ya
   sensor->connect(input);
   Played played;
   played.samples = only<FeatureSample>(play(*sensor, is_set_back));
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  for (const RejectionCount& rejection : rejections) {
+  for (const RejectionCount& rejection : testing::all_rejections(*sensor)) {
     played.rejections[rejection.reason] = rejection;
   }
   return played;

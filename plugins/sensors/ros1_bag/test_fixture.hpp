@@ -30,12 +30,6 @@ class Ros1Bag : public testing::InFolder {
     return "{type: ros1_bag, path: " + file(name) + ", " + rest + "}";
   }
 
-  std::vector<RejectionCount> rejections_of(const std::string& yaml) const {
-    std::vector<RejectionCount> out;
-    make_sensor(yaml)->rejections(out);
-    return out;
-  }
-
   /// Changes the bytes at the n-th place where `text` stands in the file.
   void patch(const std::string& text, int n, std::ptrdiff_t offset, const std::string& bytes,
              const std::string& name = "a.bag") const {

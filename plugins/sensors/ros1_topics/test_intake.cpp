@@ -52,7 +52,7 @@ TEST_F(IntakeTest, CountsWhatCannotBeUsedAndSaysItOnce) {
   take(intake, 0, imu_message(6 * kSecond));
   EXPECT_EQ(taken().size(), 3U);
   EXPECT_THAT(
-      rejections(intake),
+      rejections_of(intake),
       ElementsAre(
           "/imu0: stamp not after the previous one | 2 | stamp 5000000000 ns",
           "/imu0: value that is not finite | 1 | stamp 6000000000 ns",
@@ -100,7 +100,7 @@ TEST_F(IntakeTest, IsNotSpoiltByOneStampInTheFuture) {
     take(intake, 0, imu_message(5 * kSecond + 10'000'000));
     take(intake, 0, imu_message(5 * kSecond + 20'000'000));
     EXPECT_THAT(stamps_ms(taken()), ElementsAre(5000, 5010, 5020)) << ahead_s;
-    EXPECT_THAT(rejections(intake),
+    EXPECT_THAT(rejections_of(intake),
                 ElementsAre("/imu0: stamp far ahead of the previous one | 1 | stamp " +
                             std::to_string((5 + ahead_s) * kSecond) + " ns"));
   }
@@ -126,7 +126,7 @@ TEST_F(IntakeTest, GoesOnFromAClockThatWasSetBack) {
   }
   EXPECT_THAT(stamps_ms(taken()),
               ElementsAre(3'600'000, 3'600'000, 5090, 5900, 5100, 6000, 5110, 6100));
-  EXPECT_THAT(rejections(intake),
+  EXPECT_THAT(rejections_of(intake),
               ElementsAre("/imu0: stamp not after the previous one | 9 | stamp 5000000000 ns",
                           "/cam0: stamp not after the previous one | 9 | stamp 5000000000 ns",
                           "/imu0: clock set back | 1 | stamp 5090000000 ns",
@@ -190,8 +190,9 @@ TEST_F(IntakeTest, MakesCellsOfAnglesWhoseRatesAreExactInTheMean) {
   const auto& behind = *all[1].get_if<EncoderSample>();
   EXPECT_EQ(behind.begin_ns, kTime + 400'000'000) << "no cell reaches over the gap";
   EXPECT_NEAR(behind.drive_rad_per_s[0], 10. / 0.1, 1e-9);
-  EXPECT_THAT(rejections(intake), ElementsAre("/joint_states: gap longer than 0.2 s | 1 | stamp " +
-                                              std::to_string(kTime + 400'000'000) + " ns"));
+  EXPECT_THAT(rejections_of(intake),
+              ElementsAre("/joint_states: gap longer than 0.2 s | 1 | stamp " +
+                          std::to_string(kTime + 400'000'000) + " ns"));
 }
 
 TEST_F(IntakeTest, TakesJointsAsTheyAreMounted) {
@@ -216,7 +217,7 @@ TEST_F(IntakeTest, TakesJointsAsTheyAreMounted) {
   const auto& behind = *all[1].get_if<EncoderSample>();
   EXPECT_EQ(behind.begin_ns, kTime + 30'000'000);
   EXPECT_NEAR(behind.drive_rad_per_s[1], -5. / 0.01, 1e-9);
-  EXPECT_THAT(rejections(intake),
+  EXPECT_THAT(rejections_of(intake),
               ElementsAre("/joint_states: reading that leaves open how many turns a joint has gone "
                           "(drive_turn, steer_turn) | 1 | stamp " +
                           std::to_string(kTime + 20'000'000) + " ns"));
@@ -235,7 +236,7 @@ TEST_F(IntakeTest, NamesTheJointThatIsNotThere) {
   message.velocity = {0., 0., 0., std::nan("")};
   take(intake, 0, message);
   EXPECT_THAT(
-      rejections(intake),
+      rejections_of(intake),
       ElementsAre(
           "/joint_states: no joint 'drive_1' - did you mean 'drve_1'? | 1 | stamp 1000000000 ns",
           "/joint_states: no velocity of joint 'drive_1' | 1 | stamp 1000000000 ns",

@@ -14,14 +14,16 @@
 #include "bag.hpp"
 #include "intake.hpp"
 #include "live_queue.hpp"
+#include "rejections.hpp"
 #include "ros1_fields.hpp"
 #include "ros_messages.hpp"
 #include "topic_options.hpp"
 #include "viwo/api/host_services.hpp"
 #include "viwo/api/measurement.hpp"
-#include "viwo/api/rejections.hpp"
 
 namespace viwo::ros1 {
+
+using testing::rejections_of;
 
 inline constexpr std::int64_t kSecond = 1'000'000'000;
 inline constexpr std::int64_t kTime = 1'700'000'000 * kSecond + 123'456'789;
@@ -66,16 +68,6 @@ class IntakeTest : public ::testing::Test {
       all.push_back(out);
     }
     return all;
-  }
-
-  static std::vector<std::string> rejections(const live::Intake& intake) {
-    std::vector<RejectionCount> counts;
-    intake.rejections(counts);
-    std::vector<std::string> texts;
-    for (const RejectionCount& c : counts) {
-      texts.push_back(c.reason + " | " + std::to_string(c.count) + " | " + c.first);
-    }
-    return texts;
   }
 
   std::vector<std::string> warnings_;

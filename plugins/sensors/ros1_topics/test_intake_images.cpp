@@ -48,9 +48,9 @@ TEST_F(IntakeTest, TakesPosesOfEitherMessage) {
     EXPECT_EQ(sample.q_BtoW_xyzw, (std::array{0., 0., 0.6, 0.8}));
   }
   EXPECT_EQ(stamp_ns(all[1]), kTime + 1);
-  EXPECT_THAT(rejections(intake), ElementsAre("/pose: quaternion that is not of unit norm | 1 | "
-                                              "stamp " +
-                                              std::to_string(kTime + 2) + " ns"));
+  EXPECT_THAT(rejections_of(intake), ElementsAre("/pose: quaternion that is not of unit norm | 1 | "
+                                                 "stamp " +
+                                                 std::to_string(kTime + 2) + " ns"));
 }
 
 TEST_F(IntakeTest, TakesImagesRawAndCompressedPixelForPixel) {
@@ -125,7 +125,7 @@ TEST_F(IntakeTest, RefusesCompressedImagesOfDepthAndSaysItOnce) {
     take(intake, 0, depth);
   }
   EXPECT_TRUE(taken().empty());
-  EXPECT_THAT(rejections(intake),
+  EXPECT_THAT(rejections_of(intake),
               ElementsAre("/cam0: image of depth (format '16UC1; compressedDepth png'): grey or "
                           "colour ones are needed | 2 | stamp 1000000000 ns"));
   EXPECT_EQ(warnings_.size(), 1U);
@@ -169,9 +169,9 @@ TEST_F(IntakeTest, TakesFixesAndCountsMessagesThatHaveNone) {
   EXPECT_EQ(fix->t_ns, kTime);
   EXPECT_EQ(fix->latitude_deg, 42.5);
   EXPECT_EQ(fix->covariance_ENU_m2[8], 3.24);
-  EXPECT_THAT(rejections(intake), ElementsAre("/fix: message without a fix | 1 | stamp 0 ns",
-                                              "/fix: latitude beyond 90 degrees | 1 | stamp " +
-                                                  std::to_string(kTime + kSecond) + " ns"));
+  EXPECT_THAT(rejections_of(intake), ElementsAre("/fix: message without a fix | 1 | stamp 0 ns",
+                                                 "/fix: latitude beyond 90 degrees | 1 | stamp " +
+                                                     std::to_string(kTime + kSecond) + " ns"));
 }
 
 }  // namespace

@@ -108,11 +108,8 @@ TEST_F(HostileDatabase, StampsOfNoClockAreCountedAndOverflowNothing) {
   }
   const auto sensor = make_sensor(section("imu_topic: /imu0, clock: reception"));
   EXPECT_EQ(only<ImuSample>(play(*sensor)).size(), 400U);
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  ASSERT_EQ(rejections.size(), 1U);
-  EXPECT_EQ(rejections[0].reason, "/imu0: stamp of another century");
-  EXPECT_EQ(rejections[0].count, 3);
+  EXPECT_THAT(rejections_of(*sensor),
+              ElementsAre(::testing::StartsWith("/imu0: stamp of another century | 3 | ")));
   EXPECT_THAT(error("imu_topic: /imu0, start_s: 1e9, duration_s: 1e9"),
               HasSubstr("has no messages in the time that is read"));
 }

@@ -11,6 +11,7 @@
 namespace viwo {
 namespace {
 
+using testing::all_rejections;
 using testing::text_of;
 
 constexpr const char* kTopics =
@@ -73,11 +74,6 @@ class Mcap : public Ros2Bag {
       at += 9 + length;
     }
   }
-  static std::vector<RejectionCount> rejections_of(const Sensor& sensor) {
-    std::vector<RejectionCount> out;
-    sensor.rejections(out);
-    return out;
-  }
 };
 
 TEST_F(Mcap, GivesToTheBitWhatSqliteGives) {
@@ -89,7 +85,7 @@ TEST_F(Mcap, GivesToTheBitWhatSqliteGives) {
     SCOPED_TRACE(name);
     const auto sensor = make_sensor(section_of(data(name)));
     const auto samples = play(*sensor);
-    EXPECT_TRUE(rejections_of(*sensor).empty());
+    EXPECT_TRUE(all_rejections(*sensor).empty());
     if (std::string(name) != "split/split_0.mcap") {
       expect_same(expected, samples);
     } else {
@@ -131,7 +127,7 @@ TEST_F(Mcap, GivesWhatIsBeforeACutAndSaysWhere) {
         EXPECT_EQ(imu[i].t_ns, expected[i].t_ns);
         EXPECT_EQ(imu[i].accel_m_per_s2, expected[i].accel_m_per_s2);
       }
-      const auto rejections = rejections_of(*sensor);
+      const auto rejections = all_rejections(*sensor);
       ASSERT_EQ(rejections.size(), 1U);
       EXPECT_THAT(rejections[0].reason, HasSubstr("file without its end"));
       EXPECT_THAT(rejections[0].first, ::testing::MatchesRegex("a.mcap: byte .*, .* bytes left"));
@@ -161,7 +157,7 @@ TEST_F(Mcap, AFileThatEndsWithZerosIsOneThatWasCut) {
       store(content.substr(0, content.size() / 2) + std::string(5000, '\0')), "imu_topic: /imu0"));
   EXPECT_GT(play(*sensor).size(), 4U);
   // The chunk that has zeros at its end, and the end.
-  const auto rejections = rejections_of(*sensor);
+  const auto rejections = all_rejections(*sensor);
   ASSERT_EQ(rejections.size(), 2U);
   EXPECT_EQ(rejections[0].reason, "message of a chunk that has another check sum than it says");
   EXPECT_THAT(rejections[1].reason, HasSubstr("file without its end"));
@@ -176,7 +172,7 @@ TEST_F(Mcap, CountsTheMessagesOfAChunkThatIsDamaged) {
     const auto sensor = make_sensor(section_of(store(content), "imu_topic: /imu0"));
     EXPECT_LT(play(*sensor).size(), 20U);
     EXPECT_GT(play(*make_sensor(section_of(store(content), "imu_topic: /imu0"))).size(), 10U);
-    const auto rejections = rejections_of(*sensor);
+    const auto rejections = all_rejections(*sensor);
     ASSERT_EQ(rejections.size(), 1U);
     EXPECT_THAT(rejections[0].reason, HasSubstr("message of a chunk that "));
     EXPECT_GE(rejections[0].count, 1);
@@ -195,7 +191,7 @@ TEST_F(Mcap, CountsTheMessagesOfAChunkThatCannotBeDecompressed) {
   std::fill_n(&content[at + 53], 16, '\xff');  // where the compressed bytes begin
   const auto sensor = make_sensor(section_of(store(content), "imu_topic: /imu0"));
   const auto n = static_cast<std::int64_t>(play(*sensor).size());
-  const auto rejections = rejections_of(*sensor);
+  const auto rejections = all_rejections(*sensor);
   ASSERT_EQ(rejections.size(), 1U);
   EXPECT_EQ(rejections[0].reason, "message of a chunk that cannot be decompressed");
   EXPECT_EQ(rejections[0].count, 400 - n);
@@ -207,7 +203,7 @@ TEST_F(Mcap, CountsTheMessagesOfAChunkThatCannotBeDecompressed) {
     if (content[i] == '\x07') content[i] = '\x7f';  // a kind of record that nobody knows
     i += 9 + length;
   }
-  const auto by_time = rejections_of(*make_sensor(section_of(store(content), "imu_topic: /imu0")));
+  const auto by_time = all_rejections(*make_sensor(section_of(store(content), "imu_topic: /imu0")));
   ASSERT_EQ(by_time.size(), 1U);
   EXPECT_NEAR(static_cast<double>(by_time[0].count), static_cast<double>(400 - n), 2.);
   EXPECT_THAT(by_time[0].first, HasSubstr(" s: their number is that of others in this time"));
@@ -245,7 +241,7 @@ TEST_F(Mcap, ReadsWithoutASummaryThatIsDamaged) {
   content[content.size() - 60] = static_cast<char>(content[content.size() - 60] ^ 1);
   const auto sensor = make_sensor(section_of(store(content), "imu_topic: /imu0"));
   EXPECT_EQ(play(*sensor).size(), 20U);
-  const auto rejections = rejections_of(*sensor);
+  const auto rejections = all_rejections(*sensor);
   ASSERT_EQ(rejections.size(), 1U);
   EXPECT_THAT(rejections[0].reason, HasSubstr("summary that is damaged"));
 }
@@ -261,7 +257,7 @@ TEST_F(Mcap, OrdersMessagesByReceptionWhicheverChunkTheyAreIn) {
   const auto imu = only<ImuSample>(play(*sensor));
   ASSERT_EQ(imu.size(), 6U);
   for (int k = 0; k < 6; ++k) EXPECT_EQ(imu[static_cast<std::size_t>(k)].gyro_rad_per_s[0], k);
-  EXPECT_TRUE(rejections_of(*sensor).empty());
+  EXPECT_TRUE(all_rejections(*sensor).empty());
 }
 
 TEST_F(Mcap, ReadsImagesAgainInAnyOrderFromSeveralThreads) {

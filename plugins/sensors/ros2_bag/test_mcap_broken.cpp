@@ -19,6 +19,7 @@ using bag::mcap::kHeader;
 using bag::mcap::kMagic;
 using bag::mcap::kMessage;
 using bag::mcap::kSchema;
+using ::testing::StartsWith;
 
 class McapBroken : public Ros2Bag {
  protected:
@@ -128,10 +129,9 @@ TEST_F(McapBroken, StopsAChunkThatBecomesLargerThanItSays) {
   const auto before_mb = peak_mb();
   const auto sensor = make_sensor(section("imu_topic: /imu0", "a.mcap"));
   EXPECT_EQ(play(*sensor).size(), 1U);
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  ASSERT_EQ(rejections.size(), 1U);
-  EXPECT_EQ(rejections[0].reason, "message of a chunk that is of another size than it says");
+  EXPECT_THAT(
+      rejections_of(*sensor),
+      ElementsAre(StartsWith("message of a chunk that is of another size than it says | ")));
   EXPECT_LT(peak_mb() - before_mb, 50);
 }
 
@@ -216,10 +216,8 @@ TEST_F(McapBroken, CountsMessagesOfAChannelThatIsDescribedNowhere) {
   write(all({schema(), channel(), message(), message(kStart + 1, 8), message(kStart + 2)}));
   const auto sensor = make_sensor(section("imu_topic: /imu0", "a.mcap"));
   EXPECT_EQ(play(*sensor).size(), 2U);
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  ASSERT_EQ(rejections.size(), 1U);
-  EXPECT_EQ(rejections[0].reason, "message of a channel that is described nowhere");
+  EXPECT_THAT(rejections_of(*sensor),
+              ElementsAre(StartsWith("message of a channel that is described nowhere | ")));
 }
 
 TEST_F(McapBroken, SurvivesAByteThatIsWrongAnywhere) {

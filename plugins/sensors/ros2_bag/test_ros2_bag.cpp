@@ -10,6 +10,10 @@
 namespace viwo {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::EndsWith;
+using ::testing::StartsWith;
+
 TEST_F(Ros2Bag, GivesAllTopicsInTimeOrderToTheBit) {
   write_drive();
   const auto all = play(*make_sensor(section(kAll)));
@@ -188,18 +192,16 @@ TEST_F(Ros2Bag, CountsMessagesThatAreBroken) {
       make_sensor(section("imu_topic: /imu0, joint_topic: /joints, drive_joints: [drive], "
                           "max_rejected_fraction: 0.7"));
   EXPECT_EQ(play(*sensor).size(), 2U);
-  std::vector<RejectionCount> rejections;
-  sensor->rejections(rejections);
-  ASSERT_EQ(rejections.size(), 3U);
-  EXPECT_EQ(rejections[0].reason, "/imu0: broken message: it ends too early");
-  EXPECT_EQ(rejections[0].first, "bag_0.db3: message 1");
-  EXPECT_EQ(rejections[1].reason, "/imu0: broken message: it does not begin like CDR");
-  EXPECT_EQ(rejections[2].reason, "/joints: broken message: a list is longer than its message");
-  rejections.clear();
-  make_sensor(section("imu_topic: /imu0, start_s: 1e-9, max_rejected_fraction: 0.7"))
-      ->rejections(rejections);
-  ASSERT_EQ(rejections.size(), 1U);
-  EXPECT_EQ(rejections[0].first, "bag_0.db3: message 3") << "of the file, wherever reading begins";
+  EXPECT_THAT(
+      rejections_of(*sensor),
+      ElementsAre(AllOf(StartsWith("/imu0: broken message: it ends too early | "),
+                        EndsWith(" | bag_0.db3: message 1")),
+                  StartsWith("/imu0: broken message: it does not begin like CDR | "),
+                  StartsWith("/joints: broken message: a list is longer than its message | ")));
+  EXPECT_THAT(rejections_of(*make_sensor(
+                  section("imu_topic: /imu0, start_s: 1e-9, max_rejected_fraction: 0.7"))),
+              ElementsAre(EndsWith(" | bag_0.db3: message 3")))
+      << "of the file, wherever reading begins";
 }
 
 TEST_F(Ros2Bag, ABrokenImageIsAnErrorWhenItIsRead) {

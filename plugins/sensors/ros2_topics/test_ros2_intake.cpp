@@ -15,6 +15,7 @@
 
 #include "cdr_message.hpp"
 #include "intake.hpp"
+#include "rejections.hpp"
 #include "ros2_fields.hpp"
 #include "ros2_messages.hpp"
 #include "viwo/api/status.hpp"
@@ -114,11 +115,7 @@ class Ros2Intake : public ::testing::Test {
     }
     return all;
   }
-  std::vector<RejectionCount> rejections() const {
-    std::vector<RejectionCount> counts;
-    intake_->rejections(counts);
-    return counts;
-  }
+  std::vector<RejectionCount> rejections() const { return testing::all_rejections(*intake_); }
 
   bag::TopicOptions options_;
   HostServices services_;

@@ -4,14 +4,18 @@
 #include <thread>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "live_queue.hpp"
+#include "rejections.hpp"
 
 namespace viwo::live {
 namespace {
 
 using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using testing::rejections_of;
 using Taken = LiveQueue::Taken;
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -92,9 +96,7 @@ TEST(LiveQueue, GivesWhatCameInItsOrderAndThenTheEnd) {
   ASSERT_EQ(queue.pop(out, 0ms), Taken::kMeasurement);
   EXPECT_EQ(stamp_ns(out), 2);
   EXPECT_EQ(queue.pop(out, 0ms), Taken::kEnded);
-  std::vector<RejectionCount> rejections;
-  queue.rejections(rejections);
-  EXPECT_TRUE(rejections.empty());
+  EXPECT_THAT(rejections_of(queue), ElementsAre());
 }
 
 TEST(LiveQueue, DropsTheOldestImagesWhenItIsFullAndNothingElse) {
@@ -117,12 +119,9 @@ TEST(LiveQueue, DropsTheOldestImagesWhenItIsFullAndNothingElse) {
   }
   EXPECT_EQ(n_imu, 300);
   EXPECT_EQ(images, "0@20 1@21 0@30 1@31 ");
-  std::vector<RejectionCount> rejections;
-  queue.rejections(rejections);
-  ASSERT_EQ(rejections.size(), 1U);
-  EXPECT_EQ(rejections[0].reason, "image dropped: images come faster than they are taken");
-  EXPECT_EQ(rejections[0].count, 2);
-  EXPECT_EQ(rejections[0].first, "stamp 10000000 ns");
+  EXPECT_THAT(
+      rejections_of(queue),
+      ElementsAre("image dropped: images come faster than they are taken | 2 | stamp 10000000 ns"));
 }
 
 TEST(LiveQueue, DropsTheOldestOfAllElseWhenHardlyAnythingIsTaken) {
@@ -133,12 +132,9 @@ TEST(LiveQueue, DropsTheOldestOfAllElseWhenHardlyAnythingIsTaken) {
   Measurement out;
   while (queue.pop(out, 0ms) == Taken::kMeasurement) taken.push_back(stamp_ns(out));
   EXPECT_EQ(taken, (std::vector<std::int64_t>{0, 3, 4, 5}));
-  std::vector<RejectionCount> counts;
-  queue.rejections(counts);
-  ASSERT_EQ(counts.size(), 1U);
-  EXPECT_EQ(counts[0].reason, "measurement dropped: they come faster than they are taken");
-  EXPECT_EQ(counts[0].count, 2);
-  EXPECT_EQ(counts[0].first, "stamp 1 ns");
+  EXPECT_THAT(rejections_of(queue),
+              ElementsAre("measurement dropped: they come faster than they are taken | 2 | stamp "
+                          "1 ns"));
 }
 
 TEST(LiveQueue, HasRoomAgainForImagesThatWereTaken) {
@@ -149,9 +145,7 @@ TEST(LiveQueue, HasRoomAgainForImagesThatWereTaken) {
     ASSERT_EQ(queue.pop(out, 0ms), Taken::kMeasurement);
     EXPECT_EQ(stamp_ns(out), t * kMs);
   }
-  std::vector<RejectionCount> rejections;
-  queue.rejections(rejections);
-  EXPECT_TRUE(rejections.empty());
+  EXPECT_THAT(rejections_of(queue), ElementsAre());
 }
 
 TEST(LiveQueue, WakesWhoWaitsAtTheEnd) {

@@ -1,7 +1,6 @@
 // Fixes: derivatives, interpolation between clones, what is left out, consistency in whole runs.
 #include <cmath>
 #include <filesystem>
-#include <map>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,6 +10,7 @@
 #include "fix.hpp"
 #include "message_of.hpp"
 #include "plane_and_gnss_runs.hpp"
+#include "rejections.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/run/simulate.hpp"
@@ -19,6 +19,8 @@
 
 namespace viwo {
 namespace {
+
+using testing::counts_of;
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -105,14 +107,6 @@ class Drive : public ::testing::Test {
     return {sink.residuals().begin(), sink.residuals().end()};
   }
 
-  static std::map<std::string, std::int64_t> left_out(const Update& update) {
-    std::vector<RejectionCount> all;
-    update.rejections(all);
-    std::map<std::string, std::int64_t> counts;
-    for (const RejectionCount& r : all) counts[r.reason] = r.count;
-    return counts;
-  }
-
   testing::TiltedDrive drive_;
   sim::PlanarMotion motion_;
   testing::SmallFilter truth_;
@@ -132,7 +126,7 @@ TEST_F(Drive, IsWhereTheFixSaysAtAnyTimeBetweenItsClones) {
     const auto first = made[0].columns.blocks()[0].first;
     EXPECT_EQ((first - kImuSize) / kPoseSize, t <= 1.2 ? 0 : t <= 1.4 ? 1 : 2) << t;
   }
-  EXPECT_TRUE(left_out(*update).empty());
+  EXPECT_TRUE(counts_of(*update).empty());
 }
 
 TEST_F(Drive, HasTheDerivativesOfItsResidualAtTheTruthAndOtherwiseAtFirstEstimates) {
@@ -180,15 +174,13 @@ TEST_F(Drive, CountsWhatItLeavesOut) {
   testing::SmallFilter one = truth_;
   one.clones.erase(one.clones.begin(), one.clones.end() - 1);
   EXPECT_EQ(factors(*update, one, {fix(1.6)}).size(), 0u);
-  EXPECT_EQ(left_out(*update),
-            (std::map<std::string, std::int64_t>{{"fix that is older than the oldest clone", 2},
+  EXPECT_EQ(counts_of(*update), (testing::Counts{{"fix that is older than the oldest clone", 2},
                                                  {"fix whose quaternion has not unit norm", 1},
                                                  {"fix beyond max_per_epoch", 5}}));
   const auto strict = load(", max_span_s: 0.1");
   EXPECT_EQ(factors(*strict, truth_, {fix(1.3)}).size(), 0u);
-  EXPECT_EQ(
-      left_out(*strict),
-      (std::map<std::string, std::int64_t>{{"fix between clones that are too far apart", 1}}));
+  EXPECT_EQ(counts_of(*strict),
+            (testing::Counts{{"fix between clones that are too far apart", 1}}));
 }
 
 TEST_F(Drive, DoesNotAllocate) {
@@ -255,10 +247,8 @@ TEST(EstimatorWithPoses, GivesEachPoseOnceLateOnesWithTheNextEpochAndCountsWhatI
   using Stamps = std::vector<std::vector<std::int64_t>>;
   EXPECT_EQ(first->seen, (Stamps{{100, 200}, {260}, {300, 400}}));
   EXPECT_EQ(second->seen, (Stamps{{90}, {}, {}}));
-  std::map<std::string, std::int64_t> dropped;
-  for (const RejectionCount& r : estimator.rejections()) dropped[r.reason] = r.count;
-  EXPECT_EQ(dropped, (std::map<std::string, std::int64_t>{{"poses: stamp not after the last", 2},
-                                                          {"poses: value that is not finite", 1}}));
+  EXPECT_EQ(counts_of(estimator), (testing::Counts{{"poses: stamp not after the last", 2},
+                                                   {"poses: value that is not finite", 1}}));
 }
 
 std::vector<std::string> with(std::vector<std::string> more) {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "message_of.hpp"
+#include "rejections.hpp"
 #include "test_support.hpp"
 #include "viwo/math/chi2.hpp"
 
@@ -15,6 +16,7 @@ namespace {
 using testing::Random;
 using testing::Scene;
 using testing::SceneOptions;
+using viwo::testing::counts_of;
 
 /// The defaults, changed by `change`.
 template <class Change>
@@ -25,14 +27,6 @@ VisualFeatures update_with(const Change& change) {
 }
 
 FactorSink sink_for(const Scene& scene) { return {1, static_cast<int>(scene.P.cols())}; }
-
-std::map<std::string, std::int64_t> counts(const VisualFeatures& update) {
-  std::vector<RejectionCount> rejections;
-  update.rejections(rejections);
-  std::map<std::string, std::int64_t> result;
-  for (const RejectionCount& r : rejections) result[r.reason] = r.count;
-  return result;
-}
 
 constexpr const char* kShort = "track lost with too few observations (min_observations)";
 constexpr const char* kTooMany = "track beyond max_features";
@@ -146,8 +140,7 @@ std::vector<RejectionCount> tracks_of_moving_points(const Eigen::Vector3d& v, st
   testing::epoch(update, scene, 8, testing::empty_images(scene, 7), sink);
   applied = sink.applied();
   rejected = sink.rejected();
-  std::vector<RejectionCount> counts;
-  update.rejections(counts);
+  std::vector<RejectionCount> counts = viwo::testing::all_rejections(update);
   std::erase_if(counts, [](const RejectionCount& count) {
     return !count.reason.starts_with("track dropped: its point moves");
   });
@@ -190,7 +183,7 @@ TEST(VisualFeatures, UsesLostTracksAndThoseOfALeavingCloneOnce) {
   EXPECT_EQ(sink.applied(), 1);
   testing::epoch(update, scene, 5, testing::empty_images(scene, 4), sink);
   EXPECT_EQ(sink.applied(), 0);
-  EXPECT_TRUE(counts(update).empty());
+  EXPECT_TRUE(counts_of(update).empty());
 }
 
 TEST(VisualFeatures, TriesTheLongestTracksFirstAndDropsLostOnesBeyondTheLimit) {
@@ -212,7 +205,7 @@ TEST(VisualFeatures, TriesTheLongestTracksFirstAndDropsLostOnesBeyondTheLimit) {
   }
   testing::epoch(update, scene, 6, testing::empty_images(scene, 5), sink);
   EXPECT_EQ(sink.applied(), 2);
-  EXPECT_EQ(counts(update).at(kTooMany), 4);
+  EXPECT_EQ(counts_of(update).at(kTooMany), 4);
   // Only the clones that these two saw first have information.
   const int column = scene.clones[0].column;
   Eigen::MatrixXd Lambda = Eigen::MatrixXd::Zero(scene.P.rows(), scene.P.cols());
@@ -237,7 +230,7 @@ TEST(VisualFeatures, WaitsForACameraThatMissesAnImage) {
   EXPECT_EQ(sink.applied(), 0);
   testing::epoch(update, scene, 6, testing::empty_images(scene, 5), sink);
   EXPECT_EQ(sink.applied(), 1);
-  EXPECT_TRUE(counts(update).empty());
+  EXPECT_TRUE(counts_of(update).empty());
 }
 
 TEST(VisualFeatures, ForgetsObservationsOfClonesThatAreGone) {
@@ -254,7 +247,7 @@ TEST(VisualFeatures, ForgetsObservationsOfClonesThatAreGone) {
   for (CloneState& clone : scene.clones) clone.t_ns += 1'000'000'000;
   testing::epoch(update, scene, 3, testing::empty_images(scene, 2), sink);
   EXPECT_EQ(sink.applied(), 0);
-  EXPECT_TRUE(counts(update).empty());
+  EXPECT_TRUE(counts_of(update).empty());
 }
 
 TEST(VisualFeatures, CountsBadDataAndGoesOn) {
@@ -292,7 +285,7 @@ TEST(VisualFeatures, CountsBadDataAndGoesOn) {
       // and 202 have it, the others do not.
       {"no room for another track (max_tracks)", 6},
       {kShort, 2}};
-  EXPECT_EQ(counts(update), expected);
+  EXPECT_EQ(counts_of(update), expected);
 }
 
 TEST(VisualFeatures, SurvivesNothingAtAllAndBrokenEstimates) {

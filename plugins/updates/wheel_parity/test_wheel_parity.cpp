@@ -1,9 +1,11 @@
 // The parity factor: its cost against the sum over samples, where it lands, gate, consistency.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "allocations.hpp"
 #include "calibration_runs.hpp"
 #include "filter_fixture.hpp"
+#include "rejections.hpp"
 #include "viwo/wheel/preintegration.hpp"
 
 namespace viwo {
@@ -144,12 +146,8 @@ TEST_F(ParityInterval, GatesASlippingWheelButNotWrongIntrinsics) {
   EXPECT_EQ(sink.rejected(), 1);
   EXPECT_EQ(sink.information(), nullptr);
   // THEN what the run lists as rejected has it, with the time of the first
-  std::vector<RejectionCount> counts;
-  update->rejections(counts);
-  ASSERT_EQ(counts.size(), 1U);
-  EXPECT_EQ(counts[0].reason, "interval dropped by the chi-square gate");
-  EXPECT_EQ(counts[0].count, 1);
-  EXPECT_EQ(counts[0].first, "t = 1.500 s");
+  EXPECT_THAT(testing::rejections_of(*update),
+              ::testing::ElementsAre("interval dropped by the chi-square gate | 1 | t = 1.500 s"));
 }
 
 TEST_F(ParityInterval, DoesNotAllocateInTheSteadyState) {

@@ -5,6 +5,7 @@
 
 #include "allocations.hpp"
 #include "filter_fixture.hpp"
+#include "rejections.hpp"
 #include "viwo/math/chi2.hpp"
 #include "viwo/testing/jacobian.hpp"
 
@@ -65,9 +66,7 @@ class Sweep : public ::testing::Test {
     FactorSink sink(2, 60);
     plugin->update(truth_.view(), truth_.epoch(encoders), sink);
     EXPECT_EQ(sink.residuals().size(), 0u);
-    std::vector<RejectionCount> counts;
-    plugin->rejections(counts);
-    return counts;
+    return testing::all_rejections(*plugin);
   }
 
   std::shared_ptr<const WheelModel> model_;

@@ -22,6 +22,7 @@
 #include <GeographicLib/LocalCartesian.hpp>
 
 #include "filter_fixture.hpp"
+#include "rejections.hpp"
 #include "viwo/estimator/estimator.hpp"
 #include "viwo/eval/consistency.hpp"
 #include "viwo/math/arrays.hpp"
@@ -72,7 +73,7 @@ struct GnssRun {
   bool aligned = false;
   double sigma_yaw = 0., error_yaw = 0.;
   UpdateCounts counts;
-  std::map<std::string, std::int64_t> left_out;
+  Counts left_out;
   std::string failure;
 };
 
@@ -334,7 +335,7 @@ inline GnssRun run_gnss(const GnssDrive& drive, std::uint64_t seed) {
   }
   run.counts = estimator.counts()[0];
   run.failure = estimator.failure();
-  for (const RejectionCount& r : estimator.rejections()) run.left_out[r.reason] = r.count;
+  run.left_out = counts_of(estimator);
   for (const UpdateFailures& f : estimator.failures()) run.failure += f.cause;
   return run;
 }

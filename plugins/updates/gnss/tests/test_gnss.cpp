@@ -1,7 +1,6 @@
 // The factors of fixes whose yaw is known: where they are zero, their derivatives, what they cannot
 // tell, what is left out.
 #include <cmath>
-#include <map>
 #include <memory>
 #include <random>
 #include <string>
@@ -16,6 +15,7 @@
 #include "allocations.hpp"
 #include "filter_fixture.hpp"
 #include "message_of.hpp"
+#include "rejections.hpp"
 #include "viwo/sim/planar_motion.hpp"
 #include "viwo/testing/jacobian.hpp"
 
@@ -25,6 +25,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
+using testing::counts_of;
 using testing::UpdateHost;
 
 constexpr double kYaw = 2.2;
@@ -99,14 +100,6 @@ class Fixes : public ::testing::Test {
     return all;
   }
 
-  static std::map<std::string, std::int64_t> left_out(const Update& update) {
-    std::vector<RejectionCount> all;
-    update.rejections(all);
-    std::map<std::string, std::int64_t> counts;
-    for (const RejectionCount& r : all) counts[r.reason] = r.count;
-    return counts;
-  }
-
   testing::TiltedDrive drive_;
   sim::PlanarMotion motion_;
   UpdateHost truth_;
@@ -121,7 +114,7 @@ TEST_F(Fixes, AreWhereTheAntennaIsAtAnyTimeBetweenTwoClones) {
     const int first = made[0].columns.blocks()[0].first;
     EXPECT_EQ((first - kImuSize) / kPoseSize, t <= 1.2 ? 0 : t <= 1.4 ? 1 : 2) << t;
   }
-  EXPECT_TRUE(left_out(*update).empty());
+  EXPECT_TRUE(counts_of(*update).empty());
 }
 
 TEST_F(Fixes, HaveTheDerivativesOfCentralDifferencesByAllBlocks) {
@@ -255,19 +248,18 @@ TEST_F(Fixes, AreCountedWhenTheyAreLeftOut) {
   UpdateHost one = truth_;
   one.clones.erase(one.clones.begin(), one.clones.end() - 1);
   EXPECT_EQ(rows_of(*update, one, {fix(1.6)}).size(), 0u);
-  EXPECT_EQ(left_out(*update), (std::map<std::string, std::int64_t>{
-                                   {"fix that is older than the oldest clone", 2},
-                                   {"fix whose covariance is not positive definite", 1},
-                                   {"fix more than 100 km from the origin", 1},
-                                   {"fix with values that cannot be used", 2},
-                                   {"fix beyond 7 in an epoch", 13}}));
+  EXPECT_EQ(counts_of(*update),
+            (testing::Counts{{"fix that is older than the oldest clone", 2},
+                             {"fix whose covariance is not positive definite", 1},
+                             {"fix more than 100 km from the origin", 1},
+                             {"fix with values that cannot be used", 2},
+                             {"fix beyond 7 in an epoch", 13}}));
   const auto strict = testing::load_update(std::string(kKnown) + ", max_span_s: 0.1}");
   UpdateHost other = truth_;
   other.start(*strict);
   EXPECT_EQ(rows_of(*strict, truth_, {fix(1.3)}).size(), 0u);
-  EXPECT_EQ(
-      left_out(*strict),
-      (std::map<std::string, std::int64_t>{{"fix between clones that are too far apart", 1}}));
+  EXPECT_EQ(counts_of(*strict),
+            (testing::Counts{{"fix between clones that are too far apart", 1}}));
 }
 
 TEST_F(Fixes, DoNotAllocate) {
