@@ -4,10 +4,10 @@
 #include <gmock/gmock.h>
 
 #include "asl_sequence.hpp"
+#include "registry.hpp"
 #include "support.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/log/kalibr.hpp"
-#include "viwo/plugin_host/registry.hpp"
 
 namespace viwo {
 namespace {
@@ -21,9 +21,9 @@ using AslDatasets = CommandLineTest;
 
 template <class Sample>
 std::vector<Sample> play(const std::string& yaml) {
-  static PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
   config::Errors errors;
-  const auto sensor = registry.make_sensor(config::parse(yaml, "test"), "sensor", 1, errors);
+  const auto sensor =
+      testing::registry().make_sensor(config::parse(yaml, "test"), "sensor", 1, errors);
   errors.throw_if_any();
   std::vector<Sample> out;
   for (Measurement m; sensor.object->next(m) == Status::kOk;) out.push_back(*m.get_if<Sample>());

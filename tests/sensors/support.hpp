@@ -13,12 +13,13 @@
 
 #include "in_folder.hpp"
 #include "message_of.hpp"
+#include "registry.hpp"
 #include "rejections.hpp"
 #include "viwo/config/yaml.hpp"
-#include "viwo/plugin_host/registry.hpp"
 
 namespace viwo {
 
+using testing::registry;
 using testing::rejections_of;
 
 class SensorsInFolder : public testing::InFolder {
@@ -27,11 +28,6 @@ class SensorsInFolder : public testing::InFolder {
     return InFolder::write(name, text).string();
   }
 };
-
-inline PluginRegistry& registry() {
-  static PluginRegistry the_registry({VIWO_TEST_PLUGIN_DIR});
-  return the_registry;
-}
 
 /// Throws InputError with what the host would print. `exact`: HostServices::exact.
 inline std::shared_ptr<Sensor> make_sensor(const std::string& yaml, std::uint64_t seed = 1,

@@ -9,18 +9,17 @@
 #include <string>
 #include <vector>
 
+#include "registry.hpp"
 #include "viwo/config/yaml.hpp"
-#include "viwo/plugin_host/registry.hpp"
 #include "viwo/wheel/wheel_model.hpp"
 
 namespace viwo::testing {
 
 /// The model of a section such as "{type: four_wis_wid, ...}".
 inline std::shared_ptr<const WheelModel> load_model(const std::string& yaml) {
-  static PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
   config::Errors errors;
   const auto loaded =
-      registry.make_kinematics(config::parse(yaml, "test"), "kinematics", 1, errors);
+      registry().make_kinematics(config::parse(yaml, "test"), "kinematics", 1, errors);
   errors.throw_if_any();
   return std::make_shared<const WheelModel>(loaded.object);
 }

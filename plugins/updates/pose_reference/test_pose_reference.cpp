@@ -10,6 +10,7 @@
 #include "fix.hpp"
 #include "message_of.hpp"
 #include "plane_and_gnss_runs.hpp"
+#include "registry.hpp"
 #include "rejections.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/yaml.hpp"
@@ -314,10 +315,7 @@ class PoseConfiguration : public ::testing::Test {
     return resolve_placeholders(load_run_configuration(
         std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/viwo_gnss.yaml", assignments));
   }
-  static RunSetup read(const config::Node& run) {
-    static PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
-    return read_run(run, registry, 1);
-  }
+  static RunSetup read(const config::Node& run) { return read_run(run, testing::registry(), 1); }
   static std::string error(const std::vector<std::string>& assignments) {
     return testing::error_of([&] { read(run(assignments)); });
   }

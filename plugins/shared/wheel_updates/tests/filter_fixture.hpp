@@ -10,10 +10,10 @@
 
 #include <Eigen/Core>
 
+#include "registry.hpp"
 #include "viwo/api/update.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/math/so3.hpp"
-#include "viwo/plugin_host/registry.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/testing/update_host.hpp"
 #include "wheel_fixture.hpp"
@@ -21,10 +21,9 @@
 namespace viwo::testing {
 
 inline std::shared_ptr<Update> load_update(const std::string& yaml, bool exact = false) {
-  static PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
   config::Errors errors;
   const auto loaded =
-      registry.make_update(config::parse(yaml, "test"), "updates", 0, errors, {}, exact);
+      registry().make_update(config::parse(yaml, "test"), "updates", 0, errors, {}, exact);
   errors.throw_if_any();
   return loaded.object;
 }

@@ -10,6 +10,7 @@
 
 #include "gnss_runs.hpp"
 #include "local_frame.hpp"
+#include "registry.hpp"
 #include "viwo/run/run.hpp"
 #include "viwo/setup/configuration.hpp"
 
@@ -116,8 +117,7 @@ TEST(HuskyRecording, HasTheFixesThatAreLeftOutWhereItClaimsThem) {
 TEST(HuskyRecording, DrivesAsFarAsItsOdometryDid) {
   const auto data = std::filesystem::path(VIWO_TEST_SHARED_DIR) / "data/real";
   if (!std::filesystem::exists(data / "husky_bag")) GTEST_SKIP() << "the recording is not here";
-  PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
-  auto setup = read_husky(registry, data, {"estimator.type=dead_reckoning"});
+  auto setup = read_husky(testing::registry(), data, {"estimator.type=dead_reckoning"});
   const RunResult result = viwo::run(setup, collect(setup), {});
   ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
   EXPECT_NEAR(result.total.path_length_m, 359., 0.5)

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "registry.hpp"
 #include "viwo/eval/consistency.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/run/run.hpp"
@@ -16,14 +17,13 @@ namespace viwo::testing {
 
 inline std::vector<RunResult> plane_and_gnss(const std::string& variant, int seeds,
                                              std::vector<std::string> assignments) {
-  static PluginRegistry registry({VIWO_TEST_PLUGIN_DIR});
   experiment::ExperimentOptions options;
   options.seeds = seeds;
   options.assignments = std::move(assignments);
   auto setup = experiment::read_experiment(
       std::string(VIWO_TEST_SOURCE_DIR) + "/configs/experiments/plane_and_gnss.yaml", options);
   std::erase_if(setup.variants, [&](const auto& v) { return v.name != variant; });
-  auto result = experiment::run_experiment(setup, options, registry, {});
+  auto result = experiment::run_experiment(setup, options, registry(), {});
   std::vector<RunResult> runs;
   for (experiment::ExperimentRun& run : result.runs) runs.push_back(std::move(run.result));
   return runs;
