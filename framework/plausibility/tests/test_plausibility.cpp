@@ -1,13 +1,9 @@
-// Faults of sensors, told from their samples alone: the samples of a simulated swerve robot, half a
-// minute of them, with one thing done to all or some of them.
+// Faults of sensors, told from their samples alone: nothing where there is none, the IMU, cameras,
+// channels that are stuck, and what is said while a run goes on.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <map>
-#include <memory>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -16,10 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "sensors_in_memory.hpp"
-#include "simulated.hpp"
-#include "viwo/plausibility/plausibility.hpp"
-#include "viwo/setup/configuration.hpp"
+#include "faulty_samples.hpp"
 
 namespace viwo {
 namespace {
@@ -27,69 +20,13 @@ namespace {
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
+using testing::Fault;
+using testing::found;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
-
-/// What is done to the samples of each sensor.
-struct Fault {
-  std::function<void(ImuSample&)> imu = [](ImuSample&) {};
-  std::function<void(EncoderSample&)> wheels = [](EncoderSample&) {};
-  std::function<void(FeatureSample&)> images = [](FeatureSample&) {};
-};
-
-RunSetup robot(const std::string& configuration, const std::vector<std::string>& more = {},
-               std::uint64_t seed = 1) {
-  std::vector<std::string> assignments = {"sensors.simulator0.duration_s=30",
-                                          "estimator.calibration_error_scale=0"};
-  assignments.insert(assignments.end(), more.begin(), more.end());
-  const config::Node run = resolve_placeholders(load_run_configuration(
-      testing::configuration("runs/" + configuration + ".yaml"), assignments));
-  return read_run(run, testing::registry(), seed);
-}
-
-/// The texts of what is found in samples with a fault.
-std::vector<std::string> found(RunSetup setup, const Fault& fault) {
-  static std::map<std::string, std::vector<Measurement>> known;
-  std::vector<Measurement>& samples = known[setup.name];
-  if (samples.empty()) samples = testing::in_time_order(collect(setup).recorded);
-  const auto sensor = [](const SampleType& type) {
-    return std::make_shared<testing::InMemory>(SampleTypes{&type}, std::vector<Measurement>{});
-  };
-  testing::set_sensors(setup, {{"imu0", sensor(sample_type<ImuSample>())},
-                               {"wheels0", sensor(sample_type<EncoderSample>())},
-                               {"images0", sensor(sample_type<FeatureSample>())}});
-  Plausibility plausibility(setup);
-  for (const Measurement& sample : samples) {
-    if (const auto* imu = sample.get_if<ImuSample>()) {
-      ImuSample changed = *imu;
-      fault.imu(changed);
-      plausibility.add("imu0", changed);
-    } else if (const auto* wheels = sample.get_if<EncoderSample>()) {
-      EncoderSample changed = *wheels;
-      fault.wheels(changed);
-      plausibility.add("wheels0", changed);
-    } else if (const auto* images = sample.get_if<FeatureSample>()) {
-      FeatureSample changed = *images;
-      fault.images(changed);
-      plausibility.add("images0", changed);
-    }
-  }
-  plausibility.finish();
-  std::vector<std::string> texts;
-  for (const Finding& finding : plausibility.findings()) texts.push_back(finding.text);
-  return texts;
-}
-
-std::vector<std::string> found(const Fault& fault) { return found(robot("viwo_swerve"), fault); }
-
-void scale(std::array<double, 3>& values, double factor) {
-  for (double& value : values) value *= factor;
-}
-
-void scale_drives(EncoderSample& wheels, double factor) {
-  for (double& rate : wheels.drive_rad_per_s) rate *= factor;
-}
+using testing::robot;
+using testing::scale;
 
 TEST(Plausibility, FindsNothingInSamplesWithoutAFault) {
   for (const char* name : {"viwo_swerve", "viwo_skid_steer", "viwo_ackermann", "viwo_mecanum"}) {
@@ -204,78 +141,6 @@ TEST(Plausibility, NamesAGyroThatIsReversed) {
                           "with them: sign of the gyro's z"));
 }
 
-TEST(Plausibility, NamesDrivesThatAreAllReversed) {
-  EXPECT_THAT(found({.wheels = [](EncoderSample& s) { scale_drives(s, -1.); }}),
-              ElementsAre("wheels0: drives turn and accelerate opposite to the IMU: sign of all "
-                          "drives"));
-}
-
-TEST(Plausibility, NamesTheLeftAndTheRightOfASkidSteerThatAreExchanged) {
-  EXPECT_THAT(
-      found(robot("viwo_skid_steer"),
-            {.wheels =
-                 [](EncoderSample& s) { std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[1]); }}),
-      ElementsAre("wheels0: turn opposite to the IMU, and accelerate with it: drives on the left "
-                  "and on the right are exchanged"));
-}
-
-TEST(Plausibility, NamesDrivesInOtherUnits) {
-  EXPECT_THAT(
-      found({.wheels = [](EncoderSample& s) { scale_drives(s, 30. / std::numbers::pi); }}),
-      ElementsAre("wheels0: turn 9.55 times as fast as the gyro: drives are in revolutions per "
-                  "minute"));
-  EXPECT_THAT(found({.wheels = [](EncoderSample& s) { scale_drives(s, 180. / std::numbers::pi); }}),
-              ElementsAre("wheels0: turn 57.3 times as fast as the gyro: drives are in deg/s"));
-  EXPECT_THAT(
-      found({.wheels = [](EncoderSample& s) { scale_drives(s, 0.5 / std::numbers::pi); }}),
-      ElementsAre("wheels0: turn 0.159 times as fast as the gyro: drives are in revolutions per "
-                  "second"));
-}
-
-TEST(Plausibility, NamesAScaleThatIsOffWithoutACause) {
-  EXPECT_THAT(found({.wheels = [](EncoderSample& s) { scale_drives(s, 2.); }}),
-              ElementsAre("imu0: the gyro turns 0.5 times as fast as the wheels (correlation "
-                          "1): unit or scale of the drives, radii and track of the kinematics, "
-                          "or scale of the gyro"));
-  // Where radii are hardly known that is no contradiction.
-  const RunSetup hardly_known = robot("viwo_swerve", {"kinematics.prior_sigma_radius_m=0.01"});
-  EXPECT_THAT(found(hardly_known, {.wheels = [](EncoderSample& s) { scale_drives(s, 2.); }}),
-              IsEmpty());
-}
-
-TEST(Plausibility, NamesOneDriveThatIsReversed) {
-  EXPECT_THAT(
-      found({.wheels = [](EncoderSample& s) { s.drive_rad_per_s[1] *= -1.; }}),
-      ElementsAre("wheels0: drive_2 turns opposite to what the other wheels say: its sign"));
-}
-
-TEST(Plausibility, NamesTwoDrivesThatAreExchanged) {
-  EXPECT_THAT(
-      found({.wheels =
-                 [](EncoderSample& s) { std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[2]); }}),
-      ElementsAre("wheels0: drives contradict each other, and do not with drive_1 and "
-                  "drive_3 exchanged: their order"));
-}
-
-TEST(Plausibility, NamesSteeringAnglesInDegrees) {
-  EXPECT_THAT(found({.wheels =
-                         [](EncoderSample& s) {
-                           for (double& angle : s.steer_rad) angle *= 180. / std::numbers::pi;
-                         }}),
-              ElementsAre(::testing::MatchesRegex(
-                  "wheels0: steering angles up to [0-9.]+ rad: they are in degrees")));
-}
-
-TEST(Plausibility, NamesSteeringAnglesThatAreReversed) {
-  EXPECT_THAT(found({.wheels =
-                         [](EncoderSample& s) {
-                           for (double& angle : s.steer_rad) angle *= -1.;
-                         }}),
-              ElementsAre("wheels0: wheels contradict each other, and do not with all steering "
-                          "angles reversed: their sign, or left and right of the wheels are "
-                          "exchanged"));
-}
-
 TEST(Plausibility, NamesAnImuThatWasStuck) {
   ImuSample held;
   EXPECT_THAT(
@@ -309,98 +174,6 @@ TEST(Plausibility, NamesReadingsThatJump) {
                          }}),
               ElementsAre("imu0: the accelerometer's x jumps by 50 m/s^2 and back in 2 % of the "
                           "readings: a disturbed bus, or a loose cable"));
-}
-
-TEST(Plausibility, NamesTheLagOfTheWheels) {
-  const auto late_by = [](std::int64_t late_ns, double shaken_rad_per_s) {
-    return found({.imu =
-                      [&](ImuSample& s) {
-                        const double t_s = 1e-9 * static_cast<double>(s.t_ns);
-                        s.gyro_rad_per_s[2] += shaken_rad_per_s * std::sin(50. * t_s);
-                      },
-                  .wheels =
-                      [&](EncoderSample& s) {
-                        for (std::int64_t* t_ns : {&s.t_ns, &s.begin_ns, &s.end_ns}) {
-                          *t_ns += late_ns;
-                        }
-                      }});
-  };
-  EXPECT_THAT(late_by(100'000'000, 0.),
-              ElementsAre(::testing::MatchesRegex(
-                  "wheels0: lags behind imu0 by (9[0-9]|10[0-9]) ms, beside the 5 ms of t_OtoI_s "
-                  "\\(\\+- 10 ms\\) - wheels\\.t_OtoI_s: -0\\.(09[0-9]*|08[0-9]|1[0-9]*)")));
-  // So late that the two rates are hardly alike, on a base that shakes.
-  EXPECT_THAT(late_by(400'000'000, 0.1),
-              ElementsAre(::testing::MatchesRegex(
-                  "wheels0: lags behind imu0 by (39[0-9]|40[0-9]) ms, beside the 5 ms of "
-                  "t_OtoI_s \\(\\+- 10 ms\\) - wheels\\.t_OtoI_s: -0\\.(39[0-9]*|4)")));
-}
-
-/// Two wheels cannot contradict each other.
-TEST(Plausibility, NamesADriveThatOnlyTheGyroKnowsIsReversed) {
-  const auto found_with = [](double left, double right) {
-    return found(robot("viwo_skid_steer"), {.wheels = [=](EncoderSample& wheels) {
-                   wheels.drive_rad_per_s[0] *= left;
-                   wheels.drive_rad_per_s[1] *= right;
-                 }});
-  };
-  EXPECT_THAT(found_with(1., -1.), ElementsAre(AllOf(HasSubstr("drive_2 turns opposite"),
-                                                     HasSubstr("variance of the gyro's rate"))));
-  EXPECT_THAT(found_with(-1., 1.), ElementsAre(HasSubstr("drive_1 turns opposite")));
-  // That may be the gyro's sign as well.
-  EXPECT_THAT(found_with(-1., -1.), ElementsAre(HasSubstr("sign of all drives")));
-}
-
-TEST(Plausibility, NamesStampsOfAnotherUnit) {
-  const auto found_with = [](std::int64_t times) {
-    return found({.wheels = [times](EncoderSample& wheels) {
-      wheels.t_ns *= times;
-      wheels.begin_ns *= times;
-      wheels.end_ns *= times;
-    }});
-  };
-  EXPECT_THAT(found_with(1000),
-              Contains(HasSubstr("wheels0: a sample every 10 s: its stamps are of another unit")));
-}
-
-TEST(Plausibility, NamesNoLagOfAClockThatWasSetOnTheWay) {
-  const auto set_by = [](std::int64_t step_ns) {
-    return found({.imu = [step_ns](ImuSample& s) {
-      if (s.t_ns > 15'000'000'000) s.t_ns += step_ns;
-    }});
-  };
-  EXPECT_THAT(set_by(-1'000'000'000), IsEmpty());
-  EXPECT_THAT(set_by(1'000'000'000),
-              ElementsAre("imu0: no samples for 1 s from t = 15.000 s: look at its cable, driver, "
-                          "bus and clock, or at what has recorded it"));
-}
-
-TEST(Plausibility, NamesTheSensorWhoseClockIsAnother) {
-  constexpr std::int64_t kYearsNs = 1'700'000'000'000'000'000;
-  const auto later = [](auto& sample) {
-    sample.t_ns += kYearsNs;
-    if constexpr (requires { sample.begin_ns; }) {
-      sample.begin_ns += kYearsNs;
-      sample.end_ns += kYearsNs;
-    }
-  };
-  const std::string cause =
-      " those of the IMU: of another clock, or of another recording - none of its samples can be "
-      "used";
-  EXPECT_THAT(found({.wheels = later}),
-              ElementsAre("wheels0: its stamps are 1.7e+09 s ahead of" + cause));
-  EXPECT_THAT(found({.images = later}),
-              ElementsAre("images0: its stamps are 1.7e+09 s ahead of" + cause));
-  EXPECT_THAT(found({.imu = later}),
-              ::testing::IsSupersetOf({"wheels0: its stamps are 1.7e+09 s behind" + cause,
-                                       "images0: its stamps are 1.7e+09 s behind" + cause}));
-}
-
-TEST(Plausibility, NamesStampsThatAreNotInNanoseconds) {
-  EXPECT_THAT(
-      found({.imu = [](ImuSample& s) { s.t_ns /= 1000; }}),
-      ::testing::Contains(HasSubstr("imu0: a sample every 5e-06 s: its stamps are of another "
-                                    "unit")));
 }
 
 TEST(Plausibility, NamesCamerasThatAreSwapped) {
