@@ -2,30 +2,16 @@
 
 #include "viwo/api/plugin.hpp"
 #include "viwo/asl/asl.hpp"
-#include "viwo/log/sensor_params.hpp"
+#include "viwo/asl/asl_table.hpp"
 
 namespace viwo {
 namespace {
 
-struct Params : log::LimitParams {
-  std::filesystem::path path;
-
-  void bind(ParamBinder& b) {
-    b(VIWO_PARAM(path),
-      {.required = true, .help = "the ground truth table, or the folder of its data.csv"});
-    log::LimitParams::bind(b);
-  }
-};
-
-class AslState final : public log::RecordingSensor<StateSample> {
- public:
-  AslState(const Params& params, const HostServices& /*services*/)
-      : RecordingSensor(log::read_asl_states(params.path, params.limits())) {}
-};
+using AslState = log::AslTable<StateSample, log::read_asl_states>;
 
 VIWO_REGISTER(Sensor, AslState, "asl_state", "1.0.0",
               "reference states from a log folder (state_groundtruth_estimate0/data.csv)",
-              "Apache-2.0", Params);
+              "Apache-2.0", log::TableParams);
 
 }  // namespace
 }  // namespace viwo
