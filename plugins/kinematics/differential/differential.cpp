@@ -1,22 +1,18 @@
 // Differential drive: one or more driven wheels per side, lateral no-slip row at the axle.
 // Equations: model.md beside this file.
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <string>
-#include <vector>
 
+#include "sides.hpp"
 #include "viwo/api/plugin.hpp"
 
 namespace viwo {
 namespace {
 
-struct Params {
+struct Params : sides::SideParams {
   double radius_left_m = 0.;
   double radius_right_m = 0.;
   double baseline_m = 0.;
-  std::vector<double> left_drives{1.};
-  std::vector<double> right_drives{2.};
   double prior_sigma_radius_m = 0.0003;
   double prior_sigma_baseline_m = 0.005;
   double sigma_drive_rad_per_s = 0.001;
@@ -31,10 +27,7 @@ struct Params {
                                .above = 0.,
                                .required = true,
                                .help = "distance between the left and right contact lines"});
-    b(VIWO_PARAM(left_drives),
-      {.min = 1., .max = kMaxDrives, .help = "drive channels on the left, counted from 1"});
-    b(VIWO_PARAM(right_drives),
-      {.min = 1., .max = kMaxDrives, .help = "drive channels on the right, counted from 1"});
+    SideParams::bind(b);
     b(VIWO_PARAM(prior_sigma_radius_m),
       {.unit = "m", .above = 0., .help = "how well the radii are known"});
     b(VIWO_PARAM(prior_sigma_baseline_m),
@@ -49,24 +42,9 @@ struct Params {
 class Differential final : public KinematicModel {
  public:
   Differential(const Params& params, const HostServices& /*services*/)
-      : params_(params), nominal_{params.radius_left_m, params.radius_right_m, params.baseline_m} {
-    for (const double number : params.left_drives) add_channel("left_drives", number);
-    n_left_ = static_cast<int>(channels_.size());
-    for (const double number : params.right_drives) add_channel("right_drives", number);
-    std::vector<std::size_t> sorted = channels_;
-    std::sort(sorted.begin(), sorted.end());
-    for (std::size_t i = 0; i < sorted.size(); ++i) {
-      if (sorted[i] != i) {
-        throw ParamError("right_drives",
-                         "left_drives and right_drives together must name each "
-                         "channel from 1 to " +
-                             std::to_string(sorted.size()) + " once");
-      }
-    }
-    if (n_left_ == 0 || n_left_ == n_drive()) {
-      throw ParamError("left_drives", "each side needs at least one drive channel");
-    }
-  }
+      : params_(params),
+        nominal_{params.radius_left_m, params.radius_right_m, params.baseline_m},
+        sides_(params) {}
 
   void describe(ModelDescription& out) const override {
     const int n = n_drive();
@@ -74,23 +52,10 @@ class Differential final : public KinematicModel {
     out.n_rows = n + 1;
     out.constant_A = true;
     out.intrinsics = {
-        {"r_left", "m", nominal_[0], params_.prior_sigma_radius_m, false, {0, n_left_}, 0.},
-        {"r_right",
-         "m",
-         nominal_[1],
-         params_.prior_sigma_radius_m,
-         false,
-         {n_left_, n - n_left_},
-         0.},
+        {"r_left", "m", nominal_[0], params_.prior_sigma_radius_m, false, sides_.left(), 0.},
+        {"r_right", "m", nominal_[1], params_.prior_sigma_radius_m, false, sides_.right(), 0.},
         {"baseline", "m", nominal_[2], params_.prior_sigma_baseline_m, false, {0, n}, 0.}};
-    for (int i = 0; i < n; ++i) {
-      const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
-      out.noises.push_back({NoiseKind::kDrive,
-                            channel,
-                            params_.sigma_drive_rad_per_s,
-                            {i, 1},
-                            "sigma_drive_rad_per_s"});
-    }
+    sides_.add_drive_noises(params_.sigma_drive_rad_per_s, out);
     out.noises.push_back(
         {NoiseKind::kSlip, 0, params_.sigma_lateral_m_per_s, {n, 1}, "sigma_lateral_m_per_s"});
   }
@@ -99,7 +64,7 @@ class Differential final : public KinematicModel {
               RowSystem& out) const override {
     const int n = n_drive();
     for (int i = 0; i < n; ++i) {
-      out.b[i] = x_WI[side(i)] * sample.drive_rad_per_s[channels_[static_cast<std::size_t>(i)]];
+      out.b[i] = x_WI[side(i)] * sample.drive_rad_per_s[sides_.channel(i)];
       if (!A_is_current) out.A.row(i) << 1., 0., sign(i) * 0.5 * x_WI[2];  // (DD-1)
     }
     out.b[n] = 0.;
@@ -136,26 +101,20 @@ class Differential final : public KinematicModel {
     sample.n_steer = 0;
     for (int i = 0; i < n; ++i) {
       const double v = xi.x() + sign(i) * 0.5 * x_WI[2] * xi.z() + slip[i];  // (DD-7)
-      sample.drive_rad_per_s[channels_[static_cast<std::size_t>(i)]] = v / x_WI[side(i)];
+      sample.drive_rad_per_s[sides_.channel(i)] = v / x_WI[side(i)];
     }
     return Status::kOk;
   }
 
  private:
-  void add_channel(const char* key, double number) {
-    if (number != std::floor(number)) throw ParamError(key, "channels are whole numbers from 1");
-    channels_.push_back(static_cast<std::size_t>(number) - 1);
-  }
-
-  int n_drive() const { return static_cast<int>(channels_.size()); }
+  int n_drive() const { return sides_.n_drive(); }
   /// Row i: index of its radius, and the side's sign of the yaw rate.
-  int side(int i) const { return i < n_left_ ? 0 : 1; }
-  double sign(int i) const { return i < n_left_ ? -1. : 1.; }
+  int side(int i) const { return sides_.is_left(i) ? 0 : 1; }
+  double sign(int i) const { return sides_.is_left(i) ? -1. : 1.; }
 
   Params params_;
   std::array<double, 3> nominal_;
-  std::vector<std::size_t> channels_;  ///< drive channel of each row, left ones first
-  int n_left_ = 0;
+  sides::Sides sides_;
 };
 
 VIWO_REGISTER(KinematicModel, Differential, "differential", "1.0.0",

@@ -1,24 +1,20 @@
 // Skid-steered base: one or more driven wheels (or a track) per side, with the instantaneous
 // centres of rotation (ICR) of the sides and of the base. Equations: model.md beside this file.
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <string>
-#include <vector>
 
+#include "sides.hpp"
 #include "viwo/api/plugin.hpp"
 
 namespace viwo {
 namespace {
 
-struct Params {
+struct Params : sides::SideParams {
   double radius_left_m = 0.;
   double radius_right_m = 0.;
   double y_icr_left_m = 0.;
   double y_icr_right_m = 0.;
   double x_icr_m = 0.;
-  std::vector<double> left_drives{1.};
-  std::vector<double> right_drives{2.};
   bool hold_frame = true;
   double prior_sigma_radius_m = 0.003;
   double prior_sigma_icr_m = 0.05;
@@ -46,10 +42,7 @@ struct Params {
       {.unit = "m", .required = true, .help = "ICR of the right side along y"});
     b(VIWO_PARAM(x_icr_m),
       {.unit = "m", .help = "ICR of the base along x: the point that does not move sideways"});
-    b(VIWO_PARAM(left_drives),
-      {.min = 1., .max = kMaxDrives, .help = "drive channels on the left, counted from 1"});
-    b(VIWO_PARAM(right_drives),
-      {.min = 1., .max = kMaxDrives, .help = "drive channels on the right, counted from 1"});
+    SideParams::bind(b);
     b(VIWO_PARAM(hold_frame),
       {.help = "hold x_icr and y_icr_left, which places O on the base; false: the mounting "
                "of the IMU is known and places it (wheels.sigma_p_IinO_m 0 in x and y)"});
@@ -66,36 +59,25 @@ struct Params {
     b(VIWO_PARAM(sigma_lateral_m_per_s),
       {.unit = "m/s", .above = 0., .help = "sideways velocity of the ICR of the base, per sample"});
   }
+  const Params& checked() const {
+    if (!(y_icr_left_m > y_icr_right_m)) {
+      throw ParamError("y_icr_left_m", "must be greater than y_icr_right_m: y is to the left");
+    }
+    return *this;
+  }
 };
 
 class SkidSteer final : public KinematicModel {
  public:
   SkidSteer(const Params& params, const HostServices& /*services*/)
-      : params_(params),
+      : params_(params.checked()),
         nominal_{params.radius_left_m, params.radius_right_m, params.y_icr_left_m,
-                 params.y_icr_right_m, params.x_icr_m} {
-    if (!(nominal_[kYLeft] > nominal_[kYRight])) {
-      throw ParamError("y_icr_left_m", "must be greater than y_icr_right_m: y is to the left");
-    }
-    for (const double number : params.left_drives) add_channel("left_drives", number);
-    n_left_ = static_cast<int>(channels_.size());
-    for (const double number : params.right_drives) add_channel("right_drives", number);
-    std::vector<std::size_t> sorted = channels_;
-    std::sort(sorted.begin(), sorted.end());
-    for (std::size_t i = 0; i < sorted.size(); ++i) {
-      if (sorted[i] == i) continue;
-      throw ParamError("right_drives",
-                       "left_drives and right_drives together must name each channel from 1 to " +
-                           std::to_string(sorted.size()) + " once");
-    }
-    if (n_left_ == 0 || n_left_ == n_drive()) {
-      throw ParamError("left_drives", "each side needs at least one drive channel");
-    }
-  }
+                 params.y_icr_right_m, params.x_icr_m},
+        sides_(params) {}
 
   void describe(ModelDescription& out) const override {
     const int n = n_drive();
-    const RowRange left{0, n_left_}, right{n_left_, n - n_left_};
+    const RowRange left = sides_.left(), right = sides_.right();
     out.n_drive = n;
     out.n_rows = n + 1;
     out.constant_A = true;
@@ -106,16 +88,9 @@ class SkidSteer final : public KinematicModel {
          left},  // (K-7)
         {"y_icr_right", "m", nominal_[kYRight], params_.prior_sigma_icr_m, false, right},
         {"x_icr", "m", nominal_[kX], params_.prior_sigma_icr_m, params_.hold_frame, {n, 1}}};
+    sides_.add_drive_noises(params_.sigma_drive_rad_per_s, out);
     for (int i = 0; i < n; ++i) {
-      const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
-      out.noises.push_back({NoiseKind::kDrive,
-                            channel,
-                            params_.sigma_drive_rad_per_s,
-                            {i, 1},
-                            "sigma_drive_rad_per_s"});
-    }
-    for (int i = 0; i < n; ++i) {
-      const int channel = static_cast<int>(channels_[static_cast<std::size_t>(i)]);
+      const int channel = static_cast<int>(sides_.channel(i));
       out.noises.push_back(
           {NoiseKind::kSlip, channel, params_.sigma_slip_m_per_s, {i, 1}, "sigma_slip_m_per_s"});
     }
@@ -127,7 +102,7 @@ class SkidSteer final : public KinematicModel {
               RowSystem& out) const override {
     const int n = n_drive();
     for (int i = 0; i < n; ++i) {
-      out.b[i] = x_WI[r(i)] * sample.drive_rad_per_s[channels_[static_cast<std::size_t>(i)]];
+      out.b[i] = x_WI[r(i)] * sample.drive_rad_per_s[sides_.channel(i)];
       if (!A_is_current) out.A.row(i) << 1., 0., -x_WI[y(i)];  // (K-1)
     }
     out.b[n] = 0.;
@@ -171,7 +146,7 @@ class SkidSteer final : public KinematicModel {
     sample.n_steer = 0;
     for (int i = 0; i < n; ++i) {
       const double v = xi.x() - x_WI[y(i)] * xi.z() + slip[i];  // (K-8)
-      sample.drive_rad_per_s[channels_[static_cast<std::size_t>(i)]] = v / x_WI[r(i)];
+      sample.drive_rad_per_s[sides_.channel(i)] = v / x_WI[r(i)];
     }
     return Status::kOk;
   }
@@ -189,20 +164,14 @@ class SkidSteer final : public KinematicModel {
  private:
   static constexpr int kRLeft = 0, kRRight = 1, kYLeft = 2, kYRight = 3, kX = 4;
 
-  void add_channel(const char* key, double number) {
-    if (number != std::floor(number)) throw ParamError(key, "channels are whole numbers from 1");
-    channels_.push_back(static_cast<std::size_t>(number) - 1);
-  }
-
-  int n_drive() const { return static_cast<int>(channels_.size()); }
+  int n_drive() const { return sides_.n_drive(); }
   /// Of row i: indices of its radius and of its ICR.
-  int r(int i) const { return i < n_left_ ? kRLeft : kRRight; }
-  int y(int i) const { return i < n_left_ ? kYLeft : kYRight; }
+  int r(int i) const { return sides_.is_left(i) ? kRLeft : kRRight; }
+  int y(int i) const { return sides_.is_left(i) ? kYLeft : kYRight; }
 
   Params params_;
   std::array<double, 5> nominal_;
-  std::vector<std::size_t> channels_;  ///< drive channel of each row, left ones first
-  int n_left_ = 0;
+  sides::Sides sides_;
 };
 
 VIWO_REGISTER(KinematicModel, SkidSteer, "skid_steer", "1.0.0",
