@@ -26,9 +26,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using namespace gnss;
-using pose_reference::BodyJacobian;
-using pose_reference::ClonePose;
-using pose_reference::Lever;
+using namespace pose_reference;
 
 /// The host has room for 16 factors of one update in an epoch. A fix is two, horizontal and height;
 /// the alignment brings two fixes at once.
@@ -41,18 +39,6 @@ constexpr double kTieSigmaM = 1e-3;
 constexpr double kContradiction = 1e-3;
 /// A fix that is so many times better than the one that the search began with takes its place.
 constexpr double kBetterSigma = 2.;
-
-ClonePose at_estimate(const CloneState& clone) {
-  // The velocity is held in I, as it was when the clone was made.
-  return {clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.R_GtoI_fej * clone.v_IinG};
-}
-
-ClonePose at_first_estimate(const CloneState& clone) {
-  ClonePose pose = at_estimate(clone);
-  pose.R_GtoI = clone.R_GtoI_fej;
-  pose.p_IinG = clone.p_IinG_fej;
-  return pose;
-}
 
 /// Where the receiver takes the antenna to be but for noise, by the state: with its drift.
 struct Place {
@@ -130,8 +116,9 @@ class Gnss final : public Update {
   }
 
   void rejections(std::vector<RejectionCount>& out) const override {
-    for (const Tally* tally : {&too_late_, &too_far_, &too_many_, &faulty_, &bad_covariance_,
-                               &far_away_, &waiting_, &contradicting_}) {
+    brackets_.append_to(out);
+    for (const Tally* tally :
+         {&too_many_, &faulty_, &bad_covariance_, &far_away_, &waiting_, &contradicting_}) {
       tally->append_to(out);
     }
     if (n_tried_ > 0 && !is_aligned_) {
@@ -172,24 +159,13 @@ class Gnss final : public Update {
 
   std::optional<Place> place_of(const FilterView& filter, const GnssSample& fix) {
     const std::int64_t t_ns = fix.t_ns + to_ns(options_.t_AtoI_s);
-    const auto clones = filter.clones;
-    if (clones.size() < 2 || t_ns < clones.front().t_ns || t_ns > clones.back().t_ns) {
-      too_late_.add(1, t_ns);
-      return std::nullopt;
-    }
-    std::size_t last = clones.size() - 1;
-    while (last > 1 && clones[last - 1].t_ns >= t_ns) --last;
-    const double period_s = seconds_between(clones[last - 1].t_ns, clones[last].t_ns);
-    if (period_s > options_.max_span_s) {
-      too_far_.add(1, t_ns);
-      return std::nullopt;
-    }
-    return place_between(filter, clones[last - 1], clones[last], period_s,
-                         seconds_between(clones[last - 1].t_ns, t_ns) / period_s);
+    const auto clones = brackets_.around(filter.clones, t_ns, options_.max_span_s);
+    if (!clones) return std::nullopt;
+    return place_between(filter, *clones);
   }
 
-  Place place_between(const FilterView& filter, const CloneState& a, const CloneState& b,
-                      double period_s, double u) const {
+  Place place_between(const FilterView& filter, const Bracket& clones) const {
+    const auto& [a, b, period_s, u] = clones;
     const BlockView& arm = filter.block(lever_);
     const Lever lever{Matrix3d::Identity(), arm.numbers()};
     const Lever first_lever{Matrix3d::Identity(), arm.first_numbers()};
@@ -354,8 +330,7 @@ class Gnss final : public Update {
   BlockId lever_, alignment_, drift_;
   RoomId room_;
 
-  Tally too_late_{"fix that is older than the oldest clone"};
-  Tally too_far_{"fix between clones that are too far apart"};
+  Brackets brackets_;
   Tally too_many_{"fix beyond 7 in an epoch"};
   Tally faulty_{"fix with values that cannot be used"};
   Tally bad_covariance_{"fix whose covariance is not positive definite"};

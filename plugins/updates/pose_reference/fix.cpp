@@ -1,11 +1,48 @@
 #include "fix.hpp"
 
+#include <cstddef>
+
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::pose_reference {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+ClonePose at_estimate(const CloneState& clone) {
+  // The velocity is held in I, as it was when the clone was made.
+  return {clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.R_GtoI_fej * clone.v_IinG};
+}
+
+ClonePose at_first_estimate(const CloneState& clone) {
+  ClonePose pose = at_estimate(clone);
+  pose.R_GtoI = clone.R_GtoI_fej;
+  pose.p_IinG = clone.p_IinG_fej;
+  return pose;
+}
+
+std::optional<Bracket> Brackets::around(std::span<const CloneState> clones, std::int64_t t_ns,
+                                        double max_span_s) {
+  if (clones.size() < 2 || t_ns < clones.front().t_ns || t_ns > clones.back().t_ns) {
+    too_late_.add(1, t_ns);
+    return std::nullopt;
+  }
+  std::size_t i = clones.size() - 1;
+  while (i > 1 && clones[i - 1].t_ns >= t_ns) --i;
+  const CloneState &first = clones[i - 1], &last = clones[i];
+  const double period_s = seconds_between(first.t_ns, last.t_ns);
+  if (period_s > max_span_s) {
+    too_far_.add(1, t_ns);
+    return std::nullopt;
+  }
+  return Bracket{first, last, period_s, seconds_between(first.t_ns, t_ns) / period_s};
+}
+
+void Brackets::append_to(std::vector<RejectionCount>& out) const {
+  too_late_.append_to(out);
+  too_far_.append_to(out);
+}
 
 BodyPose body_between(const ClonePose& first, const ClonePose& last, double period_s, double u,
                       const Lever& lever, BodyJacobian* J) {

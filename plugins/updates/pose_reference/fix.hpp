@@ -1,8 +1,16 @@
-// Pose of a body B on the IMU at an instant between two clones, with its derivatives. Equations:
-// model.md beside this file.
+// Pose of a body B on the IMU at an instant between two clones, with its derivatives, and which two
+// these are. Equations: model.md beside this file.
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
 #include <Eigen/Core>
+
+#include "tally.hpp"
+#include "viwo/api/filter_view.hpp"
 
 namespace viwo::pose_reference {
 
@@ -12,6 +20,30 @@ struct ClonePose {
   Eigen::Vector3d p_IinG = Eigen::Vector3d::Zero();
   Eigen::Vector3d w_IinI = Eigen::Vector3d::Zero();  ///< rad/s
   Eigen::Vector3d v_IinI = Eigen::Vector3d::Zero();  ///< velocity relative to G, in I, m/s
+};
+
+ClonePose at_estimate(const CloneState& clone);
+ClonePose at_first_estimate(const CloneState& clone);
+
+/// Two neighbouring clones, and an instant between them.
+struct Bracket {
+  const CloneState& first;
+  const CloneState& last;
+  double period_s;
+  double u;  ///< 0 .. 1: the part of the period that has gone then
+};
+
+/// Finds the clones around fixes, and counts the fixes that are not between two.
+class Brackets {
+ public:
+  /// Nothing for clones further apart than `max_span_s`.
+  std::optional<Bracket> around(std::span<const CloneState> clones, std::int64_t t_ns,
+                                double max_span_s);
+  void append_to(std::vector<RejectionCount>& out) const;
+
+ private:
+  Tally too_late_{"fix that is older than the oldest clone"};
+  Tally too_far_{"fix between clones that are too far apart"};
 };
 
 /// Where B sits on the IMU.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <optional>
+#include <cstdint>
 
 #include "fix.hpp"
 #include "tally.hpp"
@@ -71,18 +71,6 @@ struct Params {
   }
 };
 
-ClonePose at_estimate(const CloneState& clone) {
-  // The velocity is held in I, as it was when the clone was made.
-  return {clone.R_GtoI, clone.p_IinG, clone.w_IinI, clone.R_GtoI_fej * clone.v_IinG};
-}
-
-ClonePose at_first_estimate(const CloneState& clone) {
-  ClonePose pose = at_estimate(clone);
-  pose.R_GtoI = clone.R_GtoI_fej;
-  pose.p_IinG = clone.p_IinG_fej;
-  return pose;
-}
-
 class PoseReference final : public Update {
  public:
   PoseReference(const Params& params, const HostServices& /*services*/)
@@ -113,44 +101,25 @@ class PoseReference final : public Update {
     for (std::size_t i = 0; i < used; ++i) {
       // The last of each of `used` equal parts: all of them when there are few.
       const PoseSample& fix = fixes[(i + 1) * n / used - 1];
-      const auto last = clone_behind(filter, fix.t_ns);
-      if (last) emit(filter.clones[*last - 1], filter.clones[*last], fix, sink);
+      const auto clones = brackets_.around(filter.clones, fix.t_ns, params_.max_span_s);
+      if (clones) emit(*clones, fix, sink);
     }
   }
 
   void rejections(std::vector<RejectionCount>& out) const override {
-    too_late_.append_to(out);
-    too_far_.append_to(out);
+    brackets_.append_to(out);
     bad_quaternion_.append_to(out);
     too_many_.append_to(out);
   }
 
  private:
-  /// Index of the first clone at or behind the fix; nothing when there is none before it.
-  std::optional<std::size_t> clone_behind(const FilterView& filter, std::int64_t t_ns) {
-    const auto clones = filter.clones;
-    if (clones.size() < 2 || t_ns < clones.front().t_ns || t_ns > clones.back().t_ns) {
-      too_late_.add(1, t_ns);
-      return std::nullopt;
-    }
-    std::size_t last = clones.size() - 1;
-    while (last > 1 && clones[last - 1].t_ns >= t_ns) --last;
-    if (seconds_between(clones[last - 1].t_ns, clones[last].t_ns) > params_.max_span_s) {
-      too_far_.add(1, t_ns);
-      return std::nullopt;
-    }
-    return last;
-  }
-
-  void emit(const CloneState& first, const CloneState& last, const PoseSample& fix,
-            FactorSink& sink) {
+  void emit(const Bracket& clones, const PoseSample& fix, FactorSink& sink) {
     const Eigen::Quaterniond q = to_quaternion(fix.q_BtoW_xyzw);
     if (with_orientation_ && !(std::abs(q.norm() - 1.) < 1e-3)) {
       bad_quaternion_.add(1, fix.t_ns);
       return;
     }
-    const double period_s = seconds_between(first.t_ns, last.t_ns);
-    const double u = seconds_between(first.t_ns, fix.t_ns) / period_s;
+    const auto& [first, last, period_s, u] = clones;
     const BodyPose body = body_between(at_estimate(first), at_estimate(last), period_s, u, lever_);
     BodyJacobian J;
     body_between(at_first_estimate(first), at_first_estimate(last), period_s, u, lever_, &J);
@@ -181,8 +150,7 @@ class PoseReference final : public Update {
   Matrix3d R_WtoG_;
   Lever lever_;
 
-  Tally too_late_{"fix that is older than the oldest clone"};
-  Tally too_far_{"fix between clones that are too far apart"};
+  Brackets brackets_;
   Tally bad_quaternion_{"fix whose quaternion has not unit norm"};
   Tally too_many_{"fix beyond max_per_epoch"};
 };
