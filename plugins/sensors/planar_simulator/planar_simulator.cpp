@@ -1,8 +1,5 @@
 // Sensor planar_simulator: encoders and reference poses of a base on a plane (model.md).
-#include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <string>
 #include <vector>
 
 #include "viwo/api/plugin.hpp"
@@ -16,15 +13,8 @@
 namespace viwo {
 namespace {
 
-struct Params : sim::EncoderParams, log::JointParams {
+struct Params : sim::MotionParams, sim::EncoderParams, log::JointParams {
   NestedKinematics robot;
-  std::string motion = "icr_sweep";
-  std::filesystem::path motion_file;
-  double duration_s = 60.;
-  double speed_m_per_s = 0.5;
-  double yaw_rate_rad_per_s = 0.6;
-  Eigen::Vector2d pivot_m{0., 0.};
-  double ramp_s = 1.;
   double rate_hz = 100.;
   double reference_rate_hz = 100.;
   std::int64_t start_ns = 0;
@@ -34,16 +24,7 @@ struct Params : sim::EncoderParams, log::JointParams {
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(robot),
       {.required = true, .help = "the base: its nominal intrinsics and its noise"});
-    b(VIWO_PARAM(motion), {.choices = sim::kMotionChoices, .help = "how the base moves"});
-    b(VIWO_PARAM(motion_file), {.help = sim::kMotionFileHelp});
-    b(VIWO_PARAM(duration_s), {.unit = "s", .above = 0., .max = 86400., .help = "how long"});
-    b(VIWO_PARAM(speed_m_per_s), {.unit = "m/s", .help = "speed of the motion"});
-    b(VIWO_PARAM(yaw_rate_rad_per_s),
-      {.unit = "rad/s", .help = "constant or peak yaw rate of the motions that turn"});
-    b(VIWO_PARAM(pivot_m),
-      {.unit = "m", .help = "point of the base that motion pivot turns about"});
-    b(VIWO_PARAM(ramp_s),
-      {.unit = "s", .min = 0., .help = "smooth start from rest; 0: at speed from the beginning"});
+    sim::MotionParams::bind(b);
     b(VIWO_PARAM(rate_hz),
       {.unit = "Hz", .above = 0., .max = 10000., .help = "rate of the encoder samples"});
     b(VIWO_PARAM(reference_rate_hz),
@@ -105,9 +86,7 @@ log::Recording<Measurement> simulate(const Params& params, const HostServices& s
   const auto from_reference = poses(params, motion);
   out.samples.assign(from_wheels.begin(), from_wheels.end());
   out.samples.insert(out.samples.end(), from_reference.begin(), from_reference.end());
-  std::stable_sort(
-      out.samples.begin(), out.samples.end(),
-      [](const Measurement& a, const Measurement& b) { return stamp_ns(a) < stamp_ns(b); });
+  log::sort_by_time(out);
   return out;
 }
 

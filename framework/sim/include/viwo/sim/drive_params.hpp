@@ -18,8 +18,8 @@ inline constexpr const char* kMotionFileHelp =
     "of motion: file, a table with the columns time_s, v_x_m_per_s, v_y_m_per_s, omega_rad_per_s "
     "(plan.csv of viwo plan); the base stands before and after it";
 
-/// How PlanarMotion and Ground go.
-struct DriveParams {
+/// How PlanarMotion goes.
+struct MotionParams {
   std::string motion = "icr_sweep";
   std::filesystem::path motion_file;
   double duration_s = 60.;
@@ -27,28 +27,30 @@ struct DriveParams {
   double yaw_rate_rad_per_s = 0.6;
   Eigen::Vector2d pivot_m{0., 0.};
   double ramp_s = 1.;
+
+  void bind(ParamBinder& b) {
+    b(VIWO_PARAM(motion), {.choices = kMotionChoices, .help = "how the base moves"});
+    b(VIWO_PARAM(motion_file), {.help = kMotionFileHelp});
+    b(VIWO_PARAM(duration_s), {.unit = "s", .above = 0., .max = 86400., .help = "how long"});
+    b(VIWO_PARAM(speed_m_per_s), {.unit = "m/s", .help = "speed of the motion"});
+    b(VIWO_PARAM(yaw_rate_rad_per_s),
+      {.unit = "rad/s", .help = "constant or peak yaw rate of the motions that turn"});
+    b(VIWO_PARAM(pivot_m),
+      {.unit = "m", .help = "point of the base that motion pivot turns about"});
+    b(VIWO_PARAM(ramp_s),
+      {.unit = "s", .min = 0., .help = "smooth start from rest; 0: at speed from the beginning"});
+  }
+};
+
+/// How PlanarMotion and Ground go.
+struct DriveParams : MotionParams {
   std::string ground = "flat";
   double ground_amplitude_m = 0.05;
   double ground_wavelength_m = 3.;
   std::int64_t start_ns = 0;
 
   void bind(ParamBinder& b) {
-    b(VIWO_PARAM(motion), {.choices = kMotionChoices, .help = "how the base moves"});
-    b(VIWO_PARAM(motion_file), {.help = kMotionFileHelp});
-    b(VIWO_PARAM(duration_s), {.unit = "s", .above = 0., .max = 7200., .help = "how long"});
-    b(VIWO_PARAM(speed_m_per_s),
-      {.unit = "m/s", .min = -20., .max = 20., .help = "speed of the motion"});
-    b(VIWO_PARAM(yaw_rate_rad_per_s),
-      {.unit = "rad/s",
-       .min = -6.,
-       .max = 6.,
-       .help = "constant or peak yaw rate of the motions that turn"});
-    b(VIWO_PARAM(pivot_m),
-      {.unit = "m", .help = "point of the base that motion pivot turns about"});
-    b(VIWO_PARAM(ramp_s), {.unit = "s",
-                           .min = 0.,
-                           .max = 3600.,
-                           .help = "smooth start from rest; 0: at speed from the beginning"});
+    MotionParams::bind(b);
     b(VIWO_PARAM(ground), {.choices = "flat|uneven", .help = "what the base drives on"});
     b(VIWO_PARAM(ground_amplitude_m),
       {.unit = "m", .min = 0., .max = 10., .help = "of the waves of uneven ground"});
