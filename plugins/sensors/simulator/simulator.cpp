@@ -121,10 +121,8 @@ log::Recording<Measurement> simulate(const Params& params, const HostServices& s
                   [](const Measurement& m) { return m.get_if<StateSample>() != nullptr; });
   }
   std::move(from_rig.begin(), from_rig.end(), std::back_inserter(out.samples));
-  const auto poses = simulate_poses(
-      trajectory, rig.mounting,
-      pose_simulation_from(params, params.duration_s, start_ns, params.noise, services.exact),
-      services.seed);
+  const auto poses = simulate_poses(trajectory, rig.mounting, params, params.duration_s, start_ns,
+                                    params.noise, services);
   out.samples.insert(out.samples.end(), poses.begin(), poses.end());
   if (params.wheels) {
     try {
