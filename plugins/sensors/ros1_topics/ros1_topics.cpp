@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <ros/callback_queue.h>
+#include <ros/names.h>
 #include <ros/ros.h>
 
 #include "live_params.hpp"
@@ -16,7 +17,6 @@
 #include "raw_message.hpp"
 #include "ros1_fields.hpp"
 #include "ros1_messages.hpp"
-#include "topic_names.hpp"
 #include "topic_sensor.hpp"
 #include "viwo/api/plugin.hpp"
 
@@ -24,6 +24,13 @@ namespace viwo::ros1 {
 namespace {
 
 using namespace std::chrono_literals;
+
+/// Why this cannot be the name of a topic; empty for one that can.
+std::string why_no_name(const std::string& topic) {
+  std::string error;
+  if (topic.empty()) return "it is empty";
+  return ros::names::validate(topic, error) ? std::string() : error;
+}
 
 struct Params : live::LiveParams {
   std::string master_uri;
