@@ -8,23 +8,13 @@ namespace {
 /// Of 80 degrees.
 constexpr double kSmallestCosine = 0.17;
 
-/// Derivative of point_of_inverse_depth().
-Eigen::Matrix3d by_inverse_depth(const Eigen::Vector3d& landmark) {
-  const double depth = 1. / landmark.z();
+/// Derivative of point_of_inverse_depth() and of inverse_depth_of_point(): the same function.
+Eigen::Matrix3d inverse_depth_jacobian(const Eigen::Vector3d& at) {
+  const double inverse = 1. / at.z();
   Eigen::Matrix3d J;
-  J << depth, 0., -landmark.x() * depth * depth,  //
-      0., depth, -landmark.y() * depth * depth,   //
-      0., 0., -depth * depth;
-  return J;
-}
-
-/// Derivative of inverse_depth_of_point().
-Eigen::Matrix3d by_point(const Eigen::Vector3d& p_C) {
-  const double rho = 1. / p_C.z();
-  Eigen::Matrix3d J;
-  J << rho, 0., -p_C.x() * rho * rho,  //
-      0., rho, -p_C.y() * rho * rho,   //
-      0., 0., -rho * rho;
+  J << inverse, 0., -at.x() * inverse * inverse,  //
+      0., inverse, -at.y() * inverse * inverse,   //
+      0., 0., -inverse * inverse;
   return J;
 }
 
@@ -45,7 +35,7 @@ AnchoredPoint::AnchoredPoint(const Anchor& anchor, const Eigen::Vector3d& landma
   const Eigen::Vector3d turned = point_of_inverse_depth(landmark) - anchor.p_IinC;
   const Eigen::Vector3d p_FinI = anchor.R_ItoC.transpose() * turned;
   p_FinG = anchor.R_GtoI.transpose() * p_FinI + anchor.p_IinG;
-  by_landmark = R_CtoG * by_inverse_depth(landmark);
+  by_landmark = R_CtoG * inverse_depth_jacobian(landmark);
   by_clone << -anchor.R_GtoI.transpose() * skew(p_FinI), Eigen::Matrix3d::Identity();
   by_extrinsics << -R_CtoG * skew(turned), -R_CtoG;
 }
@@ -55,7 +45,7 @@ MovedLandmark::MovedLandmark(const Anchor& from, const Anchor& to,
   const AnchoredPoint point(from, old_landmark);
   p_C = to.to_camera(point.p_FinG);
   landmark = inverse_depth_of_point(p_C);
-  const Eigen::Matrix3d J = by_point(p_C);
+  const Eigen::Matrix3d J = inverse_depth_jacobian(p_C);
   const Eigen::Matrix3d J_point = J * to.R_ItoC * to.R_GtoI;
   const Eigen::Vector3d turned = p_C - to.p_IinC;
   by_landmark = J_point * point.by_landmark;

@@ -46,6 +46,18 @@ void set_calibration(const WindowCamera& camera, const WindowClone& clone, const
 
 }  // namespace
 
+void collect_sights(const TrackStore& tracks, int track, const Window& window,
+                    std::vector<Sight>& out) {
+  out.clear();
+  for (int clone = 0; clone < window.n_clones(); ++clone) {
+    const int slot = window.clone(clone).slot;
+    for (int camera = 0; camera < tracks.n_cameras(); ++camera) {
+      if ((tracks.mask(track, camera) >> slot & 1u) == 0) continue;
+      out.push_back({clone, camera, &tracks.observation(track, slot, camera)});
+    }
+  }
+}
+
 bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vector3d& p_FinG,
                      const Eigen::Vector3d& p_FinG_fej, double inverse_sigma, LinearSight& row) {
   const WindowClone& clone = window.clone(sight.clone);
@@ -92,14 +104,7 @@ void Feature::start(int max_sights, double sigma_px, const TriangulationLimits& 
 }
 
 int Feature::collect(const TrackStore& tracks, int track, const Window& window) {
-  sights_.clear();
-  for (int clone = 0; clone < window.n_clones(); ++clone) {
-    const int slot = window.clone(clone).slot;
-    for (int camera = 0; camera < tracks.n_cameras(); ++camera) {
-      if ((tracks.mask(track, camera) >> slot & 1u) == 0) continue;
-      sights_.push_back({clone, camera, &tracks.observation(track, slot, camera)});
-    }
-  }
+  collect_sights(tracks, track, window, sights_);
   return static_cast<int>(sights_.size());
 }
 

@@ -19,6 +19,10 @@ struct Sight {
   const Observation* observation = nullptr;
 };
 
+/// All observations of a track whose clones are in the window, in the place of what is in `out`.
+void collect_sights(const TrackStore& tracks, int track, const Window& window,
+                    std::vector<Sight>& out);
+
 struct TriangulationLimits {
   double min_distance_m = 0.1;
   double max_distance_m = 60.;

@@ -113,17 +113,6 @@ ColumnRange Landmarks::columns(const FilterView& filter) const {
   return {first, end - first};
 }
 
-void Landmarks::collect(const Landmark& landmark, const Window& window, TrackStore& tracks) {
-  sights_.clear();
-  for (int clone = 0; clone < window.n_clones(); ++clone) {
-    const int slot = window.clone(clone).slot;
-    for (int camera = 0; camera < tracks.n_cameras(); ++camera) {
-      if ((tracks.mask(landmark.track, camera) >> slot & 1u) == 0) continue;
-      sights_.push_back({clone, camera, &tracks.observation(landmark.track, slot, camera)});
-    }
-  }
-}
-
 void Landmarks::use_sights(const Window& window, TrackStore& tracks, InformationFactor& factor,
                            FactorSink& sink) {
   const FilterView& filter = window.filter();
@@ -143,7 +132,7 @@ void Landmarks::use_sights(const Window& window, TrackStore& tracks, Information
     state.factor_column = first + block.column() - range.first;
     state.clone = window.clone_in_slot(landmark.slot);
     state.camera = landmark.camera;
-    collect(landmark, window, tracks);
+    collect_sights(tracks, landmark.track, window, sights_);
     const bool ok = rows_.linearize(sights_, window, state) &&
                     (landmark.is_new || thresholds_.empty() ||
                      rows_.passes(window, thresholds_[static_cast<std::size_t>(rows_.rows())]));

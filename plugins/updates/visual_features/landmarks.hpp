@@ -67,7 +67,6 @@ class Landmarks {
  private:
   /// Where the columns of landmarks begin in the state, and how many from there on are in use.
   ColumnRange columns(const FilterView& filter) const;
-  void collect(const Landmark& landmark, const Window& window, TrackStore& tracks);
   /// False when it is to be dropped.
   bool is_sound(const Landmark& landmark, const FilterView& filter) const;
   bool move_anchor(Landmark& landmark, const FilterView& filter, BlockEdits& edits);

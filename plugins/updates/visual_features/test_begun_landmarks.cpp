@@ -21,7 +21,6 @@ using testing::SceneOptions;
 struct Begun {
   Scene truth, estimate;
   Eigen::VectorXd error;  ///< truth = estimate [+] error
-  Eigen::MatrixXd P_root;
   FactorSink sink;
   Eigen::MatrixXd Lambda;
   Eigen::VectorXd eta;

@@ -82,8 +82,6 @@ class Window {
   const WindowCamera& camera(int index) const { return cameras_[static_cast<std::size_t>(index)]; }
   int n_cameras() const { return static_cast<int>(cameras_.size()); }
   const CameraPose& pose(int clone, int camera) const { return poses_[image_index(clone, camera)]; }
-  /// The pose of a camera at the time of a clone, not of an image.
-  CameraPose pose_at_clone(int clone, int camera) const { return make_pose(clone, camera, 0.); }
 
   const FilterView& filter() const { return filter_; }
   /// Covariance of the factor's columns, all of it, in their order. Copied at the first call after
