@@ -31,14 +31,20 @@ struct MotionParams {
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(motion), {.choices = kMotionChoices, .help = "how the base moves"});
     b(VIWO_PARAM(motion_file), {.help = kMotionFileHelp});
-    b(VIWO_PARAM(duration_s), {.unit = "s", .above = 0., .max = 86400., .help = "how long"});
-    b(VIWO_PARAM(speed_m_per_s), {.unit = "m/s", .help = "speed of the motion"});
+    b(VIWO_PARAM(duration_s), {.unit = "s", .above = 0., .max = 7200., .help = "how long"});
+    b(VIWO_PARAM(speed_m_per_s),
+      {.unit = "m/s", .min = -20., .max = 20., .help = "speed of the motion"});
     b(VIWO_PARAM(yaw_rate_rad_per_s),
-      {.unit = "rad/s", .help = "constant or peak yaw rate of the motions that turn"});
+      {.unit = "rad/s",
+       .min = -6.,
+       .max = 6.,
+       .help = "constant or peak yaw rate of the motions that turn"});
     b(VIWO_PARAM(pivot_m),
       {.unit = "m", .help = "point of the base that motion pivot turns about"});
-    b(VIWO_PARAM(ramp_s),
-      {.unit = "s", .min = 0., .help = "smooth start from rest; 0: at speed from the beginning"});
+    b(VIWO_PARAM(ramp_s), {.unit = "s",
+                           .min = 0.,
+                           .max = 3600.,
+                           .help = "smooth start from rest; 0: at speed from the beginning"});
   }
 };
 
