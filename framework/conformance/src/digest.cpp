@@ -46,18 +46,6 @@ void add(const ImageSample& s, Digest& out) {
   for (const std::uint8_t pixel : image.pixels) out.add(static_cast<int>(pixel));
 }
 
-template <class Sample>
-bool add_if(const Measurement& measurement, Digest& out) {
-  const auto* sample = measurement.get_if<Sample>();
-  if (sample != nullptr) add(*sample, out);
-  return sample != nullptr;
-}
-
-template <class... Samples>
-void add_one_of(const Measurement& measurement, Digest& out) {
-  (add_if<Samples>(measurement, out) || ...);
-}
-
 }  // namespace
 
 std::uint64_t digest_of(const Measurement& measurement) {
@@ -69,8 +57,8 @@ std::uint64_t digest_of(const Measurement& measurement) {
   digest.add(extent.begin_ns);
   digest.add(extent.end_ns);
   digest.add(type.channel(measurement.view().data()));
-  add_one_of<EncoderSample, PoseSample, ImuSample, FeatureSample, StateSample, CalibrationSample,
-             ImageSample>(measurement, digest);
+  visit_one_of<EncoderSample, PoseSample, ImuSample, FeatureSample, StateSample, CalibrationSample,
+               ImageSample>(measurement, [&](const auto& sample) { add(sample, digest); });
   return digest.value();
 }
 

@@ -86,13 +86,6 @@ std::string fault(const ImageSample& s) {
   return image.pixels == again.pixels ? "" : "has other pixels when read again";
 }
 
-template <class Sample>
-bool set_fault(const Measurement& measurement, std::string& out) {
-  const auto* sample = measurement.get_if<Sample>();
-  if (sample != nullptr) out = fault(*sample);
-  return sample != nullptr;
-}
-
 /// Of viwo's own kinds all that can be wrong, of others what they say themselves.
 std::string fault(const Measurement& measurement) {
   const SampleExtent extent = measurement.view().extent();
@@ -101,11 +94,9 @@ std::string fault(const Measurement& measurement) {
            std::to_string(extent.end_ns) + " ns, which does not hold its stamp";
   }
   std::string text;
-  if (set_fault<EncoderSample>(measurement, text) || set_fault<PoseSample>(measurement, text) ||
-      set_fault<ImuSample>(measurement, text) || set_fault<FeatureSample>(measurement, text) ||
-      set_fault<StateSample>(measurement, text) ||
-      set_fault<CalibrationSample>(measurement, text) ||
-      set_fault<ImageSample>(measurement, text)) {
+  if (visit_one_of<EncoderSample, PoseSample, ImuSample, FeatureSample, StateSample,
+                   CalibrationSample, ImageSample>(measurement,
+                                                   [&](const auto& s) { text = fault(s); })) {
     return text;
   }
   const SampleView view = measurement.view();

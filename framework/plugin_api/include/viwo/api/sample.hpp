@@ -178,6 +178,16 @@ class Measurement {
 
 inline std::int64_t stamp_ns(const Measurement& measurement) { return measurement.t_ns(); }
 
+/// Calls `f` with the sample if it is of one of these kinds; false when it is of none.
+template <Sample... Kinds, class F>
+bool visit_one_of(const Measurement& measurement, F&& f) {
+  const auto visit = [&f](const auto* sample) {
+    if (sample != nullptr) f(*sample);
+    return sample != nullptr;
+  };
+  return (visit(measurement.get_if<Kinds>()) || ...);
+}
+
 namespace detail {
 
 template <class T, class... Member>
