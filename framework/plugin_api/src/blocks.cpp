@@ -65,8 +65,7 @@ BlockSpec& BlockSpec::add(std::string entry, std::string unit, double initial, d
   return *this;
 }
 
-CameraBlocks declare_camera(Declarations& host, int index) {
-  const CameraPrior& prior = host.rig().cameras()[static_cast<std::size_t>(index)];
+std::array<BlockSpec, 3> camera_blocks(std::size_t index, const CameraPrior& prior) {
   const std::string cam = "cam" + std::to_string(index) + ".";
   BlockSpec extrinsics{.name = cam + "extrinsics"};
   add_pose(extrinsics, cam + "theta_ItoC", prior.camera.R_ItoC, cam + "p_IinC", prior.camera.p_IinC,
@@ -77,15 +76,20 @@ CameraBlocks declare_camera(Declarations& host, int index) {
     intrinsics.add(cam + kNames[i], i < 4 ? "px" : "", prior.camera.intrinsics[i],
                    prior.sigma_intrinsics[i]);
   }
+  BlockSpec clock{.name = cam + "clock"};
+  clock.add(cam + "t_CtoI", "s", prior.camera.t_CtoI_s, prior.sigma_clock_s, Excitation::kClock);
+  return {extrinsics, intrinsics, clock};
+}
+
+CameraBlocks declare_camera(Declarations& host, int index) {
+  const std::span<const CameraPrior> cameras = host.rig().cameras();
+  const auto i = static_cast<std::size_t>(index);
   // One clock for cameras that are triggered together: it is called after the first of them.
-  const bool shares = index == 0 || prior.shares_clock;
-  const CameraPrior& clocked = shares ? host.rig().cameras().front() : prior;
-  const std::string owner = shares ? "cam0." : cam;
-  BlockSpec clock{.name = owner + "clock"};
-  clock.add(owner + "t_CtoI", "s", clocked.camera.t_CtoI_s, clocked.sigma_clock_s,
-            Excitation::kClock);
-  return {host.block(extrinsics), host.block(intrinsics), host.block(clock),
-          prior.camera.t_CtoI_s - clocked.camera.t_CtoI_s};
+  const std::size_t clocked = cameras[i].shares_clock ? 0 : i;
+  const auto blocks = camera_blocks(i, cameras[i]);
+  const BlockSpec clock = camera_blocks(clocked, cameras[clocked])[2];
+  return {host.block(blocks[0]), host.block(blocks[1]), host.block(clock),
+          cameras[i].camera.t_CtoI_s - cameras[clocked].camera.t_CtoI_s};
 }
 
 void CameraBlocks::read(const FilterView& filter, CameraView& camera) const {

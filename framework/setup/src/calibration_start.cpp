@@ -14,8 +14,6 @@ namespace {
 using config::Errors;
 using config::Node;
 
-constexpr const char* kCameraNumbers[] = {"fx", "fy", "cx", "cy", "d1", "d2", "d3", "d4"};
-
 std::string prefix_of(const std::string& set) { return set.empty() ? "" : set + "."; }
 
 bool belongs_to(const CalibrationEntry& entry, const std::string& prefix) {
@@ -144,26 +142,15 @@ void CalibrationStart::take_camera(std::size_t index, CameraPrior& prior, Errors
                                "of the run: is it the same camera?");
     return;
   }
-  const std::string cam = "cam" + std::to_string(index) + ".";
-  BlockSpec extrinsics;
-  for (const char* axis : {"theta_ItoC_x", "theta_ItoC_y", "theta_ItoC_z"}) {
-    extrinsics.add(cam + axis, "rad", 0., 0.);
-  }
-  for (const char* axis : {"p_IinC_x", "p_IinC_y", "p_IinC_z"}) {
-    extrinsics.add(cam + axis, "m", 0., 0.);
-  }
-  BlockSpec numbers;
-  for (int i = 0; i < 8; ++i) numbers.add(cam + kCameraNumbers[i], i < 4 ? "px" : "", 0., 0.);
-  BlockSpec clock;
-  clock.add(cam + "t_CtoI", "s", 0., 0.);
+  const auto [extrinsics, numbers, clock] = camera_blocks(index, prior);
   Eigen::VectorXd pose = pose_of(camera.R_ItoC, camera.p_IinC);
   if (take(file_.cameras, extrinsics, pose, prior.sigma_extrinsics, errors)) {
     camera.R_ItoC = exp_so3(Eigen::Vector3d(pose.head<3>()));
     camera.p_IinC = pose.tail<3>();
   }
   take(file_.cameras, numbers, camera.intrinsics, prior.sigma_intrinsics, errors);
-  for (const char* f : {"fx", "fy"}) {
-    const CalibrationEntry* const entry = find(file_.cameras, cam + f);
+  for (const std::size_t f : {0u, 1u}) {
+    const CalibrationEntry* const entry = find(file_.cameras, numbers.entries[f].name);
     if (entry != nullptr && !(entry->estimate > 0.)) {
       errors.add(entry->mark, entry->name + ": a focal length must be above 0");
     }

@@ -62,6 +62,9 @@ struct CameraBlocks {
 /// that shares it `cam0.clock`.
 VIWO_API CameraBlocks declare_camera(Declarations& host, int index);
 
+/// Extrinsics, intrinsics and clock of camera `index` as blocks of its own, in this order.
+VIWO_API std::array<BlockSpec, 3> camera_blocks(std::size_t index, const CameraPrior& prior);
+
 /// A wheel set: its kinematic model, and how its odometry frame O sits on the IMU.
 struct WheelsView {
   const KinematicModel* model = nullptr;
