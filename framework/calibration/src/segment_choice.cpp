@@ -10,6 +10,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "viwo/math/median.hpp"
 #include "viwo/math/significant.hpp"
 
 namespace viwo::calibration {
@@ -27,9 +28,7 @@ double pose_interval_s(const CalibrationSetup& setup) {
     }
   }
   if (intervals_s.empty()) return std::numeric_limits<double>::infinity();
-  const auto at = intervals_s.begin() + static_cast<std::ptrdiff_t>(intervals_s.size() / 2);
-  std::nth_element(intervals_s.begin(), at, intervals_s.end());
-  return *at;
+  return upper_median(intervals_s);
 }
 
 /// Every third recording is left out in turn: by how much dead reckoning then misses their ends.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "viwo/math/median.hpp"
 #include "viwo/math/significant.hpp"
 
 namespace viwo::log {
@@ -15,9 +16,7 @@ std::int64_t median_spacing_ns(const std::vector<EncoderSample>& samples) {
   for (std::size_t i = 1; i < samples.size(); ++i) {
     spacings.push_back(samples[i].t_ns - samples[i - 1].t_ns);
   }
-  const auto middle = spacings.begin() + static_cast<std::ptrdiff_t>(spacings.size() / 2);
-  std::nth_element(spacings.begin(), middle, spacings.end());
-  return *middle;
+  return upper_median(spacings);
 }
 
 EncoderSample cell_between(const EncoderReading& a, const EncoderReading& b) {

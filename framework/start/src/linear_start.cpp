@@ -7,6 +7,7 @@
 
 #include "start_frame.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/median.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
@@ -334,9 +335,7 @@ double parallax_rad(const VisualWindow& window, const Vector3d& gyro_bias,
     }
     angles.push_back(most);
   }
-  const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
-  std::nth_element(angles.begin(), middle, angles.end());
-  return *middle;
+  return upper_median(angles);
 }
 
 }  // namespace viwo

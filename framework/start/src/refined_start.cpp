@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 
 #include "visual_problem.hpp"
+#include "viwo/math/median.hpp"
 
 namespace viwo {
 namespace {
@@ -49,10 +50,8 @@ bool descend(const VisualProblem& problem, double sigma_px, int iterations, Visu
 /// Leaves out the tracks whose sights are off by much more than those of the others.
 void drop_outliers(VisualWindow& window, VisualEstimate& x, const VisualNormals& n) {
   std::vector<double> costs = n.track_cost;
-  const auto middle = costs.begin() + static_cast<std::ptrdiff_t>(costs.size() / 2);
-  std::nth_element(costs.begin(), middle, costs.end());
   // Means of some ten sights each scatter little.
-  const double limit = 6. * *middle;
+  const double limit = 6. * upper_median(costs);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < window.tracks.size(); ++i) {
     if (n.track_cost[i] > limit) continue;

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "viwo/math/median.hpp"
 #include "viwo/math/stamp.hpp"
 
 namespace viwo {
@@ -31,9 +32,7 @@ std::optional<double> median_distance(const FeatureSample& a, const std::vector<
     if (std::isfinite(distance)) distances.push_back(distance);
   }
   if (distances.size() < kFewestPoints) return std::nullopt;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return upper_median(distances);
 }
 
 /// Points in the order of their ids.
@@ -73,9 +72,7 @@ Stillness stillness_of(std::span<const FeatureSample> tracks, std::span<const do
     if (moved) neighbours.push_back(*moved);
   }
   if (neighbours.empty()) return Stillness::kUnknown;
-  const auto middle = neighbours.begin() + static_cast<std::ptrdiff_t>(neighbours.size() / 2);
-  std::nth_element(neighbours.begin(), middle, neighbours.end());
-  const double limit = std::min(kMostPx, *middle + kMostGrowthPx);
+  const double limit = std::min(kMostPx, upper_median(neighbours) + kMostGrowthPx);
   bool any_old = false;
   for (const FeatureSample* image : images) {
     const double age_s = seconds_between(imu_ns(*image), imu_ns(*images.back()));

@@ -8,6 +8,7 @@
 #include "start_frame.hpp"
 #include "viwo/camera/camera_model.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/median.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
@@ -54,12 +55,7 @@ VisualEstimate VisualProblem::initial(const LinearStart& linear, const Vector3d&
     in_anchor.emplace_back(camera.R_ItoC * (key.R_GtoI * (p_G - key.p_IinG)) + camera.p_IinC);
     if (in_anchor.back().z() > 0.05) depths.push_back(in_anchor.back().z());
   }
-  double usual = 3.;
-  if (!depths.empty()) {
-    const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-    std::nth_element(depths.begin(), middle, depths.end());
-    usual = *middle;
-  }
+  const double usual = depths.empty() ? 3. : upper_median(depths);
   for (std::size_t i = 0; i < window_.tracks.size(); ++i) {
     const Vector3d& bearing = window_.tracks[i].sights.front().bearing;
     const double z = in_anchor[i].z();

@@ -11,6 +11,7 @@
 
 #include "canvas.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/math/median.hpp"
 
 namespace viwo::view {
 namespace {
@@ -48,10 +49,9 @@ double rate_of(const std::vector<double>& t_s) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < t_s.size(); ++i) steps.push_back(t_s[i] - t_s[i - 1]);
   if (steps.empty()) return kDefaultRate_hz;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  if (!(*middle > 0.)) return kDefaultRate_hz;
-  return std::clamp(std::round(10. / *middle) / 10., 1., 240.);
+  const double usual_s = upper_median(steps);
+  if (!(usual_s > 0.)) return kDefaultRate_hz;
+  return std::clamp(std::round(10. / usual_s) / 10., 1., 240.);
 }
 
 /// Whether all pictures can be read again. Libraries do not tell when the disk was full.
