@@ -17,6 +17,7 @@
 #include "viwo/math/so3.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/random.hpp"
+#include "viwo/sim/true_cameras.hpp"
 
 namespace viwo {
 namespace {
@@ -135,21 +136,11 @@ class WrongStart {
 /// Draws of cameras follow those of any number of wheel sets.
 constexpr std::uint64_t kFirstCameraDraw = 1000;
 
-/// Moves a camera off by draws from its prior; what it was is remembered in `drawn_from`.
-void make_wrong(CameraPrior& prior, std::size_t index, WrongStart& wrong,
-                std::map<std::string, double>& drawn_from) {
+/// Moves a camera off by draws from its prior; what it was goes to `drawn_from`.
+void make_wrong(CameraPrior& prior, WrongStart& wrong, std::vector<CameraView>& drawn_from) {
   if (!wrong.is_wrong()) return;
-  const std::string name = "cam" + std::to_string(index) + ".";
   CameraView& camera = prior.camera;
-  const Vector3d theta = log_so3(camera.R_ItoC);
-  constexpr const char* kAxes[] = {"x", "y", "z"};
-  constexpr const char* kIntrinsics[] = {"fx", "fy", "cx", "cy", "d1", "d2", "d3", "d4"};
-  for (int i = 0; i < 3; ++i) {
-    drawn_from[name + "theta_ItoC_" + kAxes[i]] = theta[i];
-    drawn_from[name + "p_IinC_" + kAxes[i]] = camera.p_IinC[i];
-  }
-  for (int i = 0; i < 8; ++i) drawn_from[name + kIntrinsics[i]] = camera.intrinsics[i];
-  drawn_from[name + "t_CtoI"] = camera.t_CtoI_s;
+  drawn_from.push_back(camera);
   camera.R_ItoC = exp_so3(wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()))) * camera.R_ItoC;
   camera.p_IinC += wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
   for (int i = 0; i < 8; ++i) camera.intrinsics[i] += wrong.draw(prior.sigma_intrinsics[i]);
@@ -171,6 +162,7 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
   if (!calibrates) error.scale = 0.;
   WrongStart clock(error, context.seed, kFirstCameraDraw);
   std::optional<double> later_s;  // of all that share one clock
+  std::vector<CameraView> drawn_from;
   for (const CameraView& camera : *cameras) {
     const std::size_t index = setup.cameras.size();
     CameraPrior prior;
@@ -184,13 +176,16 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
     if (context.start != nullptr) context.start->take_camera(index, prior, errors);
     if (!later_s) later_s = clock.draw(prior.sigma_clock_s);
     WrongStart wrong(error, context.seed, kFirstCameraDraw + 1 + index);
-    make_wrong(prior, index, wrong, setup.drawn_from);
+    make_wrong(prior, wrong, drawn_from);
     const double own_s = wrong.draw(prior.sigma_clock_s);
     if (wrong.is_wrong()) prior.camera.t_CtoI_s += prior.shares_clock ? *later_s : own_s;
     if (!calibrates || !p.calibrate_extrinsics) prior.sigma_extrinsics.setZero();
     if (!calibrates || !p.calibrate_intrinsics) prior.sigma_intrinsics.setZero();
     if (!calibrates || !p.calibrate_time_offset) prior.sigma_clock_s = 0.;
     setup.cameras.push_back(prior);
+  }
+  for (const CalibrationSample& true_one : sim::camera_truth(drawn_from, 0)) {
+    setup.drawn_from[true_one.name] = true_one.value;
   }
 }
 
