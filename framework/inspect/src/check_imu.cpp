@@ -8,6 +8,7 @@
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/plausibility/imu_axes.hpp"
 #include "viwo/series/rate_grid.hpp"
 #include "viwo/series/rests.hpp"
 
@@ -29,12 +30,6 @@ constexpr double kAccelBias_m_per_s2 = 0.05, kGyroBias_rad_per_s = 0.02;
 double gravity_of(const Recording& recording) {
   const auto& filter = recording.setup->filter;
   return (filter ? filter->options : EstimatorOptions{}).filter.gravity_m_per_s2;
-}
-
-std::string axis_of(const Vector3d& direction) {
-  int i = 0;
-  direction.cwiseAbs().maxCoeff(&i);
-  return std::string(direction[i] < 0. ? "-" : "+") + "xyz"[i];
 }
 
 double degrees(double angle) { return angle * 180. / std::numbers::pi; }
@@ -127,9 +122,6 @@ void check_rest(const Recording& recording, const Rest& rest, const std::string&
 /// A number that never changes, and two that are the same all the time.
 void check_channels(const Recording& recording, const std::string& label, Findings& out) {
   const auto& imu = recording.imu;
-  constexpr std::array<const char*, 6> kNames = {"gyro's x",          "gyro's y",
-                                                 "gyro's z",          "accelerometer's x",
-                                                 "accelerometer's y", "accelerometer's z"};
   constexpr std::size_t kFewest = 100;
   if (imu.size() < kFewest) return;
   std::array<bool, 6> constant{};
@@ -151,13 +143,13 @@ void check_channels(const Recording& recording, const std::string& label, Findin
     const double value = i < 3 ? imu.front().gyro_rad_per_s[i] : imu.front().accel_m_per_s2[i - 3];
     if (constant[i]) {
       out.push_back({label, Severity::kFault, "channel",
-                     std::string("the ") + kNames[i] + " reads " + significant(value, 4) +
+                     std::string("the ") + kImuAxes[i] + " reads " + significant(value, 4) +
                          " all the time: not connected, or not read"});
     }
     for (std::size_t j = 0; j < i; ++j) {
       if (!same[i][j] || constant[i]) continue;
       out.push_back({label, Severity::kFault, "channel",
-                     std::string("the ") + kNames[i] + " and the " + kNames[j] +
+                     std::string("the ") + kImuAxes[i] + " and the " + kImuAxes[j] +
                          " are the same number in every reading: one of them is read twice"});
     }
   }

@@ -6,6 +6,7 @@
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/plausibility/imu_axes.hpp"
 
 namespace viwo {
 namespace {
@@ -16,9 +17,6 @@ constexpr std::int64_t kFewest = 500;  ///< readings before a verdict
 constexpr double kShortest_s = 3.;     ///< likewise
 constexpr int kManyEqual = 100;
 constexpr double kLongPull_s = 10.;  ///< of no braking, and no curve
-constexpr std::array<const char*, 6> kAxes = {"gyro's x",          "gyro's y",
-                                              "gyro's z",          "accelerometer's x",
-                                              "accelerometer's y", "accelerometer's z"};
 
 const char* unit_of(std::size_t axis) { return axis < 3 ? " rad/s" : " m/s^2"; }
 
@@ -157,8 +155,8 @@ void ImuCheck::find_stuck_channels(std::int64_t zero_ns, Findings& out) const {
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     const StuckChannel& channel = channels_[i];
     if (!channel.was_stuck()) continue;
-    out.push_back({name_ + " stuck " + kAxes[i],
-                   name_ + ": the " + kAxes[i] + " reads " + significant(channel.value(), 3) +
+    out.push_back({name_ + " stuck " + kImuAxes[i],
+                   name_ + ": the " + kImuAxes[i] + " reads " + significant(channel.value(), 3) +
                        unit_of(i) + " all the time from " + time_text(channel.from_ns() - zero_ns) +
                        " on, for " +
                        significant(seconds_between(channel.from_ns(), channel.to_ns()), 3) +
@@ -177,8 +175,8 @@ void ImuCheck::find_saturated(Findings& out) const {
     const Axis& axis = axes_[i];
     const double share = static_cast<double>(axis.at_largest) / static_cast<double>(count_);
     if (share < 0.02 || axis.most - axis.least <= 20. * axis.finest) continue;
-    out.push_back({name_ + " saturated " + kAxes[i],
-                   name_ + ": the " + kAxes[i] + " is at +-" + significant(axis.largest, 3) +
+    out.push_back({name_ + " saturated " + kImuAxes[i],
+                   name_ + ": the " + kImuAxes[i] + " is at +-" + significant(axis.largest, 3) +
                        unit_of(i) + " in " + percent(share) +
                        " of the readings: saturated - choose a larger full scale range"});
   }
@@ -190,7 +188,7 @@ void ImuCheck::find_spikes(Findings& out) const {
     const double share = static_cast<double>(axis.spikes) / static_cast<double>(count_);
     if (axis.spikes < 20 || share < 0.005) continue;
     const double mean = axis.spike_sum / static_cast<double>(axis.spikes);
-    out.push_back({name_ + " spikes", name_ + ": the " + kAxes[i] + " jumps by " +
+    out.push_back({name_ + " spikes", name_ + ": the " + kImuAxes[i] + " jumps by " +
                                           significant(mean, 2) + unit_of(i) + " and back in " +
                                           percent(share) +
                                           " of the readings: a disturbed bus, or a loose cable"});

@@ -12,6 +12,7 @@
 #include "twist_check.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/plausibility/channel_change.hpp"
+#include "viwo/plausibility/imu_axes.hpp"
 
 namespace viwo {
 namespace {
@@ -26,13 +27,6 @@ constexpr double kFactorTolerance = 0.15;
 
 bool is_about(double value, double wanted) {
   return std::abs(value / wanted - 1.) < kFactorTolerance;
-}
-
-/// The largest entry of a direction: "+x", "-z".
-std::string axis_of(const Eigen::Vector3d& direction) {
-  int i = 0;
-  direction.cwiseAbs().maxCoeff(&i);
-  return std::string(direction[i] < 0. ? "-" : "+") + "xyz"[i];
 }
 
 /// Which axis of the base each of the accelerometer's is, and its sign.
