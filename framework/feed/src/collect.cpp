@@ -69,11 +69,10 @@ class Collector {
   }
 
  private:
-  void add_reference(const PoseSample& pose) {
-    const Eigen::Quaterniond q_BtoW = to_quaternion(pose.q_BtoW_xyzw).normalized();
-    data_.reference.push_back(setup_.filter
-                                  ? StampedPose{pose.t_ns, to_vector(pose.p_BinW_m), q_BtoW}
-                                  : planar_pose(pose.t_ns, pose.p_BinW_m, q_BtoW));
+  void add_reference(const PoseSample& sample) {
+    const StampedPose pose = stamped_pose(sample);
+    data_.reference.push_back(setup_.filter ? pose
+                                            : planar_pose(pose.t_ns, sample.p_BinW_m, pose.q_BtoW));
   }
 
   const RunSetup& setup_;

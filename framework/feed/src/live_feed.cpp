@@ -28,7 +28,7 @@
 #include "viwo/feed/bounded_series.hpp"
 #include "viwo/feed/estimate_sample.hpp"
 #include "viwo/feed/feed.hpp"
-#include "viwo/math/arrays.hpp"
+#include "viwo/math/trajectory.hpp"
 
 namespace viwo {
 namespace {
@@ -323,17 +323,12 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
           estimator.add(route.stream, sample);
           break;
         case Consumer::kReferencePoses:
-          add_reference(*sample.get_if<PoseSample>());
+          reference_.add(stamped_pose(*sample.get_if<PoseSample>()));
           break;
         default:
           break;
       }
     });
-  }
-
-  void add_reference(const PoseSample& pose) {
-    reference_.add(
-        {pose.t_ns, to_vector(pose.p_BinW_m), to_quaternion(pose.q_BtoW_xyzw).normalized()});
   }
 
   const RunSetup& setup_;  // setup and hooks: not after stop()

@@ -15,7 +15,7 @@
 #include "played_sensor.hpp"
 #include "viwo/feed/estimate_sample.hpp"
 #include "viwo/feed/feed.hpp"
-#include "viwo/math/arrays.hpp"
+#include "viwo/math/trajectory.hpp"
 
 namespace viwo {
 namespace {
@@ -117,9 +117,7 @@ class LockstepFeed final : public Feed {
     has_imu_ = has_imu_ || sample.get_if<ImuSample>() != nullptr;
     setup_.routes.dispatch(sensor, sample.type(), [&](const Route& route) {
       if (route.consumer != Consumer::kReferencePoses) return;
-      const PoseSample& pose = *sample.get_if<PoseSample>();
-      reference_.push_back(
-          {pose.t_ns, to_vector(pose.p_BinW_m), to_quaternion(pose.q_BtoW_xyzw).normalized()});
+      reference_.push_back(stamped_pose(*sample.get_if<PoseSample>()));
     });
     const EstimatorRoutes& routes = routes_of(sensor, sample.type());
     if (routes.routes.empty()) return;

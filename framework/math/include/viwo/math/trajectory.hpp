@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 
 #include "viwo/api/measurement.hpp"
+#include "viwo/math/arrays.hpp"
 
 namespace viwo {
 
@@ -20,6 +21,10 @@ struct StampedPose {
   Eigen::Vector3d p_BinW = Eigen::Vector3d::Zero();            ///< m
   Eigen::Quaterniond q_BtoW = Eigen::Quaterniond::Identity();  ///< Hamilton, unit norm
 };
+
+inline StampedPose stamped_pose(const PoseSample& sample) {
+  return {sample.t_ns, to_vector(sample.p_BinW_m), to_quaternion(sample.q_BtoW_xyzw).normalized()};
+}
 
 /// In time order, stamps increasing.
 using Trajectory = std::vector<StampedPose>;
