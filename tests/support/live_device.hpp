@@ -51,6 +51,22 @@ class Device : public Sensor {
   bool stopped_ = false;
 };
 
+/// Breaks after all that it was made with has been given.
+class BreakingDevice : public Device {
+ public:
+  explicit BreakingDevice(std::vector<Measurement> measurements,
+                          std::string error = "the cable is out")
+      : Device(std::move(measurements), false), error_(std::move(error)) {}
+  Status next(Measurement& out) override {
+    const Status status = Device::next(out);
+    if (status == Status::kEnd) throw InputError(error_);
+    return status;
+  }
+
+ private:
+  std::string error_;
+};
+
 /// A robot with wheels, IMU and a camera that starts while it moves.
 inline RunSetup standing_then_driving(double duration_s = 4.,
                                       const std::string& estimator = "start: moving") {

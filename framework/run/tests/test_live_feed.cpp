@@ -24,6 +24,7 @@
 namespace viwo {
 namespace {
 
+using testing::BreakingDevice;
 using testing::Device;
 using testing::in_time_order;
 using testing::Points;
@@ -258,27 +259,22 @@ TEST(LiveFeed, SaysThatNothingHasCome) {
 }
 
 TEST(LiveFeed, EndsWithTheErrorOfItsSensor) {
-  class Broken final : public Device {
-   public:
-    Broken() : Device({}, false) {}
-    Status next(Measurement& /*out*/) override { throw InputError("the cable is out"); }
-  };
   RunSetup setup = standing_then_driving();
   RunData data;
-  data.live.push_back(stream("device", std::make_shared<Broken>()));
+  data.live.push_back(
+      stream("device", std::make_shared<BreakingDevice>(std::vector<Measurement>())));
   EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }), "the cable is out");
 }
 
 TEST(LiveFeed, EndsWithTheErrorOfItsSensorThoughThatCannotBeStopped) {
-  class Broken final : public Device {
+  class Broken final : public BreakingDevice {
    public:
-    Broken() : Device({}, false) {}
-    Status next(Measurement& /*out*/) override { throw InputError("the cable is out"); }
+    using BreakingDevice::BreakingDevice;
     void stop() override { throw InputError("and nobody listens"); }
   };
   RunSetup setup = standing_then_driving();
   RunData data;
-  data.live.push_back(stream("device", std::make_shared<Broken>()));
+  data.live.push_back(stream("device", std::make_shared<Broken>(std::vector<Measurement>())));
   EXPECT_EQ(testing::error_of([&] { run_filter(setup, data); }), "the cable is out");
 }
 
@@ -303,22 +299,12 @@ TEST(LiveFeed, KeepsTheResultsOfASensorThatCannotBeStopped) {
 }
 
 TEST(LiveFeed, KeepsTheResultsUpToTheErrorOfOneOfItsSensors) {
-  /// Breaks after all else has been given.
-  class Breaking final : public Device {
-   public:
-    using Device::Device;
-    Status next(Measurement& out) override {
-      const Status status = Device::next(out);
-      if (status == Status::kEnd) throw InputError("the cable is out");
-      return status;
-    }
-  };
   RunSetup setup = standing_then_driving();
   const RunData recorded = collect(setup);
   RunData data;
   setup.routes = routes_of_device(setup, {{"silent", {}}});
   data.live.push_back(
-      stream("device", std::make_shared<Breaking>(in_time_order(recorded.recorded), false)));
+      stream("device", std::make_shared<BreakingDevice>(in_time_order(recorded.recorded))));
   data.live.push_back(stream("silent", std::make_shared<Device>(std::vector<Measurement>(), true)));
   const RunResult live = run_filter(setup, data);
   EXPECT_EQ(live.status, RunStatus::kFailed);

@@ -18,6 +18,7 @@
 namespace viwo {
 namespace {
 
+using testing::BreakingDevice;
 using testing::Device;
 using testing::routes_of_pictures;
 using testing::standing_then_driving;
@@ -108,18 +109,10 @@ TEST(LockstepFeed, WaitsForWhatComesUntilItIsInterrupted) {
 }
 
 TEST(LockstepFeed, EndsWithWhatItsSensorSays) {
-  class Broken final : public Device {
-   public:
-    using Device::Device;
-    Status next(Measurement& out) override {
-      const Status status = Device::next(out);
-      if (status == Status::kEnd) throw InputError("messages were lost");
-      return status;
-    }
-  };
   RunSetup setup = standing_then_driving();
   const auto measurements = with_pictures(collect(setup));
-  const RunResult result = play(std::make_shared<Broken>(measurements, false));
+  const RunResult result =
+      play(std::make_shared<BreakingDevice>(measurements, "messages were lost"));
   EXPECT_EQ(result.status, RunStatus::kFailed);
   EXPECT_EQ(result.cause, "messages were lost");
 }
