@@ -108,19 +108,8 @@ void epochs(benchmark::State& state, const Variant& variant) {
                          benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
-void reference_product(benchmark::State& state) {
-  std::srand(1);  // Eigen's Random
-  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(512, 512);
-  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(512, 512);
-  Eigen::MatrixXd c(512, 512);
-  for (auto _ : state) {
-    c.noalias() = a * b;
-    benchmark::DoNotOptimize(c.data());
-  }
-}
-
 void register_all() {
-  benchmark::RegisterBenchmark(kReference.c_str(), reference_product)
+  benchmark::RegisterBenchmark(kReference.c_str(), testing::matrix_product, 512)
       ->Unit(benchmark::kMillisecond);
   for (const Variant& variant : kVariants) {
     benchmark::RegisterBenchmark(variant.name, epochs, variant)

@@ -96,19 +96,8 @@ void preintegrate_intervals(benchmark::State& state, const std::string& yaml,
   report_samples(state, kIntervals * kPerInterval);
 }
 
-void reference_product(benchmark::State& state) {
-  std::srand(1);  // Eigen's Random
-  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(64, 64);
-  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(64, 64);
-  Eigen::MatrixXd c(64, 64);
-  for (auto _ : state) {
-    c.noalias() = a * b;
-    benchmark::DoNotOptimize(c.data());
-  }
-}
-
 void register_all() {
-  benchmark::RegisterBenchmark(kReference.c_str(), reference_product);
+  benchmark::RegisterBenchmark(kReference.c_str(), testing::matrix_product, 64);
   const std::pair<const char*, std::string> models[] = {
       {"four_wis_wid", testing::swerve("four_wis_wid")},
       {"four_wis_wid_drive_only", testing::swerve("four_wis_wid_drive_only")},

@@ -4,14 +4,28 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
 #include <benchmark/benchmark.h>
 
 namespace viwo::testing {
+
+/// The reference: of matrices with `n` rows and columns.
+inline void matrix_product(benchmark::State& state, Eigen::Index n) {
+  std::srand(1);  // Eigen's Random
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Random(n, n);
+  const Eigen::MatrixXd b = Eigen::MatrixXd::Random(n, n);
+  Eigen::MatrixXd c(n, n);
+  for (auto _ : state) {
+    c.noalias() = a * b;
+    benchmark::DoNotOptimize(c.data());
+  }
+}
 
 /// Of both spellings that the library has had.
 template <class Run>
