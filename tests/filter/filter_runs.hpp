@@ -2,10 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "registry.hpp"
+#include "viwo/eval/consistency.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/run/run.hpp"
 #include "viwo/setup/configuration.hpp"
@@ -32,6 +34,33 @@ inline std::vector<RunResult> paper_runs(const std::string& variant, int seeds,
   std::vector<RunResult> runs;
   for (experiment::ExperimentRun& run : result.runs) runs.push_back(std::move(run.result));
   return runs;
+}
+
+enum class MayBeModest { kNo, kYes };
+
+/// Empty when the pose is consistent at all instants (s), each with its share of an error
+/// probability of 0.001, else what is not.
+inline std::string inconsistency_of_pose(const std::vector<RunResult>& runs,
+                                         const std::vector<double>& instants,
+                                         MayBeModest modest = MayBeModest::kNo) {
+  std::ostringstream out;
+  const int n = static_cast<int>(runs.size());
+  const auto bounds =
+      eval::mean_nees_bounds(6, n, 1. - 0.001 / static_cast<double>(instants.size()));
+  for (const double instant : instants) {
+    double mean = 0.;
+    for (const auto& run : runs) {
+      const auto& series = run.nees.series;
+      const auto at = std::find_if(series.begin(), series.end(),
+                                   [&](const auto& entry) { return entry.first >= instant; });
+      if (at == series.end()) return "a run ended early: " + run.cause;
+      mean += at->second / n;
+    }
+    if ((modest == MayBeModest::kYes || mean > bounds.low) && mean < bounds.high) continue;
+    out << "at " << instant << " s: mean NEES of the pose " << mean << " outside of " << bounds.low
+        << " .. " << bounds.high << "\n";
+  }
+  return out.str();
 }
 
 /// The estimator of a run that starts at the first true state.

@@ -59,23 +59,11 @@ bool is_intrinsic(const std::string& name) {
 /// Empty when the pose is consistent at all instants and no intrinsic is further off than it
 /// claims, else what is not.
 std::string inconsistency(const std::vector<RunResult>& runs) {
+  const std::string pose = testing::inconsistency_of_pose(runs, kInstants);
+  if (pose.starts_with("a run ended early")) return pose;
   std::ostringstream out;
+  out << pose;
   const int n = static_cast<int>(runs.size());
-  const auto pose =
-      eval::mean_nees_bounds(6, n, 1. - kErrorProbability / static_cast<double>(kInstants.size()));
-  for (const double instant : kInstants) {
-    double mean = 0.;
-    for (const auto& run : runs) {
-      const auto& series = run.nees.series;
-      const auto at = std::find_if(series.begin(), series.end(),
-                                   [&](const auto& entry) { return entry.first >= instant; });
-      if (at == series.end()) return "a run ended early: " + run.cause;
-      mean += at->second / n;
-    }
-    if (mean > pose.low && mean < pose.high) continue;
-    out << "at " << instant << " s: mean NEES of the pose " << mean << " outside of " << pose.low
-        << " .. " << pose.high << "\n";
-  }
   const auto count = runs.front().calibration.size();
   const auto single =
       eval::mean_nees_bounds(1, n, 1. - kErrorProbability / static_cast<double>(count));

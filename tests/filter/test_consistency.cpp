@@ -5,45 +5,22 @@
 // independent is one instant over the seeds: the sum of NEES there is chi-square with 6 degrees of
 // freedom per seed, exactly. Several instants are tested, each with its share of the error
 // probability (Bonferroni), which holds whatever their correlation.
-#include <cmath>
-#include <sstream>
-
 #include <gtest/gtest.h>
 
 #include "filter_runs.hpp"
-#include "viwo/eval/consistency.hpp"
 
 namespace viwo {
 namespace {
 
+using testing::MayBeModest;
+
 constexpr int kSeeds = 8;
-constexpr double kErrorProbability = 0.001;
 const std::vector<double> kInstants{5., 10., 15., 19.5};
 const std::vector<std::string> kTwentySeconds{"sensors.simulator0.duration_s=20"};
 
-enum class MayBeModest { kNo, kYes };
-
-/// Empty when the pose is consistent at all instants, else what is not.
 std::string inconsistency(const std::vector<RunResult>& runs,
                           MayBeModest modest = MayBeModest::kNo) {
-  std::ostringstream out;
-  const int n = static_cast<int>(runs.size());
-  const auto bounds =
-      eval::mean_nees_bounds(6, n, 1. - kErrorProbability / static_cast<double>(kInstants.size()));
-  for (const double instant : kInstants) {
-    double mean = 0.;
-    for (const auto& run : runs) {
-      const auto& series = run.nees.series;
-      const auto at = std::find_if(series.begin(), series.end(),
-                                   [&](const auto& entry) { return entry.first >= instant; });
-      if (at == series.end()) return "a run ended early: " + run.cause;
-      mean += at->second / n;
-    }
-    if ((modest == MayBeModest::kYes || mean > bounds.low) && mean < bounds.high) continue;
-    out << "at " << instant << " s: mean NEES " << mean << " outside of " << bounds.low << " .. "
-        << bounds.high << "\n";
-  }
-  return out.str();
+  return testing::inconsistency_of_pose(runs, kInstants, modest);
 }
 
 std::vector<std::string> with(std::vector<std::string> more) {
