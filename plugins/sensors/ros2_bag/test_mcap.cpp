@@ -5,6 +5,7 @@
 
 #include <sys/resource.h>
 
+#include "expect_same.hpp"
 #include "ros2_writer.hpp"
 #include "test_fixture.hpp"
 
@@ -17,40 +18,6 @@ using testing::text_of;
 constexpr const char* kTopics =
     "imu_topic: /imu0, joint_topic: /joints, drive_joints: [drive], steer_joints: [steer], "
     "image_topics: [/cam0], pose_topic: /pose";
-
-template <class Sample>
-void expect_equal(const std::vector<Measurement>& a, const std::vector<Measurement>& b,
-                  void (*compare)(const Sample&, const Sample&)) {
-  const auto x = only<Sample>(a), y = only<Sample>(b);
-  ASSERT_EQ(x.size(), y.size());
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    EXPECT_EQ(x[i].t_ns, y[i].t_ns);
-    compare(x[i], y[i]);
-  }
-}
-
-/// To the bit, pixels too.
-void expect_same(const std::vector<Measurement>& a, const std::vector<Measurement>& b) {
-  expect_equal<ImuSample>(a, b, [](const ImuSample& x, const ImuSample& y) {
-    EXPECT_EQ(x.gyro_rad_per_s, y.gyro_rad_per_s);
-    EXPECT_EQ(x.accel_m_per_s2, y.accel_m_per_s2);
-  });
-  expect_equal<EncoderSample>(a, b, [](const EncoderSample& x, const EncoderSample& y) {
-    EXPECT_EQ(x.begin_ns, y.begin_ns);
-    EXPECT_EQ(x.drive_rad_per_s, y.drive_rad_per_s);
-    EXPECT_EQ(x.steer_rad, y.steer_rad);
-  });
-  expect_equal<PoseSample>(a, b, [](const PoseSample& x, const PoseSample& y) {
-    EXPECT_EQ(x.p_BinW_m, y.p_BinW_m);
-    EXPECT_EQ(x.q_BtoW_xyzw, y.q_BtoW_xyzw);
-  });
-  expect_equal<ImageSample>(a, b, [](const ImageSample& x, const ImageSample& y) {
-    Image left, right;
-    x.source->read(left);
-    y.source->read(right);
-    EXPECT_EQ(left.pixels, right.pixels);
-  });
-}
 
 class Mcap : public Ros2Bag {
  protected:
@@ -88,6 +55,10 @@ TEST_F(Mcap, GivesToTheBitWhatSqliteGives) {
     EXPECT_TRUE(all_rejections(*sensor).empty());
     if (std::string(name) != "split/split_0.mcap") {
       expect_same(expected, samples);
+      expect_equal<EncoderSample>(expected, samples,
+                                  [](const EncoderSample& x, const EncoderSample& y) {
+                                    EXPECT_EQ(x.begin_ns, y.begin_ns);
+                                  });
     } else {
       EXPECT_EQ(only<ImuSample>(samples).size(), 10U);
     }
