@@ -111,10 +111,9 @@ TEST_F(ConfigurationTest, RefusesWrongValues) {
              "alone, it is in s");
   refuse_run("duration_s: 5", "duration_s: [5]",
              "run.yaml:11:17  sensors.sim.duration_s: expected a number, got a list (how long, s)");
-  refuse_run(
-      "duration_s: 5", "duration_s: 0",
-      "run.yaml:11:17  sensors.sim.duration_s: 0 violates 0 < duration_s <= 86400 (how long, "
-      "s)");
+  refuse_run("duration_s: 5", "duration_s: 0",
+             "run.yaml:11:17  sensors.sim.duration_s: 0 violates 0 < duration_s <= 7200 (how long, "
+             "s)");
   refuse_run("motion: circle", "motion: cirlce",
              "run.yaml:12:13  sensors.sim.motion: unknown value 'cirlce' - did you mean 'circle'?");
   refuse_run("*robot", "*robot\nodometry: {twist: planar, epochs: 3}",
