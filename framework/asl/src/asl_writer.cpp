@@ -132,19 +132,11 @@ struct AslWriter::Tables {
   /// False when the measurement is of none of the kinds.
   template <class... Samples>
   bool write_one_of(const Measurement& measurement) {
-    return (write_if<Samples>(measurement) || ...);
+    return visit_one_of<Samples...>(measurement, [this](const auto& sample) { write(sample); });
   }
 
   std::vector<std::optional<TextWriter>> image_tables;  ///< by camera
   Image pixels;
-
- private:
-  template <class Sample>
-  bool write_if(const Measurement& measurement) {
-    const auto* sample = measurement.get_if<Sample>();
-    if (sample != nullptr) write(*sample);
-    return sample != nullptr;
-  }
 };
 
 TextWriter& AslWriter::Tables::open(Table table, std::string_view header) {

@@ -68,8 +68,7 @@ void refuse_misspelt_labels(const Recording& recording) {
       const bool is_near = label.starts_with(stem) ||
                            !config::nearest(label, std::vector<std::string>{known}).empty();
       if (label == known || !is_near) continue;
-      config::fail(recording.mark,
-                   name_of(recording) + ": label '" + label + "' - did you mean '" + known + "'?");
+      fail(recording, ": label '" + label + "' - did you mean '" + known + "'?");
     }
   }
 }
@@ -101,9 +100,7 @@ void require_for_smoother(const CalibrationSetup& setup, const Node& file) {
   }
   for (const CalibrationRecording& recording : setup.recordings) {
     if (!recording.motion.distance_m && !recording.motion.turn_rad) continue;
-    config::fail(
-        recording.label.mark,
-        name_of(recording.label) + ": distance_m and turn_deg are not for reference: smoother");
+    fail(recording.label, ": distance_m and turn_deg are not for reference: smoother");
   }
 }
 

@@ -68,8 +68,7 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
     end_ns = std::min(end_ns - margin_ns, poses.back().t_ns - offset_ns);
   }
   if (!(seconds_between(begin_ns, end_ns) > 0.)) {
-    config::fail(recording.label.mark,
-                 name_of(recording.label) + ": wheels and reference have no time in common");
+    fail(recording.label, ": wheels and reference have no time in common");
   }
   for (const StampedPose& pose : poses) {
     const double before = yaw_.empty() ? 0. : yaw_.back();
@@ -137,11 +136,9 @@ void RecordingProblem::compare_with_reference() {
     }
   }
   if (ends.size() < 2) {
-    config::fail(recording_.label.mark,
-                 name_of(recording_.label) +
-                     ": at all ends of segments the reference has gaps of more than " +
-                     significant(recording_.motion.max_gap_s, 3) +
-                     " s (evaluation.reference_max_gap_s, of poses)");
+    fail(recording_.label, ": at all ends of segments the reference has gaps of more than " +
+                               significant(recording_.motion.max_gap_s, 3) +
+                               " s (evaluation.reference_max_gap_s, of poses)");
   }
   stamps_ns_ = std::move(known_ns);
   const bool from_start = options_.segments == calibration::Segments::kTrajectory;

@@ -26,8 +26,7 @@ std::optional<double> number_of(const Recording& recording, const char* label, c
   const auto [stop, error] = std::from_chars(text.data(), end, number);
   if (error != std::errc() || stop != end || !std::isfinite(number) ||
       !(may_be_any || number > 0.)) {
-    config::fail(recording.mark,
-                 name_of(recording) + ": " + label + " is '" + text + "', not " + what);
+    fail(recording, ": " + std::string(label) + " is '" + text + "', not " + what);
   }
   return number;
 }
@@ -88,27 +87,24 @@ Trajectory yaw_of_headings(std::span<const HeadingSample> headings) {
 
 MotionReference motion_reference(const Recording& label, const RunSetup& setup, const RunData& data,
                                  ReferenceKind kind) {
-  const auto has_no = [&label](const std::string& what) {
-    config::fail(label.mark, name_of(label) + " has " + what);
-  };
   MotionReference out;
   out.kind = kind;
   const bool has_gyro = !data.imu().empty() || !data.headings().empty();
   if (kind == ReferenceKind::kAuto) {
     if (data.reference.empty() && !has_gyro) {
-      has_no(
-          "neither a reference nor a gyro to calibrate against; wheels alone, "
-          "with distance_m or turn_deg as labels of the recordings, are reference: none");
+      fail(label,
+           " has neither a reference nor a gyro to calibrate against; wheels alone, "
+           "with distance_m or turn_deg as labels of the recordings, are reference: none");
     }
     out.kind = data.reference.empty() ? ReferenceKind::kGyro : ReferenceKind::kPoses;
   }
   if (out.kind == ReferenceKind::kPoses) {
-    if (data.reference.empty()) has_no("no reference poses to calibrate against");
+    if (data.reference.empty()) fail(label, " has no reference poses to calibrate against");
     out.poses = data.reference;
     out.offset_s = setup.reference_time_offset_s;
     out.max_gap_s = setup.evaluation.max_reference_gap_s;
   } else if (out.kind == ReferenceKind::kGyro) {
-    if (!has_gyro) has_no("no gyro to calibrate against");
+    if (!has_gyro) fail(label, " has no gyro to calibrate against");
     out.poses = data.imu().empty() ? yaw_of_headings(data.headings()) : yaw_of_gyro(data.imu());
     out.offset_s = setup.t_OtoI_s;
     // Headings are often logged where they change only.

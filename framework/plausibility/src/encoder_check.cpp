@@ -105,8 +105,8 @@ void EncoderCheck::find_degrees(Findings& out) const {
                  name_ + ": steering angles up to " + significant(largest_steer_, 3) +
                      " rad: they are in degrees",
                  false,
-                 {{"sensors." + sensor_ + ".steer_scale",
-                   yaml_list(n_steer(), [](std::size_t) { return "0.0174532925199433"; })}}});
+                 ChannelChange{ChannelChange::kSteersInDegrees}.remedies(
+                     sensor_, solver_.model().description())});
 }
 
 /// One change makes the contradictions of the wheels vanish: to a tenth of what they are. Others

@@ -38,7 +38,6 @@ class EncoderCheck {
     double signal = 0.;    ///< of what the rows say, (m/s)^2
   };
 
-  std::size_t n_steer() const { return static_cast<std::size_t>(n_steer_); }
   void watch_steering(const EncoderSample& sample);
   void try_changes(const EncoderSample& sample);
   void find_stuck(std::int64_t zero_ns, Findings& out) const;

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -31,10 +30,8 @@ class LogMedian {
 
 class ImuCheck {
  public:
-  ImuCheck(SensorName imu, double gravity_m_per_s2)
-      : name_(std::move(imu.text)),
-        unit_key_("sensors." + imu.sensor + ".accel_unit"),
-        gravity_(gravity_m_per_s2) {}
+  ImuCheck(const SensorName& imu, double gravity_m_per_s2)
+      : name_(imu.text), unit_key_(imu.key("accel_unit")), gravity_(gravity_m_per_s2) {}
 
   /// Readings in time order. `moves`: the wheels turn.
   void add(const ImuSample& sample, bool moves);

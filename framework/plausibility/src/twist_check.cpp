@@ -39,8 +39,8 @@ TwistCheck::TwistCheck(const SensorName& imu, const SensorName& wheels,
                        Gyro gyro)
     : imu_(imu.text),
       wheels_(wheels.text),
-      gyro_unit_("sensors." + imu.sensor + (gyro == Gyro::kHeading ? ".yaw_unit" : ".gyro_unit")),
-      drive_scale_("sensors." + wheels.sensor + ".drive_scale"),
+      gyro_unit_(imu.key(gyro == Gyro::kHeading ? "yaw_unit" : "gyro_unit")),
+      drive_scale_(wheels.key("drive_scale")),
       gyro_is_(gyro),
       n_drive_(model->description().n_drive),
       n_steer_(model->description().n_steer),
@@ -48,7 +48,7 @@ TwistCheck::TwistCheck(const SensorName& imu, const SensorName& wheels,
       p_IinO_(prior.wheels.p_IinO.head<2>()),
       t_OtoI_s_(prior.wheels.t_OtoI_s),
       sigma_t_OtoI_s_(prior.sigma_time_offset_s),
-      order_(wheels_, wheels.sensor, model, prior.wheels.x_WI) {}
+      order_(wheels, model, prior.wheels.x_WI) {}
 
 void TwistCheck::add_imu(const ImuSample& sample) {
   if (sample.fault() != nullptr || sample.t_ns < 0) return;

@@ -5,12 +5,9 @@
 
 namespace viwo {
 
-YawOrderCheck::YawOrderCheck(std::string name, std::string sensor,
-                             const std::shared_ptr<const WheelModel>& model, const Intrinsics& x_WI)
-    : name_(std::move(name)),
-      sensor_(std::move(sensor)),
-      solver_(model, {}),
-      changes_(changes_by_gyro(model, x_WI)) {
+YawOrderCheck::YawOrderCheck(SensorName wheels, const std::shared_ptr<const WheelModel>& model,
+                             const Intrinsics& x_WI)
+    : wheels_(std::move(wheels)), solver_(model, {}), changes_(changes_by_gyro(model, x_WI)) {
   solver_.set_intrinsics(x_WI);
   // Models with more have rows that contradict each other.
   if (changes_.size() > kMost) changes_.resize(kMost);
@@ -44,9 +41,9 @@ bool YawOrderCheck::findings(Findings& out) const {
   if (opposite_.count() < kFewest) return false;
   const std::size_t best = clear_change(undone_, opposite_);
   if (best == 0) return false;
-  out.push_back({name_ + " yaw order",
-                 name_ + ": " + text_of(changes_[best], undone_.front(), undone_[best]), false,
-                 changes_[best].remedies(sensor_, solver_.model().description())});
+  out.push_back({wheels_.text + " yaw order",
+                 wheels_.text + ": " + text_of(changes_[best], undone_.front(), undone_[best]),
+                 false, changes_[best].remedies(wheels_.sensor, solver_.model().description())});
   return true;
 }
 

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <memory>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "sensor_name.hpp"
 #include "viwo/api/measurement.hpp"
 #include "viwo/plausibility/finding.hpp"
 #include "viwo/plausibility/yaw_order.hpp"
@@ -19,9 +19,8 @@ class YawOrderCheck {
   static constexpr int kMost = 16;  ///< changes
   using Rates = Eigen::Matrix<double, kMost, 1>;
 
-  /// `name` is what texts call the wheels, `sensor` what the configuration calls it.
-  YawOrderCheck(std::string name, std::string sensor,
-                const std::shared_ptr<const WheelModel>& model, const Intrinsics& x_WI);
+  YawOrderCheck(SensorName wheels, const std::shared_ptr<const WheelModel>& model,
+                const Intrinsics& x_WI);
 
   /// Yaw rate of a sample with each of the changes undone, rad/s, of which `as_it_is` is known;
   /// NaN: the wheels tell none.
@@ -32,7 +31,7 @@ class YawOrderCheck {
   bool findings(Findings& out) const;
 
  private:
-  std::string name_, sensor_;
+  SensorName wheels_;
   TwistSolver solver_;
   TwistSolution solution_;
   std::vector<ChannelChange> changes_;  ///< the first is none

@@ -184,9 +184,7 @@ std::filesystem::path kinematics_calibration(const Node& kinematics) {
     config::fail(file->mark(), "kinematics.calibration must be the path of a calibration.yaml");
   }
   const std::filesystem::path from = file->mark().line > 0 ? file->mark().file : "";
-  const auto path = std::filesystem::absolute(from.parent_path() / file->scalar());
-  config::require_file_of_key("kinematics.calibration", *file, path);
-  return path.lexically_normal();
+  return std::filesystem::absolute(from.parent_path() / file->scalar()).lexically_normal();
 }
 
 std::optional<CalibrationStart> read_calibration_start(const Node& run,
@@ -202,10 +200,11 @@ std::optional<CalibrationStart> read_calibration_start(const Node& run,
     return std::nullopt;
   }
   if (of_run.empty() && of_wheels.empty()) return std::nullopt;
-  if (!of_run.empty()) {
-    config::require_file_of_key("calibration", *run.find("calibration"), of_run);
-  }
-  return CalibrationStart(read_calibration(of_run.empty() ? of_wheels : of_run), of_run.empty());
+  const bool only_wheels = of_run.empty();
+  const std::string key = only_wheels ? "kinematics.calibration" : "calibration";
+  const std::filesystem::path& file = only_wheels ? of_wheels : of_run;
+  config::require_file_of_key(key, *run.at_path(key), file);
+  return CalibrationStart(read_calibration(file), only_wheels);
 }
 
 }  // namespace viwo
