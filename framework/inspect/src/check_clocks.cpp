@@ -14,6 +14,8 @@
 #include "viwo/math/significant.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/plausibility/imu_axes.hpp"
+#include "viwo/plausibility/plausibility.hpp"
 #include "viwo/series/lag.hpp"
 
 namespace viwo::inspect {
@@ -210,6 +212,38 @@ Finding clock_finding(const std::string& label, const ClockWords& words, const L
   return finding;
 }
 
+/// Wheels that do not turn as the gyro says of the vertical, but as it says of another of its axes.
+/// `correlation`: with the vertical.
+void check_gyro_axes(const Recording& recording, const std::string& wheels,
+                     const RateGrid& of_wheels, double correlation, Findings& out) {
+  const Span span = span_of(recording);
+  const std::vector<Turn> gyro = turns_of(recording.imu);
+  double most = 0.;
+  Vector3d axis = Vector3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const Vector3d one = Vector3d::Unit(i);
+    const auto lag = find_lag(RateGrid(span.begin_ns, span.end_ns, about(gyro, one)), of_wheels);
+    if (!lag || std::abs(lag->correlation) <= std::abs(most)) continue;
+    most = lag->correlation;
+    axis = std::copysign(1., most) * one;
+  }
+  constexpr double kAlike = 0.8, kClearly = 0.3;
+  if (std::abs(most) < std::max(kAlike, std::abs(correlation) + kClearly)) return;
+  const Vector3d up = up_of(recording.imu);
+  out.push_back({recording.label<ImuSample>(recording.imu_sensor),
+                 Severity::kFault,
+                 "axes",
+                 "its " + axis_of(axis) + " axis turns as " + wheels + " does (correlation " +
+                     significant(std::abs(most), 3) + ", about the vertical " +
+                     significant(std::abs(correlation), 2) + "), " +
+                     (up.norm() > 0. ? "but gravity is along its " + axis_of(up) +
+                                           " axis: columns of its gyro or accelerometer are "
+                                           "exchanged"
+                                     : "which is not what wheels.R_ItoO says of its mounting"),
+                 {{"correlation", std::abs(most), ""},
+                  {"correlation about the vertical", std::abs(correlation), ""}}});
+}
+
 /// Of a wheel set against a gyro.
 void check_wheel_clock(const Recording& recording, const Wheels& wheels, const YawRates& rates,
                        Findings& out) {
@@ -234,6 +268,11 @@ void check_wheel_clock(const Recording& recording, const Wheels& wheels, const Y
                    is_compared ? "compared with " + label
                                : "not looked at but for its stamps: its turns and those of " +
                                      label + " are too few, or too different"});
+  }
+  if (!is_heading && !is_compared) {
+    check_gyro_axes(recording, label,
+                    RateGrid(span.begin_ns, span.end_ns, about(of_wheels, Vector3d::UnitZ())),
+                    lag ? lag->correlation : 0., out);
   }
   if (!lag) {
     out.push_back({label, Severity::kNote, "clock",

@@ -67,6 +67,7 @@ constexpr std::array<std::string_view, 6> kWheelCauses = {"order",   "turn", "st
 constexpr std::array<std::string_view, 8> kNotOfGyro = {
     "order", "turn", "steering", "channel", "steer offsets", "parity", "speed", "heading"};
 constexpr std::array<std::string_view, 2> kOrder = {"order", "steering"};
+constexpr std::array<std::string_view, 1> kAxes = {"axes"};
 constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
 /// What no noise is the remedy of.
 constexpr std::array<std::string_view, 4> kNoNoise = {"contradicted", "parity", "speed", "heading"};
@@ -103,7 +104,9 @@ void demote_consequences(const Recording& recording, Findings& findings) {
   }
   for (Finding& finding : findings) {
     const bool is_of_gyro = std::find(gyros.begin(), gyros.end(), finding.sensor) != gyros.end();
-    if (is_of_gyro && finding.check == "rate" && !wheels.empty()) demote(finding, wheels);
+    if (!is_of_gyro || finding.check != "rate") continue;
+    if (!wheels.empty()) demote(finding, wheels);
+    if (is_fault_of(findings, finding.sensor, kAxes)) demote(finding, finding.sensor);
   }
   const Findings all = findings;
   const auto wrong = std::find_if(gyros.begin(), gyros.end(), [&](const std::string& gyro) {

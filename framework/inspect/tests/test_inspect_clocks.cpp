@@ -10,6 +10,7 @@
 namespace viwo::inspect {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -49,6 +50,21 @@ TEST(InspectClocks, FindsAClockThatWasSet) {
   const Finding clock = finding_of(set, "wheels0", "clock");
   EXPECT_THAT(clock.what, HasSubstr("was set"));
   EXPECT_NEAR(figure_of(clock, "change"), 0.5, 0.01);
+}
+
+TEST(InspectClocks, FindsAGyroWhoseColumnsAreExchangedOnABaseThatStaysLevel) {
+  const auto level = [] {
+    return simulated("viwo_swerve",
+                     {"sensors.simulator0.duration_s=40", "sensors.simulator0.ground=flat"});
+  };
+  const Inspection exchanged = inspected(level(), {.imu = [](ImuSample& s) {
+                                           std::swap(s.gyro_rad_per_s[0], s.gyro_rad_per_s[2]);
+                                           return true;
+                                         }});
+  EXPECT_THAT(faults_of(exchanged), ElementsAre("imu0 axes"));
+  EXPECT_THAT(
+      finding_of(exchanged, "imu0", "axes").what,
+      AllOf(HasSubstr("its +x axis turns as wheels0 does"), HasSubstr("along its +z axis")));
 }
 
 class InspectRealCamera : public ::testing::Test {
