@@ -223,6 +223,11 @@ log::ImuRecording read_imu(const Contents& contents, const Params& params) {
   return finish(contents, order, std::move(samples));
 }
 
+/// To rad, of a yaw that is one number.
+double yaw_factor(const Source& source, const Params& params) {
+  return source.pick.is_rotation ? 1. : params.yaw_factor();
+}
+
 /// Of a quaternion w, x, y, z.
 double yaw_of(std::span<const double> q) {
   return std::atan2(2. * (q[0] * q[3] + q[1] * q[2]), 1. - 2. * (q[2] * q[2] + q[3] * q[3]));
@@ -239,13 +244,13 @@ log::HeadingRecording read_headings(const Contents& contents, const Params& para
                     });
   auto [entry, pick] = find(params.heading_entry);
   const std::vector<Source> sources = {{entry, std::move(pick)}};
+  const double factor = yaw_factor(sources.back(), params);
   StampOrder order(params.limits());
   std::vector<HeadingSample> samples;
   for_each_reading(contents, sources, {nullptr, 0, params.max_rejected_fraction}, order,
                    [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
                      const bool is_number = numbers.size() == 1;
-                     const double yaw_rad =
-                         is_number ? params.yaw_factor() * numbers[0] : yaw_of(numbers);
+                     const double yaw_rad = is_number ? factor * numbers[0] : yaw_of(numbers);
                      const HeadingSample heading{t_ns, params.heading_scale * yaw_rad};
                      if (const char* const why = heading.fault()) return order.reject(why, where);
                      if (!is_number && !is_unit(numbers)) return order.reject(log::kNotUnit, where);
@@ -255,13 +260,14 @@ log::HeadingRecording read_headings(const Contents& contents, const Params& para
 }
 
 /// Of three numbers x, y, yaw, or seven with a quaternion w, x, y, z.
-PoseSample pose_of(std::int64_t t_ns, std::span<const double> numbers, const Params& params) {
+PoseSample pose_of(std::int64_t t_ns, std::span<const double> numbers, double position_factor,
+                   double yaw_factor) {
   PoseSample pose;
   pose.t_ns = t_ns;
   const std::size_t n = numbers.size() == 3 ? 2 : 3;
-  for (std::size_t i = 0; i < n; ++i) pose.p_BinW_m[i] = params.position_factor() * numbers[i];
+  for (std::size_t i = 0; i < n; ++i) pose.p_BinW_m[i] = position_factor * numbers[i];
   if (numbers.size() == 3) {
-    const double half_rad = 0.5 * params.yaw_factor() * numbers[2];
+    const double half_rad = 0.5 * yaw_factor * numbers[2];
     pose.q_BtoW_xyzw = {0., 0., std::sin(half_rad), std::cos(half_rad)};
   } else {
     pose.q_BtoW_xyzw = {numbers[4], numbers[5], numbers[6], numbers[3]};
@@ -305,12 +311,13 @@ log::PoseRecording read_poses(const Contents& contents, const Params& params) {
   StampOrder order(params.limits());
   std::vector<PoseSample> samples;
   const std::int64_t spread = sources.size() == 1 ? 0 : spread_us(params);
+  const double factor = yaw_factor(sources.back(), params);
   for_each_reading(contents, sources, {nullptr, spread, params.max_rejected_fraction}, order,
                    [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
                      if (numbers.size() != 3 && numbers.size() != 7) {
                        return order.reject("record of several poses", where);
                      }
-                     PoseSample pose = pose_of(t_ns, numbers, params);
+                     PoseSample pose = pose_of(t_ns, numbers, params.position_factor(), factor);
                      if (const char* const why = log::why_rejected(pose))
                        return order.reject(why, where);
                      if (order.accept(t_ns, where)) samples.push_back(pose);

@@ -205,6 +205,26 @@ TEST_F(WpiLog, AGyroOfTheYawIsAHeading) {
   }
 }
 
+TEST_F(WpiLog, AGyroInDegreesLeavesThePosesOfTheProgramInRad) {
+  Writer out;
+  out.geometry();
+  out.add("/gyro", "double", 0, number(90.));
+  out.add("/p2", "struct:Pose2d", 0, numbers({1., 2., M_PI / 2.}));
+  out.add("/turn", "struct:Rotation2d", 0, numbers({M_PI / 2.}));
+  const double h = std::sqrt(0.5);
+  for (const char* heading : {"/gyro", "/turn", "/p2/rotation/value"}) {
+    const auto samples =
+        play(*make_sensor(log(out.bytes, std::string("pose_entries: [/p2], yaw_unit: deg, ") +
+                                             "heading_entry: " + heading)));
+    const auto headings = only<HeadingSample>(samples);
+    const auto poses = only<PoseSample>(samples);
+    ASSERT_EQ(headings.size(), 1U) << heading;
+    ASSERT_EQ(poses.size(), 1U) << heading;
+    EXPECT_NEAR(headings[0].yaw_rad, M_PI / 2., 1e-12) << heading;
+    EXPECT_NEAR(poses[0].q_BtoW_xyzw[2], h, 1e-12) << heading;
+  }
+}
+
 TEST_F(WpiLog, AFullImuIsOneAndComesInTheOrderOfTime) {
   Writer out;
   for (int k = 0; k < 2; ++k) {
