@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdlib>
-#include <cstring>
 #include <memory>
 #include <string_view>
 #include <vector>
 
 #include <libdeflate.h>
+
+#include "png_rows.hpp"
 
 namespace viwo {
 namespace {
@@ -43,45 +43,6 @@ bool take_chunk(Bytes& rest, Chunk& out) {
   return true;
 }
 
-/// Of three neighbours, the one that is the nearest to left + up - corner.
-int paeth(int left, int up, int corner) {
-  const int to_left = std::abs(up - corner), to_up = std::abs(left - corner);
-  const int to_corner = std::abs(up + left - 2 * corner);
-  const int nearer = to_up <= to_corner ? up : corner;
-  return to_left <= to_up && to_left <= to_corner ? left : nearer;
-}
-
-/// A row of pixels from the differences that a filter has left. False for an unknown filter.
-bool restore_row(int filter, Bytes row, const std::uint8_t* __restrict up,
-                 std::uint8_t* __restrict out) {
-  const auto byte = [](int value) { return static_cast<std::uint8_t>(value); };
-  int left = 0, corner = 0;
-  switch (filter) {
-    case 0:
-      std::memcpy(out, row.data(), row.size());
-      return true;
-    case 1:
-      for (std::size_t i = 0; i < row.size(); ++i) out[i] = byte(left = byte(row[i] + left));
-      return true;
-    case 2:
-      for (std::size_t i = 0; i < row.size(); ++i) out[i] = byte(row[i] + up[i]);
-      return true;
-    case 3:
-      for (std::size_t i = 0; i < row.size(); ++i) {
-        out[i] = byte(left = byte(row[i] + (left + up[i]) / 2));
-      }
-      return true;
-    case 4:
-      for (std::size_t i = 0; i < row.size(); ++i) {
-        out[i] = byte(left = byte(row[i] + paeth(left, up[i], corner)));
-        corner = up[i];
-      }
-      return true;
-    default:
-      return false;
-  }
-}
-
 struct Free {
   void operator()(libdeflate_decompressor* one) const { libdeflate_free_decompressor(one); }
 };
@@ -89,7 +50,7 @@ struct Free {
 /// Storage of a thread, used again.
 struct Storage {
   std::unique_ptr<libdeflate_decompressor, Free> decompressor{libdeflate_alloc_decompressor()};
-  std::vector<std::uint8_t> compressed, rows, blank;
+  std::vector<std::uint8_t> compressed, rows;
 };
 
 }  // namespace
@@ -130,15 +91,7 @@ bool decode_grey_png(Bytes bytes, Image& out) {
   out.width_px = static_cast<int>(width);
   out.height_px = static_cast<int>(height);
   out.pixels.resize(width * height);
-  storage.blank.assign(width, 0);
-  const std::uint8_t* up = storage.blank.data();
-  for (std::size_t y = 0; y < height; ++y) {
-    const Bytes row = Bytes(storage.rows).subspan(y * (width + 1), width + 1);
-    std::uint8_t* to = out.pixels.data() + y * width;
-    if (!restore_row(row[0], row.subspan(1), up, to)) return false;
-    up = to;
-  }
-  return true;
+  return restore_png_rows(storage.rows, width, out.pixels);
 }
 
 }  // namespace viwo
