@@ -7,7 +7,7 @@ thread that estimates, per image epoch with its inertial measurements, as the pr
 percentile and largest, medians over the runs. Errors are those of `viwo evaluate --align none` for all of
 them: RMSE over the way, means over the seeds. Allocations are counted in a run of their own, which is not
 timed: those of a peer's epochs, and all of viwo's process. A run whose position is off by more than LOST of the
-way, or that ends with an error, is lost: it is counted, and in no mean.
+way and by more than LOST_M, or that ends with an error, is lost: it is counted, and in no mean.
 """
 
 import argparse
@@ -20,7 +20,7 @@ import statistics
 import subprocess
 import sys
 
-LOST = 0.05
+LOST, LOST_M = 0.05, 1.
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 NAMES = {'viwo': 'viwo', 'openvins': 'OpenVINS', 'sqrtvins': 'sqrtVINS'}
 
@@ -140,13 +140,13 @@ def times_of(file):
 
 
 def errors_of(viwo, reference, estimate):
-    """RMSE without alignment, and whether that is more than LOST of the way."""
+    """RMSE without alignment, and whether that is lost."""
     said = subprocess.run([viwo, 'evaluate', '--reference', reference, '--estimate', estimate, '--align', 'none'],
                           capture_output=True, text=True, check=False)
     if said.returncode != 0:
         sys.exit(f'viwo evaluate: {said.stderr}')
     found = json.loads(said.stdout)
-    return {'m': found['ate_m'], 'deg': found['ate_deg'], 'lost': found['ate_m'] > LOST * found['path_length_m']}
+    return {'m': found['ate_m'], 'deg': found['ate_deg'], 'lost': found['ate_m'] > max(LOST * found['path_length_m'], LOST_M)}
 
 
 class Programs:
@@ -256,7 +256,7 @@ def conditions(arguments):
             f'{arguments.seconds:g} s at most, 10 Hz, no alignment; gates at 95 %, the same prior of the start, 11 clones '
             f'and no landmarks unless said, at most 100 points per update. {arguments.rounds} rounds. OpenVINS '
             f'{"without" if shown else "with"} the triangulation for its display. Lost: more than {LOST:.0%} of the '
-            'way off, or ended with an error; such runs are in no mean.')
+            f'way and more than {LOST_M:g} m off, or ended with an error; such runs are in no mean.')
 
 
 def write_reference(data):
