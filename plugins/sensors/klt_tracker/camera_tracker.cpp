@@ -15,21 +15,28 @@ namespace {
 
 /// A point that correlates less with what it was when it was found is another one, or hidden.
 constexpr float kMinAlike = 0.7F;
+/// One that does as much at once is not asked of Lucas-Kanade.
+constexpr float kSurelyAlike = 0.9F;
 constexpr float kMaxRefinePx = 3.F;
+
+/// Fits the patch of a track from a first guess, which gets the result.
+bool refine(const Track& track, const Frame& to, float least_alike, cv::Point2f& uv,
+            Eigen::Matrix2f& A) {
+  const Eigen::Vector2f guess(uv.x, uv.y);
+  PatchPose pose{guess, A};
+  const float alike = track.patch->fit(to.image, pose);
+  if (alike < least_alike || !((pose.u - guess).norm() < kMaxRefinePx)) return false;
+  uv = cv::Point2f(pose.u.x(), pose.u.y());
+  A = pose.A;
+  return true;
+}
 
 }  // namespace
 
 bool find_track(const Track& track, const Frame& from, const Frame& to,
                 const TrackerOptions& options, int highest, cv::Point2f& uv, Eigen::Matrix2f& A) {
-  if (!follow_window(from, to, options, highest, track.uv, uv)) return false;
-  if (track.patch == nullptr) return true;
-  const Eigen::Vector2f guess(uv.x, uv.y);
-  PatchPose pose{guess, A};
-  const float alike = track.patch->fit(to.image, pose);
-  if (alike < kMinAlike || !((pose.u - guess).norm() < kMaxRefinePx)) return false;
-  uv = cv::Point2f(pose.u.x(), pose.u.y());
-  A = pose.A;
-  return true;
+  return follow_window(from, to, options, highest, track.uv, uv) &&
+         (track.patch == nullptr || refine(track, to, kMinAlike, uv, A));
 }
 
 CameraTracker::CameraTracker(const CameraView& camera, const TrackerOptions& options, cv::Mat mask,
@@ -42,20 +49,32 @@ CameraTracker::CameraTracker(const CameraView& camera, const TrackerOptions& opt
 
 bool CameraTracker::find(const Frame& from, const Frame& to, double dt_s, std::size_t i) {
   Track& track = tracks_[i];
-  const auto search = [&](const cv::Point2f& guess, int highest) {
+  const auto look = [&](const cv::Point2f& guess, const auto& finds) {
     now_[i] = guess;
     Eigen::Matrix2f A = track.A;
-    if (!find_track(track, from, to, options_, highest, now_[i], A)) return false;
+    if (!finds(now_[i], A)) return false;
     const auto ray = detector_.ray_at(now_[i]);
     if (!ray) return false;
     rays_[i] = *ray;
     track.A = A;
     return true;
   };
+  const auto search = [&](const cv::Point2f& guess, int highest) {
+    return look(guess, [&](cv::Point2f& uv, Eigen::Matrix2f& A) {
+      return find_track(track, from, to, options_, highest, uv, A);
+    });
+  };
+  const auto fits = [&](const cv::Point2f& guess) {
+    return track.patch != nullptr && look(guess, [&](cv::Point2f& uv, Eigen::Matrix2f& A) {
+             return refine(track, to, kSurelyAlike, uv, A);
+           });
+  };
   if (track.has_velocity) {
     const cv::Point2f predicted =
         track.uv + track.velocity_px_per_s * static_cast<float>(dt_s);  // (KLT-2)
-    if (detector_.inside(predicted) && search(predicted, kLevelOfGuess)) return true;
+    if (detector_.inside(predicted) && (fits(predicted) || search(predicted, kLevelOfGuess))) {
+      return true;
+    }
   }
   // New, or a camera that starts or stops turning.
   return search(track.uv, options_.pyr_levels);

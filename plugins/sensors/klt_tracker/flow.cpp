@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -35,6 +37,15 @@ using Window = std::array<float, static_cast<std::size_t>(kMaxSide* kMaxSide)>;
 /// With a pixel more on each side, in rows that are eight longer.
 using WideWindow = std::array<float, static_cast<std::size_t>((kMaxSide + 8) * (kMaxSide + 2))>;
 
+/// Grey levels of a row between its pixels, `a` to the right of each.
+void between_columns(const std::uint8_t* __restrict grey, float a, int columns,
+                     float* __restrict out) {
+  for (int i = 0; i < columns; ++i) {
+    const auto left = static_cast<float>(grey[i]), right = static_cast<float>(grey[i + 1]);
+    out[i] = left + a * (right - left);
+  }
+}
+
 /// Grey levels between pixels of a window whose first pixel is at `corner`. False when it is not
 /// within the image and its surroundings.
 bool sample_window(const Level& level, const Eigen::Vector2f& corner, int columns, int rows,
@@ -47,15 +58,17 @@ bool sample_window(const Level& level, const Eigen::Vector2f& corner, int column
   }
   const float left = std::floor(corner.x()), top = std::floor(corner.y());
   const float a = corner.x() - left, b = corner.y() - top;
-  const float w00 = (1.F - a) * (1.F - b), w01 = a * (1.F - b), w10 = (1.F - a) * b, w11 = a * b;
   const auto step = static_cast<std::ptrdiff_t>(level.image.step1());
-  const float* above = level.image.ptr<float>() + static_cast<std::ptrdiff_t>(top) * step +
-                       static_cast<std::ptrdiff_t>(left);
-  for (int row = 0; row < rows; ++row, above += step, out += columns) {
-    const float* below = above + step;
-    for (int i = 0; i < columns; ++i) {
-      out[i] = w00 * above[i] + w01 * above[i + 1] + w10 * below[i] + w11 * below[i + 1];
-    }
+  const std::uint8_t* grey = level.image.ptr() + static_cast<std::ptrdiff_t>(top) * step +
+                             static_cast<std::ptrdiff_t>(left);
+  std::array<std::array<float, kMaxSide + 8>, 2> between;
+  float *above = between[0].data(), *below = between[1].data();
+  between_columns(grey, a, columns, above);
+  for (int row = 0; row < rows; ++row, out += columns) {
+    grey += step;
+    between_columns(grey, a, columns, below);
+    for (int i = 0; i < columns; ++i) out[i] = above[i] + b * (below[i] - above[i]);
+    std::swap(above, below);
   }
   return true;
 }

@@ -56,22 +56,24 @@ void equalise(const std::array<std::int64_t, 256>& counts, const cv::Mat& from, 
   cv::LUT(from, table, to);
 }
 
+void make_room(cv::Size size, int border, Level& level) {
+  level.border = border;
+  level.storage.create(size.height + 2 * border, size.width + 2 * border, CV_8UC1);
+  level.image = level.storage(cv::Rect(cv::Point(border, border), size));
+}
+
+/// The level with its border; `grey` may be the part of it that is the image.
+void fill(const cv::Mat& grey, Level& level) {
+  const int b = level.border;
+  cv::copyMakeBorder(grey, level.storage, b, b, b, b, cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
+}
+
 }  // namespace
 
 FrameMaker::FrameMaker(const TrackerOptions& options) : options_(options) {
   if (options.histogram_method == Histogram::kClahe) {
     clahe_ = cv::createCLAHE(kClaheLimit, cv::Size(kClaheTiles, kClaheTiles));
   }
-}
-
-void FrameMaker::add_level(const cv::Mat& grey, Level& level) const {
-  const int b = level.border = options_.win_size + kMargin;
-  level.storage.create(grey.rows + 2 * b, grey.cols + 2 * b, CV_32FC1);
-  level.image = level.storage(cv::Rect(b, b, grey.cols, grey.rows));
-  grey.convertTo(level.image, CV_32F);
-  // In place.
-  cv::copyMakeBorder(level.image, level.storage, b, b, b, b,
-                     cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
 }
 
 void FrameMaker::make(Frame& frame) {
@@ -92,18 +94,23 @@ void FrameMaker::make(Frame& frame) {
       break;
   }
   const auto n = static_cast<std::size_t>(options_.pyr_levels) + 1;
+  const int border = options_.win_size + kMargin;
   frame.levels.resize(n);
-  smaller_.resize(n);
-  if (lowest_level(options_) == 0) add_level(frame.image, frame.levels[0]);
+  if (lowest_level(options_) == 0) {
+    make_room(frame.image.size(), border, frame.levels[0]);
+    fill(frame.image, frame.levels[0]);
+  }
   for (std::size_t l = 1; l < n; ++l) {
-    const cv::Mat& larger = l == 1 ? frame.image : smaller_[l - 1];
+    const cv::Mat& larger = l == 1 ? frame.image : frame.levels[l - 1].image;
     // A window must fit in.
     if (l > 1 && std::min(larger.cols, larger.rows) < 2 * options_.win_size) {
       frame.levels.resize(l);
       break;
     }
-    cv::pyrDown(larger, smaller_[l]);
-    add_level(smaller_[l], frame.levels[l]);
+    Level& level = frame.levels[l];
+    make_room(cv::Size((larger.cols + 1) / 2, (larger.rows + 1) / 2), border, level);
+    cv::pyrDown(larger, level.image);
+    fill(level.image, level);
   }
 }
 

@@ -12,7 +12,7 @@
 
 namespace viwo::klt {
 
-/// Grey levels as floating-point numbers, each level half as large as the one before.
+/// 8 bit, each level half as large as the one before.
 struct Level {
   cv::Mat image;
   int border = 0;   ///< pixels beyond each edge that are there, too: the image mirrored
@@ -37,11 +37,8 @@ class FrameMaker {
   void make(Frame& frame);
 
  private:
-  void add_level(const cv::Mat& grey, Level& level) const;
-
   TrackerOptions options_;
   cv::Ptr<cv::CLAHE> clahe_;
-  std::vector<cv::Mat> smaller_;  ///< images of level 1 and above, 8 bit
 };
 
 }  // namespace viwo::klt
