@@ -7,7 +7,7 @@
 
 namespace viwo {
 
-/// Restores an image of `width` pixels a row. `filtered` has, row after row, the filter and the
+/// Restores an image of `width` > 0 pixels a row. `filtered` has, row after row, the filter and the
 /// differences of `width` pixels; `pixels` gets the pixels. False for an unknown filter.
 bool restore_png_rows(std::span<const std::uint8_t> filtered, std::size_t width,
                       std::span<std::uint8_t> pixels);

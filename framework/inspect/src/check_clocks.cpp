@@ -212,36 +212,50 @@ Finding clock_finding(const std::string& label, const ClockWords& words, const L
   return finding;
 }
 
-/// Wheels that do not turn as the gyro says of the vertical, but as it says of another of its axes.
-/// `correlation`: with the vertical.
-void check_gyro_axes(const Recording& recording, const std::string& wheels,
-                     const RateGrid& of_wheels, double correlation, Findings& out) {
+/// A gyro of which another axis turns as the wheels do than the vertical, of which it says nothing
+/// that they have in common.
+void check_gyro_columns(const Recording& recording, Findings& out) {
+  if (recording.imu.empty()) return;
   const Span span = span_of(recording);
-  const std::vector<Turn> gyro = turns_of(recording.imu);
-  double most = 0.;
-  Vector3d axis = Vector3d::Zero();
-  for (int i = 0; i < 3; ++i) {
-    const Vector3d one = Vector3d::Unit(i);
-    const auto lag = find_lag(RateGrid(span.begin_ns, span.end_ns, about(gyro, one)), of_wheels);
-    if (!lag || std::abs(lag->correlation) <= std::abs(most)) continue;
-    most = lag->correlation;
-    axis = std::copysign(1., most) * one;
-  }
-  constexpr double kAlike = 0.8, kClearly = 0.3;
-  if (std::abs(most) < std::max(kAlike, std::abs(correlation) + kClearly)) return;
   const Vector3d up = up_of(recording.imu);
+  if (up.norm() == 0.) return;
+  constexpr double kAlike = 0.8, kClearly = 0.3, kMostLag_s = 0.2, kMostScale = 2., kAlong = 0.7;
+  const std::vector<Turn> gyro = turns_of(recording.imu);
+  const auto grid_about = [&](const Vector3d& axis) {
+    return RateGrid(span.begin_ns, span.end_ns, about(gyro, axis));
+  };
+  const RateGrid vertical = grid_about(up);
+  double most = 0., vertically = 0.;
+  Vector3d axis = Vector3d::Zero();
+  std::string label;
+  for (const Wheels& wheels : recording.wheels) {
+    if (wheels.samples.empty()) continue;
+    const RateGrid b(span.begin_ns, span.end_ns, about(twists_of(wheels), Vector3d::UnitZ()));
+    if (const auto lag = find_lag(vertical, b)) {
+      vertically = std::max(vertically, std::abs(lag->correlation));
+    }
+    for (int i = 0; i < 3; ++i) {
+      const Vector3d one = Vector3d::Unit(i);
+      if (std::abs(up.dot(one)) > kAlong) continue;
+      const auto lag = find_lag(grid_about(one), b);
+      // Exchanged columns keep time and scale; a chassis that pitches when it drives off does not.
+      if (!lag || std::abs(lag->lag_s) > kMostLag_s || std::abs(lag->slope) > kMostScale ||
+          std::abs(lag->slope) < 1. / kMostScale || std::abs(lag->correlation) <= most) {
+        continue;
+      }
+      most = std::abs(lag->correlation);
+      axis = std::copysign(1., lag->correlation) * one;
+      label = recording.label<EncoderSample>(wheels.sensor);
+    }
+  }
+  if (vertically > kAlike || most < std::max(kAlike, vertically + kClearly)) return;
   out.push_back({recording.label<ImuSample>(recording.imu_sensor),
                  Severity::kFault,
-                 "axes",
-                 "its " + axis_of(axis) + " axis turns as " + wheels + " does (correlation " +
-                     significant(std::abs(most), 3) + ", about the vertical " +
-                     significant(std::abs(correlation), 2) + "), " +
-                     (up.norm() > 0. ? "but gravity is along its " + axis_of(up) +
-                                           " axis: columns of its gyro or accelerometer are "
-                                           "exchanged"
-                                     : "which is not what wheels.R_ItoO says of its mounting"),
-                 {{"correlation", std::abs(most), ""},
-                  {"correlation about the vertical", std::abs(correlation), ""}}});
+                 "columns",
+                 "its " + axis_of(axis) + " axis turns as " + label + " does (correlation " +
+                     significant(most, 3) + "), but gravity is along its " + axis_of(up) +
+                     " axis: columns of its gyro or its accelerometer are exchanged",
+                 {{"correlation", most, ""}, {"correlation about the vertical", vertically, ""}}});
 }
 
 /// Of a wheel set against a gyro.
@@ -268,11 +282,6 @@ void check_wheel_clock(const Recording& recording, const Wheels& wheels, const Y
                    is_compared ? "compared with " + label
                                : "not looked at but for its stamps: its turns and those of " +
                                      label + " are too few, or too different"});
-  }
-  if (!is_heading && !is_compared) {
-    check_gyro_axes(recording, label,
-                    RateGrid(span.begin_ns, span.end_ns, about(of_wheels, Vector3d::UnitZ())),
-                    lag ? lag->correlation : 0., out);
   }
   if (!lag) {
     out.push_back({label, Severity::kNote, "clock",
@@ -306,6 +315,7 @@ void check_wheel_clocks(const Recording& recording, Findings& out) {
       check_wheel_clock(recording, wheels, rates, out);
     }
   }
+  check_gyro_columns(recording, out);
 }
 
 void check_camera_clocks(const Recording& recording, Findings& out) {

@@ -67,11 +67,14 @@ constexpr std::array<std::string_view, 6> kWheelCauses = {"order",   "turn", "st
 constexpr std::array<std::string_view, 8> kNotOfGyro = {
     "order", "turn", "steering", "channel", "steer offsets", "parity", "speed", "heading"};
 constexpr std::array<std::string_view, 2> kOrder = {"order", "steering"};
-constexpr std::array<std::string_view, 1> kAxes = {"axes"};
 constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
 /// What no noise is the remedy of.
 constexpr std::array<std::string_view, 4> kNoNoise = {"contradicted", "parity", "speed", "heading"};
-constexpr std::array<std::string_view, 5> kImuCauses = {"gravity", "rate", "up", "tilt", "channel"};
+constexpr std::array<std::string_view, 6> kImuCauses = {"gravity", "rate",    "up",
+                                                        "tilt",    "channel", "columns"};
+/// What exchanged columns look like besides.
+constexpr std::array<std::string_view, 1> kColumns = {"columns"};
+constexpr std::array<std::string_view, 3> kOfColumns = {"rate", "up", "tilt"};
 /// Of Plausibility: by check_wheel_clocks(), check_yaw_order() and check_stamps().
 constexpr std::array<std::string_view, 3> kToldWithMore = {"lag", "yaw order", "unit"};
 bool is_one_of(const std::string& check, Checks checks) {
@@ -104,9 +107,12 @@ void demote_consequences(const Recording& recording, Findings& findings) {
   }
   for (Finding& finding : findings) {
     const bool is_of_gyro = std::find(gyros.begin(), gyros.end(), finding.sensor) != gyros.end();
-    if (!is_of_gyro || finding.check != "rate") continue;
-    if (!wheels.empty()) demote(finding, wheels);
-    if (is_fault_of(findings, finding.sensor, kAxes)) demote(finding, finding.sensor);
+    if (is_of_gyro && finding.check == "rate" && !wheels.empty()) {
+      demote(finding, wheels);
+    } else if (is_one_of(finding.check, kOfColumns) &&
+               is_fault_of(findings, finding.sensor, kColumns)) {
+      demote(finding, finding.sensor);
+    }
   }
   const Findings all = findings;
   const auto wrong = std::find_if(gyros.begin(), gyros.end(), [&](const std::string& gyro) {

@@ -61,9 +61,9 @@ TEST(InspectClocks, FindsAGyroWhoseColumnsAreExchangedOnABaseThatStaysLevel) {
                                            std::swap(s.gyro_rad_per_s[0], s.gyro_rad_per_s[2]);
                                            return true;
                                          }});
-  EXPECT_THAT(faults_of(exchanged), ElementsAre("imu0 axes"));
+  EXPECT_THAT(faults_of(exchanged), ElementsAre("imu0 columns"));
   EXPECT_THAT(
-      finding_of(exchanged, "imu0", "axes").what,
+      finding_of(exchanged, "imu0", "columns").what,
       AllOf(HasSubstr("its +x axis turns as wheels0 does"), HasSubstr("along its +z axis")));
 }
 

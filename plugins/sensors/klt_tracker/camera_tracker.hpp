@@ -51,7 +51,7 @@ class CameraTracker {
   std::vector<Track>& tracks() { return tracks_; }
 
  private:
-  /// Where a point is in the next image, first near the predicted place; fills `status_`.
+  /// Where a point is in the next image, first near the predicted place; fills `now_` and `rays_`.
   bool find(const Frame& from, const Frame& to, double dt_s, std::size_t track);
   void check_epipolar();
   /// The tracks that are left, at their new places.

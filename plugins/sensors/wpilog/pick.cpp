@@ -36,18 +36,11 @@ std::optional<Field> primitive(const std::string& base) {
   return std::nullopt;
 }
 
-/// The number at this path of a struct is that of a Rotation2d.
-bool is_rotation(const Type& type, std::string_view path) {
-  return type.is_struct && (type.base == "Rotation2d" || path.ends_with("rotation/value") ||
-                            path.ends_with("angle/value"));
-}
-
 /// The fields at these paths; nothing when one is missing.
 std::optional<Pick> pick_fields(const Type& type, std::initializer_list<std::string> paths,
                                 const Schemas& schemas) {
   Pick pick{{}, schemas.layout(type.base).size, type.many()};
   for (const std::string& path : paths) {
-    pick.is_rotation = pick.is_rotation || is_rotation(type, path);
     const auto field = schemas.find(type.base, path);
     if (!field) return std::nullopt;
     pick.fields.push_back(*field);
@@ -102,10 +95,8 @@ std::optional<Pick> pick_number(const std::string& type_text, std::string_view p
   }
   if (!field) return std::nullopt;
   field->offset += index * element;
-  return Pick{{*field},
-              (index + 1) * element,
-              type.is_array ? Pick::Many::kOneAndMore : Pick::Many::kOne,
-              is_rotation(type, path)};
+  return Pick{
+      {*field}, (index + 1) * element, type.is_array ? Pick::Many::kOneAndMore : Pick::Many::kOne};
 }
 
 std::optional<Pick> pick_heading(const std::string& type_text, std::string_view path,

@@ -18,8 +18,6 @@ struct Pick {
   std::size_t element = 0;    ///< size of one [bytes]
   /// How many elements a payload has: one, any number, or one and whatever stands behind it.
   enum class Many : std::uint8_t { kOne, kAny, kOneAndMore } many = Many::kOne;
-  /// The angle is one of WPILib's own structs: in rad, whatever unit numbers have.
-  bool is_rotation = false;
 
   /// Appends the numbers of all elements; false for a payload of another size.
   bool decode(std::string_view payload, std::vector<double>& out) const;

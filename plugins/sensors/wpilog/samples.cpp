@@ -223,11 +223,6 @@ log::ImuRecording read_imu(const Contents& contents, const Params& params) {
   return finish(contents, order, std::move(samples));
 }
 
-/// To rad, of a yaw that is one number.
-double yaw_factor(const Source& source, const Params& params) {
-  return source.pick.is_rotation ? 1. : params.yaw_factor();
-}
-
 /// Of a quaternion w, x, y, z.
 double yaw_of(std::span<const double> q) {
   return std::atan2(2. * (q[0] * q[3] + q[1] * q[2]), 1. - 2. * (q[2] * q[2] + q[3] * q[3]));
@@ -244,13 +239,13 @@ log::HeadingRecording read_headings(const Contents& contents, const Params& para
                     });
   auto [entry, pick] = find(params.heading_entry);
   const std::vector<Source> sources = {{entry, std::move(pick)}};
-  const double factor = yaw_factor(sources.back(), params);
   StampOrder order(params.limits());
   std::vector<HeadingSample> samples;
   for_each_reading(contents, sources, {nullptr, 0, params.max_rejected_fraction}, order,
                    [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
                      const bool is_number = numbers.size() == 1;
-                     const double yaw_rad = is_number ? factor * numbers[0] : yaw_of(numbers);
+                     const double yaw_rad =
+                         is_number ? params.yaw_factor() * numbers[0] : yaw_of(numbers);
                      const HeadingSample heading{t_ns, params.heading_scale * yaw_rad};
                      if (const char* const why = heading.fault()) return order.reject(why, where);
                      if (!is_number && !is_unit(numbers)) return order.reject(log::kNotUnit, where);
@@ -311,13 +306,16 @@ log::PoseRecording read_poses(const Contents& contents, const Params& params) {
   StampOrder order(params.limits());
   std::vector<PoseSample> samples;
   const std::int64_t spread = sources.size() == 1 ? 0 : spread_us(params);
-  const double factor = yaw_factor(sources.back(), params);
+  // A Pose2d is in rad, whatever unit the gyro has.
+  const double yaw_factor = sources[0].entry->type.starts_with("struct:") && sources.size() == 1
+                                ? 1.
+                                : params.yaw_factor();
   for_each_reading(contents, sources, {nullptr, spread, params.max_rejected_fraction}, order,
                    [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
                      if (numbers.size() != 3 && numbers.size() != 7) {
                        return order.reject("record of several poses", where);
                      }
-                     PoseSample pose = pose_of(t_ns, numbers, params.position_factor(), factor);
+                     PoseSample pose = pose_of(t_ns, numbers, params.position_factor(), yaw_factor);
                      if (const char* const why = log::why_rejected(pose))
                        return order.reject(why, where);
                      if (order.accept(t_ns, where)) samples.push_back(pose);

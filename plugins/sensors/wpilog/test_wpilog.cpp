@@ -209,10 +209,10 @@ TEST_F(WpiLog, AGyroInDegreesLeavesThePosesOfTheProgramInRad) {
   Writer out;
   out.geometry();
   out.add("/gyro", "double", 0, number(90.));
+  out.add("/wrong", "struct:Rotation2d", 0, numbers({90.}));  // a program that takes it for degrees
   out.add("/p2", "struct:Pose2d", 0, numbers({1., 2., M_PI / 2.}));
-  out.add("/turn", "struct:Rotation2d", 0, numbers({M_PI / 2.}));
   const double h = std::sqrt(0.5);
-  for (const char* heading : {"/gyro", "/turn", "/p2/rotation/value"}) {
+  for (const char* heading : {"/gyro", "/wrong"}) {
     const auto samples =
         play(*make_sensor(log(out.bytes, std::string("pose_entries: [/p2], yaw_unit: deg, ") +
                                              "heading_entry: " + heading)));
