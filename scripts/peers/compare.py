@@ -146,7 +146,8 @@ def errors_of(viwo, reference, estimate):
     if said.returncode != 0:
         sys.exit(f'viwo evaluate: {said.stderr}')
     found = json.loads(said.stdout)
-    return {'m': found['ate_m'], 'deg': found['ate_deg'], 'lost': found['ate_m'] > max(LOST * found['path_length_m'], LOST_M)}
+    most_m = max(LOST * found['path_length_m'], LOST_M)
+    return {'m': found['ate_m'], 'deg': found['ate_deg'], 'lost': found['ate_m'] > most_m}
 
 
 class Programs:

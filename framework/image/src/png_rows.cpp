@@ -1,7 +1,7 @@
 #include "png_rows.hpp"
 
+#include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <cstring>
 #include <vector>
 
@@ -14,42 +14,7 @@ using Bytes = std::span<const std::uint8_t>;
 /// of 4 one of them and the one above the left one.
 enum Filter : std::uint8_t { kNone, kLeft, kUp, kMean, kPaeth, kFilters };
 
-/// Of three neighbours, the one that is the nearest to left + up - corner.
-int paeth(int left, int up, int corner) {
-  const int to_left = std::abs(up - corner), to_up = std::abs(left - corner);
-  const int to_corner = std::abs(up + left - 2 * corner);
-  const int nearer = to_up <= to_corner ? up : corner;
-  return to_left <= to_up && to_left <= to_corner ? left : nearer;
-}
-
-void restore_row(std::uint8_t filter, Bytes row, const std::uint8_t* __restrict up,
-                 std::uint8_t* __restrict out) {
-  const auto byte = [](int value) { return static_cast<std::uint8_t>(value); };
-  int left = 0, corner = 0;
-  switch (filter) {
-    case kLeft:
-      for (std::size_t i = 0; i < row.size(); ++i) out[i] = byte(left = byte(row[i] + left));
-      break;
-    case kUp:
-      for (std::size_t i = 0; i < row.size(); ++i) out[i] = byte(row[i] + up[i]);
-      break;
-    case kMean:
-      for (std::size_t i = 0; i < row.size(); ++i) {
-        out[i] = byte(left = byte(row[i] + (left + up[i]) / 2));
-      }
-      break;
-    case kPaeth:
-      for (std::size_t i = 0; i < row.size(); ++i) {
-        out[i] = byte(left = byte(row[i] + paeth(left, up[i], corner)));
-        corner = up[i];
-      }
-      break;
-    default:
-      std::memcpy(out, row.data(), row.size());
-  }
-}
-
-// A pixel needs the one on its left and those above: of one row, one after the other. Of several
+// A pixel may need the one on its left and those above: of one row, one after the other. Of several
 // rows, each a pixel behind the one above it, a pixel of each can be restored at the same time.
 constexpr std::size_t kRows = 16;
 using Lanes = std::uint8_t __attribute__((vector_size(kRows)));  // a byte of each row
@@ -84,6 +49,7 @@ void transpose(Tile& tile) {
 
 Lanes distance(Lanes a, Lanes b) { return a > b ? a - b : b - a; }
 
+/// Of three neighbours, the one that is the nearest to left + up - corner.
 Lanes paeth(Lanes left, Lanes up, Lanes corner) {
   const Lanes to_left = distance(up, corner), to_up = distance(left, corner);
   // |(up - corner) + (left - corner)|: their sum where both have one sign, at most 255, which is
@@ -96,16 +62,17 @@ Lanes paeth(Lanes left, Lanes up, Lanes corner) {
   return ((to_left <= to_up) & (to_left <= to_corner)) ? left : nearer;
 }
 
-/// Restores kRows rows at a time.
+/// Restores up to kRows rows at a time.
 class Block {
  public:
   explicit Block(std::size_t width)
       : width_(width), stride_(width + 4 * kRows), up_(stride_), rows_(kRows + kRows * stride_) {}
 
-  void restore(const std::uint8_t* filtered, const std::uint8_t* up, std::uint8_t* out) {
+  void restore(const std::uint8_t* filtered, std::size_t rows, const std::uint8_t* up,
+               std::uint8_t* out) {
     std::memcpy(up_.data(), up, width_);
     std::array<Lanes, kFilters> is{};
-    for (std::size_t k = 0; k < kRows; ++k, filtered += width_ + 1) {
+    for (std::size_t k = 0; k < rows; ++k, filtered += width_ + 1) {
       for (std::size_t f = 0; f < kFilters; ++f) is[f][k] = filtered[0] == f ? 0xff : 0;
       std::memcpy(row(k), filtered + 1, width_);
     }
@@ -126,7 +93,7 @@ class Block {
       transpose(tile);
       for (std::size_t k = 0; k < kRows; ++k) std::memcpy(row(k) + i - k, &tile[k], kRows);
     }
-    for (std::size_t k = 0; k < kRows; ++k) std::memcpy(out + k * width_, row(k), width_);
+    for (std::size_t k = 0; k < rows; ++k) std::memcpy(out + k * width_, row(k), width_);
   }
 
  private:
@@ -142,7 +109,6 @@ class Block {
 bool restore_png_rows(Bytes filtered, std::size_t width, std::span<std::uint8_t> pixels) {
   const std::size_t height = pixels.size() / width;
   const auto row = [&](std::size_t y) { return filtered.subspan(y * (width + 1), width + 1); };
-  const auto needs_its_left = [&](std::size_t y) { return row(y)[0] != kNone && row(y)[0] != kUp; };
   for (std::size_t y = 0; y < height; ++y) {
     if (row(y)[0] >= kFilters) return false;
   }
@@ -150,12 +116,17 @@ bool restore_png_rows(Bytes filtered, std::size_t width, std::span<std::uint8_t>
   Block block(width);
   const std::uint8_t* up = blank.data();
   for (std::size_t y = 0; y < height;) {
+    const Bytes first = row(y);
     std::uint8_t* out = pixels.data() + y * width;
-    const std::size_t rows = y + kRows <= height && needs_its_left(y) ? kRows : 1;
-    if (rows == kRows) {
-      block.restore(row(y).data(), up, out);
+    std::size_t rows = 1;
+    if (first[0] == kNone) {
+      std::memcpy(out, first.data() + 1, width);
+    } else if (first[0] == kUp) {
+      std::transform(first.begin() + 1, first.end(), up, out,
+                     [](int a, int b) { return static_cast<std::uint8_t>(a + b); });
     } else {
-      restore_row(row(y)[0], row(y).subspan(1), up, out);
+      rows = std::min(kRows, height - y);
+      block.restore(first.data(), rows, up, out);
     }
     y += rows;
     up = out + (rows - 1) * width;

@@ -212,32 +212,25 @@ Finding clock_finding(const std::string& label, const ClockWords& words, const L
   return finding;
 }
 
-/// A gyro of which another axis turns as the wheels do than the vertical, of which it says nothing
-/// that they have in common.
-void check_gyro_columns(const Recording& recording, Findings& out) {
-  if (recording.imu.empty()) return;
-  const Span span = span_of(recording);
+/// A gyro of which another axis turns as the wheels do than the vertical. `vertically`: the largest
+/// correlation of wheels with that.
+void check_gyro_columns(const Recording& recording, double vertically, Findings& out) {
+  constexpr double kAlike = 0.8, kClearly = 0.3, kMostLag_s = 0.2, kMostScale = 2., kAlong = 0.7;
+  if (recording.imu.empty() || vertically > kAlike) return;
   const Vector3d up = up_of(recording.imu);
   if (up.norm() == 0.) return;
-  constexpr double kAlike = 0.8, kClearly = 0.3, kMostLag_s = 0.2, kMostScale = 2., kAlong = 0.7;
+  const Span span = span_of(recording);
   const std::vector<Turn> gyro = turns_of(recording.imu);
-  const auto grid_about = [&](const Vector3d& axis) {
-    return RateGrid(span.begin_ns, span.end_ns, about(gyro, axis));
-  };
-  const RateGrid vertical = grid_about(up);
-  double most = 0., vertically = 0.;
+  double most = 0.;
   Vector3d axis = Vector3d::Zero();
   std::string label;
   for (const Wheels& wheels : recording.wheels) {
     if (wheels.samples.empty()) continue;
     const RateGrid b(span.begin_ns, span.end_ns, about(twists_of(wheels), Vector3d::UnitZ()));
-    if (const auto lag = find_lag(vertical, b)) {
-      vertically = std::max(vertically, std::abs(lag->correlation));
-    }
     for (int i = 0; i < 3; ++i) {
       const Vector3d one = Vector3d::Unit(i);
       if (std::abs(up.dot(one)) > kAlong) continue;
-      const auto lag = find_lag(grid_about(one), b);
+      const auto lag = find_lag(RateGrid(span.begin_ns, span.end_ns, about(gyro, one)), b);
       // Exchanged columns keep time and scale; a chassis that pitches when it drives off does not.
       if (!lag || std::abs(lag->lag_s) > kMostLag_s || std::abs(lag->slope) > kMostScale ||
           std::abs(lag->slope) < 1. / kMostScale || std::abs(lag->correlation) <= most) {
@@ -248,7 +241,7 @@ void check_gyro_columns(const Recording& recording, Findings& out) {
       label = recording.label<EncoderSample>(wheels.sensor);
     }
   }
-  if (vertically > kAlike || most < std::max(kAlike, vertically + kClearly)) return;
+  if (most < std::max(kAlike, vertically + kClearly)) return;
   out.push_back({recording.label<ImuSample>(recording.imu_sensor),
                  Severity::kFault,
                  "columns",
@@ -258,15 +251,16 @@ void check_gyro_columns(const Recording& recording, Findings& out) {
                  {{"correlation", most, ""}, {"correlation about the vertical", vertically, ""}}});
 }
 
-/// Of a wheel set against a gyro.
-void check_wheel_clock(const Recording& recording, const Wheels& wheels, const YawRates& rates,
-                       Findings& out) {
+/// Of a wheel set against a gyro. Returns their correlation, regardless of sign, with an IMU.
+double check_wheel_clock(const Recording& recording, const Wheels& wheels, const YawRates& rates,
+                         Findings& out) {
   const Span span = span_of(recording);
   const std::string label = recording.label<EncoderSample>(wheels.sensor);
   std::vector<Turn> of_wheels = twists_of(wheels);
   const RateGrid a(span.begin_ns, span.end_ns, rates.turns);
   std::optional<Lag> lag =
       find_lag(a, RateGrid(span.begin_ns, span.end_ns, about(of_wheels, Vector3d::UnitZ())));
+  const double correlation = lag ? std::abs(lag->correlation) : 0.;
   if (lag && lag->correlation > 0.) {
     const RateGrid twists(span.begin_ns, span.end_ns, of_wheels);
     const Vector3d row = yaw_of_twist(a, twists, lag->lag_s);
@@ -287,7 +281,7 @@ void check_wheel_clock(const Recording& recording, const Wheels& wheels, const Y
     out.push_back({label, Severity::kNote, "clock",
                    "too little rotation, or too little in common with " + rates.label +
                        ", to compare its clock and sign with the gyro"});
-    return;
+    return 0.;
   }
   std::string key = wheels.prior.name.empty()
                         ? "wheels.t_OtoI_s"
@@ -306,16 +300,18 @@ void check_wheel_clock(const Recording& recording, const Wheels& wheels, const Y
                  "right are exchanged";
   }
   out.push_back(clock);
+  return is_heading ? 0. : correlation;
 }
 
 void check_wheel_clocks(const Recording& recording, Findings& out) {
+  double vertically = 0.;
   for (const Wheels& wheels : recording.wheels) {
     if (wheels.samples.empty()) continue;
     for (const YawRates& rates : yaw_rates_of(recording, wheels.prior)) {
-      check_wheel_clock(recording, wheels, rates, out);
+      vertically = std::max(vertically, check_wheel_clock(recording, wheels, rates, out));
     }
   }
-  check_gyro_columns(recording, out);
+  check_gyro_columns(recording, vertically, out);
 }
 
 void check_camera_clocks(const Recording& recording, Findings& out) {
