@@ -74,7 +74,7 @@ class Ros1Topics final : public live::TopicSensor {
     node_->setCallbackQueue(&callbacks_);
     subscribe();
     if (params.publish) advertise(params);
-    if (asks_for_mount()) ask_for_mount();
+    if (mounts().are_asked_for()) ask_for_mounts();
     watch_ = node_->createWallTimer(ros::WallDuration(1.),
                                     [this](const ros::WallTimerEvent&) { watch(); });
     // Two threads: watch() may wait for the master, messages must not.
@@ -140,7 +140,7 @@ class Ros1Topics final : public live::TopicSensor {
     diagnostics_ = node_->advertise<msg::DiagnosticArray>("/diagnostics", 10);
   }
 
-  void ask_for_mount() {
+  void ask_for_mounts() {
     tf_static_ =
         subscribe("/tf_static", 100, [this](const ros::MessageEvent<const RawMessage>& event) {
           if (event.getConnectionHeader().at("md5sum") != kTransformsMd5) return;
@@ -150,11 +150,11 @@ class Ros1Topics final : public live::TopicSensor {
 
   /// A parameter that may be set later. The master is asked for nothing when it is not there.
   void ask_for_description() {
-    if (!asks_for_mount() || has_mount() || description_.empty()) return;
+    if (description_.empty() || mounts().are_known()) return;
     if (!is_reachable(master_, kProbe)) return;
     std::string urdf;
     if (!ros::param::get(description_, urdf)) return;
-    take_description(urdf);
+    mounts().take_description(urdf);
     description_.clear();
   }
 

@@ -71,7 +71,7 @@ class Ros2Topics final : public live::TopicSensor {
         inlets_(intake().topics().size()),
         node_(params.settings(), [this] { wake(); }) {
     if (params.publish) advertise(params);
-    if (asks_for_mount()) ask_for_mount(params);
+    if (mounts().are_asked_for()) ask_for_mounts(params);
     thread_ = std::thread([this] { receive(); });
   }
 
@@ -115,7 +115,7 @@ class Ros2Topics final : public live::TopicSensor {
     write(*diagnostics_, diagnostics_message(diagnostics));
   }
 
-  void ask_for_mount(const Params& params) {
+  void ask_for_mounts(const Params& params) {
     const auto latched = [this](const std::string& topic, const std::string& type) {
       return &node_.make_reader(dds_topic(topic), dds_type(type), DdsNode::Delivery::kLatched,
                                 kMostLatched);
@@ -134,7 +134,7 @@ class Ros2Topics final : public live::TopicSensor {
     while (description_ != nullptr && node_.take(*description_, message, info)) {
       if (!info.valid_data) continue;
       try {
-        take_description(std::string(fields_of(message)->text()));
+        mounts().take_description(std::string(fields_of(message)->text()));
       } catch (const bag::BrokenMessage& broken) {
         services().log(
             LogLevel::kWarning,

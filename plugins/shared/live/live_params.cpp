@@ -29,6 +29,11 @@ void LiveParams::bind(ParamBinder& b) {
   b(VIWO_PARAM(imu_frame),
     {.help = "frame of the IMU: where it sits on body_frame is then what /tf_static and the "
              "robot's description say, instead of p_IinB_m and rpy_ItoB_rad"});
+  b(VIWO_PARAM(wheel_frame),
+    {.help = "frame O of the wheels, as base_link: where the imu_frame is in it is said, as it is "
+             "written into the section wheels, and compared with the estimate"});
+  b(VIWO_PARAM(camera_frames),
+    {.help = "optical frames of the cameras, in the order of image_topics: likewise"});
   b(VIWO_PARAM(description_topic),
     {.help = "the robot's description (URDF): std_msgs/String of ROS 2, parameter of ROS 1; empty: "
              "/tf_static alone is asked"});
@@ -55,6 +60,15 @@ OutputFrames LiveParams::frames() const {
   if (!imu_frame.empty() && !(p_IinB_m.isZero(0.) && rpy_ItoB_rad.isZero(0.))) {
     throw ParamError("imu_frame",
                      "p_IinB_m and rpy_ItoB_rad say where '" + imu_frame + "' sits: give either");
+  }
+  if (imu_frame.empty() && !wheel_frame.empty()) {
+    throw ParamError("wheel_frame", "needs imu_frame: where that is in it is asked for");
+  }
+  if (imu_frame.empty() && !camera_frames.empty()) {
+    throw ParamError("camera_frames", "needs imu_frame: where that is in them is asked for");
+  }
+  if (camera_frames.size() > image_topics.size()) {
+    throw ParamError("camera_frames", "more of them than image_topics");
   }
   frames.R_ItoB = rotation_of_rpy(rpy_ItoB_rad);
   frames.p_IinB = p_IinB_m;

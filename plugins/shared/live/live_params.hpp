@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -21,6 +22,8 @@ struct LiveParams : bag::TopicOptions {
   std::string world_frame = "odom";
   std::string body_frame = "imu";
   std::string imu_frame;
+  std::string wheel_frame;
+  std::vector<std::string> camera_frames;
   std::string description_topic = "/robot_description";
   Eigen::Vector3d p_IinB_m{0., 0., 0.};
   Eigen::Vector3d rpy_ItoB_rad{0., 0., 0.};

@@ -6,12 +6,8 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/Geometry>
-
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
-#include "viwo/math/rpy.hpp"
-#include "viwo/math/significant.hpp"
 
 namespace viwo::live {
 namespace {
@@ -21,12 +17,6 @@ using namespace std::chrono_literals;
 constexpr auto kPoll = 100ms;           ///< how late an end that nobody signals is seen
 constexpr auto kTopicSilence = 1000ms;  ///< of one topic: worth a warning
 constexpr auto kPublisherWait = 3s;     ///< before topics without publisher are named
-
-std::string list_text(const Eigen::Vector3d& v) {
-  std::string text;
-  for (const double value : v) text += (text.empty() ? "[" : ", ") + significant(value, 6);
-  return text + "]";
-}
 
 std::unique_ptr<MeasurementQueue> make_queue(const LiveParams& params, Pace pace) {
   const auto max_images = static_cast<std::size_t>(params.max_waiting_images);
@@ -41,18 +31,14 @@ TopicSensor::TopicSensor(const LiveParams& params, const HostServices& services,
     : services_(services),
       options_(params),
       make_fields_(make_fields),
-      imu_frame_(params.imu_frame),
-      frames_(params.frames()),
-      has_mount_(params.imu_frame.empty()),
+      mounts_(params, services_),
       publish_(params.publish),
       sigma_rate_(params.sigma_rate_rad_per_s),
       warn_latency_s_(params.warn_latency_s),
       idle_timeout_(std::llround(1e3 * params.idle_timeout_s)),
       queue_(make_queue(params, pace)),
       steps_(dynamic_cast<StepQueue*>(queue_.get())),
-      intake_(options_, services_, *queue_, make_fields, pace) {
-  if (asks_for_mount()) find_mount("");  // of a frame in itself it is known
-}
+      intake_(options_, services_, *queue_, make_fields, pace) {}
 
 Status TopicSensor::next(Measurement& out) {
   const auto since = Clock::now();
@@ -87,16 +73,11 @@ void TopicSensor::rejections(std::vector<RejectionCount>& out) const {
 }
 
 void TopicSensor::estimate(const EstimateSample& estimate) {
-  if (!publish_) return;
   Health health;
+  health.trouble = mounts_.trouble(estimate);
+  if (!publish_) return;
   std::optional<Odometry> odometry;
-  {
-    const std::scoped_lock lock(mount_mutex_);
-    if (has_mount_) odometry = odometry_of(estimate, frames_, sigma_rate_);
-  }
-  if (!odometry) {
-    health.trouble = "nothing says where frame '" + imu_frame_ + "' is in '" + frames_.body + "'";
-  }
+  if (const auto frames = mounts_.frames()) odometry = odometry_of(estimate, *frames, sigma_rate_);
   health.silent_topics = intake_.silent_topics(kTopicSilence);
   std::vector<RejectionCount> rejected;
   rejections(rejected);
@@ -128,88 +109,16 @@ bool TopicSensor::is_idle(Clock::duration longer_than) const {
 bool TopicSensor::is_time_to_name_missing() {
   if (named_missing_ || Clock::now() - begin_ < kPublisherWait) return false;
   named_missing_ = true;
-  if (asks_for_mount()) say_missing_mount();
+  mounts_.say_missing();
   return true;
 }
 
-bool TopicSensor::has_mount() const {
-  const std::scoped_lock lock(mount_mutex_);
-  return has_mount_;
-}
-
 void TopicSensor::take_transforms(std::span<const std::uint8_t> message) {
-  std::string why;
   try {
-    for (const bag::Transform& transform : bag::read_transforms(*make_fields_(message))) {
-      const std::scoped_lock lock(mount_mutex_);
-      if (const std::string no = tree_.add(transform); !no.empty()) why = no;
-    }
+    mounts_.take(bag::read_transforms(*make_fields_(message)));
   } catch (const bag::BrokenMessage& broken) {
-    why = std::string("a message that is broken: ") + broken.what();
+    mounts_.say_useless(std::string("/tf_static: a message that is broken: ") + broken.what());
   }
-  find_mount(why.empty() ? "" : "/tf_static: " + why);
-}
-
-void TopicSensor::take_description(const std::string& urdf) {
-  FrameTree described;  // to read it takes time, which the estimate is not to wait for
-  const std::string why = described.add_urdf(urdf);
-  {
-    const std::scoped_lock lock(mount_mutex_);
-    tree_.merge(described);
-  }
-  find_mount(why);
-}
-
-void TopicSensor::find_mount(const std::string& why_not_all) {
-  if (!why_not_all.empty()) say_once(LogLevel::kWarning, why_not_all + "; it is not used");
-  std::string text;
-  {
-    const std::scoped_lock lock(mount_mutex_);
-    const auto found = tree_.find(imu_frame_, frames_.body);
-    if (!found) return;
-    const bool is_same = has_mount_ && found->R_AtoB.isApprox(frames_.R_ItoB, 1e-9) &&
-                         found->p_AinB.isApprox(frames_.p_IinB, 1e-9);
-    if (is_same) return;
-    has_mount_ = true;
-    frames_.R_ItoB = found->R_AtoB;
-    frames_.p_IinB = found->p_AinB;
-    text = "frame '" + imu_frame_ + "' is in '" + frames_.body +
-           "' at p_IinB_m: " + list_text(frames_.p_IinB) +
-           ", rpy_ItoB_rad: " + list_text(rpy_of_rotation(frames_.R_ItoB));
-  }
-  say_once(LogLevel::kInfo, text);
-}
-
-void TopicSensor::say_once(LogLevel level, const std::string& text) {
-  constexpr std::size_t kMost = 20;
-  {
-    const std::scoped_lock lock(mount_mutex_);
-    if (said_.size() >= kMost || !said_.insert(text).second) return;
-  }
-  services_.log(level, text);
-}
-
-void TopicSensor::say_missing_mount() {
-  std::string text;
-  {
-    const std::scoped_lock lock(mount_mutex_);
-    if (has_mount_) return;
-    text = "nothing says where frame '" + imu_frame_ + "' is in '" + frames_.body +
-           "': no pose is published";
-    const auto names = tree_.names();
-    bool are_there = true;
-    for (const std::string& wanted : {plain_name(imu_frame_), plain_name(frames_.body)}) {
-      if (names.empty() || std::find(names.begin(), names.end(), wanted) != names.end()) continue;
-      are_there = false;
-      text += "; there is no '" + wanted + "'" + log::did_you_mean(wanted, names);
-    }
-    if (names.empty()) {
-      text += " (no frame is known from /tf_static or the robot's description)";
-    } else if (are_there) {
-      text += ": both are there, but no fixed frames join them";
-    }
-  }
-  services_.log(LogLevel::kWarning, text);
 }
 
 void TopicSensor::name_missing(const std::string& topic,

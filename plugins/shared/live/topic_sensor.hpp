@@ -6,16 +6,15 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "estimate_messages.hpp"
-#include "frame_tree.hpp"
 #include "intake.hpp"
 #include "live_params.hpp"
 #include "live_queue.hpp"
+#include "mounts.hpp"
 #include "step_queue.hpp"
 #include "viwo/api/host_services.hpp"
 #include "viwo/api/sensor.hpp"
@@ -48,12 +47,8 @@ class TopicSensor : public Sensor {
   void end(LogLevel level, const std::string& why);
   /// Ends it with an InputError of next(): what it has given is not what it should have.
   void fail(const std::string& why);
-  /// Whether the robot is asked where its IMU sits: for messages of /tf_static and a description.
-  bool asks_for_mount() const { return publish_ && !imu_frame_.empty(); }
-  bool has_mount() const;
-  /// What is of no use is said.
+  /// A message of /tf_static.
   void take_transforms(std::span<const std::uint8_t> message);
-  void take_description(const std::string& urdf);
 
   /// Whether nothing that could be used has come for this long.
   bool is_idle(Clock::duration longer_than) const;
@@ -64,25 +59,17 @@ class TopicSensor : public Sensor {
   void name_missing(const std::string& topic, const std::vector<std::string>& there) const;
 
   const HostServices& services() const { return services_; }
+  Mounts& mounts() { return mounts_; }
   Intake& intake() { return intake_; }
   const Intake& intake() const { return intake_; }
   /// Of a sensor that is played in step; null of others.
   StepQueue* steps() { return steps_; }
 
  private:
-  void find_mount(const std::string& why_not_all);
-  void say_once(LogLevel level, const std::string& text);
-  void say_missing_mount();
-
   HostServices services_;
   bag::TopicOptions options_;
   MakeFields make_fields_;
-  std::string imu_frame_;
-  mutable std::mutex mount_mutex_;
-  FrameTree tree_;
-  OutputFrames frames_;
-  bool has_mount_;
-  std::set<std::string> said_;  ///< of mounts: what is said again is not worth a line
+  Mounts mounts_;
   bool publish_;
   double sigma_rate_;
   double warn_latency_s_;

@@ -213,7 +213,8 @@ TEST_F(Ros2Topics, PublishesTheEstimate) {
 }
 
 TEST_F(Ros2Topics, AsksTheRobotWhereItsImuSits) {
-  const auto sensor = make(", imu_topic: /imu0, imu_frame: imu_link, body_frame: base_link");
+  const auto sensor = make(
+      ", imu_topic: /imu0, imu_frame: imu_link, body_frame: base_link, wheel_frame: base_link");
   Child recorder(dds_->node("record", dds_->file("heard.txt")), dds_->file("recorder.log"));
   EstimateSample estimate;
   estimate.p_IinG_m = {1., 2., 3.};
@@ -227,6 +228,9 @@ TEST_F(Ros2Topics, AsksTheRobotWhereItsImuSits) {
   ASSERT_TRUE(wait_until_said(
       "frame 'imu_link' is in 'base_link' at p_IinB_m: [0.5, 0, 0.25], rpy_ItoB_rad: [0, 0, 0]"))
       << dds_->text_of("robot.log");
+  EXPECT_TRUE(wait_until_said(
+      "frame 'imu_link' is in 'base_link', wheels: {p_IinO_m: [0.5, 0, 0.25], rpy_ItoO_rad: [0, 0, "
+      "0]}"));
   EXPECT_THAT(publish_until_heard(*sensor, estimate, {"odometry "}),
               ContainsRegex("odometry 170000000[0-9]+ odom base_link 0.5 2 2.75"));
   EXPECT_THAT(error_of(", imu_topic: /i, imu_frame: imu_link, p_IinB_m: [1, 0, 0]"),
