@@ -169,12 +169,12 @@ int run_command(const Arguments& arguments) {
   std::optional<ForecastOutput> forecast;
   if (!arguments.plan.empty()) forecast.emplace(arguments.plan, setup, plugins);
   view::PictureSinks sinks = view::open_sinks(setup, arguments.show, arguments.video);
-  std::optional<EstimateOutput> mcap;
-  if (!arguments.mcap.empty()) mcap.emplace(arguments.mcap, setup);
   const RunData data = collect(setup, LiveSensors::kAllowed);
   view::RunPictures pictures(setup, data, std::move(sinks));
   const auto folder = out_folder(arguments);
-  make_folder(folder);  // whether results can be written shows before the work
+  make_folder(folder);                 // whether results can be written shows before the work
+  std::optional<EstimateOutput> mcap;  // behind all that may be refused: it empties its file
+  if (!arguments.mcap.empty()) mcap.emplace(arguments.mcap, setup);
   const Figures figures(arguments, folder);
   write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
   // Until all is written. What has no filter is done in no time.

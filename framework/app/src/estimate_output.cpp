@@ -64,6 +64,7 @@ void EstimateOutput::watch(RunHooks& hooks) {
   hooks.on_warning = [this, then = hooks.on_warning](double t_s, const std::string& text) {
     if (then) then(t_s, text);
     warnings_.emplace_back(t_s, text);
+    since_written_.push_back(text);
   };
 }
 
@@ -88,6 +89,7 @@ void EstimateOutput::write(double t_s, const Filter& filter) {
   EstimateSample estimate = estimate_sample(filter, piece_, warnings_at(t_s));
   estimate.latency_s = std::numeric_limits<double>::quiet_NaN();  // of no interest afterwards
   const std::vector<log::SeenImage> seen = std::exchange(seen_, {});
+  since_written_.clear();
   if (!failure_.empty()) return;
   try {
     out_->write(estimate, seen);
@@ -101,7 +103,7 @@ std::string EstimateOutput::finish(const RunResult& result) {
   try {
     std::string why = reason(result);
     if (why.empty() && result.status != RunStatus::kOk) why = "the run failed";
-    out_->close(why);
+    out_->close(why, since_written_);
   } catch (const std::exception& error) {
     failure_ = error.what();
   }

@@ -36,6 +36,7 @@ class EstimateOutput final : public EstimatorObserver {
   std::vector<log::SeenImage> seen_;   ///< in this epoch
   int piece_ = 0;
   std::vector<std::pair<double, std::string>> warnings_;  ///< of the last seconds, with their times
+  std::vector<std::string> since_written_;                ///< warnings after the last epoch
   std::string failure_;
 };
 

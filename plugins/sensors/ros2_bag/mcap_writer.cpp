@@ -48,14 +48,19 @@ Buffer& Buffer::raw(std::span<const std::uint8_t> bytes) {
   return *this;
 }
 
-Writer::Writer(const std::string& file, Compression compression, std::size_t chunk_bytes)
+Bytes Writer::head(const std::string& library) {
+  return Buffer().raw(kMagic).record(kHeader, Buffer().text("ros2").text(library)).bytes();
+}
+
+Writer::Writer(const std::string& file, Compression compression, std::size_t chunk_bytes,
+               const std::string& library)
     : file_(file),
       fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)),
       compression_(compression),
       chunk_bytes_(chunk_bytes) {
   if (fd_ < 0) fail(std::strerror(errno));
   try {
-    put(Buffer().raw(kMagic).record(kHeader, Buffer().text("ros2").text("viwo")));
+    put(Buffer().raw(head(library)));
   } catch (...) {
     ::close(fd_);
     throw;

@@ -39,8 +39,13 @@ class Buffer {
 /// Everything that fails is a std::runtime_error "file  cannot be written: why".
 class Writer {
  public:
+  static constexpr std::size_t kChunkBytes = 768 << 10;
+
+  /// `library`: who writes, as the file's header names it.
   explicit Writer(const std::string& file, Compression compression = Compression::kZstd,
-                  std::size_t chunk_bytes = 768 << 10);
+                  std::size_t chunk_bytes = kChunkBytes, const std::string& library = "viwo");
+  /// What files of that library begin with.
+  static Bytes head(const std::string& library);
   ~Writer();
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;

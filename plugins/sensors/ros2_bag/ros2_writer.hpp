@@ -19,7 +19,7 @@ class Ros2Writer final : public BagWriter {
  public:
   explicit Ros2Writer(const std::string& file,
                       mcap::Compression compression = mcap::Compression::kZstd,
-                      std::size_t chunk_bytes = 768 << 10);
+                      std::size_t chunk_bytes = mcap::Writer::kChunkBytes);
 
   void write_imu(const std::string& topic, const Stamps& stamps,
                  const std::array<double, 3>& gyro_rad_per_s,

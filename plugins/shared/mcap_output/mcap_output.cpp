@@ -1,6 +1,9 @@
 #include "mcap_output.hpp"
 
 #include <cmath>
+#include <fstream>
+#include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "ros2_definitions.hpp"
@@ -16,9 +19,30 @@ constexpr double kDiagnosticsPeriod_s = 1.;
 /// Of each axis of the angular rate, as of live topics unless a configuration says otherwise.
 constexpr double kSigmaRate_rad_per_s = 0.01;
 
+/// Not that of recordings that are made with viwo_bag.
+constexpr const char* kLibrary = "viwo run";
+
+/// Throws where a file is there that no run has written: a recording, or a configuration.
+std::string that_may_be_written(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return file.string();  // open() says why not
+  const bag::Bytes expected = bag::mcap::Writer::head(kLibrary);
+  bag::Bytes begin(expected.size());
+  std::ifstream in(file, std::ios::binary);
+  in.read(reinterpret_cast<char*>(begin.data()), static_cast<std::streamsize>(begin.size()));
+  if (in.gcount() > 0 && begin != expected) {
+    throw std::runtime_error(file.string() +
+                             "  is there already and was not written by --mcap: choose another "
+                             "name, or remove it");
+  }
+  return file.string();
+}
+
 }  // namespace
 
-McapOutput::McapOutput(const std::filesystem::path& file) : out_(file.string()) {}
+McapOutput::McapOutput(const std::filesystem::path& file)
+    : out_(that_may_be_written(file), bag::mcap::Compression::kZstd, bag::mcap::Writer::kChunkBytes,
+           kLibrary) {}
 
 void McapOutput::put(const std::string& topic, const std::string& type, const bag::Bytes& message) {
   auto known = channels_.find(topic);
@@ -62,12 +86,16 @@ void McapOutput::put_diagnostics(Diagnostics diagnostics, bool always) {
       ros2::diagnostics_message(diagnostics_));
 }
 
-void McapOutput::close(const std::string& failure) {
+void McapOutput::close(const std::string& failure, const std::vector<std::string>& warnings) {
   if (!path_.poses().empty()) put_path();
   Diagnostics last = diagnostics_;
   last.t_ns = t_ns_;
   last.fails = !failure.empty();
   if (last.fails) last.message = failure;
+  for (const std::string& warning : warnings) {
+    last.message = last.warns || last.fails ? last.message + "; " + warning : warning;
+    last.warns = true;
+  }
   put_diagnostics(std::move(last), true);
   out_.close();
 }

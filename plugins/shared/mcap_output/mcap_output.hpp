@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "estimate_messages.hpp"
 #include "mcap_writer.hpp"
@@ -16,10 +17,11 @@ namespace viwo::live {
 /// Written chunk by chunk as it comes: when the process is killed, readers have all chunks before.
 class McapOutput final : public log::EstimateLog {
  public:
+  /// std::runtime_error for a file that cannot be written, or was written by others.
   explicit McapOutput(const std::filesystem::path& file);
 
   void write(const EstimateSample& estimate, std::span<const log::SeenImage> images) override;
-  void close(const std::string& failure) override;
+  void close(const std::string& failure, const std::vector<std::string>& warnings) override;
 
  private:
   void put(const std::string& topic, const std::string& type, const bag::Bytes& message);

@@ -1,5 +1,7 @@
 // What `viwo run --mcap` writes, read back by the reader of bags.
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <map>
 
@@ -56,7 +58,7 @@ class McapOutputTest : public testing::InFolder {
 TEST_F(McapOutputTest, HasEachEpochThePathEachFiveSecondsAndTheLastState) {
   McapOutput out(file_);
   write(out, 101);
-  out.close("");
+  out.close("", {});
   // The path at 0, 5 and 10 s, and at the end.
   EXPECT_THAT(counts(), ::testing::UnorderedElementsAre(
                             ::testing::Pair("/viwo/odometry", 101), ::testing::Pair("/tf", 101),
@@ -84,12 +86,50 @@ TEST_F(McapOutputTest, ADiskThatIsFullIsAnErrorAndWhatWasWrittenIsRead) {
   const std::string failure = testing::error_of<std::runtime_error>([&] {
     McapOutput out(file_);
     write(out, 5000);
-    out.close("");
+    out.close("", {});
   });
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   EXPECT_EQ(failure, file_.string() + "  cannot be written: File too large");
   EXPECT_GT(counts()["/viwo/odometry"], 100);
+}
+
+TEST_F(McapOutputTest, WritesOverARunButNotOverARecordingOrAText) {
+  for (int twice = 0; twice < 2; ++twice) {
+    McapOutput out(file_);
+    write(out, 3);
+    out.close("", {});
+  }
+  EXPECT_EQ(counts()["/viwo/odometry"], 3);
+  const auto refused = [](const std::filesystem::path& file) {
+    return testing::error_of<std::runtime_error>([&] { McapOutput{file}; });
+  };
+  const auto recording = folder_ / "recording.mcap", text = folder_ / "run.yaml";
+  bag::mcap::Writer(recording.string()).close();
+  std::ofstream(text) << "name: run\n";
+  for (const auto& file : {recording, text}) {
+    const auto before = std::filesystem::file_size(file);
+    EXPECT_THAT(refused(file), ::testing::HasSubstr("was not written by --mcap"));
+    EXPECT_EQ(std::filesystem::file_size(file), before);
+  }
+}
+
+TEST_F(McapOutputTest, EndsWithWhatWasWarnedOfSinceTheLastEpoch) {
+  {
+    McapOutput out(file_);
+    write(out, 3);
+    out.close("", {"imu0: no samples", "wheels0: no samples"});
+  }
+  std::string last;
+  const auto bag = bag::open_ros2(file_);
+  Rejections damage;
+  bag->read(
+      {{"/diagnostics", false}}, 0, std::numeric_limits<std::int64_t>::max(),
+      [&](const bag::Message& message) {
+        last.assign(reinterpret_cast<const char*>(message.bytes.data()), message.bytes.size());
+      },
+      damage);
+  EXPECT_THAT(last, ::testing::HasSubstr("imu0: no samples; wheels0: no samples"));
 }
 
 }  // namespace

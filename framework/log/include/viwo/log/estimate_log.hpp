@@ -31,9 +31,10 @@ class EstimateLog {
   virtual ~EstimateLog() = default;
   /// The next epoch. std::runtime_error when it cannot be written.
   virtual void write(const EstimateSample& estimate, std::span<const SeenImage> images) = 0;
-  /// Ends the file: the last state, and why the run is not to be trusted ("" if it is).
-  /// std::runtime_error when not all of it could be written; what has been stays readable.
-  virtual void close(const std::string& failure) = 0;
+  /// Ends the file: the last state, why the run is not to be trusted ("" if it is), and what the
+  /// run has warned of since the last epoch. std::runtime_error when not all of it could be
+  /// written; what has been stays readable.
+  virtual void close(const std::string& failure, const std::vector<std::string>& warnings) = 0;
 };
 
 /// The one name that the library exports, an EstimateLogMaker. Program and library are of one
