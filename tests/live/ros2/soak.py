@@ -11,38 +11,18 @@ import json
 import os
 import pathlib
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import time
 
-HERE = pathlib.Path(__file__).resolve().parent
-CONFIG = HERE.parents[2] / "configs/runs/viwo_live_ros2.yaml"
-CYCLONE = """<CycloneDDS><Domain Id='any'><General><Interfaces>
-<NetworkInterface address='127.0.0.1' multicast='false'/></Interfaces>
-<AllowMulticast>false</AllowMulticast></General>
-<Discovery><LeaseDuration>2s</LeaseDuration><ParticipantIndex>auto</ParticipantIndex>
-<MaxAutoParticipantIndex>20</MaxAutoParticipantIndex>
-<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"""
+from loopback import CYCLONE, HERE, free_domain, listening
+
 MOST_MB_PER_HOUR = 1.0
 LEAST_HOURS_TO_FIT = 4.0  # of data: before, what a run gets once is most of what grows
 MOST_MB_ONCE = 40.0
 WARM_UP = 0.3  # part of the run: buffers, pieces and thinned series grow until they are full
-
-
-def free_domain():
-    """A domain is a range of UDP ports; who has the same port of TCP has the domain."""
-    for domain in range(1, 90):
-        lock = socket.socket()
-        try:
-            lock.bind(("127.0.0.1", 7400 + 250 * domain))
-            lock.listen(1)
-            return domain, lock
-        except OSError:
-            lock.close()
-    raise SystemExit("no free domain")
 
 
 def rss_mb(pid):
@@ -74,10 +54,7 @@ def slope(samples):
 
 def live_run(args, out, domain):
     """What the robot and viwo say of it, and the memory of viwo."""
-    words = [args.viwo, "run", str(CONFIG), "--out", str(out / "live"),
-             "--set", f"sensors.ros0.domain_id={domain}",
-             "--set", "sensors.ros0.interfaces=[127.0.0.1]",
-             "--set", "sensors.ros0.peers=[127.0.0.1]",
+    words = [*listening(args.viwo, domain, out / "live"),
              "--set", "sensors.ros0.image_topics=[/cam0/image_raw]",
              "--set", f"sensors.tracks0.cameras={HERE / 'soak_camera.yaml'}",
              "--set", f"cameras.kalibr={HERE / 'soak_camera.yaml'}",
@@ -92,7 +69,7 @@ def live_run(args, out, domain):
                 robot = subprocess.run(
                     [args.ros2_soak, str(domain), str(out / "lap"), str(60 * args.minutes),
                      str(args.speed), str(args.seed)],
-                    env={**os.environ, "CYCLONEDDS_URI": CYCLONE}, stdout=subprocess.PIPE,
+                    env={**os.environ, **CYCLONE}, stdout=subprocess.PIPE,
                     stderr=faults, text=True, timeout=60 * args.minutes + 120)
         finally:
             end.set()

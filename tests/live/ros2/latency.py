@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+"""How long a pose takes from the arrival of its images, live by DDS: a simulated robot with a stereo
+pair of 848 x 800, IMU at 200 Hz and joints at 100 Hz is recorded, played in its own time by Cyclone DDS
+and listened to by viwo, on loopback and this machine alone. For an otherwise idle machine. Exit code 1
+where something is not as it must be: status, an image that was dropped, an estimate that is missing.
+
+  latency.py VIWO VIWO_BAG ROS2_NODE [--camera-hz 30] [--seconds 20] [--repeat 3] [--out DIR]
+"""
+import argparse
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from loopback import CYCLONE, HERE, free_domain, listening
+
+LATENCY = "latency from image to pose"
+OF_SENSORS = ("ros0", "tracks0")
+
+
+def live_run(args, out, domain):
+    """The summary of viwo's run on the bag."""
+    log = out / "live.log"
+    with open(log, "w") as lines:
+        viwo = subprocess.Popen(listening(args.viwo, domain, out / "live"), stdout=lines,
+                                stderr=subprocess.STDOUT)
+        try:
+            while "listening" not in log.read_text():
+                if viwo.poll() is not None:
+                    raise SystemExit(log.read_text())
+                time.sleep(0.05)
+            subprocess.run([args.ros2_node, "play", str(domain), str(out / "robot")],
+                           env={**os.environ, **CYCLONE}, check=True, stdout=subprocess.DEVNULL,
+                           timeout=args.seconds + 60)
+            time.sleep(1)
+        finally:
+            viwo.send_signal(signal.SIGINT)
+            viwo.wait(60)
+    return json.loads((out / "live/summary.json").read_text())
+
+
+def problems(summary, trajectory, camera_hz):
+    """What is not as it must be: messages that were lost or dropped, images without an estimate."""
+    if summary["status"] != "ok":
+        yield f"status {summary['status']}"
+    for sensor in OF_SENSORS:
+        for r in summary["rejected_measurements"].get(sensor, []):
+            yield f"{sensor}: {r['count']} x {r['reason']}"
+    stamps = [float(line.split()[0]) for line in trajectory.splitlines() if line[:1] != "#"]
+    images = round((stamps[-1] - stamps[0]) * camera_hz) + 1
+    if len(stamps) != images:
+        yield f"{len(stamps)} estimates of {images} images"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    for name in ("viwo", "viwo_bag", "ros2_node"):
+        parser.add_argument(name)
+    parser.add_argument("--camera-hz", type=float, default=30)
+    parser.add_argument("--seconds", type=float, default=20, help="of the recording")
+    parser.add_argument("--repeat", type=int, default=3, help="times that it is played")
+    parser.add_argument("--out", type=pathlib.Path, help="keeps what was written")
+    args = parser.parse_args()
+    domain, _lock = free_domain()
+    found = []
+    with tempfile.TemporaryDirectory(prefix="viwo_latency_") as scratch:
+        out = args.out or pathlib.Path(scratch)
+        out.mkdir(parents=True, exist_ok=True)
+        for words in ([args.viwo, "simulate", str(HERE.parent / "simulate.yaml"),
+                       "--set", f"sensors.simulator0.camera_rate_hz={args.camera_hz}",
+                       "--set", f"sensors.simulator0.duration_s={args.seconds}",
+                       "--out", str(out / "log")],
+                      [args.viwo_bag, str(out / "log"), str(out / "robot")]):
+            subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
+        for _ in range(args.repeat):
+            summary = live_run(args, out, domain)
+            print(f"{LATENCY} [ms]: {summary['timing_ms'][LATENCY]}", flush=True)
+            found += problems(summary, (out / "live/trajectory.tum").read_text(), args.camera_hz)
+    for problem in found:
+        print(f"PROBLEM: {problem}")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
