@@ -173,6 +173,7 @@ std::string printable(std::string_view text) {
 }
 
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates) {
+  if (candidates.empty()) return " - there are none";
   const std::string near = config::nearest(name, candidates);
   if (!near.empty()) return " - did you mean '" + printable(near) + "'?";
   return " - there are: " + list_of(candidates, name);

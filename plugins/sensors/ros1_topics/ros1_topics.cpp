@@ -76,7 +76,7 @@ class Ros1Topics final : public live::TopicSensor {
     if (params.publish) advertise(params);
     if (mounts().are_asked_for()) ask_for_mounts();
     watch_ = node_->createWallTimer(ros::WallDuration(1.),
-                                    [this](const ros::WallTimerEvent&) { watch(); });
+                                    [this](const ros::WallTimerEvent&) { watch_master(); });
     // Two threads: watch() may wait for the master, messages must not.
     spinner_ = std::make_unique<ros::AsyncSpinner>(2, &callbacks_);
     spinner_->start();
@@ -159,17 +159,16 @@ class Ros1Topics final : public live::TopicSensor {
   }
 
   /// Every second.
-  void watch() {
+  void watch_master() {
     if (is_idle(kSilence) && !is_reachable(master_, kProbe)) {
       end(LogLevel::kWarning, "the ROS master at " + master_.uri + " is gone and nothing comes");
       return;
     }
     ask_for_description();
-    if (is_time_to_name_missing()) name_missing_topics();
+    watch();
   }
 
-  /// Topics that nobody publishes, with those that were perhaps meant.
-  void name_missing_topics() const {
+  void name_missing_topics() const override {
     std::vector<std::string> there;
     for (std::size_t i = 0; i < subscribers_.size(); ++i) {
       if (subscribers_[i].getNumPublishers() > 0) continue;

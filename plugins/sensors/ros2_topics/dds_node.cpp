@@ -53,6 +53,11 @@ dds::DomainParticipantQos qos_of(const DdsSettings& settings) {
   return qos;
 }
 
+/// DDS tells a participant of its own writers, too.
+bool is_own(const rtps::GUID_t& writer, const dds::DomainParticipant& participant) {
+  return writer.guidPrefix == participant.guid().guidPrefix;
+}
+
 }  // namespace
 
 DdsNode::DdsNode(const DdsSettings& settings, std::function<void()> on_change)
@@ -63,7 +68,7 @@ DdsNode::DdsNode(const DdsSettings& settings, std::function<void()> on_change)
       settings.domain, qos_of(settings), this, mask);
   if (participant_ == nullptr) {
     throw InputError("no participant of DDS in domain " + std::to_string(settings.domain) +
-                     ": are there such interfaces, and fewer than a hundred participants?");
+                     ": are there fewer than a hundred participants?");
   }
   subscriber_ = participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
   publisher_ = participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT);
@@ -76,19 +81,21 @@ DdsNode::~DdsNode() {
 }
 
 #ifdef FASTDDS_VERSION_MAJOR
-void DdsNode::on_data_writer_discovery(dds::DomainParticipant* /*participant*/,
+void DdsNode::on_data_writer_discovery(dds::DomainParticipant* participant,
                                        rtps::WriterDiscoveryStatus reason,
                                        const dds::PublicationBuiltinTopicData& info,
                                        bool& /*should_be_ignored*/) {
   const bool is_there = reason == rtps::WriterDiscoveryStatus::DISCOVERED_WRITER ||
                         reason == rtps::WriterDiscoveryStatus::CHANGED_QOS_WRITER;
+  if (is_own(info.guid, *participant)) return;
   note(info.guid, is_there,
        {info.topic_name.c_str(), info.type_name.c_str(),
         info.reliability.kind == dds::RELIABLE_RELIABILITY_QOS});
 }
 #else
-void DdsNode::on_publisher_discovery(dds::DomainParticipant* /*participant*/,
+void DdsNode::on_publisher_discovery(dds::DomainParticipant* participant,
                                      rtps::WriterDiscoveryInfo&& info) {
+  if (is_own(info.info.guid(), *participant)) return;
   note(info.info.guid(), info.status != rtps::WriterDiscoveryInfo::REMOVED_WRITER,
        {info.info.topicName().c_str(), info.info.typeName().c_str(),
         info.info.m_qos.m_reliability.kind == dds::RELIABLE_RELIABILITY_QOS});

@@ -1,9 +1,12 @@
 #include "dds_settings.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <string_view>
 
 #include <arpa/inet.h>
+#include <ifaddrs.h>
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
@@ -23,6 +26,36 @@ void check_addresses(const char* key, const std::vector<std::string>& addresses)
     in_addr ignored{};
     if (inet_pton(AF_INET, address.c_str(), &ignored) == 1) continue;
     throw ParamError(key, log::quoted(address) + " is no address such as 192.168.1.7");
+  }
+}
+
+/// Those of IPv4.
+std::vector<std::string> addresses_of_this_machine() {
+  std::vector<std::string> all;
+  ifaddrs* first = nullptr;
+  if (getifaddrs(&first) != 0) return all;
+  for (const ifaddrs* at = first; at != nullptr; at = at->ifa_next) {
+    if (at->ifa_addr == nullptr || at->ifa_addr->sa_family != AF_INET) continue;
+    std::array<char, INET_ADDRSTRLEN> text{};
+    const auto* const address = reinterpret_cast<const sockaddr_in*>(at->ifa_addr);
+    if (inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size()) != nullptr) {
+      all.emplace_back(text.data());
+    }
+  }
+  freeifaddrs(first);
+  return all;
+}
+
+/// DDS leaves out what is not there, and a run would listen to nothing.
+void check_interfaces(const std::vector<std::string>& interfaces) {
+  if (interfaces.empty()) return;
+  const auto there = addresses_of_this_machine();
+  for (const std::string& address : interfaces) {
+    if (there.empty() || std::find(there.begin(), there.end(), address) != there.end()) continue;
+    std::string known;
+    for (const std::string& other : there) known += (known.empty() ? "" : ", ") + other;
+    throw ParamError("interfaces",
+                     address + " is no address of this machine - there are: " + known);
   }
 }
 
@@ -46,6 +79,7 @@ bool is_only_this_machine() {
 
 DdsSettings DdsParams::settings() const {
   check_addresses("interfaces", interfaces);
+  check_interfaces(interfaces);
   check_addresses("peers", peers);
   DdsSettings settings;
   settings.domain = domain_id < 0 ? domain_of_environment() : static_cast<std::uint32_t>(domain_id);

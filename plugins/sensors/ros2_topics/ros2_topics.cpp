@@ -174,6 +174,7 @@ class Ros2Topics final : public live::TopicSensor {
       if (Clock::now() - watched > kWatchPeriod) {
         watched = Clock::now();
         watch();
+        watch_steps();
       }
     }
   }
@@ -289,17 +290,14 @@ class Ros2Topics final : public live::TopicSensor {
     }
   }
 
-  /// Every second.
-  void watch() {
-    if (is_time_to_name_missing()) name_missing_topics();
+  void watch_steps() {
     if (steps() == nullptr) return;
     if (const std::string why = steps()->deadlock(); !why.empty()) {
       fail("in step a topic waits for the others, and " + why + ", which does not come");
     }
   }
 
-  /// Topics that nobody publishes, with those that were perhaps meant.
-  void name_missing_topics() const {
+  void name_missing_topics() const override {
     std::set<std::string> there;
     for (const DdsNode::Published& published : node_.published()) {
       if (const auto topic = ros_topic(published.topic)) there.insert(*topic);

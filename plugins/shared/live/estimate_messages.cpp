@@ -114,6 +114,25 @@ Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health)
   return message;
 }
 
+Diagnostics diagnostics_without_estimate(std::int64_t t_ns, const std::string& how_long,
+                                         const Health& health,
+                                         const std::vector<RejectionCount>& rejected) {
+  constexpr std::size_t kMostCauses = 3;
+  Diagnostics message;
+  message.t_ns = t_ns;
+  message.warns = true;
+  message.message = "no estimate " + how_long;
+  if (!health.trouble.empty()) message.message += "; " + health.trouble;
+  for (const std::string& topic : health.silent_topics) {
+    message.message += "; nothing on topic '" + topic + "'";
+  }
+  for (std::size_t i = 0; i < std::min(rejected.size(), kMostCauses); ++i) {
+    message.message += "; " + std::to_string(rejected[i].count) + " x " + rejected[i].reason;
+  }
+  message.values.emplace_back("rejections", std::to_string(health.rejected));
+  return message;
+}
+
 bool Path::add(const Pose& pose, int piece) {
   if (piece != piece_) poses_.clear();
   piece_ = piece;

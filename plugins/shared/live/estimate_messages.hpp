@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "viwo/api/rejections.hpp"
 #include "viwo/api/sensor.hpp"
 
 namespace viwo::live {
@@ -66,6 +67,12 @@ struct Diagnostics {
 
 /// Latency, calibration with its sigmas, and a warning when something is off.
 Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health);
+
+/// While there is no estimate: a warning that says so, for how long ("yet", "for 3 s"), and what
+/// may be the cause. `rejected`: what was dropped so far.
+Diagnostics diagnostics_without_estimate(std::int64_t t_ns, const std::string& how_long,
+                                         const Health& health,
+                                         const std::vector<RejectionCount>& rejected);
 
 /// The way so far, as far as it is shown: a pose each half second, the last kMost of them, of the
 /// present piece of the run.

@@ -291,6 +291,13 @@ std::optional<Intake::Clock::time_point> Intake::last_use() const {
   return last_use_;
 }
 
+std::optional<std::int64_t> Intake::newest_ns() const {
+  const std::scoped_lock lock(mutex_);
+  std::optional<std::int64_t> newest;
+  for (const State& state : states_) newest = std::max(newest, state.last_ns);
+  return newest;
+}
+
 std::vector<std::string> Intake::silent_topics(std::chrono::milliseconds longer_than) const {
   const std::scoped_lock lock(mutex_);
   std::vector<std::string> silent;

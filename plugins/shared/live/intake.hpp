@@ -61,6 +61,8 @@ class Intake {
 
   /// When something came last that could be used; of all topics.
   std::optional<Clock::time_point> last_use() const;
+  /// The newest stamp of all topics.
+  std::optional<std::int64_t> newest_ns() const;
   /// Topics of which nothing could be used for longer than this, of fixes five times as long.
   std::vector<std::string> silent_topics(std::chrono::milliseconds longer_than) const;
   void rejections(std::vector<RejectionCount>& out) const;

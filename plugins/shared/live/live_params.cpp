@@ -1,7 +1,9 @@
 #include "live_params.hpp"
 
 #include <set>
+#include <string>
 
+#include "frame_tree.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/math/rpy.hpp"
 
@@ -50,8 +52,8 @@ void LiveParams::bind(ParamBinder& b) {
 
 OutputFrames LiveParams::frames() const {
   OutputFrames frames;
-  frames.world = world_frame;
-  frames.body = body_frame;
+  frames.world = plain_name(world_frame);  // tf2 knows no other names
+  frames.body = plain_name(body_frame);
   if (frames.world.empty()) throw ParamError("world_frame", "a frame needs a name");
   if (frames.body.empty()) throw ParamError("body_frame", "a frame needs a name");
   if (frames.world == frames.body) {
@@ -86,7 +88,9 @@ const LiveParams& LiveParams::checked(std::string (*why_no_name)(const std::stri
   const auto check_topic = [&](const std::string& key, const std::string& topic) {
     if (topic.empty()) return;
     check_name(key, topic);
-    if (!seen.insert(topic).second) throw ParamError(key, "'" + topic + "' is wanted twice");
+    if (!seen.insert(plain_name(topic)).second) {
+      throw ParamError(key, "'" + topic + "' is wanted twice");
+    }
   };
   check_topic("imu_topic", imu_topic);
   for (const std::string& topic : image_topics) check_topic("image_topics", topic);
@@ -94,9 +98,17 @@ const LiveParams& LiveParams::checked(std::string (*why_no_name)(const std::stri
   check_topic("pose_topic", pose_topic);
   check_topic("odometry_topic", odometry_topic);
   check_topic("gnss_topic", gnss_topic);
-  check_name("odometry_topic_out", odometry_topic_out);
-  if (!path_topic_out.empty()) check_name("path_topic_out", path_topic_out);
-  if (!description_topic.empty()) check_name("description_topic", description_topic);
+  if (publish) {
+    if (publish_tf) seen.insert("tf");
+    seen.insert("diagnostics");
+    check_name("odometry_topic_out", odometry_topic_out);
+    check_topic("odometry_topic_out", odometry_topic_out);
+    check_topic("path_topic_out", path_topic_out);
+  }
+  if (!imu_frame.empty()) {
+    seen.insert("tf_static");
+    check_topic("description_topic", description_topic);
+  }
   return *this;
 }
 

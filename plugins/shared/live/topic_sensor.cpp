@@ -1,6 +1,7 @@
 #include "topic_sensor.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -17,6 +18,11 @@ using namespace std::chrono_literals;
 constexpr auto kPoll = 100ms;           ///< how late an end that nobody signals is seen
 constexpr auto kTopicSilence = 1000ms;  ///< of one topic: worth a warning
 constexpr auto kPublisherWait = 3s;     ///< before topics without publisher are named
+constexpr auto kNoEstimate = 2s;        ///< without one: worth a warning
+constexpr auto kNamingWait = 2s;        ///< until watch() has named them
+
+/// Whether a sensor of this process publishes.
+std::atomic<bool> is_published = false;
 
 std::unique_ptr<MeasurementQueue> make_queue(const LiveParams& params, Pace pace) {
   const auto max_images = static_cast<std::size_t>(params.max_waiting_images);
@@ -38,7 +44,17 @@ TopicSensor::TopicSensor(const LiveParams& params, const HostServices& services,
       idle_timeout_(std::llround(1e3 * params.idle_timeout_s)),
       queue_(make_queue(params, pace)),
       steps_(dynamic_cast<StepQueue*>(queue_.get())),
-      intake_(options_, services_, *queue_, make_fields, pace) {}
+      intake_(options_, services_, *queue_, make_fields, pace) {
+  if (publish_ && is_published.exchange(true)) {
+    throw ParamError("publish",
+                     "another sensor of this run publishes the estimate: set publish: false here");
+  }
+  holds_publishing_ = publish_;
+}
+
+TopicSensor::~TopicSensor() {
+  if (holds_publishing_) is_published = false;
+}
 
 Status TopicSensor::next(Measurement& out) {
   const auto since = Clock::now();
@@ -58,8 +74,11 @@ Status TopicSensor::next(Measurement& out) {
       end(LogLevel::kWarning, why);
       continue;
     }
-    const auto last = std::max(since, intake_.last_use().value_or(since));
-    if (idle_timeout_ > 0ms && Clock::now() - last > idle_timeout_) {
+    const auto last_use = intake_.last_use();
+    const auto idle = Clock::now() - std::max(since, last_use.value_or(since));
+    if (idle_timeout_ == 0ms || idle <= idle_timeout_) continue;
+    hurries_ = !last_use;  // who hears nothing is to know of which topics, before it ends
+    if (!hurries_ || named_missing_ || idle > idle_timeout_ + kNamingWait) {
       end(LogLevel::kInfo, "nothing has come for " +
                                log::number_text(1e-3 * double(idle_timeout_.count())) +
                                " s (idle_timeout_s)");
@@ -73,19 +92,48 @@ void TopicSensor::rejections(std::vector<RejectionCount>& out) const {
 }
 
 void TopicSensor::estimate(const EstimateSample& estimate) {
-  Health health;
-  health.trouble = mounts_.trouble(estimate);
+  last_estimate_ = Clock::now();
+  has_estimate_ = true;
+  const std::string trouble = mounts_.trouble(estimate);
   if (!publish_) return;
   std::optional<Odometry> odometry;
   if (const auto frames = mounts_.frames()) odometry = odometry_of(estimate, *frames, sigma_rate_);
-  health.silent_topics = intake_.silent_topics(kTopicSilence);
   std::vector<RejectionCount> rejected;
-  rejections(rejected);
-  for (const RejectionCount& r : rejected) health.rejected += r.count;
-  health.warn_latency_s = warn_latency_s_;
+  const Health health = health_now(trouble, rejected);
   const bool is_new = odometry && path_.add(odometry->pose, estimate.piece);
   publish(odometry ? &*odometry : nullptr, is_new ? &path_ : nullptr,
           diagnostics_of(estimate, health));
+}
+
+Health TopicSensor::health_now(const std::string& trouble,
+                               std::vector<RejectionCount>& rejected) const {
+  Health health;
+  health.trouble = trouble;
+  // In step the wall's time tells nothing of a topic.
+  if (steps_ == nullptr) health.silent_topics = intake_.silent_topics(kTopicSilence);
+  rejections(rejected);
+  for (const RejectionCount& r : rejected) health.rejected += r.count;
+  health.warn_latency_s = warn_latency_s_;
+  return health;
+}
+
+void TopicSensor::watch() {
+  if (!named_missing_ && (hurries_ || Clock::now() - begin_ >= kPublisherWait)) {
+    mounts_.say_missing();
+    name_missing_topics();
+    named_missing_ = true;
+  }
+  const Clock::time_point last = last_estimate_;
+  const auto without = Clock::now() - last;
+  if (!publish_ || steps_ != nullptr || without < kNoEstimate) return;
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(without).count();
+  const std::string how_long = has_estimate_ ? "for " + std::to_string(seconds) + " s" : "yet";
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const std::int64_t t_ns = intake_.newest_ns().value_or(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+  std::vector<RejectionCount> rejected;
+  const Health health = health_now("", rejected);
+  publish(nullptr, nullptr, diagnostics_without_estimate(t_ns, how_long, health, rejected));
 }
 
 void TopicSensor::end(LogLevel level, const std::string& why) {
@@ -104,13 +152,6 @@ void TopicSensor::fail(const std::string& why) {
 
 bool TopicSensor::is_idle(Clock::duration longer_than) const {
   return Clock::now() - intake_.last_use().value_or(begin_) > longer_than;
-}
-
-bool TopicSensor::is_time_to_name_missing() {
-  if (named_missing_ || Clock::now() - begin_ < kPublisherWait) return false;
-  named_missing_ = true;
-  mounts_.say_missing();
-  return true;
 }
 
 void TopicSensor::take_transforms(std::span<const std::uint8_t> message) {

@@ -2,6 +2,7 @@
 // with messages that have come, and with estimates that are to go.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -33,8 +34,10 @@ class TopicSensor : public Sensor {
   void estimate(const EstimateSample& estimate) final;
 
  protected:
+  /// ParamError where another one publishes already.
   TopicSensor(const LiveParams& params, const HostServices& services, MakeFields make_fields,
               Pace pace = Pace::kLive);
+  ~TopicSensor() override;
 
   /// Why nothing will come any more, although nobody has said so; empty while it may.
   virtual std::string gone() const { return {}; }
@@ -52,9 +55,11 @@ class TopicSensor : public Sensor {
 
   /// Whether nothing that could be used has come for this long.
   bool is_idle(Clock::duration longer_than) const;
-  /// Once, some seconds after the start: whether topics without publisher are to be named now. Says
-  /// itself that nothing tells where the IMU sits.
-  bool is_time_to_name_missing();
+  /// Every second: topics without publisher are named once, and while there is no estimate that is
+  /// published as a warning.
+  void watch();
+  /// Calls name_missing() for topics that nobody publishes.
+  virtual void name_missing_topics() const = 0;
   /// `there`: the topics that are published.
   void name_missing(const std::string& topic, const std::vector<std::string>& there) const;
 
@@ -66,6 +71,8 @@ class TopicSensor : public Sensor {
   StepQueue* steps() { return steps_; }
 
  private:
+  Health health_now(const std::string& trouble, std::vector<RejectionCount>& rejected) const;
+
   HostServices services_;
   bag::TopicOptions options_;
   MakeFields make_fields_;
@@ -76,7 +83,11 @@ class TopicSensor : public Sensor {
   std::chrono::milliseconds idle_timeout_;
   Path path_;
   Clock::time_point begin_ = Clock::now();
-  bool named_missing_ = false;
+  std::atomic<Clock::time_point> last_estimate_ = begin_;
+  std::atomic<bool> has_estimate_ = false;
+  std::atomic<bool> named_missing_ = false;
+  std::atomic<bool> hurries_ = false;  ///< to name them: next() is about to end
+  bool holds_publishing_ = false;
   std::unique_ptr<MeasurementQueue> queue_;
   StepQueue* steps_ = nullptr;
   Intake intake_;

@@ -146,8 +146,9 @@ TEST_F(Ros2Topics, CountsWhatCannotBeUsed) {
 
 TEST_F(Ros2Topics, SaysWhoIsTwoAndWhoIsBestEffort) {
   const auto sensor = make(", imu_topic: /imu0");
-  const auto strict = make(std::string(kAllTopics) + ", reliable: true");
-  const auto all = make(kAllTopics);  // who waits for what is published
+  const auto strict = make(std::string(kAllTopics) + ", publish: false, reliable: true");
+  // Who publishes waits for readers of all topics.
+  const auto all = make(std::string(kAllTopics) + ", publish: false");
   Child one(dds_->node("publish", "600"), dds_->file("one.log"));
   Child two(dds_->node("publish", "600"), dds_->file("two.log"));
   EXPECT_TRUE(
@@ -160,7 +161,7 @@ TEST_F(Ros2Topics, SaysWhoIsTwoAndWhoIsBestEffort) {
 }
 
 TEST_F(Ros2Topics, SaysWhichTopicNobodyPublishesAndWhatIsThereInstead) {
-  const auto published = make(kAllTopics);
+  const auto published = make(std::string(kAllTopics) + ", publish: false");
   Child publisher(dds_->node("publish", "1600"), dds_->file("publisher.log"));
   const auto sensor = make(", imu_topic: /imu1");
   EXPECT_TRUE(wait_until_said("nobody publishes topic '/imu1' - did you mean '/imu0'?"))
@@ -185,13 +186,23 @@ TEST_F(Ros2Topics, RefusesParametersThatContradictEachOther) {
               HasSubstr("sensor.imu_topic: '/a b' cannot be the name of a topic: "));
   EXPECT_THAT(error_of(", imu_topic: /i, image_topics: [/c, /i]"),
               HasSubstr("sensor.image_topics: '/i' is wanted twice"));
-  EXPECT_THAT(error_of(", imu_topic: /i, body_frame: odom"),
+  EXPECT_THAT(error_of(", imu_topic: /i, joint_topic: i, drive_joints: [a]"),
+              HasSubstr("sensor.joint_topic: 'i' is wanted twice"));
+  EXPECT_THAT(error_of(", imu_topic: /i, odometry_topic: /viwo/odometry"),
+              HasSubstr("sensor.odometry_topic_out: 'viwo/odometry' is wanted twice"));
+  EXPECT_THAT(error_of(", imu_topic: /i, path_topic_out: /tf"),
+              HasSubstr("sensor.path_topic_out: '/tf' is wanted twice"));
+  EXPECT_THAT(error_of(", imu_topic: /i, body_frame: /odom"),
               HasSubstr("sensor.body_frame: 'odom' is the world_frame, too"));
+  const auto first = make(", imu_topic: /i");
+  EXPECT_THAT(error_of(", imu_topic: /i"),
+              HasSubstr("sensor.publish: another sensor of this run publishes the estimate"));
+  EXPECT_EQ(error_of(", imu_topic: /i, publish: false"), "");
 }
 
 TEST_F(Ros2Topics, PublishesTheEstimate) {
   const auto sensor = make(
-      ", imu_topic: /imu0, world_frame: map, body_frame: base_link, p_IinB_m: [0.5, 0, 0], "
+      ", imu_topic: /imu0, world_frame: /map, body_frame: /base_link, p_IinB_m: [0.5, 0, 0], "
       "warn_latency_s: 10, sigma_rate_rad_per_s: 0.5");
   Child recorder(dds_->node("record", dds_->file("heard.txt")), dds_->file("recorder.log"));
   EstimateSample estimate;
@@ -210,6 +221,24 @@ TEST_F(Ros2Topics, PublishesTheEstimate) {
   EXPECT_THAT(heard, ContainsRegex("path map [0-9]+ 0.5"));
   EXPECT_THAT(heard, ContainsRegex("diagnostics 170000000[0-9]+ level 1 latency_s=0.0125 "));
   EXPECT_THAT(heard, HasSubstr(" r_1=0.0255 sigma r_1=0.25"));
+}
+
+TEST_F(Ros2Topics, TellsTheRobotThatThereIsNoEstimate) {
+  Child recorder(dds_->node("record", dds_->file("heard.txt")), dds_->file("recorder.log"));
+  const auto sensor = make(", imu_topic: /imu0");
+  const auto heard = [] { return dds_->text_of("heard.txt").find(" level 1 rejections=0"); };
+  const auto deadline = steady_clock::now() + 20s;
+  while (heard() == std::string::npos && steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(50ms);
+  }
+  EXPECT_NE(heard(), std::string::npos) << dds_->text_of("heard.txt");
+}
+
+TEST_F(Ros2Topics, NamesWhatIsMissingBeforeItEndsForWantOfIt) {
+  const auto sensor = make(", imu_topic: /imu0, idle_timeout_s: 0.5");
+  Measurement out;
+  EXPECT_EQ(sensor->next(out), Status::kEnd);
+  EXPECT_TRUE(said().has("nobody publishes topic '/imu0' (nor any other)")) << said().all();
 }
 
 TEST_F(Ros2Topics, AsksTheRobotWhereItsImuSits) {
