@@ -45,6 +45,10 @@ set(VIWO_NO_FALSE_WARNINGS
     $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overread>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized>)
+if(NOT CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  # How GCC before 10.1 passed arguments on arm64, told at length for each that Boost passes so.
+  list(APPEND VIWO_NO_FALSE_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>)
+endif()
 set(VIWO_WARNINGS -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
     ${VIWO_NO_FALSE_WARNINGS})
 if(VIWO_WERROR)
