@@ -12,3 +12,6 @@ set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 foreach(kind LIBRARY INCLUDE PACKAGE)
   set(CMAKE_FIND_ROOT_PATH_MODE_${kind} ONLY)
 endforeach()
+# pkg-config knows of no system but this machine's.
+set(ENV{PKG_CONFIG_LIBDIR} ${VIWO_SYSROOT}/usr/lib/aarch64-linux-gnu/pkgconfig:${VIWO_SYSROOT}/usr/share/pkgconfig)
+set(ENV{PKG_CONFIG_SYSROOT_DIR} ${VIWO_SYSROOT})

@@ -172,10 +172,10 @@ int run_command(const Arguments& arguments) {
   const RunData data = collect(setup, LiveSensors::kAllowed);
   view::RunPictures pictures(setup, data, std::move(sinks));
   const auto folder = out_folder(arguments);
-  make_folder(folder);                 // whether results can be written shows before the work
-  std::optional<EstimateOutput> mcap;  // behind all that may be refused: it empties its file
-  if (!arguments.mcap.empty()) mcap.emplace(arguments.mcap, setup);
+  make_folder(folder);  // whether results can be written shows before the work
   const Figures figures(arguments, folder);
+  std::optional<EstimateOutput> mcap;  // behind what else may be refused: it empties its file
+  if (!arguments.mcap.empty()) mcap.emplace(arguments.mcap, setup);
   write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
   // Until all is written. What has no filter is done in no time.
   std::optional<InterruptSignal> interrupt;

@@ -105,10 +105,7 @@ const LiveParams& LiveParams::checked(std::string (*why_no_name)(const std::stri
     check_topic("odometry_topic_out", odometry_topic_out);
     check_topic("path_topic_out", path_topic_out);
   }
-  if (!imu_frame.empty()) {
-    seen.insert("tf_static");
-    check_topic("description_topic", description_topic);
-  }
+  if (!description_topic.empty()) check_name("description_topic", description_topic);
   return *this;
 }
 

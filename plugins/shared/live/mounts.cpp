@@ -92,14 +92,14 @@ std::optional<OutputFrames> Mounts::frames() const {
 }
 
 void Mounts::take(const std::vector<bag::Transform>& transforms) {
-  for (const bag::Transform& transform : transforms) {
-    std::string why;
-    {
-      const std::scoped_lock lock(mutex_);
-      why = tree_.add(transform);
+  std::string why;  // the last of them: the rest is likely the same
+  {
+    const std::scoped_lock lock(mutex_);
+    for (const bag::Transform& transform : transforms) {
+      if (const std::string no = tree_.add(transform); !no.empty()) why = no;
     }
-    if (!why.empty()) say_useless("/tf_static: " + why);
   }
+  if (!why.empty()) say_useless("/tf_static: " + why);
   find();
 }
 
@@ -193,7 +193,8 @@ std::string Mounts::contradiction(const Wanted& wanted, const EstimateSample& es
   const std::string owner = is_camera ? "cam" + std::to_string(wanted.camera) + "." : "";
   const auto theta = three_of(estimate, owner + (is_camera ? "theta_ItoC" : "theta_ItoO"));
   const auto p = three_of(estimate, owner + (is_camera ? "p_IinC" : "p_IinO"));
-  if (!theta || !p) return {};  // it is not estimated
+  if (!theta || !p) return {};
+  if (theta->sigma == 0. && p->sigma == 0.) return {};  // held: it is not estimated
   const FramePose& said = *wanted.imu_in_it;
   const double apart_m = (p->value - said.p_AinB).norm();
   const double apart_rad = log_so3(exp_so3(theta->value) * said.R_AtoB.transpose()).norm();
@@ -221,7 +222,7 @@ std::string Mounts::trouble(const EstimateSample& estimate) {
       if (!text.empty()) all += (all.empty() ? "" : "; ") + text;
     }
   }
-  for (const std::string& line : news) services_.log(LogLevel::kWarning, line);
+  for (const std::string& line : news) say_once(LogLevel::kWarning, line);
   return all;
 }
 

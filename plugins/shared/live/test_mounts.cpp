@@ -89,7 +89,8 @@ TEST(Mounts, EstimatesThatAreElsewhereAreTold) {
   mounts.take({kImuFrame, kCameraFrame});
   told.texts.clear();
   const Eigen::Vector3d theta(0., 0., M_PI_2), p(0.1, 0.2, 0.3);
-  EXPECT_EQ(mounts.trouble(estimate_of("", "O", theta, p, 0.)), "");
+  EXPECT_EQ(mounts.trouble(estimate_of("", "O", theta, p, 1e-6)), "");
+  EXPECT_EQ(mounts.trouble(estimate_of("", "O", theta, 2. * p, 0.)), "") << "it is held";
   EXPECT_EQ(mounts.trouble(estimate_of("", "O", theta, p + Eigen::Vector3d(0.1, 0., 0.), 0.05)), "")
       << "within its sigmas";
   EXPECT_THAT(mounts.trouble(estimate_of("", "O", theta, p + Eigen::Vector3d(0.1, 0., 0.), 0.01)),

@@ -1,10 +1,11 @@
 #include "topic_sensor.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstddef>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "viwo/api/status.hpp"
@@ -21,8 +22,9 @@ constexpr auto kPublisherWait = 3s;     ///< before topics without publisher are
 constexpr auto kNoEstimate = 2s;        ///< without one: worth a warning
 constexpr auto kNamingWait = 2s;        ///< until watch() has named them
 
-/// Whether a sensor of this process publishes.
-std::atomic<bool> is_published = false;
+/// Where sensors of this kind publish in this process.
+std::mutex published_mutex;
+std::set<std::string> published_to;
 
 std::unique_ptr<MeasurementQueue> make_queue(const LiveParams& params, Pace pace) {
   const auto max_images = static_cast<std::size_t>(params.max_waiting_images);
@@ -45,15 +47,19 @@ TopicSensor::TopicSensor(const LiveParams& params, const HostServices& services,
       queue_(make_queue(params, pace)),
       steps_(dynamic_cast<StepQueue*>(queue_.get())),
       intake_(options_, services_, *queue_, make_fields, pace) {
-  if (publish_ && is_published.exchange(true)) {
-    throw ParamError("publish",
-                     "another sensor of this run publishes the estimate: set publish: false here");
+  if (!publish_) return;
+  const std::string topic = plain_name(params.odometry_topic_out);
+  const std::scoped_lock lock(published_mutex);
+  if (!published_to.insert(topic).second) {
+    throw ParamError("publish", "another sensor of this run publishes the estimate as '" + topic +
+                                    "': set publish: false here, or another odometry_topic_out");
   }
-  holds_publishing_ = publish_;
+  publishes_to_ = topic;
 }
 
 TopicSensor::~TopicSensor() {
-  if (holds_publishing_) is_published = false;
+  const std::scoped_lock lock(published_mutex);
+  published_to.erase(publishes_to_);
 }
 
 Status TopicSensor::next(Measurement& out) {
@@ -128,9 +134,7 @@ void TopicSensor::watch() {
   if (!publish_ || steps_ != nullptr || without < kNoEstimate) return;
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(without).count();
   const std::string how_long = has_estimate_ ? "for " + std::to_string(seconds) + " s" : "yet";
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  const std::int64_t t_ns = intake_.newest_ns().value_or(
-      std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+  const std::int64_t t_ns = intake_.newest_ns().value_or(0);  // of the robot's clock, or of none
   std::vector<RejectionCount> rejected;
   const Health health = health_now("", rejected);
   publish(nullptr, nullptr, diagnostics_without_estimate(t_ns, how_long, health, rejected));

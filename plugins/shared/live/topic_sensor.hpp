@@ -34,7 +34,7 @@ class TopicSensor : public Sensor {
   void estimate(const EstimateSample& estimate) final;
 
  protected:
-  /// ParamError where another one publishes already.
+  /// ParamError where another one publishes to the same topic.
   TopicSensor(const LiveParams& params, const HostServices& services, MakeFields make_fields,
               Pace pace = Pace::kLive);
   ~TopicSensor() override;
@@ -87,7 +87,7 @@ class TopicSensor : public Sensor {
   std::atomic<bool> has_estimate_ = false;
   std::atomic<bool> named_missing_ = false;
   std::atomic<bool> hurries_ = false;  ///< to name them: next() is about to end
-  bool holds_publishing_ = false;
+  std::string publishes_to_;
   std::unique_ptr<MeasurementQueue> queue_;
   StepQueue* steps_ = nullptr;
   Intake intake_;

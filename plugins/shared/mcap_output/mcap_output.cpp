@@ -30,10 +30,10 @@ std::string that_may_be_written(const std::filesystem::path& file) {
   bag::Bytes begin(expected.size());
   std::ifstream in(file, std::ios::binary);
   in.read(reinterpret_cast<char*>(begin.data()), static_cast<std::streamsize>(begin.size()));
-  if (in.gcount() > 0 && begin != expected) {
+  if (!in.is_open() || in.bad() || (in.gcount() > 0 && begin != expected)) {
     throw std::runtime_error(file.string() +
-                             "  is there already and was not written by --mcap: choose another "
-                             "name, or remove it");
+                             "  is there already and was not written by --mcap (of this version): "
+                             "choose another name, or remove it");
   }
   return file.string();
 }

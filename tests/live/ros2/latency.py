@@ -39,11 +39,16 @@ def live_run(args, out, domain):
             time.sleep(1)
         finally:
             viwo.send_signal(signal.SIGINT)
-            viwo.wait(60)
+            code = viwo.wait(60)
+    if code != 0:
+        raise SystemExit(log.read_text())
     return json.loads((out / "live/summary.json").read_text())
 
 
-def problems(summary, trajectory, camera_hz):
+START_S = 3  # of images, before the first estimate
+
+
+def problems(summary, trajectory, args):
     """What is not as it must be: messages that were lost or dropped, images without an estimate."""
     if summary["status"] != "ok":
         yield f"status {summary['status']}"
@@ -51,9 +56,10 @@ def problems(summary, trajectory, camera_hz):
         for r in summary["rejected_measurements"].get(sensor, []):
             yield f"{sensor}: {r['count']} x {r['reason']}"
     stamps = [float(line.split()[0]) for line in trajectory.splitlines() if line[:1] != "#"]
-    images = round((stamps[-1] - stamps[0]) * camera_hz) + 1
-    if len(stamps) != images:
-        yield f"{len(stamps)} estimates of {images} images"
+    if len(stamps) < (args.seconds - START_S) * args.camera_hz:
+        yield f"{len(stamps)} estimates in {args.seconds} s"
+    elif len(stamps) != round((stamps[-1] - stamps[0]) * args.camera_hz) + 1:
+        yield f"{len(stamps)} estimates from {stamps[0]} to {stamps[-1]} s"
 
 
 def main():
@@ -79,7 +85,7 @@ def main():
         for _ in range(args.repeat):
             summary = live_run(args, out, domain)
             print(f"{LATENCY} [ms]: {summary['timing_ms'][LATENCY]}", flush=True)
-            found += problems(summary, (out / "live/trajectory.tum").read_text(), args.camera_hz)
+            found += problems(summary, (out / "live/trajectory.tum").read_text(), args)
     for problem in found:
         print(f"PROBLEM: {problem}")
     return 1 if found else 0
