@@ -77,7 +77,7 @@ class Ros1Topics final : public live::TopicSensor {
     if (mounts().are_asked_for()) ask_for_mounts();
     watch_ = node_->createWallTimer(ros::WallDuration(1.),
                                     [this](const ros::WallTimerEvent&) { watch_master(); });
-    // Two threads: watch() may wait for the master, messages must not.
+    // Two threads: watch_master() may wait for the master, messages must not.
     spinner_ = std::make_unique<ros::AsyncSpinner>(2, &callbacks_);
     spinner_->start();
   }

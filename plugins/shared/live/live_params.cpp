@@ -85,12 +85,13 @@ const LiveParams& LiveParams::checked(std::string (*why_no_name)(const std::stri
     }
   };
   std::set<std::string> seen;
+  const auto check_once = [&](const std::string& key, const std::string& topic) {
+    if (topic.empty() || seen.insert(plain_name(topic)).second) return;
+    throw ParamError(key, "'" + topic + "' is wanted twice");
+  };
   const auto check_topic = [&](const std::string& key, const std::string& topic) {
-    if (topic.empty()) return;
-    check_name(key, topic);
-    if (!seen.insert(plain_name(topic)).second) {
-      throw ParamError(key, "'" + topic + "' is wanted twice");
-    }
+    if (!topic.empty()) check_name(key, topic);
+    check_once(key, topic);
   };
   check_topic("imu_topic", imu_topic);
   for (const std::string& topic : image_topics) check_topic("image_topics", topic);
@@ -98,12 +99,13 @@ const LiveParams& LiveParams::checked(std::string (*why_no_name)(const std::stri
   check_topic("pose_topic", pose_topic);
   check_topic("odometry_topic", odometry_topic);
   check_topic("gnss_topic", gnss_topic);
+  check_name("odometry_topic_out", odometry_topic_out);
+  if (!path_topic_out.empty()) check_name("path_topic_out", path_topic_out);
   if (publish) {
     if (publish_tf) seen.insert("tf");
     seen.insert("diagnostics");
-    check_name("odometry_topic_out", odometry_topic_out);
-    check_topic("odometry_topic_out", odometry_topic_out);
-    check_topic("path_topic_out", path_topic_out);
+    check_once("odometry_topic_out", odometry_topic_out);
+    check_once("path_topic_out", path_topic_out);
   }
   if (!description_topic.empty()) check_name("description_topic", description_topic);
   return *this;

@@ -85,10 +85,14 @@ bool Mounts::are_known() const {
 
 std::optional<OutputFrames> Mounts::frames() const {
   const std::scoped_lock lock(mutex_);
+  OutputFrames frames = frames_;
   for (const Wanted& wanted : wanted_) {
-    if (wanted.of == Of::kBody && !wanted.imu_in_it) return std::nullopt;
+    if (wanted.of != Of::kBody) continue;
+    if (!wanted.imu_in_it) return std::nullopt;
+    frames.R_ItoB = wanted.imu_in_it->R_AtoB;
+    frames.p_IinB = wanted.imu_in_it->p_AinB;
   }
-  return frames_;
+  return frames;
 }
 
 void Mounts::take(const std::vector<bag::Transform>& transforms) {
@@ -131,10 +135,6 @@ void Mounts::find() {
       if (is_same) continue;
       wanted.imu_in_it = found;
       wanted.contradicts = false;
-      if (wanted.of == Of::kBody) {
-        frames_.R_ItoB = found->R_AtoB;
-        frames_.p_IinB = found->p_AinB;
-      }
       news.push_back(text(wanted));
     }
   }

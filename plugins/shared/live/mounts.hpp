@@ -59,8 +59,8 @@ class Mounts {
 
   HostServices services_;
   std::string imu_frame_;
+  const OutputFrames frames_;  ///< as they are configured
   mutable std::mutex mutex_;
-  OutputFrames frames_;
   FrameTree tree_;
   std::vector<Wanted> wanted_;  ///< of the same frames always: are_asked_for() needs no lock
   std::set<std::string> said_;  ///< what is said again is not worth a line

@@ -99,7 +99,6 @@ void TopicSensor::rejections(std::vector<RejectionCount>& out) const {
 
 void TopicSensor::estimate(const EstimateSample& estimate) {
   last_estimate_ = Clock::now();
-  has_estimate_ = true;
   const std::string trouble = mounts_.trouble(estimate);
   if (!publish_) return;
   std::optional<Odometry> odometry;
@@ -133,7 +132,7 @@ void TopicSensor::watch() {
   const auto without = Clock::now() - last;
   if (!publish_ || steps_ != nullptr || without < kNoEstimate) return;
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(without).count();
-  const std::string how_long = has_estimate_ ? "for " + std::to_string(seconds) + " s" : "yet";
+  const std::string how_long = last != begin_ ? "for " + std::to_string(seconds) + " s" : "yet";
   const std::int64_t t_ns = intake_.newest_ns().value_or(0);  // of the robot's clock, or of none
   std::vector<RejectionCount> rejected;
   const Health health = health_now("", rejected);

@@ -83,8 +83,7 @@ class TopicSensor : public Sensor {
   std::chrono::milliseconds idle_timeout_;
   Path path_;
   Clock::time_point begin_ = Clock::now();
-  std::atomic<Clock::time_point> last_estimate_ = begin_;
-  std::atomic<bool> has_estimate_ = false;
+  std::atomic<Clock::time_point> last_estimate_ = begin_;  ///< begin_: there was none
   std::atomic<bool> named_missing_ = false;
   std::atomic<bool> hurries_ = false;  ///< to name them: next() is about to end
   std::string publishes_to_;

@@ -16,10 +16,11 @@ import sys
 import tempfile
 import time
 
-from loopback import CYCLONE, HERE, free_domain, listening
+from loopback import CYCLONE, HERE, free_domain, listening, record
 
 LATENCY = "latency from image to pose"
 OF_SENSORS = ("ros0", "tracks0")
+START_S = 3  # of images, before the first estimate
 
 
 def live_run(args, out, domain):
@@ -43,9 +44,6 @@ def live_run(args, out, domain):
     if code != 0:
         raise SystemExit(log.read_text())
     return json.loads((out / "live/summary.json").read_text())
-
-
-START_S = 3  # of images, before the first estimate
 
 
 def problems(summary, trajectory, args):
@@ -76,12 +74,9 @@ def main():
     with tempfile.TemporaryDirectory(prefix="viwo_latency_") as scratch:
         out = args.out or pathlib.Path(scratch)
         out.mkdir(parents=True, exist_ok=True)
-        for words in ([args.viwo, "simulate", str(HERE.parent / "simulate.yaml"),
-                       "--set", f"sensors.simulator0.camera_rate_hz={args.camera_hz}",
-                       "--set", f"sensors.simulator0.duration_s={args.seconds}",
-                       "--out", str(out / "log")],
-                      [args.viwo_bag, str(out / "log"), str(out / "robot")]):
-            subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
+        record(args.viwo, args.viwo_bag, HERE.parent / "simulate.yaml", out / "robot",
+               f"sensors.simulator0.camera_rate_hz={args.camera_hz}",
+               f"sensors.simulator0.duration_s={args.seconds}")
         for _ in range(args.repeat):
             summary = live_run(args, out, domain)
             print(f"{LATENCY} [ms]: {summary['timing_ms'][LATENCY]}", flush=True)

@@ -1,6 +1,7 @@
 """A DDS domain of one's own on loopback, for the programs here that let viwo listen to Cyclone DDS."""
 import pathlib
 import socket
+import subprocess
 
 HERE = pathlib.Path(__file__).resolve().parent
 CONFIG = HERE.parents[2] / "configs/runs/viwo_live_ros2.yaml"
@@ -23,6 +24,14 @@ def free_domain():
         except OSError:
             lock.close()
     raise SystemExit("no free domain")
+
+
+def record(viwo, viwo_bag, config, bag, *assignments):
+    """Makes the bag of what a simulated robot gives, beside its log."""
+    log = str(bag.parent / "log")
+    sets = [word for assignment in assignments for word in ("--set", assignment)]
+    for words in ([viwo, "simulate", str(config), *sets, "--out", log], [viwo_bag, log, str(bag)]):
+        subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
 
 
 def listening(viwo, domain, out):

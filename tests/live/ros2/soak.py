@@ -17,7 +17,7 @@ import tempfile
 import threading
 import time
 
-from loopback import CYCLONE, HERE, free_domain, listening
+from loopback import CYCLONE, HERE, free_domain, listening, record
 
 MOST_MB_PER_HOUR = 1.0
 LEAST_HOURS_TO_FIT = 4.0  # of data: before, what a run gets once is most of what grows
@@ -118,9 +118,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="viwo_soak_") as scratch:
         out = args.out or pathlib.Path(scratch)
         out.mkdir(parents=True, exist_ok=True)
-        for words in ([args.viwo, "simulate", str(HERE / "soak.yaml"), "--out", str(out / "log")],
-                      [args.viwo_bag, str(out / "log"), str(out / "lap")]):
-            subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
+        record(args.viwo, args.viwo_bag, HERE / "soak.yaml", out / "lap")
         heard, code, samples = live_run(args, out, domain)
         summary = json.loads((out / "live/summary.json").read_text())
     print(json.dumps(heard, indent=1))
