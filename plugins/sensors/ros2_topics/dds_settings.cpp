@@ -70,9 +70,16 @@ std::uint32_t domain_of_environment() {
   return static_cast<std::uint32_t>(*domain);
 }
 
+/// ROS 2 lets the first of the two win. ROS_STATIC_PEERS is not looked at: 'peers' has them.
 bool is_only_this_machine() {
-  return environment("ROS_LOCALHOST_ONLY") == "1" ||
-         environment("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST";
+  if (environment("ROS_LOCALHOST_ONLY") == "1") return true;
+  const std::string_view range = environment("ROS_AUTOMATIC_DISCOVERY_RANGE");
+  if (range == "OFF") {
+    throw InputError(
+        "the environment's ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: nobody would be found; LOCALHOST "
+        "or SUBNET, or 'interfaces' that the parameters give");
+  }
+  return range == "LOCALHOST";
 }
 
 }  // namespace

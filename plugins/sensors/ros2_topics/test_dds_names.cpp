@@ -70,6 +70,23 @@ TEST_F(Settings, StayOnThisMachineWhereTheEnvironmentSaysSo) {
   EXPECT_EQ(DdsParams().settings().interfaces, std::vector<std::string>{"127.0.0.1"});
 }
 
+TEST_F(Settings, OfTheParametersWinOverTheEnvironment) {
+  DdsParams given;
+  given.interfaces = {"127.0.0.1", "127.0.0.1"};  // what no environment gives
+  for (const char* range : {"LOCALHOST", "OFF"}) {
+    setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", range, 1);
+    EXPECT_EQ(given.settings().interfaces, given.interfaces) << range;
+  }
+}
+
+TEST_F(Settings, RefuseAnEnvironmentInWhichNobodyIsFound) {
+  setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", 1);
+  EXPECT_THAT(error_of({}), ::testing::StartsWith(
+                                "the environment's ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: nobody"));
+  setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET", 1);
+  EXPECT_EQ(error_of({}), "");
+}
+
 TEST_F(Settings, RefuseWhatIsNoAddress) {
   DdsParams params;
   params.peers = {"robot"};
