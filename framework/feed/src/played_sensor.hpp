@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "viwo/feed/feed.hpp"
 #include "viwo/feed/run_data.hpp"
 
 namespace viwo {
