@@ -1,13 +1,14 @@
 #!/bin/bash
-# arm64.sh [CTEST ARGUMENT...]   builds for arm64 on another machine, and runs unit tests under qemu
+# arm64.sh                       builds for arm64 on another machine, and runs unit tests under qemu
+# arm64.sh CTEST ARGUMENT...     the same, with the tests that these arguments choose
 # arm64.sh --packages            builds and makes the Debian packages for arm64, in build-arm64
 # With Debian's cross compiler and the libraries of a minimal Debian of this machine's release, which
 # debootstrap puts into /var/tmp/viwo_arm64_RELEASE the first time (2 GB; VIWO_ARM64_SYSTEM names another
-# folder). As root. Tests are those labelled unit; under emulation some take longer than they are given.
+# folder). As root. Without arguments those of tests/not_under_qemu.txt are left out.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 if [[ ${1:-} = -h || ${1:-} = --help ]]; then
-  sed -n '2,6s/^# //p' "$0"
+  sed -n '2,7s/^# //p' "$0"
   exit
 fi
 if [ "$(id -u)" -ne 0 ]; then echo "arm64.sh: a system in a folder is made as root" >&2 && exit 2; fi
@@ -70,4 +71,7 @@ if [ "${1:-}" = --packages ]; then
 fi
 echo "== Testing under qemu"
 export QEMU_LD_PREFIX=$system
+if [ $# -eq 0 ]; then
+  set -- --exclude-regex "$(grep -v '^#' tests/not_under_qemu.txt | paste -sd '|')"
+fi
 ctest --preset arm64 --output-on-failure --parallel "$(nproc)" "$@"
