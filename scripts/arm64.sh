@@ -66,10 +66,7 @@ cmake --build --preset arm64 --parallel "$(nproc)"
 
 if [ "${1:-}" = --packages ]; then
   echo "== Packages"
-  # There is nothing to be compiled in there.
-  inside 'export DEBIAN_FRONTEND=noninteractive; apt-get -q update &&
-    apt-get -y -q install cmake dpkg-dev file python3 < /dev/null &&
-    cd build-arm64 && cpack'
+  inside 'scripts/install_dependencies.sh --packages && cd build-arm64 && cpack'
   exit
 fi
 echo "== Testing under qemu"
