@@ -41,10 +41,16 @@ void make_folder(const std::filesystem::path& folder) {
 FileWriter::FileWriter(std::filesystem::path file, Appears appears)
     : file_(std::move(file)), unfinished_(file_) {
   std::error_code ignored;
-  if (appears == Appears::kWhole && !std::filesystem::is_other(file_, ignored)) {
-    unfinished_ += ".tmp";
+  if (std::filesystem::is_other(file_, ignored)) {
+    // A pipe that nobody reads is an error, not something to wait for.
+    fd_ = ::open(file_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+    if (fd_ < 0 || ::fcntl(fd_, F_SETFL, 0) != 0) fail();
+    return;
   }
-  fd_ = ::open(unfinished_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (appears == Appears::kWhole) unfinished_ += ".tmp";
+  // What is there is not written into: it may be a link to a file that is none of the results.
+  ::unlink(unfinished_.c_str());
+  fd_ = ::open(unfinished_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (fd_ < 0) fail();
 }
 

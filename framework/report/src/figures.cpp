@@ -27,7 +27,14 @@ std::string slug(const std::string& title) {
   return result.empty() ? "plot" : result;
 }
 
+/// What is there goes: it may be a link to a file that is none of the figures.
+void clear(const std::filesystem::path& path) {
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+}
+
 void write(const std::filesystem::path& path, const std::string& text) {
+  clear(path);
   errno = 0;
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file << text;
@@ -58,6 +65,7 @@ void write_figures(const std::filesystem::path& folder, const Document& document
       if (figure.script.empty()) continue;
       write(folder / (name + ".dat"), figure.data);
       write(folder / (name + ".gp"), figure.script);
+      clear(folder / (name + (format == FigureFormat::kSvg ? ".svg" : ".pdf")));
       run_gnuplot(folder, name + ".gp");
     }
   }

@@ -19,8 +19,9 @@ enum class Appears {
   kAtOnce,  ///< as it is written: what has been stays when the process is killed
 };
 
-/// A file that is written. One that appears whole is FILE.tmp until commit(), and goes if nobody
-/// commits.
+/// A file that is written, in place of what was there; a link is replaced, not followed, unless it
+/// leads to a device or a pipe. One that appears whole is FILE.tmp until commit(), and goes if
+/// nobody commits.
 class FileWriter {
  public:
   explicit FileWriter(std::filesystem::path file, Appears appears = Appears::kWhole);
