@@ -161,6 +161,7 @@ class Runner {
 
   /// Takes over what the journal has, or throws it away.
   void open_journal(WorkProgress& progress) {
+    if (!folder_.empty()) journal_.require_own_folder();
     const int there = folder_.empty() ? 0 : journal_.size();
     if (there == 0) return;
     if (!options_.resume && !options_.shard && !options_.collect) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 
@@ -247,6 +248,7 @@ Plot ratio_map(const ExperimentResult& result, const std::string& title,
 double rounded(double value) {
   if (!std::isfinite(value) || value == 0.) return value;
   const double unit = std::pow(10., std::floor(std::log10(std::abs(value))) - 4.);
+  if (!(unit >= std::numeric_limits<double>::min())) return 0.;
   return std::stod(significant(std::round(value / unit) * unit, 5));
 }
 

@@ -1,5 +1,6 @@
 #include "run_journal.hpp"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "checksum.hpp"
+#include "viwo/api/status.hpp"
 #include "viwo/log/files.hpp"
 #include "viwo/results/run_record.hpp"
 
@@ -28,18 +30,56 @@ std::string checksum(std::string_view bytes) {
   return text;
 }
 
-/// Files of runs in the folder, complete or not.
+/// VARIANT,RECORDING,SEED before the extension.
+bool is_of_run(std::string_view name, std::string_view extension) {
+  return name.ends_with(extension) && std::count(name.begin(), name.end(), ',') == 2;
+}
+
+/// Files of runs in the folder, complete or not; no folders.
 std::vector<fs::path> files_in(const fs::path& folder, bool unfinished) {
   std::vector<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     const std::string name = at->path().filename().string();
-    if (name.ends_with(kExtension) || (unfinished && name.ends_with(kUnfinished))) {
-      files.push_back(at->path());
-    }
+    if (!is_of_run(name, kExtension) && !(unfinished && is_of_run(name, kUnfinished))) continue;
+    std::error_code ignored;
+    if (!fs::is_directory(at->symlink_status(ignored))) files.push_back(at->path());
   }
   return files;
 }
+
+/// Nothing for what is no file, or too long for a run that was thinned.
+std::optional<std::string> bytes_of(const fs::path& file) {
+  constexpr std::uintmax_t kMostBytes = std::uintmax_t{64} << 20;
+  if (!fs::is_regular_file(file) || fs::file_size(file) > kMostBytes) return std::nullopt;
+  std::ifstream in(file, std::ios::binary);
+  return std::string{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+/// Takes everything but what lies too deep: the parser needs a part of the stack for each level.
+class Levels : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  bool null() override { return true; }
+  bool boolean(bool /*value*/) override { return true; }
+  bool number_integer(number_integer_t /*value*/) override { return true; }
+  bool number_unsigned(number_unsigned_t /*value*/) override { return true; }
+  bool number_float(number_float_t /*value*/, const string_t& /*text*/) override { return true; }
+  bool string(string_t& /*value*/) override { return true; }
+  bool binary(binary_t& /*value*/) override { return true; }
+  bool start_object(std::size_t /*size*/) override { return ++levels_ <= kMost; }
+  bool key(string_t& /*value*/) override { return true; }
+  bool end_object() override { return --levels_ >= 0; }
+  bool start_array(std::size_t /*size*/) override { return ++levels_ <= kMost; }
+  bool end_array() override { return --levels_ >= 0; }
+  bool parse_error(std::size_t /*at*/, const std::string& /*token*/,
+                   const nlohmann::json::exception& /*what*/) override {
+    return false;
+  }
+
+ private:
+  static constexpr int kMost = 32;  ///< a record has less than ten
+  int levels_ = 0;
+};
 
 }  // namespace
 
@@ -52,13 +92,15 @@ fs::path RunJournal::file_of(const RunKey& key) const {
 int RunJournal::size() const { return static_cast<int>(files_in(folder_, false).size()); }
 
 std::optional<RunResult> RunJournal::read(const RunKey& key) const {
-  std::ifstream in(file_of(key), std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (bytes.size() < kChecksumBytes) return std::nullopt;
-  const std::string expected = bytes.substr(bytes.size() - kChecksumBytes);
-  bytes.resize(bytes.size() - kChecksumBytes);
-  if (checksum(bytes) != expected) return std::nullopt;
   try {
+    const std::optional<std::string> all = bytes_of(file_of(key));
+    if (!all || all->size() < kChecksumBytes) return std::nullopt;
+    const std::string bytes = all->substr(0, all->size() - kChecksumBytes);
+    if (checksum(bytes) != all->substr(bytes.size())) return std::nullopt;
+    Levels levels;
+    if (!nlohmann::json::sax_parse(bytes, &levels, nlohmann::json::input_format_t::cbor)) {
+      return std::nullopt;
+    }
     const nlohmann::json entry = nlohmann::json::from_cbor(bytes);
     if (entry.at("variant") != key.variant || entry.at("recording") != key.recording ||
         entry.at("seed") != key.seed || entry.at("configuration") != key.configuration) {
@@ -71,6 +113,7 @@ std::optional<RunResult> RunJournal::read(const RunKey& key) const {
 }
 
 void RunJournal::write(const RunKey& key, const RunResult& run) const {
+  require_own_folder();
   log::make_folder(folder_);
   const nlohmann::json entry = {{"variant", key.variant},
                                 {"recording", key.recording},
@@ -83,7 +126,15 @@ void RunJournal::write(const RunKey& key, const RunResult& run) const {
   log::write_bytes(file_of(key), bytes);
 }
 
+void RunJournal::require_own_folder() const {
+  std::error_code ignored;
+  if (!fs::is_symlink(fs::symlink_status(folder_, ignored))) return;
+  throw InputError(folder_.string() +
+                   "  is a link; runs are kept in a folder of their own - remove it");
+}
+
 void RunJournal::remove() const {
+  require_own_folder();
   std::error_code ignored;  // what stays is a file too many, not a wrong result
   for (const fs::path& file : files_in(folder_, true)) fs::remove(file, ignored);
   fs::remove(folder_, ignored);

@@ -18,7 +18,8 @@ struct RunKey {
 };
 
 /// One file per run, `journal/<variant>,<recording>,<seed>.cbor` in the folder of the results: the
-/// key and the record of the run as CBOR, then the CRC-32 of that, little-endian.
+/// key and the record of the run as CBOR, then the CRC-32 of that, little-endian. Other files in
+/// the folder are left alone.
 class RunJournal {
  public:
   explicit RunJournal(const std::filesystem::path& results) : folder_(results / "journal") {}
@@ -37,6 +38,9 @@ class RunJournal {
 
   /// Removes the files of runs, and the folder if nothing else is in it.
   void remove() const;
+
+  /// Throws InputError for a folder that is a link: what is in it may be somebody else's.
+  void require_own_folder() const;
 
  private:
   std::filesystem::path file_of(const RunKey& key) const;

@@ -3,7 +3,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include "checksum.hpp"
 #include "experiment_file.hpp"
 #include "message_of.hpp"
 #include "run_journal.hpp"
@@ -40,7 +42,7 @@ RunResult odd_result() {
   run.accuracy->alignment = eval::Alignment::kSe3;
   run.accuracy->ate_m = std::numeric_limits<double>::infinity();
   run.accuracy->rpe = {{10., 3, 0.1, 0.2, 0.3, 0.4}};
-  run.accuracy->series.yaw_error_deg = {0.1, 0.2};
+  run.accuracy->series = {{0., 0.1}, {0., 1.}, {0.3, 0.4}, {0.1, 0.2}};
   run.nees_planar = 3.3;
   run.total.g = {0.7, 0.1, 0.2};
   run.total.samples = 11;
@@ -55,7 +57,9 @@ RunResult odd_result() {
   run.calibration = {{"r_1", "m", {0.1, 0.2}, {0.3, 0.4}, 0.5, 0.6}};
   run.updates = {{"parity", {8, 9}, {1, 2}, {3, 4}, {2, true, "lost"}}};
   run.monitor.t_s = {0.5};
+  run.monitor.parameters = {"r_1"};
   run.monitor.sigma_ratio = {{0.25}};
+  run.monitor.held = {1};
   run.monitor.warnings = {{0.5, "turn", {"r_1"}}};
   return run;
 }
@@ -84,6 +88,36 @@ TEST(RunRecord, ComesBackBitForBit) {
   EXPECT_EQ(back.rejections[0].second.first, "odom.csv:17");
   EXPECT_EQ(back.monitor.warnings[0].parameters, std::vector<std::string>{"r_1"});
   EXPECT_FALSE(from_record(to_record(RunResult())).accuracy);
+}
+
+TEST(RunRecord, IsRefusedWhereNoRunCanHaveMadeIt) {
+  const nlohmann::json whole = to_record(odd_result());
+  EXPECT_NO_THROW(from_record(whole));
+  const std::vector<std::pair<const char*, nlohmann::json>> changes{
+      {"/status", 99},
+      {"/epochs", -5},
+      {"/epochs", 7.5},
+      {"/epochs", 1e300},
+      {"/duration_s", true},
+      {"/a_member_of_nobody", 1},
+      {"/estimate/0/1/0", std::numeric_limits<double>::quiet_NaN()},
+      {"/estimate/1", whole.at("estimate").at(0)},
+      {"/accuracy/alignment", 99},
+      {"/accuracy/n_poses", -1},
+      {"/accuracy/series/t_s/2", 0.3},
+      {"/epoch_t_s/2", 0.3},
+      {"/epoch_t_s/1", -1.},
+      {"/calibration/0/estimate/2", 0.3},
+      {"/updates/0/applied/2", 1},
+      {"/updates/0/total/rejected", -1},
+      {"/monitor/held/1", 1},
+      {"/monitor/parameters/1", "r_2"},
+  };
+  for (const auto& [at, value] : changes) {
+    nlohmann::json changed = whole;
+    changed[nlohmann::json::json_pointer(at)] = value;
+    EXPECT_ANY_THROW(from_record(changed)) << at << ": " << value;
+  }
 }
 
 TEST(RunRecord, IsThinnedToItsEndsAndEveryNthPointWithCountsSummed) {
@@ -152,6 +186,47 @@ TEST_F(Journal, TakesNothingFromAFileThatIsCutOrChangedAnywhere) {
     EXPECT_FALSE(is_taken(changed)) << n;
   }
   EXPECT_FALSE(is_taken(whole + "x"));
+}
+
+TEST_F(Journal, TakesNothingFromWhatIsNoFileOrTooDeep) {
+  const RunJournal journal(folder_);
+  fs::create_directory(folder_ / "journal");
+  const fs::path file = folder_ / "journal" / "full,circle,3.cbor";
+  ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+  EXPECT_FALSE(journal.read(kKey));
+  EXPECT_EQ(journal.size(), 1);
+  fs::remove(file);
+  fs::create_symlink("/dev/zero", file);
+  EXPECT_FALSE(journal.read(kKey));
+  fs::remove(file);
+  fs::create_directory(file);
+  EXPECT_FALSE(journal.read(kKey));
+  EXPECT_EQ(journal.size(), 0);
+  fs::remove(file);
+  // 200000 arrays, each in the one before.
+  std::string deep(200'000, '\x81');
+  deep += '\0';
+  const std::uint32_t crc = crc_of(deep);
+  for (int i = 0; i < 4; ++i) deep += static_cast<char>((crc >> (8 * i)) & 0xff);
+  std::ofstream(file, std::ios::binary) << deep;
+  EXPECT_FALSE(journal.read(kKey));
+}
+
+TEST_F(Journal, LeavesWhatIsNotItsOwnAlone) {
+  const RunJournal journal(folder_ / "out");
+  fs::create_directories(folder_ / "out");
+  fs::create_directory(folder_ / "others");
+  std::ofstream(folder_ / "others" / "a,b,1.cbor") << "of somebody else";
+  fs::create_directory_symlink("../others", folder_ / "out" / "journal");
+  EXPECT_THAT(error_of<InputError>([&] { journal.remove(); }), HasSubstr("is a link"));
+  EXPECT_THAT(error_of<InputError>([&] { journal.write(kKey, {}); }), HasSubstr("is a link"));
+  EXPECT_EQ(files_in(folder_ / "others"), 1);
+  fs::remove(folder_ / "out" / "journal");
+  fs::create_directory(folder_ / "out" / "journal");
+  std::ofstream(folder_ / "out" / "journal" / "notes.cbor") << "of somebody else";
+  journal.write(kKey, {});
+  journal.remove();
+  EXPECT_EQ(files_in(folder_ / "out" / "journal"), 1);
 }
 
 class Resume : public testing::ExperimentFile {
@@ -250,7 +325,7 @@ TEST_F(Resume, RunsAgainWhatDoesNotFitOrIsDamaged) {
   const fs::path out = folder_ / "out";
   interrupt_after(4, {}, out);
   std::ofstream(out / "journal" / "redundant,circle,2.cbor") << "not a run";
-  std::ofstream(out / "journal" / "other.cbor") << "of something else";
+  std::ofstream(out / "journal" / "a,b,1.cbor") << "of something else";
   ExperimentOptions options;
   options.resume = true;
   testing::Told told;
@@ -290,8 +365,9 @@ TEST_F(Resume, StopsWithAClearMessageWhenTheDiskIsFull) {
   file_ = write(kVariants);
   const fs::path out = folder_ / "out";
   fs::create_directories(out / "journal");
-  fs::create_symlink("/dev/full", out / "journal" / "redundant,lateral,1.cbor.tmp");
+  fs::create_symlink("/dev/full", out / "journal" / "redundant,lateral,1.cbor");
   ExperimentOptions options;
+  options.resume = true;
   options.jobs = 1;
   try {
     run(options, out);

@@ -83,6 +83,8 @@ TEST_F(Summary, HasEveryMetricInEveryPlaceAlsoOfARunThatWasTakenOver) {
   CalibrationTrack& track = run.calibration.emplace_back();
   track.estimate = track.sigma = {0.1, 0.1};
   track.scatter = 2.25;
+  run.epoch_t_s = {0., 0.1};
+  run.updates[0].applied = run.updates[0].rejected = {4, 4};
   const RunResult kept = from_record(to_record(run));
   const auto summary = summary_of(result);
   const std::string csv = text_of(folder_ / "out" / "runs.csv");

@@ -1,6 +1,9 @@
 #include "viwo/results/run_record.hpp"
 
+#include <algorithm>
 #include <optional>
+
+#include "viwo/api/status.hpp"
 
 // What is kept of each type, in both directions: all of its members, in their order. A member that
 // is missing here does not compile, for the names are also those of a binding to all there are.
@@ -91,6 +94,58 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunResult, status, cause, epochs, duration_s,
 
 nlohmann::json to_record(const RunResult& run) { return run; }
 
-RunResult from_record(const nlohmann::json& record) { return record.get<RunResult>(); }
+namespace {
+
+bool is_well_formed(const Trajectory& poses) {
+  const auto is_later = [](const StampedPose& a, const StampedPose& b) { return b.t_ns <= a.t_ns; };
+  return std::adjacent_find(poses.begin(), poses.end(), is_later) == poses.end() &&
+         std::all_of(poses.begin(), poses.end(), [](const StampedPose& pose) {
+           return pose.p_BinW.allFinite() && pose.q_BtoW.coeffs().allFinite();
+         });
+}
+
+bool is_well_formed(const eval::Accuracy& accuracy) {
+  const eval::ErrorSeries& series = accuracy.series;
+  const std::size_t n = series.t_s.size();
+  return accuracy.alignment >= eval::Alignment::kNone &&
+         accuracy.alignment <= eval::Alignment::kSe3 && series.path_length_m.size() == n &&
+         series.position_error_m.size() == n && series.yaw_error_deg.size() == n &&
+         std::min({accuracy.n_poses, accuracy.n_outside, accuracy.n_in_gap}) >= 0;
+}
+
+bool is_well_formed(const MonitorTrack& monitor) {
+  const std::size_t n = monitor.t_s.size();
+  return monitor.held.size() == n && monitor.sigma_ratio.size() == monitor.parameters.size() &&
+         std::all_of(monitor.sigma_ratio.begin(), monitor.sigma_ratio.end(),
+                     [&](const auto& ratios) { return ratios.empty() || ratios.size() == n; });
+}
+
+bool is_well_formed(const RunResult& run) {
+  const std::size_t n = run.epoch_t_s.size();
+  return run.status >= RunStatus::kOk && run.status <= RunStatus::kFailed && run.epochs >= 0 &&
+         is_well_formed(run.estimate) && is_well_formed(run.reference) &&
+         (!run.accuracy || is_well_formed(*run.accuracy)) && is_well_formed(run.monitor) &&
+         std::is_sorted(run.epoch_t_s.begin(), run.epoch_t_s.end()) &&
+         std::all_of(run.calibration.begin(), run.calibration.end(),
+                     [&](const CalibrationTrack& track) {
+                       return track.estimate.size() == n && track.sigma.size() == n;
+                     }) &&
+         std::all_of(run.updates.begin(), run.updates.end(), [&](const UpdateTrack& track) {
+           return track.applied.size() == n && track.rejected.size() == n &&
+                  std::min(track.total.applied, track.total.rejected) >= 0;
+         });
+}
+
+}  // namespace
+
+RunResult from_record(const nlohmann::json& record) {
+  auto run = record.get<RunResult>();
+  // A number that its member cannot hold has become another one by now.
+  if (nlohmann::json::to_cbor(to_record(run)) != nlohmann::json::to_cbor(record) ||
+      !is_well_formed(run)) {
+    throw InputError("this is not the record of a run");
+  }
+  return run;
+}
 
 }  // namespace viwo
