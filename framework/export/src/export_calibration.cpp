@@ -6,6 +6,7 @@
 
 #include "formats.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/log/text.hpp"
 #include "viwo/math/significant.hpp"
 
 namespace viwo::exports {
@@ -120,11 +121,18 @@ void Lost::radii_but_the_mean(const std::vector<Wheel>& wheels) {
 
 std::string head(const Robot& robot, const std::vector<std::string>& lost,
                  const std::string& mark) {
-  std::string text = mark + "Written by viwo export from " + robot.file->path.filename().string() +
-                     (robot.file->model.empty() ? "" : " (" + robot.file->model + ")") + ".\n";
+  std::string text;
+  // Texts of the file end no comment: in Java a backslash can be the end of a line.
+  const auto add = [&](const std::string& line) {
+    std::string clean = log::printable(line);
+    std::replace(clean.begin(), clean.end(), '\\', '/');
+    text += mark + clean + "\n";
+  };
+  add("Written by viwo export from " + robot.file->path.filename().string() +
+      (robot.file->model.empty() ? "" : " (" + robot.file->model + ")") + ".");
   std::istringstream doubts(doubts_of(*robot.file));
-  for (std::string line; std::getline(doubts, line);) text += mark + line + "\n";
-  for (const std::string& line : lost) text += mark + "Not in here: " + line + "\n";
+  for (std::string line; std::getline(doubts, line);) add(line);
+  for (const std::string& line : lost) add("Not in here: " + line);
   return text;
 }
 

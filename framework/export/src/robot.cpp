@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "viwo/config/errors.hpp"
+#include "viwo/log/text.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo::exports {
@@ -99,6 +101,29 @@ void add_axles(Intrinsics& intrinsics, Robot& robot) {
   }
 }
 
+/// An Ackermann base may have encoders at its rear wheels only, which come first.
+void take_signs(const CalibrationFile& file, Robot& robot) {
+  const std::size_t n = file.drive_signs.size();
+  if (n == 0 || robot.base == Base::kUnknown) return;
+  if (n != robot.wheels.size() && !(robot.base == Base::kAckermann && n == 2)) {
+    throw InputError(file.path.string() + ": 'drive_signs' has " + std::to_string(n) +
+                     " signs for " + std::to_string(robot.wheels.size()) + " wheels");
+  }
+  for (std::size_t i = 0; i < n; ++i) robot.wheels[i].reversed = file.drive_signs[i] < 0;
+}
+
+/// Throws InputError for sizes that no robot has.
+void check_sizes(const CalibrationFile& file) {
+  for (const CalibrationEntry& entry : file.intrinsics) {
+    const std::string name = entry.name.substr(entry.name.rfind('.') + 1);
+    const bool is_size =
+        name.starts_with("r_") || name == "baseline" || name == "track" || name == "wheel_base";
+    if (!is_size || entry.estimate > 0.) continue;
+    config::fail(entry.mark, "intrinsics." + entry.name + ".estimate: " +
+                                 log::number_text(entry.estimate) + " m is no size of a robot");
+  }
+}
+
 void recognise(const CalibrationFile& file, Robot& robot) {
   Intrinsics intrinsics(file);
   int n = 0;
@@ -115,8 +140,7 @@ void recognise(const CalibrationFile& file, Robot& robot) {
     add_axles(intrinsics, robot);
   }
   robot.beside = intrinsics.unused();
-  const std::size_t known = std::min(file.drive_signs.size(), robot.wheels.size());
-  for (std::size_t i = 0; i < known; ++i) robot.wheels[i].reversed = file.drive_signs[i] < 0;
+  take_signs(file, robot);
 }
 
 /// The values of entries; InputError if one is missing.
@@ -179,6 +203,7 @@ Robot robot_of(const CalibrationFile& file) {
   Robot robot;
   robot.file = &file;
   recognise(file, robot);
+  if (robot.base != Base::kUnknown) check_sizes(file);
   if (find(file.mount, "p_IinO_x") != nullptr) {
     const Eigen::VectorXd values = values_of(
         file, file.mount,

@@ -27,6 +27,7 @@ namespace viwo::exports {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -72,6 +73,45 @@ TEST(Export, SaysInTheFileWhatItDoesNotHold) {
   for (const std::string& format : formats()) {
     EXPECT_THAT(export_calibration(doubtful, format).text, HasSubstr("too few turns -"));
   }
+}
+
+TEST(Export, WritesNoTextOfTheFileThatEndsAComment) {
+  CalibrationFile file = with_rig(differential());
+  file.status = CalibrationFile::Status::kDoubtful;
+  file.path = "robot/a\rint b;.yaml";
+  file.reasons = {"\\u000a int evil;", "cr\rint evil;",
+                  "nel\xc2\x85"
+                  "evil: 1",
+                  "ls\xe2\x80\xa8"
+                  "evil: 1",
+                  "--><robot/>"};
+  for (const std::string& format : formats()) {
+    const std::string text = export_calibration(file, format).text;
+    EXPECT_EQ(text.find_first_of("\r\\"), std::string::npos) << format;
+    EXPECT_THAT(text, Not(AnyOf(HasSubstr("\xc2\x85"), HasSubstr("\xe2\x80\xa8")))) << format;
+    EXPECT_THAT(text, HasSubstr("evil"));
+  }
+  EXPECT_THAT(export_calibration(file, "urdf").text, Not(HasSubstr("--><robot/>")));
+}
+
+TEST(Export, RefusesWhatIsNoRobot) {
+  for (const double size : {0., -0.1}) {
+    CalibrationFile file = differential();
+    file.intrinsics[1].estimate = size;
+    EXPECT_THAT(error_of([&] { export_calibration(file, "urdf"); }),
+                HasSubstr("intrinsics.r_right.estimate: " + log::number_text(size) +
+                          " m is no size of a robot"));
+  }
+  CalibrationFile file = differential();
+  file.drive_signs = {1, 1, 1, -1, 1};
+  EXPECT_EQ(error_of([&] { export_calibration(file, "csv"); }),
+            "robot/calibration.yaml: 'drive_signs' has 5 signs for 2 wheels");
+  // Of an Ackermann base the rear wheels alone may have encoders.
+  file = ackermann();
+  file.drive_signs = {1, -1};
+  const std::string urdf = export_calibration(file, "urdf").text;
+  const auto joint = between_texts(urdf, "\"drive_rear_right_joint\"", "</joint>");
+  EXPECT_THAT(joint, HasSubstr("<axis xyz=\"0 -1 0\"/>"));
 }
 
 TEST(Export, NamesTheFormatsThatHoldABaseWhereOneCannot) {

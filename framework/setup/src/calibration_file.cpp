@@ -2,6 +2,7 @@
 #include "viwo/setup/calibration_file.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
@@ -49,8 +50,11 @@ struct EntryParams {
   std::string unit;
 
   void bind(ParamBinder& b) {
-    b(VIWO_PARAM(estimate), {.required = true, .help = "value to run with"});
-    b(VIWO_PARAM(sigma), {.min = 0., .required = true, .help = "standard deviation; 0: held"});
+    constexpr double kMost = 1e9;
+    b(VIWO_PARAM(estimate),
+      {.min = -kMost, .max = kMost, .required = true, .help = "value to run with"});
+    b(VIWO_PARAM(sigma),
+      {.min = 0., .max = kMost, .required = true, .help = "standard deviation; 0: held"});
     b(VIWO_PARAM(nominal), {.help = "for the reader; not used"});
     b(VIWO_PARAM(unit), {.help = "must be that of the parameter; may be left out"});
   }
@@ -97,7 +101,21 @@ std::string without_owner(const std::string& name) {
   return dot == std::string::npos ? name : name.substr(dot + 1);
 }
 
+/// What is a name where others read it: in Java, XML, YAML, tables.
+void check_text(const config::Mark& mark, const std::string& what, const std::string& text,
+                Errors& errors, std::string_view more = "") {
+  constexpr std::size_t kMost = 100;
+  const bool is_plain = std::all_of(text.begin(), text.end(), [&](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+           std::string_view("_.+-").find(c) != std::string_view::npos ||
+           more.find(c) != std::string_view::npos;
+  });
+  if (is_plain && text.size() <= kMost) return;
+  errors.add(mark, what + ": " + log::quoted(text) + " is no name: letters, digits, _ . + -");
+}
+
 void check_name(const Section& section, const Node::Entry& entry, Errors& errors) {
+  check_text(entry.key_mark, section.key, entry.key, errors);
   if (section.names.empty()) return;
   const std::string name = without_owner(entry.key);
   if (std::find(section.names.begin(), section.names.end(), name) != section.names.end()) return;
@@ -119,6 +137,7 @@ void read_entries(const Node& root, const Section& section, Entries& out, Errors
     const auto values = config::read_section<EntryParams>(entry.value, entry.key_mark,
                                                           path + "." + entry.key, errors);
     if (errors.size() > before) continue;
+    check_text(entry.key_mark, path + "." + entry.key + ".unit", values.unit, errors, "/^*%() ");
     const Node* const at = entry.value.find("estimate");
     out.push_back({entry.key, values.estimate, values.sigma, values.nominal, values.unit,
                    at->mark(), entry.key_mark});
@@ -129,7 +148,10 @@ void read_wheel_sets(const Node& root, CalibrationFile& file, Errors& errors) {
   const Node* const sets = root.find("wheel_sets");
   if (sets == nullptr) return;
   for (const Node::Entry& entry : sets->entries()) {
-    if (entry.value.is_scalar()) file.wheel_sets[entry.key] = entry.value.scalar();
+    check_text(entry.key_mark, "wheel_sets", entry.key, errors);
+    if (!entry.value.is_scalar()) continue;
+    check_text(entry.value.mark(), "wheel_sets", entry.value.scalar(), errors);
+    file.wheel_sets[entry.key] = entry.value.scalar();
   }
   if (!sets->is_map() || file.wheel_sets.size() != sets->entries().size()) {
     errors.add(sets->mark(), "'wheel_sets' is a section NAME: type of its kinematic model");
@@ -158,14 +180,16 @@ void read_camera_models(const Node& root, CalibrationFile& file, Errors& errors)
   }
 }
 
-/// The row of a correlations matrix: as many numbers as there are rows before it.
+/// A row of a correlations matrix has as many numbers as there are rows before it.
+bool has_length(const Node::Entry& row, Eigen::Index k, Errors& errors) {
+  if (row.value.is_list() && std::ssize(row.value.items()) == k) return true;
+  errors.add(row.value.mark(), "correlations." + row.key + ": expected a list of " +
+                                   std::to_string(k) +
+                                   " numbers, one for each of the rows before it");
+  return false;
+}
+
 bool read_row(const Node::Entry& row, Eigen::Index k, Eigen::MatrixXd& matrix, Errors& errors) {
-  if (!row.value.is_list() || static_cast<Eigen::Index>(row.value.items().size()) != k) {
-    errors.add(row.value.mark(), "correlations." + row.key + ": expected a list of " +
-                                     std::to_string(k) +
-                                     " numbers, one for each of the rows before it");
-    return false;
-  }
   for (Eigen::Index i = 0; i < k; ++i) {
     const Node& item = row.value.items()[static_cast<std::size_t>(i)];
     const auto value = item.is_scalar() ? log::parse_number(item.scalar()) : std::nullopt;
@@ -188,6 +212,10 @@ void read_correlations(const Node& root, CalibrationFile& file, Errors& errors) 
   }
   PriorCorrelations& out = file.correlations;
   const auto n = static_cast<Eigen::Index>(rows->entries().size());
+  // All of them before there is a place for n x n.
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (!has_length(rows->entries()[static_cast<std::size_t>(k)], k, errors)) return;
+  }
   out.matrix = Eigen::MatrixXd::Identity(n, n);
   for (const Node::Entry& row : rows->entries()) {
     const auto has = [&](const Section& section) {
@@ -302,11 +330,17 @@ CalibrationFile read_calibration(const std::filesystem::path& path) {
   file.path = path;
   file.model = top.model;
   file.twist = top.twist;
-  for (const double sign : top.drive_signs) file.drive_signs.push_back(sign < 0. ? -1 : 1);
+  for (const double sign : top.drive_signs) {
+    if (std::abs(sign) != 1.) {
+      errors.add(root.find("drive_signs")->mark(), "drive_signs: 1 or -1 each");
+    }
+    file.drive_signs.push_back(sign < 0. ? -1 : 1);
+  }
   file.status = top.status;
   file.reasons = top.reasons;
   const Node* const model = root.find("model");
   file.model_mark = model != nullptr ? model->mark() : root.mark();
+  check_text(file.model_mark, "model", file.model, errors);
   if (const Node* const section = root.find("intrinsics")) file.intrinsics_mark = section->mark();
   const Node* const status = root.find("status");
   check_status(file, status != nullptr ? status->mark() : root.mark(), errors);
@@ -322,6 +356,11 @@ CalibrationFile read_calibration(const std::filesystem::path& path) {
   }
   read_wheel_sets(root, file, errors);
   read_camera_models(root, file, errors);
+  if (errors.empty() && model == nullptr &&
+      std::all_of(sections().begin(), sections().end(),
+                  [&](const Section& section) { return (file.*section.entries).empty(); })) {
+    errors.add(root.mark(), "there is nothing of a calibration in this file");
+  }
   if (errors.empty()) read_correlations(root, file, errors);
   errors.throw_if_any();
   return file;

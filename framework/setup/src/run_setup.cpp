@@ -217,6 +217,12 @@ void require_wheels_for_place(const Node& run, const RunSetup& setup, config::Er
 /// Wheels that turn the other way are not those that were calibrated.
 void require_drive_signs(const CalibrationFile& file, const RunSetup& setup) {
   if (file.drive_signs.empty() || !setup.model || file.drive_signs == drive_signs(setup)) return;
+  if (file.drive_signs.size() != drive_signs(setup).size()) {
+    throw InputError(file.path.string() + "  'drive_signs' has " +
+                     std::to_string(file.drive_signs.size()) + " signs, but kinematics '" +
+                     setup.kinematics.info.name + "' has " +
+                     std::to_string(drive_signs(setup).size()) + " drives");
+  }
   std::string scale;
   for (const int sign : file.drive_signs) {
     scale += (scale.empty() ? "[" : ", ") + std::to_string(sign);

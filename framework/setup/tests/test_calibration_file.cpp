@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "in_folder.hpp"
 #include "message_of.hpp"
@@ -14,6 +15,7 @@
 namespace viwo {
 namespace {
 
+using ::testing::AllOf;
 using testing::error_of;
 using ::testing::HasSubstr;
 using testing::registry;
@@ -80,7 +82,7 @@ TEST_F(CalibrationFileTest, RefusesWhatIsWrongWithItsPlace) {
   EXPECT_EQ(error_of_file(kTwoSides + "mounts: {}\n"),
             "F:7:1  calibration: unknown key 'mounts' - did you mean 'mount'?");
   EXPECT_THAT(error_of_file(kTwoSidesHead + "  r_left: {estimate: 0.05, sigma: -1}\n"),
-              HasSubstr("F:4:35  intrinsics.r_left.sigma: -1 violates sigma >= 0"));
+              HasSubstr("F:4:35  intrinsics.r_left.sigma: -1 violates 0 <= sigma <= 1e+09"));
   EXPECT_EQ(error_of_file(kTwoSides + "camera_models: {cam1: {}}\n"),
             "F:7:17  camera_models: 'cam1' stands where cam0 should; cameras are counted from cam0 "
             "without gaps");
@@ -96,6 +98,40 @@ TEST_F(CalibrationFileTest, RefusesWhatIsWrongWithItsPlace) {
               HasSubstr("F:8:3  correlations: no such correlations exist"));
 }
 
+TEST_F(CalibrationFileTest, RefusesWhatIsNoNameOrNoNumberOfARobot) {
+  EXPECT_EQ(error_of_file("model: \"a\\nb\"\ntwist: plain\nintrinsics: {}\n"),
+            "F:1:8  model: 'a?b' is no name: letters, digits, _ . + -");
+  EXPECT_EQ(error_of_file(kTwoSides + "  'x\"/><y z=\"': {estimate: 1, sigma: 0}\n"),
+            "F:7:3  intrinsics: 'x\"/><y z=\"' is no name: letters, digits, _ . + -");
+  EXPECT_THAT(error_of_file(kTwoSides + "  x: {estimate: 1, sigma: 0, unit: \"m\\n\"}\n"),
+              HasSubstr("F:7:3  intrinsics.x.unit: 'm?' is no name"));
+  EXPECT_THAT(error_of_file(kTwoSides + "wheel_sets: {'a b': 'c d'}\n"),
+              AllOf(HasSubstr("wheel_sets: 'a b' is no name"), HasSubstr("'c d' is no name")));
+  EXPECT_THAT(error_of_file(kTwoSides + "  x: {estimate: .inf, sigma: 0}\n"),
+              HasSubstr("F:7:17  intrinsics.x.estimate"));
+  EXPECT_EQ(error_of_file(kTwoSides + "drive_signs: [1, 0.5]\n"),
+            "F:7:14  drive_signs: 1 or -1 each");
+  EXPECT_EQ(error_of_file("status: ok\n"), "F:1:1  there is nothing of a calibration in this file");
+}
+
+TEST_F(CalibrationFileTest, TakesNoPlaceForCorrelationsThatAreNotThere) {
+  std::string entries = kTwoSides, rows = "correlations:\n";
+  for (int i = 0; i < 9000; ++i) {
+    const std::string name = "e" + std::to_string(i);
+    entries += "  " + name + ": {estimate: 1, sigma: 1}\n";
+    rows += "  " + name + ": []\n";
+  }
+  const auto most_kb = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const long before_kb = most_kb();
+  const std::string error = error_of_file(entries + rows);
+  EXPECT_LT(most_kb() - before_kb, 300'000) << "a matrix of them all has 648 MB";
+  EXPECT_THAT(error, HasSubstr("correlations.e1: expected a list of 1 numbers"));
+}
+
 TEST_F(CalibrationFileTest, MustFitTheRunThatTakesIt) {
   EXPECT_EQ(error_of_run(kTwoSides), "");
   EXPECT_EQ(error_of_run(kTwoSides, "kinematics.calibration"), "");
@@ -108,6 +144,8 @@ TEST_F(CalibrationFileTest, MustFitTheRunThatTakesIt) {
             "F:4:22  r_left: -0.05 is beyond what the model 'differential' takes, 0 to inf m\n"
             "F:5:3  the model 'differential' has no intrinsic 'r_rihgt' - did you mean 'r_right'?\n"
             "F:6:24  baseline: its unit is 'mm', not 'm'");
+  EXPECT_EQ(error_of_run(kTwoSides + "drive_signs: [1, -1, 1]\n"),
+            "F  'drive_signs' has 3 signs, but kinematics 'differential' has 2 drives");
   EXPECT_EQ(error_of_run("cameras: {cam0.fx: {estimate: 300, sigma: 1}}\n"),
             "F:1:1  this calibration has nothing that the run has");
   EXPECT_EQ(
