@@ -185,6 +185,15 @@ TEST_F(ViwoBag, RefusesWrongInputAndWritesNothing) {
   EXPECT_FALSE(fs::exists(folder_ / "out.part"));
 }
 
+TEST_F(ViwoBag, TakesNoImageFromOutsideOfItsFolder) {
+  write_log("log");
+  for (const std::string name : {"../../../secret.png", "/etc/passwd"}) {
+    std::ofstream(path("log/cam0/data.csv")) << "#timestamp [ns],filename\n1," << name << "\n";
+    EXPECT_EQ(run(path("log") + " " + path("out.bag")), 2);
+    EXPECT_THAT(output_, HasSubstr("'" + name + "' leads out of the folder of the images"));
+  }
+}
+
 TEST_F(ViwoBag, KeepsTheBagThatIsThereUntilThereIsAnother) {
   const auto content = [this] { return testing::text_of(path("a.bag")); };
   write_log("log");

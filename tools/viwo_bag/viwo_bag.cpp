@@ -24,7 +24,9 @@
 #include "viwo/api/status.hpp"
 #include "viwo/asl/asl.hpp"
 #include "viwo/asl/asl_columns.hpp"
+#include "viwo/asl/asl_images.hpp"
 #include "viwo/image/image_file.hpp"
+#include "viwo/log/printable_output.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"
 
@@ -81,7 +83,7 @@ void read_images(const fs::path& folder, std::size_t camera, std::vector<ImageOn
   const std::size_t stamp = log::stamp_column(table);
   const std::size_t name = table.column("filename");
   while (table.next()) {
-    out.push_back({table.stamp_ns(stamp), camera, folder / "data" / std::string(table.text(name))});
+    out.push_back({table.stamp_ns(stamp), camera, folder / "data" / log::image_name(table, name)});
   }
   if (table.cut_short()) {
     std::cerr << folder.string() << "  dropped: " << log::kLastLineCutShort << "\n";
@@ -349,6 +351,7 @@ void convert(const fs::path& folder, const fs::path& out) {
 }  // namespace viwo
 
 int main(int argc, char** argv) {
+  const viwo::log::PrintableOutput out(std::cout), err(std::cerr);
   const std::vector<std::string> words(argv + 1, argv + argc);
   if (words.size() == 1 && (words[0] == "--help" || words[0] == "-h")) {
     std::cout << viwo::kHelp;

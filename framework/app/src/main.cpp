@@ -12,6 +12,7 @@
 #include "out_of_memory.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/log/printable_output.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
 #include "viwo/plugin_host/installation.hpp"
 
@@ -112,6 +113,7 @@ int dispatch(const std::vector<std::string>& words) {
 
 int main(int argc, char** argv) {
   viwo::app::end_well_without_memory();
+  const viwo::log::PrintableOutput out(std::cout), err(std::cerr);
   try {
     viwo::become_faster_copy(argv);
     if (!viwo::host_record_is_consistent()) {

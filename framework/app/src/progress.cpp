@@ -7,6 +7,8 @@
 
 #include <unistd.h>
 
+#include "viwo/log/text.hpp"
+
 namespace viwo::app {
 namespace {
 
@@ -16,7 +18,8 @@ void draw_bar(const std::string& what, double fraction, const std::string& text,
   constexpr int kWidth = 30;
   std::string bar(static_cast<std::size_t>(kWidth * std::clamp(fraction, 0., 1.)), '#');
   bar.resize(kWidth, '.');
-  std::fprintf(stderr, "\r\033[K%s [%s] %s", what.c_str(), bar.c_str(), text.c_str());
+  std::fprintf(stderr, "\r\033[K%s [%s] %s", log::printable(what).c_str(), bar.c_str(),
+               log::printable(text).c_str());
   if (left_s >= 0.) std::fprintf(stderr, ", about %.0f s left", std::ceil(left_s));
   std::fflush(stderr);
 }
@@ -54,16 +57,16 @@ void Progress::done(const std::string& line) {
 
 void Progress::note(const std::string& line) {
   const std::lock_guard lock(mutex_);
-  std::fprintf(stderr, terminal_ ? "\r\033[K%s\n" : "%s\n", line.c_str());
+  std::fprintf(stderr, terminal_ ? "\r\033[K%s\n" : "%s\n", log::printable(line).c_str());
   if (terminal_) draw();
 }
 
 void Progress::show(const std::string& line) const {
   if (!terminal_) {
-    std::fprintf(stderr, "[%d/%d] %s\n", count_, total_, line.c_str());
+    std::fprintf(stderr, "[%d/%d] %s\n", count_, total_, log::printable(line).c_str());
     return;
   }
-  std::fprintf(stderr, "\r\033[K%s\n", line.c_str());
+  std::fprintf(stderr, "\r\033[K%s\n", log::printable(line).c_str());
   draw();
 }
 

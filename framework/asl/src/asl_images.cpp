@@ -50,7 +50,7 @@ class CameraTable {
     while (table.next()) {
       ++rows_;
       const std::int64_t t_ns = table.stamp_ns(stamp);
-      const fs::path file = folder_ / "data" / name_in(table, name);
+      const fs::path file = folder_ / "data" / image_name(table, name);
       std::error_code ignored;
       if (!fs::is_regular_file(file, ignored)) {
         miss(file, table.reader());
@@ -64,16 +64,6 @@ class CameraTable {
   }
 
  private:
-  /// A recording names no files but its own.
-  static fs::path name_in(const TableReader& table, std::size_t column) {
-    if (table.text(column).empty()) table.fail(column, "is empty");
-    const fs::path name = table.text(column);
-    if (name.is_absolute() || std::find(name.begin(), name.end(), "..") != name.end()) {
-      table.fail(column, quoted(table.text(column)) + " leads out of the folder of the images");
-    }
-    return name;
-  }
-
   void miss(const fs::path& file, const TextReader& at) {
     filter_.reject(kNoImageFile, at);
     ++missing_;
@@ -116,6 +106,15 @@ class CameraTable {
 };
 
 }  // namespace
+
+fs::path image_name(const TableReader& table, std::size_t column) {
+  if (table.text(column).empty()) table.fail(column, "is empty");
+  const fs::path name = table.text(column);
+  if (name.is_absolute() || std::find(name.begin(), name.end(), "..") != name.end()) {
+    table.fail(column, quoted(table.text(column)) + " leads out of the folder of the images");
+  }
+  return name;
+}
 
 ImageRecording read_asl_images(std::span<const fs::path> folders, const LogLimits& limits) {
   ImageRecording out;

@@ -237,6 +237,8 @@ CameraView read_camera(const Section& section) {
   return camera;
 }
 
+constexpr std::size_t kMostCameras = 64;
+
 /// "cam" and a number.
 bool is_camera_key(const std::string& key) {
   return key.size() > 3 && key.starts_with("cam") &&
@@ -284,6 +286,9 @@ std::vector<CameraView> read_kalibr_cameras(const std::filesystem::path& file) {
   for (const Node* node = root.find("cam0"); node != nullptr;
        node = root.find("cam" + std::to_string(cameras.size()))) {
     const std::string name = "cam" + std::to_string(cameras.size());
+    if (cameras.size() == kMostCameras) {
+      config::fail(node->mark(), name + ": more than " + std::to_string(kMostCameras) + " cameras");
+    }
     const Section section(*node, name, errors);
     place = read_place(section, *node, place, cameras.empty());
     cameras.push_back(read_camera(section));

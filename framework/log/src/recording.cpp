@@ -1,5 +1,6 @@
 #include "viwo/log/recording.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -8,6 +9,10 @@
 
 namespace viwo::log {
 namespace {
+
+bool is_too_far(const std::array<double, 3>& p_m) {
+  return std::any_of(p_m.begin(), p_m.end(), [](double x) { return std::abs(x) > kFarthest_m; });
+}
 
 /// nullptr when the quaternion can be used; it is of unit norm then.
 const char* why_not_unit(std::array<double, 4>& xyzw) {
@@ -23,6 +28,7 @@ const char* why_rejected(StateSample& state) {
       !all_finite(state.accel_bias_m_per_s2)) {
     return kNotFinite;
   }
+  if (is_too_far(state.p_IinG_m)) return kTooFar;
   return why_not_unit(state.q_ItoG_xyzw);
 }
 
@@ -38,6 +44,7 @@ void sort_by_time(Recording<Measurement>& recording) {
 
 const char* why_rejected(PoseSample& pose) {
   if (!all_finite(pose.p_BinW_m) || !all_finite(pose.q_BtoW_xyzw)) return kNotFinite;
+  if (is_too_far(pose.p_BinW_m)) return kTooFar;
   return why_not_unit(pose.q_BtoW_xyzw);
 }
 

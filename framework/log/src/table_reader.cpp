@@ -132,7 +132,21 @@ std::size_t TableReader::column(std::string_view name) const {
   reader_.fail("no column '" + std::string(name) + "'" + did_you_mean(name, columns_));
 }
 
+void TableReader::require_one(std::string_view name) const {
+  const std::string with_unit = std::string(name) + " [";
+  std::string_view first;
+  for (const std::string& candidate : columns_) {
+    if (candidate != name && !candidate.starts_with(with_unit)) continue;
+    if (!first.empty()) {
+      reader_.fail("columns " + quoted(first) + " and " + log::quoted(candidate) +
+                   " are the same quantity: keep one of them");
+    }
+    first = candidate;
+  }
+}
+
 std::size_t TableReader::column(std::string_view name, std::string_view unit) const {
+  require_one(name);
   const std::string with_unit = std::string(name) + " [" + std::string(unit) + "]";
   if (const auto found = find(with_unit)) return *found;
   if (const auto found = find(name)) return *found;
@@ -145,6 +159,7 @@ std::size_t TableReader::column(std::string_view name, std::string_view unit) co
 }
 
 std::size_t TableReader::column_in_any_unit(std::string_view name) const {
+  require_one(name);
   const std::string with_unit = std::string(name) + " [";
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     if (columns_[i].starts_with(with_unit)) return i;

@@ -66,6 +66,12 @@ std::optional<Decimal> take_apart(std::string_view text) {
   return out;
 }
 
+/// U+0080 to U+009F, and the ends of lines U+2028 and U+2029.
+bool ends_a_line_or_controls(std::string_view character) {
+  return (character.size() == 2 && character >= "\xc2\x80" && character <= "\xc2\x9f") ||
+         character == "\xe2\x80\xa8" || character == "\xe2\x80\xa9";
+}
+
 /// How many bytes the first character has; 0 where it is none.
 std::size_t utf8_size(std::string_view text) {
   const auto first = static_cast<unsigned char>(text[0]);
@@ -160,7 +166,7 @@ std::string printable(std::string_view text) {
   while (!text.empty()) {
     const auto c = static_cast<unsigned char>(text[0]);
     const std::size_t size = utf8_size(text);
-    if (c < 0x20 || c == 0x7f) {
+    if (c < 0x20 || c == 0x7f || ends_a_line_or_controls(text.substr(0, size))) {
       out += '?';
     } else if (size > 0) {
       out += text.substr(0, size);

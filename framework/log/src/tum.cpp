@@ -8,6 +8,7 @@
 
 #include "quaternion.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_reader.hpp"
 
@@ -48,6 +49,7 @@ StampedPose parse_pose(const TextReader& reader, std::string_view line) {
     values[i] = *value;
   }
   pose.p_BinW << values[1], values[2], values[3];
+  if (!(pose.p_BinW.cwiseAbs().maxCoeff() <= kFarthest_m)) reader.fail(kTooFar);
   pose.q_BtoW = Eigen::Quaterniond(values[7], values[4], values[5], values[6]);
   const double norm = pose.q_BtoW.norm();
   if (!make_unit(pose.q_BtoW)) {

@@ -109,6 +109,12 @@ TEST_F(Kalibr, RefusesUnknownModelsWithWhatThereIs) {
             "'equidistant'?");
 }
 
+TEST_F(Kalibr, RefusesMoreCamerasThanThereCanBe) {
+  std::string text = camera(std::string("  T_cam_imu:\n") + kQuarter);
+  for (int i = 1; i < 10'000; ++i) text += "cam" + std::to_string(i) + ": {}\n";
+  EXPECT_THAT(refusal(text), ::testing::HasSubstr("cam64: more than 64 cameras"));
+}
+
 TEST_F(Kalibr, RefusesWhatIsNoRotation) {
   const auto with_first_row = [](const std::string& row) {
     return camera("  T_cam_imu:\n    - " + row +

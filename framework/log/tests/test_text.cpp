@@ -2,10 +2,14 @@
 #include <cmath>
 #include <cstring>
 #include <random>
+#include <sstream>
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include "log_files.hpp"
+#include "viwo/log/files.hpp"
+#include "viwo/log/printable_output.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_reader.hpp"
@@ -63,6 +67,22 @@ TEST_F(TextReaderTest, RefusesATruncatedGzipAtTheLineWhereItEnds) {
     EXPECT_EQ(message, file.string() + ":" + std::to_string(last + 1) +
                            "  the gzip data end early: the file is truncated");
   }
+}
+
+TEST_F(TextReaderTest, ReadsAllMembersOfAGzipAndRefusesWhatIsNoneBehindThem) {
+  const std::string one = text_of(write_gz("one.gz", "1\n2\n"));
+  const std::string two = text_of(write_gz("two.gz", "3\n"));
+  EXPECT_THAT(lines_of(write("both.gz", one + two)), ElementsAre("1", "2", "3"));
+  EXPECT_THAT(lines_of(write("padded.gz", one + std::string(100'000, '\0'))),
+              ElementsAre("1", "2"));
+  for (const std::string& rest :
+       {std::string("3\n"), std::string("\x1f"), std::string(1, '\0') + two}) {
+    const auto file = write("rest.gz", one + rest);
+    EXPECT_EQ(
+        error_of([&] { lines_of(file); }),
+        file.string() + ":3  something is behind the gzip data that is none: the file is damaged");
+  }
+  EXPECT_THAT(lines_of(write("short", "\x1f")), ElementsAre("\x1f"));
 }
 
 TEST_F(TextReaderTest, RefusesAGzipWithAFlippedBit) {
@@ -229,6 +249,17 @@ TEST_F(TableReaderTest, RefusesAHeaderWithAmbiguousColumns) {
                 ":1  numbers where the header is expected: the first line names the columns");
 }
 
+TEST_F(TableReaderTest, RefusesAQuantityThatIsThereTwice) {
+  const auto file = write("twice.csv", "t [ns],w [deg s^-1],v,w\n1,2,3,4\n");
+  TableReader table(file);
+  const std::string both = file.string() +
+                           ":1  columns 'w [deg s^-1]' and 'w' are the same "
+                           "quantity: keep one of them";
+  EXPECT_EQ(error_of([&] { table.column("w", "rad s^-1"); }), both);
+  EXPECT_EQ(error_of([&] { table.column_in_any_unit("w"); }), both);
+  EXPECT_EQ(table.column("v", "m s^-1"), 2U);
+}
+
 TEST_F(TextWriterTest, ReportsAFullDiskAndAMissingFolder) {
   EXPECT_EQ(error_of<std::runtime_error>([] {
               TextWriter out("/dev/full");
@@ -238,6 +269,35 @@ TEST_F(TextWriterTest, ReportsAFullDiskAndAMissingFolder) {
             "cannot write /dev/full: No space left on device");
   EXPECT_EQ(error_of<std::runtime_error>([&] { TextWriter{folder_ / "none" / "a"}; }),
             "cannot write " + (folder_ / "none" / "a").string() + ": No such file or directory");
+}
+
+TEST_F(TextWriterTest, WritesIntoNoFileThatALinkLeadsTo) {
+  const auto others = folder_ / "others.txt", file = folder_ / "file.txt";
+  write_text(others, "of somebody else");
+  for (const Appears appears : {Appears::kWhole, Appears::kAtOnce}) {
+    for (const char* end : {"", ".tmp"}) {
+      const auto link = file.string() + end;
+      std::filesystem::remove(link);
+      std::filesystem::create_symlink(others, link);
+      FileWriter out(file, appears);
+      out.write("text");
+      out.commit();
+      EXPECT_EQ(text_of(file), "text");
+      EXPECT_EQ(text_of(others), "of somebody else");
+      EXPECT_FALSE(std::filesystem::is_symlink(file));
+      std::filesystem::remove(link);
+    }
+  }
+}
+
+TEST_F(TextWriterTest, DoesNotWaitForThoseWhoReadAPipe) {
+  const auto pipe = folder_ / "pipe", file = folder_ / "beside.txt";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(error_of<std::runtime_error>([&] { write_text(pipe, "text"); }),
+            "cannot write " + pipe.string() + ": No such device or address");
+  ASSERT_EQ(::mkfifo((file.string() + ".tmp").c_str(), 0600), 0);
+  write_text(file, "text");
+  EXPECT_EQ(text_of(file), "text");
 }
 
 TEST_F(TextWriterTest, WritesUtf8WhateverTheTexts) {
@@ -251,6 +311,18 @@ TEST_F(TextWriterTest, WritesUtf8WhateverTheTexts) {
   EXPECT_EQ(text_of(file), "na\xef\xbf\xbdve");
   write_bytes(file, "na\xefve");
   EXPECT_EQ(text_of(file), "na\xefve");
+}
+
+TEST(PrintableOutput, LetsNoControlCharacterThrough) {
+  std::ostringstream terminal;
+  {
+    const PrintableOutput guard(terminal);
+    terminal << "\x1b]0;title\x07\tcaf\xc3\xa9 \xc2\xa0|\xc2" << std::flush << "\x9b"
+             << "2J\r\x7f\n";
+  }
+  EXPECT_EQ(terminal.str(), "?]0;title?\tcaf\xc3\xa9 \xc2\xa0|?2J??\n");
+  EXPECT_EQ(printable("\x1b[2J\n\xc2\x9b|\xe2\x80\xa8|\xe2\x80\xa6\xff"),
+            "?[2J??|?|\xe2\x80\xa6\\xff");
 }
 
 }  // namespace

@@ -81,6 +81,7 @@ TEST_F(TumTest, SaysLineAndWhatIsWrong) {
   EXPECT_EQ(message("two 0 0 0 0 0 0 1"), ":3  column 't': 'two' is no time in seconds");
   EXPECT_EQ(message("2 0 0 zero 0 0 0 1"), ":3  column 'z': 'zero' is not a number");
   EXPECT_EQ(message("2 0 nan 0 0 0 0 1"), ":3  column 'y': 'nan' is not finite");
+  EXPECT_EQ(message("2 0 1e160 0 0 0 0 1"), ":3  position beyond 1e9 m");
   EXPECT_EQ(message("2 0 0 0 0 0 0 0.5"), ":3  the quaternion has the norm 0.5, not 1");
   EXPECT_EQ(message("1 0 0 0 0 0 0 1"), ":3  the stamp is not after the previous one");
   const auto file = write("comments.tum", "# nothing\n");

@@ -7,12 +7,17 @@
 
 #include "viwo/api/measurement.hpp"
 #include "viwo/log/recording.hpp"
+#include "viwo/log/table_reader.hpp"
 
 namespace viwo::log {
 
 using ImageRecording = Recording<ImageSample>;
 
 inline constexpr const char* kNoImageFile = "image file that is missing";
+
+/// The text in a column as the name of a file; InputError for one that leads out of its folder: a
+/// recording names no files but its own.
+std::filesystem::path image_name(const TableReader& table, std::size_t column);
 
 /// The images of the camera folders, index in the list = camera, merged by their stamps, at equal
 /// stamps by camera. Files are looked for now, read when their pixels are needed (ImageFile). Rows

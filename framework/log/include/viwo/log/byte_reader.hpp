@@ -16,23 +16,23 @@ class ByteReader {
 
   /// The next bytes, at most `size`; how many they are. None at the end, and where the rest cannot
   /// be read: fault() says why then. That is also where gzip data have become far longer than those
-  /// of a recording do.
+  /// of a recording do, and where something else than gzip data (or zeros) is behind them.
   std::size_t read(char* into, std::size_t size);
 
   const std::string& fault() const { return fault_; }
   bool truncated() const { return truncated_; }  ///< the fault: the gzip data end early
 
  private:
+  struct Source;
   struct Closer {
-    void operator()(void* handle) const;
+    void operator()(Source* source) const;
   };
 
-  bool is_too_long(std::uint64_t more);
+  std::size_t read_plain(char* into, std::size_t size);
+  std::size_t inflate(char* into, std::size_t size);
+  bool begin_member();
 
-  std::string file_;
-  std::uint64_t given_ = 0;               ///< bytes so far
-  std::uint64_t check_at_ = 0;            ///< how many they are when it is looked at again
-  std::unique_ptr<void, Closer> handle_;  ///< zlib's gzFile, which also reads what is plain
+  std::unique_ptr<Source, Closer> source_;
   std::string fault_;
   bool truncated_ = false;
 };

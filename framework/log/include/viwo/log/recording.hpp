@@ -52,8 +52,8 @@ void append(Recording<Measurement>& out, Recording<Sample> more, const std::stri
 /// Into time order; samples of one time stay in the order in which their kinds were appended.
 void sort_by_time(Recording<Measurement>& recording);
 
-/// Why a datum cannot be used (kNotFinite, kNotUnit); nullptr when it can. A quaternion whose norm
-/// is off by less than 1e-3 is of unit norm then.
+/// Why a datum cannot be used (kNotFinite, kTooFar, kNotUnit); nullptr when it can. A quaternion
+/// whose norm is off by less than 1e-3 is of unit norm then.
 const char* why_rejected(PoseSample& pose);
 const char* why_rejected(const ImuSample& imu);
 /// Channels that are not used are zero, hence finite.

@@ -16,6 +16,8 @@ inline constexpr const char* kLastLineCutShort = "last line cut short";
 inline constexpr const char* kUnreadable = "row that cannot be read";
 inline constexpr const char* kNotFinite = "value that is not finite";
 inline constexpr const char* kIdTwice = "point whose id the image already has";
+inline constexpr const char* kTooFar = "position beyond 1e9 m";
+inline constexpr double kFarthest_m = 1e9;
 inline constexpr const char* kNotUnit = "quaternion that is not of unit norm";
 
 class StampFilter {

@@ -94,6 +94,8 @@ class TableReader {
  private:
   [[noreturn]] void refuse(const std::string& text) const;
   std::optional<std::size_t> find(std::string_view name) const;
+  /// Throws InputError where two columns have the name, in whatever units.
+  void require_one(std::string_view name) const;
 
   void check_columns() const;
   /// The line behind `skip` others; without the '#' before a header.
