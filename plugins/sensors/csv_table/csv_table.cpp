@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "csv_table_params.hpp"
+#include "header_unit.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
 #include "viwo/log/text.hpp"
@@ -17,6 +18,7 @@ namespace viwo {
 namespace {
 
 using csv_table::Params;
+using csv_table::Quantity;
 
 /// The table, once for each kind of samples in it.
 class Table {
@@ -24,6 +26,8 @@ class Table {
   explicit Table(const Params& params)
       : reader_(params.path, params.layout()), unit_(params.time_unit), has_header_(params.header) {
     time_ = column("time_column", params.time_column);
+    const double seconds = 1e-9 * static_cast<double>(*log::parse_time_ns("1", unit_));
+    require_unit("time_unit", {time_}, Quantity::kTime, seconds);
   }
 
   /// ParamError for a column that is not there.
@@ -39,6 +43,21 @@ class Table {
     std::vector<std::size_t> out;
     for (const std::string& name : names) out.push_back(column(key, name));
     return out;
+  }
+
+  /// ParamError where the header names another unit than the configuration, of which 1 is `si`.
+  /// Readings that are `scaled` may be in any.
+  void require_unit(const char* key, const std::vector<std::size_t>& columns, Quantity of,
+                    double si, bool scaled = false) const {
+    constexpr double kSame = 1e-3;
+    for (const std::size_t i : columns) {
+      const auto unit = csv_table::unit_of_header(reader_.columns()[i]);
+      if (!unit || scaled || (unit->of == of && std::abs(unit->si - si) < kSame * si)) continue;
+      throw ParamError(key, "the header says that " + log::quoted(reader_.columns()[i]) +
+                                " is in " + unit->name +
+                                ": give that unit, or the scale that makes this one of it, or "
+                                "mend the header");
+    }
   }
 
   /// Calls `row` with the stamp of each row that has something in `columns`, if only in one.
@@ -91,12 +110,31 @@ class Table {
   std::vector<Named> named_;  ///< by the parameters
 };
 
+void require_units(const Table& table, const Params& params, const std::vector<std::size_t>& drives,
+                   const std::vector<std::size_t>& steers) {
+  const auto is_scaled = [](const std::vector<double>& scale) {
+    return std::any_of(scale.begin(), scale.end(), [](double s) { return std::abs(s) != 1.; });
+  };
+  if (params.drive_unit != Params::DriveUnit::kCount) {
+    const bool is_angle = params.is_angle(), are_metres = params.wheel_radius_m > 0.;
+    const Quantity of = are_metres ? (is_angle ? Quantity::kLength : Quantity::kSpeed)
+                                   : (is_angle ? Quantity::kAngle : Quantity::kRate);
+    table.require_unit("drive_unit", drives, of, are_metres ? 1. : params.drive_factor(is_angle),
+                       is_scaled(params.drive_scale));
+  }
+  if (params.steer_unit != Params::SteerUnit::kCount) {
+    table.require_unit("steer_unit", steers, Quantity::kAngle, params.steer_factor(),
+                       is_scaled(params.steer_scale));
+  }
+}
+
 log::EncoderRecording read_wheels(const Params& params) {
   Table table(params);
   const auto drives = table.columns("drive_columns", params.drive_columns);
   const auto steers = table.columns("steer_columns", params.steer_columns);
   const double drive_factor = params.drive_factor(params.is_angle());
   const double steer_factor = params.steer_factor();
+  require_units(table, params, drives, steers);
   params.check_turns(params.is_angle(), params.drive_turn, params.steer_turn);
   log::EncoderCollector collector(
       {params.limits(), params.is_angle(), params.stride, params.joints()}, drives.size(),
@@ -142,6 +180,7 @@ log::PoseRecording read_poses(const Params& params) {
   const auto p = table.columns("position_columns", params.position_columns);
   auto q = table.columns("quaternion_columns", params.quaternion_columns);
   if (!params.yaw_column.empty()) q = {table.column("yaw_column", params.yaw_column)};
+  table.require_unit("position_unit", p, Quantity::kLength, params.position_factor());
   auto all = p;
   all.insert(all.end(), q.begin(), q.end());
   log::PoseCollector collector(params.limits());

@@ -61,6 +61,31 @@ TEST_F(CsvTable, EveryUnitOfADriveBecomesRadiansPerSecond) {
   }
 }
 
+TEST_F(CsvTable, AUnitInTheHeaderMustBeTheOneThatIsConfigured) {
+  const auto error = [&](const std::string& header, const std::string& rest) {
+    return error_of(
+        "{type: csv_table, path: " + write("u.csv", header + "\n0,3,4,5,6,7,8\n0.1,4,4,5,6,7,8\n") +
+        ", time_unit: s, " + rest + "}");
+  };
+  const std::string d = "time_column: 1, drive_columns: [2], ";
+  const std::string metres = d + "drive_unit: m, wheel_radius_m: 0.1";
+  for (const std::string other : {"[km/h]", "(rad s^-1)", "[m]", "[mph]"}) {
+    EXPECT_THAT(error("t,v " + other + ",a,b,c,d,e", metres),
+                HasSubstr("drive_unit: the header says that 'v " + other + "' is in "));
+  }
+  EXPECT_EQ(error("t,v [km/h],a,b,c,d,e", metres + ", drive_scale: [0.2777778]"), "");
+  EXPECT_EQ(error("t,v [m/s],a,b,c,d,e", metres + ", drive_scale: [-1]"), "");
+  EXPECT_EQ(error("t,v [left],a,b,c,d,e", metres), "");
+  EXPECT_EQ(error("t,w [deg s^-1],a,b,c,d,e", d + "drive_unit: deg"), "");
+  EXPECT_THAT(error("t,w [deg],a,b,c,d,e", d + "drive_unit: deg"), HasSubstr("is in deg: give"));
+  EXPECT_EQ(error("t,w [deg],a,b,c,d,e", d + "drive_unit: deg, drive_input: angle"), "");
+  EXPECT_THAT(error("t [ms],v,a,b,c,d,e", metres), HasSubstr("time_unit: the header says"));
+  EXPECT_THAT(error("t,v,a,b,c,d,s (deg)", metres + ", steer_columns: [7]"),
+              HasSubstr("steer_unit: the header says that 's (deg)' is in deg"));
+  EXPECT_THAT(error("t,x [mm],y,h,b,c,d", "time_column: 1, position_columns: [2, 3]"),
+              HasSubstr("position_unit: the header says that 'x [mm]' is in mm"));
+}
+
 TEST_F(CsvTable, AnglesAreDifferencedOverTheTimeBetweenThem) {
   // 100 counts of 1000 in 0.1 s
   const auto samples = play_only<EncoderSample>(
