@@ -246,6 +246,17 @@ void reverse_drives(CalibrationSetup& setup, const std::vector<int>& signs) {
   }
 }
 
+namespace {
+
+/// -1 for each bit of the pattern that is set.
+std::vector<int> signs_of(std::size_t pattern, std::size_t n) {
+  std::vector<int> signs(n, 1);
+  for (std::size_t i = 0; i < n; ++i) signs[i] = (pattern >> i & 1) != 0 ? -1 : 1;
+  return signs;
+}
+
+}  // namespace
+
 JointSearch search_joints(const CalibrationSetup& setup,
                           const std::vector<std::size_t>& recordings) {
   const WheelModel& model = *setup.recordings[recordings.front()].setup.model;
@@ -277,10 +288,8 @@ JointSearch search_joints(const CalibrationSetup& setup,
   std::vector<Solution> all;
   std::vector<std::size_t> pattern_of;
   for (std::size_t pattern = 0; pattern < patterns; ++pattern) {
-    std::vector<int> sign(n, 1);
-    for (std::size_t i = 0; i < n; ++i) sign[i] = (pattern >> i & 1) != 0 ? -1 : 1;
     auto signed_samples = samples;
-    for (TurningSample& sample : signed_samples) reverse(sign, sample.y);
+    for (TurningSample& sample : signed_samples) reverse(signs_of(pattern, n), sample.y);
     const SearchCost cost(model, std::move(signed_samples), out.zeros);
     for (Solution& solution : solve(cost, out.zeros, model.nominal())) {
       all.push_back(std::move(solution));
@@ -293,9 +302,7 @@ JointSearch search_joints(const CalibrationSetup& setup,
   }
   out.x_WI = all[best].x;
   out.cost = all[best].cost;
-  out.drive_signs.assign(n, 1);
-  for (std::size_t i = 0; i < n; ++i)
-    out.drive_signs[i] = (pattern_of[best] >> i & 1) != 0 ? -1 : 1;
+  out.drive_signs = signs_of(pattern_of[best], n);
   out.other_cost = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < all.size(); ++i) {
     const bool other = pattern_of[i] != pattern_of[best] ||
@@ -303,6 +310,7 @@ JointSearch search_joints(const CalibrationSetup& setup,
     if (other && all[i].cost < out.other_cost) {
       out.other_cost = all[i].cost;
       out.other = all[i].x;
+      out.other_drive_signs = signs_of(pattern_of[i], n);
     }
   }
   return out;

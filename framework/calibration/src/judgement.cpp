@@ -20,6 +20,11 @@ constexpr double kStrange = 3., kUnbelievable = 5.;
 constexpr double kOnlyOne = 1.2;
 /// Sigmas of the model that the wheels may contradict each other by.
 constexpr double kQuiet = 3.;
+/// What the worst bases have of them is two thirds of that; a drive that is off by 2 % has twice
+/// it.
+constexpr double kNoNoise = 100.;
+/// Encoders that are read by themselves are never so much better than the model says.
+constexpr double kCopies = 0.05;
 
 const std::vector<IntrinsicSpec>& specs_of(const CalibrationResult& result) {
   return result.setup->recordings.front().setup.model->description().intrinsics;
@@ -118,11 +123,20 @@ void judge_wheels(CalibrationResult& result) {
         "wheels that are elsewhere");
     return;
   }
-  if (result.all.noise.parity_scale > kQuiet) {
-    result.warnings.push_back("the wheels contradict each other by " +
-                              significant(result.all.noise.parity_scale, 2) +
-                              " times what the model's sigmas say: slip, play, or sigmas that are "
-                              "too small for this base");
+  const double scale = result.all.noise.parity_scale;
+  const std::string by = significant(scale, 2) + " times what the model's sigmas say";
+  if (scale > kNoNoise) {
+    result.doubts.push_back("calibrated, the wheels still contradict each other by " + by +
+                            ", and no noise is like that: a gear, radius or unit of one of them, "
+                            "zeros of the steering, or a prior that is too narrow for what is "
+                            "wrong");
+  } else if (scale > kQuiet) {
+    result.warnings.push_back("the wheels contradict each other by " + by +
+                              ": slip, play, or sigmas that are too small for this base");
+  } else if (scale < kCopies) {
+    result.warnings.push_back("the wheels contradict each other by no more than " + by +
+                              ": channels that are copies of each other tell nothing of their "
+                              "noise (leave wheel_noise_scale of a plan at 1)");
   }
 }
 
@@ -193,6 +207,13 @@ void judge_search(CalibrationResult& result) {
   for (const int zero : search.zeros) {
     other += (other.empty() ? "" : ", ") + specs_of(result)[static_cast<std::size_t>(zero)].name +
              " = " + significant(search.other[zero], 3) + " rad";
+  }
+  if (search.other_drive_signs != search.drive_signs) {
+    std::string signs;
+    for (const int sign : search.other_drive_signs) {
+      signs += (signs.empty() ? "" : ", ") + std::to_string(sign);
+    }
+    other += (other.empty() ? "" : ", with ") + ("drive signs [" + signs + "]");
   }
   result.doubts.push_back("another solution of the joints fits as well" +
                           (other.empty() ? "" : ": " + other) +

@@ -55,6 +55,17 @@ TEST(JointSearch, SaysWhatAllDrivesReversedMayBeAsWell) {
   EXPECT_THAT(result.warnings, exchanged);
 }
 
+TEST(JointSearch, SaysWithWhichSignsTheOtherSolutionIs) {
+  const std::string base =
+      "type: differential, radius_left_m: 0.05, radius_right_m: 0.05, baseline_m: 0.3";
+  CalibrationSetup setup = gyro_setup(base, base, 1);
+  testing::change_wheels(setup, [](EncoderSample& sample) { sample.drive_rad_per_s[1] = 0.; });
+  setup.options.find_drive_signs = true;
+  EXPECT_THAT(calibrate(setup).doubts,
+              ::testing::Contains(::testing::HasSubstr(
+                  "another solution of the joints fits as well: drive signs [")));
+}
+
 TEST(JointSearch, SaysThatADriveWithoutTurnsTellsNoZeros) {
   CalibrationSetup setup = unknown_swerve(1, "straight");
   setup.options.find_steering_zeros = true;

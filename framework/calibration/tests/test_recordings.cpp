@@ -46,6 +46,26 @@ TEST_F(Recordings, NominalDeadReckoningEndsWhereOthersMeasured) {
   }
 }
 
+TEST(RealCar, IsDoubtedWithAWheelThatCountsMoreThanTheOthers) {
+  const auto data = std::filesystem::path(VIWO_TEST_SHARED_DIR) / "data" / "real";
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "no recordings at " << data;
+  const auto file = std::filesystem::path(::testing::TempDir()) / "viwo_real_car.yaml";
+  std::ofstream(file) << "calibration: car\nbase: "
+                      << (kConfigs / "runs/comma2k19_car.yaml").string()
+                      << "\nreference: gyro\nprior_sigma_clock_offset_s: 0.1\n"
+                         "recordings: [{name: highway, distance_m: 1012, turn_deg: 0}]\n";
+  const auto doubts = [&](const std::string& scale) {
+    auto setup = read_calibration_setup(file,
+                                        {"placeholders.data=" + data.string(),
+                                         "sensors.wheels0.drive_scale=[" + scale + ", 1, 1, 1]"},
+                                        registry());
+    return calibrate(setup).doubts;
+  };
+  EXPECT_THAT(doubts("1"), ::testing::IsEmpty());
+  EXPECT_THAT(doubts("1.03"),
+              ::testing::Contains(::testing::HasSubstr("and no noise is like that: a gear")));
+}
+
 TEST_F(Recordings, CalibrationPredictsTheRepetitionThatIsLeftOutAndHalfwaysTheMotion) {
   auto setup =
       read_calibration_setup(kConfigs / "calibrations" / "recordings.yaml", {}, registry());

@@ -12,6 +12,7 @@
 #include "viwo/math/so3.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/plausibility/channel_change.hpp"
+#include "viwo/plausibility/yaw_order.hpp"
 #include "viwo/series/lag.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
@@ -62,7 +63,7 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
   constexpr double kWindow_s = 1., kLongest_s = 30., kLeast_m = 0.03;
   const auto clock_ns = to_ns(wheels.prior.wheels.t_OtoI_s);
   const double gap_s = std::max(0.5, 2.5 * period_of(turns_of(poses)));
-  double path = 0., time_s = 0.;
+  double path = 0., time_s = 0., turned_rad = 0.;
   Eigen::Vector2d along = Eigen::Vector2d::Zero();
   std::int64_t begin_ns = 0;
   for (const EncoderSample& sample : wheels.samples) {
@@ -72,6 +73,9 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
     path += solution.xi.head<2>().norm() * dt_s;
     along += solution.xi.head<2>() * dt_s;
     time_s += dt_s;
+    double fastest = 0.;
+    for (const double rate : sample.drive_rad_per_s) fastest = std::max(fastest, std::abs(rate));
+    turned_rad += fastest * dt_s;
     const double window_s = seconds_between(begin_ns, sample.end_ns);
     if (window_s < kWindow_s) continue;
     const auto from = interpolate(poses, begin_ns + clock_ns, gap_s);
@@ -80,7 +84,9 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
     const bool goes = moved.norm() > kLeast_m;
     if (from && to && !goes && window_s < kLongest_s) continue;
     const bool is_whole = time_s > 0.9 * window_s;
-    if (goes && is_whole) {
+    // Poses of a base that stands still can be corrected meanwhile.
+    constexpr double kTurns_rad = 0.1;
+    if (goes && is_whole && turned_rad > kTurns_rad) {
       const double angle = from->q_BtoW.angularDistance(to->q_BtoW);
       // Nearly straight: the chord is the path, wherever the body is on the base.
       constexpr double kStraight = 0.1;
@@ -94,7 +100,7 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
         speeds.path_m += moved.norm();
       }
     }
-    path = time_s = 0.;
+    path = time_s = turned_rad = 0.;
     along.setZero();
   }
   return speeds;
@@ -128,31 +134,36 @@ void check_heading(const Speeds& speeds, const std::string& label, const std::st
   out.push_back(heading);
 }
 
-/// With the drives of a side reversed the base goes next to nowhere where it goes straight.
+/// Of a side, or a drive of two, that is reversed or has another gear: where the base goes straight
+/// the one change without which the wheels go as far as the poses, and to where those go.
 bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& label,
                  const std::string& other, Findings& out) {
-  for (const ChannelChange& change : side_changes(wheels.model, wheels.prior.wheels.x_WI)) {
+  std::optional<Finding> found;
+  for (const ChannelChange& change : changes_by_gyro(wheels.model, wheels.prior.wheels.x_WI)) {
+    const bool is_scale =
+        change.kind == ChannelChange::kSideScale || change.kind == ChannelChange::kDriveScale;
+    if (!is_scale) continue;
     Wheels changed = wheels;
     for (EncoderSample& sample : changed.samples) change.undo(sample);
     const Speeds speeds = speeds_of(changed, poses.poses);
     if (speeds.ratio.size() < kFewestWindows || speeds.cosine.empty()) continue;
     const double ratio = eval::median(speeds.ratio);
     if (std::abs(ratio - 1.) > kMostFactor || eval::median(speeds.cosine) < 0.) continue;
-    const bool is_known = std::any_of(out.begin(), out.end(), [&](const Finding& f) {
-      return f.sensor == label && f.check == "order" && f.severity == Severity::kFault;
-    });
-    if (!is_known) {
-      out.push_back({label,
-                     Severity::kFault,
-                     "order",
-                     change.text() + " (without that they go " + significant(ratio, 3) +
-                         " times as far as " + other + ")",
-                     {{"wheels by poses", ratio, ""}},
-                     change.remedies(wheels.sensor, wheels.model->description())});
-    }
-    return true;
+    if (found) return false;  // whichever it is, if it is one of them
+    found = {label,
+             Severity::kFault,
+             "order",
+             change.text() + " (without that they go " + significant(ratio, 3) +
+                 " times as far as " + other + ")",
+             {{"wheels by poses", ratio, ""}},
+             change.remedies(wheels.sensor, wheels.model->description())};
   }
-  return false;
+  if (!found) return false;
+  const bool is_known = std::any_of(out.begin(), out.end(), [&](const Finding& f) {
+    return f.sensor == label && f.check == "order" && f.severity == Severity::kFault;
+  });
+  if (!is_known) out.push_back(std::move(*found));
+  return true;
 }
 
 /// Positions between which nothing can go: of a source that loses its place, or has none and says
@@ -244,7 +255,23 @@ bool has_axes_of_imu(const Recording& recording, const Poses& poses, const std::
   return false;
 }
 
-/// Clock and sign of the turns of poses against others of the same frame.
+/// Where `label` turns when `other` does, but `ratio` times as fast.
+void check_size_of_turns(const std::string& label, const std::string& other, double ratio,
+                         const std::string& causes, Findings& out) {
+  // Bases that slip are said to be wider than they are.
+  constexpr double kSlips = 1.25, kNoSlip = 1.6, kDegrees = 180. / std::numbers::pi;
+  const double most = std::max(ratio, 1. / ratio);
+  if (!(ratio > 0.) || most < kSlips) return;
+  const bool are_degrees = std::abs(most / kDegrees - 1.) < 0.2;
+  out.push_back({label,
+                 most < kNoSlip ? Severity::kNote : Severity::kFault,
+                 "turns",
+                 "turns " + significant(ratio, 3) + " times as fast as " + other + ": " +
+                     (are_degrees ? "one of the two is in degrees" : causes),
+                 {{"turns by " + other, ratio, ""}}});
+}
+
+/// Clock, sign and size of the turns of poses against others of the same frame.
 void check_clock(const Recording& recording, std::vector<Turn> of_poses, const std::string& label,
                  const std::vector<Turn>& turns, const std::string& other, double configured_s,
                  Findings& out) {
@@ -257,6 +284,15 @@ void check_clock(const Recording& recording, std::vector<Turn> of_poses, const s
         {label, Severity::kNote, "clock",
          "too little rotation, or too little in common with " + other + ", to compare its clock"});
     return;
+  }
+  constexpr double kSameTurns = 0.9;
+  if (lag->correlation > kSameTurns && recording.imu.empty()) {
+    check_size_of_turns(other, label, 1. / lag->slope,
+                        "width of the base (baseline, track, centres of rotation), radii or gears "
+                        "of the wheels, or units",
+                        out);
+  } else if (lag->correlation > kSameTurns) {
+    check_size_of_turns(label, other, lag->slope, "units of one of the two", out);
   }
   const double period_s = period_of(of_poses);
   const bool is_key = !recording.setup->filter;

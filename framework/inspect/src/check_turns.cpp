@@ -1,12 +1,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "checks.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/time_text.hpp"
 #include "viwo/plausibility/channel_change.hpp"
 
 namespace viwo::inspect {
@@ -16,32 +18,66 @@ using series::Wheels;
 
 namespace {
 
-/// After how much the angle of a drive begins anew: its rates, which are differences of angles,
-/// then jump back by it and are as before. 0: it does not.
-double turn_of(const std::vector<EncoderSample>& samples, std::size_t drive) {
-  std::vector<double> jumps;
+/// A rate that is far from those before and after it, which agree.
+struct Jump {
+  std::int64_t t_ns = 0;
+  double dt_s = 0., rad = 0.;  ///< how long, and what it is off by in that time
+  bool is_back = false;
+};
+
+std::vector<Jump> jumps_of(const std::vector<EncoderSample>& samples, std::size_t drive) {
+  std::vector<Jump> jumps;
   for (std::size_t i = 1; i + 1 < samples.size(); ++i) {
     const double before = samples[i - 1].drive_rad_per_s[drive];
     const double after = samples[i + 1].drive_rad_per_s[drive];
     const double usual = 0.5 * (before + after);
     const double off = samples[i].drive_rad_per_s[drive] - usual;
     const double dt_s = seconds_between(samples[i].begin_ns, samples[i].end_ns);
-    // Against the motion, and far from both neighbours, which agree.
+    const double rad = std::abs(off) * dt_s;
     constexpr double kFar = 10., kLeast_rad = 0.5;
-    const double differ = std::abs(before - after) + 0.05;
-    if (off * usual >= 0. || std::abs(off) < kFar * differ || std::abs(off) * dt_s < kLeast_rad) {
-      continue;
-    }
-    jumps.push_back(std::abs(off) * dt_s);
+    if (std::abs(off) < kFar * (std::abs(before - after) + 0.05) || rad < kLeast_rad) continue;
+    jumps.push_back({samples[i].begin_ns, dt_s, rad, off * usual < 0.});
+  }
+  return jumps;
+}
+
+/// After how much the angle of a drive begins anew: its rates, which are differences of angles,
+/// then jump back by it and are as before. 0: it does not.
+double turn_of(const std::vector<Jump>& jumps) {
+  std::vector<double> back;
+  for (const Jump& jump : jumps) {
+    if (jump.is_back) back.push_back(jump.rad);
   }
   constexpr std::size_t kFewest = 3;
-  if (jumps.size() < kFewest) return 0.;
-  const double turn = eval::median(jumps);
+  if (back.size() < kFewest) return 0.;
+  const double turn = eval::median(back);
   constexpr double kSame = 0.05;
-  const auto same = std::count_if(jumps.begin(), jumps.end(), [turn](double jump) {
-    return std::abs(jump - turn) < kSame * turn;
-  });
-  return 10 * same >= 9 * static_cast<std::ptrdiff_t>(jumps.size()) ? turn : 0.;
+  const auto same = std::count_if(
+      back.begin(), back.end(), [turn](double rad) { return std::abs(rad - turn) < kSame * turn; });
+  return 10 * same >= 9 * static_cast<std::ptrdiff_t>(back.size()) ? turn : 0.;
+}
+
+/// What no wheel does.
+void check_jumps(const Recording& recording, const Wheels& wheels, std::size_t drive,
+                 const std::vector<Jump>& jumps, Findings& out) {
+  constexpr double kMost_rad_per_s2 = 1000., kLeast_rad = 3.;
+  const Jump* most = nullptr;
+  double n = 0.;
+  for (const Jump& jump : jumps) {
+    if (jump.rad < kLeast_rad || jump.rad < kMost_rad_per_s2 * jump.dt_s * jump.dt_s) continue;
+    n += 1.;
+    if (most == nullptr || jump.rad > most->rad) most = &jump;
+  }
+  if (most == nullptr) return;
+  out.push_back({recording.label<EncoderSample>(wheels.sensor),
+                 Severity::kFault,
+                 "jumps",
+                 "drive_" + std::to_string(drive + 1) + " jumps by up to " +
+                     significant(most->rad, 3) + " rad from one sample to the next (" +
+                     significant(n, 6) + " times, most at " +
+                     time_text(most->t_ns - recording.begin_ns()) +
+                     "): its counter was set or ran over, or readings are wrong",
+                 {{"jumps", n, ""}, {"largest", most->rad, "rad"}}});
 }
 
 }  // namespace
@@ -51,7 +87,11 @@ void check_turns(const Recording& recording, Findings& out) {
     if (wheels.samples.empty()) continue;
     const auto n = static_cast<std::size_t>(wheels.model->description().n_drive);
     std::array<double, kMaxDrives> turns{};
-    for (std::size_t i = 0; i < n; ++i) turns[i] = turn_of(wheels.samples, i);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::vector<Jump> jumps = jumps_of(wheels.samples, i);
+      turns[i] = turn_of(jumps);
+      if (turns[i] == 0.) check_jumps(recording, wheels, i, jumps, out);
+    }
     const auto first = std::find_if(turns.begin(), turns.end(), [](double t) { return t > 0.; });
     if (first == turns.end()) continue;
     out.push_back({recording.label<EncoderSample>(wheels.sensor),

@@ -27,17 +27,32 @@ std::size_t stride_for(std::size_t n, std::size_t most) {
   return std::max<std::size_t>(1, n / most);
 }
 
+/// The intrinsic that explains most of the contradictions by itself, and where it does.
+struct Explained {
+  std::size_t intrinsic = 0;
+  double value = 0., part = 0.;
+};
+
 struct Calibration {
   Intrinsics x_WI;
   IntrinsicMatrix P;
+  Explained alone;
 };
+
+Explained explained(const ParityInformation& parity, const Intrinsics& x_WI) {
+  Eigen::Index i = 0;
+  const Intrinsics told = parity.Lambda.diagonal().cwiseMax(1e-12);
+  const double most = parity.eta.cwiseAbs2().cwiseQuotient(told).maxCoeff(&i);
+  return {static_cast<std::size_t>(i), x_WI[i] - parity.eta[i] / told[i],
+          parity.chi2 > 0. ? most / parity.chi2 : 0.};
+}
 
 /// Where the wheels contradict each other least, within what the prior allows: its Gauss-Newton
 /// steps (W-10). What the wheels still contradict is noise, or lies.
 std::optional<Calibration> calibrated(const Wheels& wheels) {
   const WheelsView& view = wheels.prior.wheels;
   const int n = wheels.model->n_intrinsics();
-  Calibration found{view.x_WI, IntrinsicMatrix::Zero(n, n)};
+  Calibration found{view.x_WI, IntrinsicMatrix::Zero(n, n), {}};
   const Intrinsics& sigma = wheels.prior.sigma_intrinsics;
   if (sigma.size() != n || wheels.model->n_rows() <= 3) return {};
   TwistSolver solver(wheels.model, {.noise_weighted = true});
@@ -56,6 +71,7 @@ std::optional<Calibration> calibrated(const Wheels& wheels) {
       // As Student's t with few degrees of freedom: a liar has a bounded say.
       solver.add_parity(residual, 1. / (1. + residual.chi2() / (10. * dof)), parity);
     }
+    if (step == 0) found.alone = explained(parity, view.x_WI);
     IntrinsicMatrix N = parity.Lambda;
     Intrinsics h = -parity.eta;
     for (int i = 0; i < n; ++i) {
@@ -70,6 +86,27 @@ std::optional<Calibration> calibrated(const Wheels& wheels) {
     found.P = solve.solve(IntrinsicMatrix::Identity(n, n));
   }
   return found;
+}
+
+/// One intrinsic that is far from its prior, and explains what the wheels contradict each other by.
+void check_intrinsics(const Wheels& wheels, const Calibration& calibration,
+                      const std::string& label, Findings& out) {
+  constexpr double kFar = 5., kMostOfIt = 0.7;
+  const Explained& one = calibration.alone;
+  const IntrinsicSpec& spec = wheels.model->description().intrinsics[one.intrinsic];
+  const auto i = static_cast<Eigen::Index>(one.intrinsic);
+  const double nominal = wheels.prior.wheels.x_WI[i];
+  const double sigma = wheels.prior.sigma_intrinsics[i];
+  if (one.part < kMostOfIt || !(sigma > 0.) || std::abs(one.value - nominal) < kFar * sigma) return;
+  out.push_back({label,
+                 Severity::kFault,
+                 "intrinsics",
+                 spec.name + " explains " + significant(100. * one.part, 2) +
+                     " % of what the wheels contradict each other by if it is " +
+                     significant(one.value, 4) + " " + spec.unit + " instead of " +
+                     significant(nominal, 4) +
+                     ": it, or unit, gear, sign or zero of a channel of that wheel",
+                 {{spec.name, one.value, spec.unit}, {"part", one.part, ""}}});
 }
 
 /// How far from their middle poses go for a tenth of the time; 0 where they jump nearly as far from
@@ -367,6 +404,7 @@ void check_wheels(const Recording& recording, Findings& out) {
     }
     const Parity parity = parity_of(wheels, calibration->x_WI);
     check_parity(parity, label, out);
+    check_intrinsics(wheels, *calibration, label, out);
     check_liars(recording, wheels, *calibration, label, out);
     check_noises(wheels, *calibration, parity, label, out);
   }

@@ -9,6 +9,8 @@
 #include "checks.hpp"
 #include "plots.hpp"
 #include "viwo/config/yaml.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/plausibility/channel_change.hpp"
 
 namespace viwo::inspect {
 
@@ -133,7 +135,7 @@ void demote_consequences(const Recording& recording, Findings& findings) {
     } else if (follows(kContradicted) && (finding.check == "parity" || finding.check == "speed" ||
                                           finding.check == "clock")) {
       demote(finding, sensor);
-    } else if (wrong != gyros.end() && finding.check == "clock") {
+    } else if (wrong != gyros.end() && (finding.check == "clock" || finding.check == "turns")) {
       demote(finding, *wrong);
     } else if (wrong != gyros.end() && sensor == *wrong && !is_one_of(finding.check, kImuCauses) &&
                !is_of_stamps(finding.check) && finding.check != "axes") {
@@ -160,6 +162,22 @@ void give_to_channels(const config::Node& configuration, Remedy& remedy) {
     list += i == 0 ? (scales ? "1" : "0") : of_joints.items()[i - 1].scalar();
   }
   remedy.value = "[" + list + "]";
+}
+
+/// What is found is found behind what the configuration does to the channels already: scales
+/// multiply, shifts add.
+void add_to_present(const config::Node& configuration, Remedy& remedy) {
+  const bool scales = remedy.key.ends_with("_scale");
+  const config::Node* const there = configuration.at_path(remedy.key);
+  if (!(scales || remedy.key.ends_with("_shift_rad")) || there == nullptr) return;
+  const config::Node found = config::parse(remedy.value, "remedy");
+  const std::size_t n = there->items().size();
+  if (n == 0 || found.items().size() != n) return;
+  remedy.value = yaml_list(n, [&](std::size_t i) {
+    const double a = std::stod(there->items()[i].scalar());
+    const double b = std::stod(found.items()[i].scalar());
+    return significant(scales ? a * b : a + b, 10);
+  });
 }
 
 /// A sensor that knows of units takes what it reads for the other one of two; for those that do
@@ -212,7 +230,10 @@ Inspection inspect(RunSetup& setup) {
     }
   }
   for (Finding& finding : findings) {
-    for (Remedy& remedy : finding.remedies) give_to_channels(setup.resolved, remedy);
+    for (Remedy& remedy : finding.remedies) {
+      give_to_channels(setup.resolved, remedy);
+      add_to_present(setup.resolved, remedy);
+    }
     std::erase_if(finding.remedies, [&](const Remedy& remedy) {
       return remedy.key.ends_with("_unit") && !is_other_unit(setup.resolved, remedy);
     });

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +12,6 @@
 #include "viwo/eval/json.hpp"
 #include "viwo/inspect/inspection.hpp"
 #include "viwo/log/files.hpp"
-#include "viwo/math/significant.hpp"
 #include "viwo/report/html.hpp"
 
 namespace viwo::inspect {
@@ -69,27 +67,15 @@ std::vector<std::pair<Remedy, std::string>> remedies_of(const Inspection& inspec
   return all;
 }
 
-/// What is found of the channels of a model is found behind what the configuration does to those of
-/// the log already: scales multiply, shifts add. Nothing where channels have another order there.
-std::optional<config::Node> combined(const config::Node& configuration, const Remedy& remedy) {
-  config::Node value = config::parse(remedy.value, "--fix");
-  const config::Node& there = *configuration.at_path(remedy.key);
-  const bool scales = remedy.key.ends_with("_scale"), shifts = remedy.key.ends_with("_shift_rad");
-  const std::string section = remedy.key.substr(0, remedy.key.rfind('.') + 1);
-  const std::string joint = remedy.key.substr(section.size(), 5);  // drive or steer
-  const config::Node* channels = configuration.at_path(section + joint + "_channel");
+/// Where channels have another order already, or are not those of the joints.
+bool is_for_hands(const config::Node& configuration, const Remedy& remedy) {
+  const std::size_t dot = remedy.key.rfind('.') + 1;
+  const std::string joint = remedy.key.substr(dot, 5);  // drive or steer
+  const auto* channels = configuration.at_path(remedy.key.substr(0, dot) + joint + "_channel");
   const bool has_order = channels != nullptr && !channels->items().empty();
-  if (remedy.key.ends_with("_channel")) {
-    return has_order ? std::nullopt : std::optional(value);
-  }
-  if (has_order && value.is_list() && value.items().size() != channels->items().size()) return {};
-  if (!(scales || shifts) || !there.is_list() || there.items().empty()) return value;
-  if (there.items().size() != value.items().size()) return {};
-  for (std::size_t i = 0; i < value.items().size(); ++i) {
-    const double a = std::stod(there.items()[i].scalar()), b = std::stod(value.items()[i].scalar());
-    value.items()[i] = config::Node::scalar_of(significant(scales ? a * b : a + b, 10));
-  }
-  return value;
+  if (remedy.key.ends_with("_channel")) return has_order;
+  const config::Node value = config::parse(remedy.value, "--fix");
+  return has_order && value.is_list() && value.items().size() != channels->items().size();
 }
 
 }  // namespace
@@ -190,13 +176,12 @@ std::string fixed_configuration(const RunSetup& setup, const Inspection& inspect
       head += "# Not in here, for want of such a key: " + line_of(remedy) + "  (" + reason + ")\n";
       continue;
     }
-    const auto value = combined(fixed, remedy);
-    if (!value) {
+    if (is_for_hands(fixed, remedy)) {
       head += "# To be combined by hand with what is there: " + line_of(remedy) + "  (" + reason +
               ")\n";
       continue;
     }
-    config::set_path(fixed, remedy.key, *value);
+    config::set_path(fixed, remedy.key, config::parse(remedy.value, "--fix"));
     comments[remedy.key] = reason;
   }
   std::string text = head + config::to_yaml(fixed, comments);

@@ -84,6 +84,13 @@ TEST_F(FixedConfiguration, GivesScalesToTheChannelsOfTheLog) {
   const Inspection found = inspect(setup);
   EXPECT_EQ(remedy_of(finding_of(found, "wheels0", "order"), "sensors.wheels0.drive_scale"),
             "[-1, 1, 1, 1]");
+  // What is told to be written is what has to stand there, with what does already.
+  config::Node scaled = run;
+  config::set_path(scaled, "sensors.wheels0.drive_scale", config::parse("[1, 1.01, 1, 1]", "test"));
+  RunSetup other = read_run(scaled, testing::registry());
+  EXPECT_EQ(
+      remedy_of(finding_of(inspect(other), "wheels0", "order"), "sensors.wheels0.drive_scale"),
+      "[-1, 1.01, 1, 1]");
   setup = read_run(setup.resolved, testing::registry());
   const std::string text = fixed_configuration(setup, found, testing::registry());
   setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());

@@ -85,6 +85,21 @@ TEST(Inspection, FindsTheSteeringOfARealCarInDegrees) {
               ElementsAre("wheels0 steering"));
 }
 
+TEST(Inspection, FindsTheWheelOfARealCarThatIsFast) {
+  if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
+  const auto file = testing::configuration("runs/comma2k19_car.yaml");
+  const std::array names{"r_rear_left", "r_rear_right", "r_front_left", "r_front_right"};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    std::array<std::string, 4> scale{"1", "1", "1", "1"};
+    scale[i] = "1.03";
+    RunSetup setup = setup_of(file, {"sensors.wheels0.drive_scale=[" + scale[0] + "," + scale[1] +
+                                     "," + scale[2] + "," + scale[3] + "]"});
+    const Inspection found = inspect(setup);
+    EXPECT_THAT(faults_of(found), ElementsAre("wheels0 intrinsics"));
+    EXPECT_NEAR(figure_of(finding_of(found, "wheels0", "intrinsics"), names[i]), 0.35 / 1.03, 2e-3);
+  }
+}
+
 TEST(Inspection, TellsTheJitterOfACanBus) {
   if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
   RunSetup setup = setup_of(testing::configuration("runs/comma2k19_car.yaml"));

@@ -174,6 +174,105 @@ TEST(InspectWheels, FindsThatASideIsReversedByTheGyroAndByPoses) {
             "[1, -1, 1, -1]");
 }
 
+TEST(InspectWheels, FindsTheGearOfASideByTheGyroAndByPoses) {
+  const auto left = [](EncoderSample& s) {
+    s.drive_rad_per_s[0] *= 2.;
+    s.drive_rad_per_s[2] *= 2.;
+  };
+  const Inspection by_gyro = with_wheels(four_drives(), left);
+  EXPECT_THAT(faults_of(by_gyro), ElementsAre("wheels0 order"));
+  const Finding order = finding_of(by_gyro, "wheels0", "order");
+  EXPECT_THAT(order.what, HasSubstr("drive_1, drive_3, all of one side, turn 2 times as fast as"));
+  EXPECT_EQ(remedy_of(order, "sensors.wheels0.drive_scale"), "[0.5, 1, 0.5, 1]");
+  RunSetup planar = four_drives("straight");
+  planar.filter.reset();
+  const Fault fault = {.imu = [](ImuSample&) { return false; },
+                       .wheels =
+                           [&left](EncoderSample& s) {
+                             left(s);
+                             return true;
+                           }};
+  const Inspection by_poses = inspected(std::move(planar), fault);
+  EXPECT_EQ(remedy_of(finding_of(by_poses, "wheels0", "order"), "sensors.wheels0.drive_scale"),
+            "[0.5, 1, 0.5, 1]");
+}
+
+/// Of two wheels, without an IMU.
+RunSetup two_drives(const std::vector<std::string>& more = {}) {
+  std::vector<std::string> all{"sensors.simulator0.duration_s=30"};
+  all.insert(all.end(), more.begin(), more.end());
+  RunSetup setup = simulated("viwo_skid_steer", all);
+  setup.filter.reset();
+  return setup;
+}
+
+Inspection by_poses_alone(RunSetup setup, const std::function<void(EncoderSample&)>& fault) {
+  return inspected(std::move(setup), {.imu = [](ImuSample&) { return false; },
+                                      .wheels =
+                                          [&fault](EncoderSample& s) {
+                                            fault(s);
+                                            return true;
+                                          }});
+}
+
+TEST(InspectWheels, FindsADriveOfTwoByPosesAlone) {
+  const auto straight = [] { return two_drives({"placeholders.motion=straight"}); };
+  EXPECT_THAT(faults_of(by_poses_alone(straight(), [](EncoderSample&) {})), IsEmpty());
+  for (const auto& [scale, remedy] :
+       {std::pair{-1., "[1, -1]"}, std::pair{2., "[1, 0.5]"}, std::pair{0.5, "[1, 2]"}}) {
+    const Inspection found = by_poses_alone(
+        straight(), [scale = scale](EncoderSample& s) { s.drive_rad_per_s[1] *= scale; });
+    EXPECT_EQ(remedy_of(finding_of(found, "wheels0", "order"), "sensors.wheels0.drive_scale"),
+              remedy)
+        << scale;
+  }
+  // A radius that is half as large again is neither the one's gear nor the other's.
+  const Inspection larger = by_poses_alone(straight(), [](EncoderSample& s) {
+    for (double& rate : s.drive_rad_per_s) rate *= 1.5;
+  });
+  EXPECT_THAT(faults_of(larger), ElementsAre("wheels0 speed"));
+}
+
+TEST(InspectPoses, TellThatTheWheelsTurnLessThanTheyDo) {
+  EXPECT_EQ(
+      finding_of(by_poses_alone(two_drives(), [](EncoderSample&) {}), "wheels0", "turns").what, "");
+  const Inspection narrow =
+      by_poses_alone(two_drives({"kinematics.y_icr_left_m=0.15", "kinematics.y_icr_right_m=-0.15"}),
+                     [](EncoderSample&) {});
+  EXPECT_THAT(faults_of(narrow), ElementsAre("wheels0 turns"));
+  const Finding turns = finding_of(narrow, "wheels0", "turns");
+  EXPECT_NEAR(turns.figures.at(0).value, 2., 0.05);
+  EXPECT_THAT(turns.what, HasSubstr("width of the base (baseline, track, centres of rotation)"));
+  // Skid-steered bases are often said to be wider by some part.
+  const Inspection wide =
+      by_poses_alone(two_drives({"kinematics.y_icr_left_m=0.4", "kinematics.y_icr_right_m=-0.4"}),
+                     [](EncoderSample&) {});
+  EXPECT_THAT(faults_of(wide), IsEmpty());
+  EXPECT_EQ(finding_of(wide, "wheels0", "turns").severity, Severity::kNote);
+}
+
+TEST(InspectPoses, ThatAreCorrectedWhileTheBaseStandsTellNoSpeed) {
+  const RunSetup planar = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
+  const Inspection stands = inspected(planar, {.wheels = [](EncoderSample& s) {
+                                        if (s.t_ns < 5'000'000'000) return true;
+                                        s.drive_rad_per_s.fill(0.);
+                                        return true;
+                                      }});
+  EXPECT_EQ(finding_of(stands, "wheels0", "speed").severity, Severity::kFits)
+      << finding_of(stands, "wheels0", "speed").what;
+}
+
+TEST(InspectWheels, TellsACounterThatWasSet) {
+  std::int64_t n = 0;
+  const Inspection jumps = with_wheels(swerve(), [&n](EncoderSample& s) {
+    if (++n == 1000) s.drive_rad_per_s[2] -= 200. / seconds_between(s.begin_ns, s.end_ns);
+  });
+  const Finding jump = finding_of(jumps, "wheels0", "jumps");
+  EXPECT_EQ(jump.severity, Severity::kFault);
+  EXPECT_THAT(jump.what,
+              HasSubstr("drive_3 jumps by up to 200 rad from one sample to the next (1"));
+}
+
 TEST(InspectPoses, TellsThoseThatJump) {
   std::int64_t n = 0;
   const Inspection jumps = inspected(setup_of(testing::configuration("runs/simulated_swerve.yaml")),

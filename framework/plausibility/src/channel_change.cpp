@@ -62,7 +62,13 @@ std::vector<ChannelChange> side_changes(const std::shared_ptr<const WheelModel>&
     (solution.xi[2] > 0. ? right : left) |= 1u << i;
   }
   if (std::popcount(left) < 2 || std::popcount(right) < 2) return {};
-  return {{ChannelChange::kSideSign, 0, 0, left}, {ChannelChange::kSideSign, 0, 0, right}};
+  std::vector<ChannelChange> changes;
+  for (const double scale : {-1., 2., 0.5}) {
+    for (const std::uint32_t side : {left, right}) {
+      changes.push_back({ChannelChange::kSideScale, 0, 0, side, scale});
+    }
+  }
+  return changes;
 }
 
 void ChannelChange::undo(EncoderSample& sample) const {
@@ -91,9 +97,9 @@ void ChannelChange::undo(EncoderSample& sample) const {
     case kSteersInDegrees:
       for (double& angle : sample.steer_rad) angle *= kDegree;
       break;
-    case kSideSign:
+    case kSideScale:
       for (std::size_t i = 0; i < kMaxDrives; ++i) {
-        if ((side >> i & 1u) != 0) sample.drive_rad_per_s[i] *= -1.;
+        if ((side >> i & 1u) != 0) sample.drive_rad_per_s[i] *= scale;
       }
       break;
     case kNoSteering:
@@ -130,13 +136,15 @@ std::string ChannelChange::text() const {
              " and " + second + " exchanged: their order";
     case kSteersInDegrees:
       return "wheels contradict each other, and do not if the steering angles are in degrees";
-    case kSideSign: {
+    case kSideScale: {
       std::string drives;
       for (std::size_t i = 0; i < kMaxDrives; ++i) {
         if ((side >> i & 1u) == 0) continue;
         drives += (drives.empty() ? "drive_" : ", drive_") + std::to_string(i + 1);
       }
-      return drives + ", all of one side, are reversed: their sign";
+      if (scale < 0.) return drives + ", all of one side, are reversed: their sign";
+      return drives + ", all of one side, turn " + significant(1. / scale, 2) +
+             " times as fast as their wheels: their gear ratio, or counts per turn";
     }
   }
   return "";
@@ -148,7 +156,7 @@ std::vector<Remedy> ChannelChange::remedies(const std::string& sensor,
   const auto n_steer = static_cast<std::size_t>(description.n_steer);
   const std::string section = "sensors." + sensor + ".";
   const auto factor = [&](std::size_t i) {
-    const bool is_changed = kind == kSideSign ? (side >> i & 1u) != 0 : i == a;
+    const bool is_changed = kind == kSideScale ? (side >> i & 1u) != 0 : i == a;
     return is_changed || kind == kSteerSigns ? significant(scale, 2) : "1";
   };
   const auto order = [&](std::size_t i) {
@@ -161,7 +169,7 @@ std::vector<Remedy> ChannelChange::remedies(const std::string& sensor,
     case kNoSteering:
       break;
     case kDriveScale:
-    case kSideSign:
+    case kSideScale:
       return {{section + "drive_scale", yaml_list(n_drive, factor)}};
     case kDrivesExchanged:
       return {drives};

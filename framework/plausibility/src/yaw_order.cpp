@@ -7,12 +7,12 @@
 namespace viwo {
 
 void YawDifference::add(double gyro_rad_per_s, double wheels_rad_per_s) {
-  const double off = gyro_rad_per_s - wheels_rad_per_s;
   ++n_;
   gyro_ += gyro_rad_per_s;
   gyro_squares_ += gyro_rad_per_s * gyro_rad_per_s;
-  off_ += off;
-  off_squares_ += off * off;
+  wheels_ += wheels_rad_per_s;
+  wheels_squares_ += wheels_rad_per_s * wheels_rad_per_s;
+  products_ += gyro_rad_per_s * wheels_rad_per_s;
 }
 
 double YawDifference::variance() const {
@@ -21,14 +21,24 @@ double YawDifference::variance() const {
 }
 
 double YawDifference::part() const {
+  constexpr double kMostFactor = 1.5;
   const double n = n_, all = variance();
-  return all > 0. ? (off_squares_ / n - off_ * off_ / (n * n)) / all : 1.;
+  if (!(all > 0.)) return 1.;
+  const double of_wheels = wheels_squares_ / n - wheels_ * wheels_ / (n * n);
+  const double common = products_ / n - gyro_ * wheels_ / (n * n);
+  const double factor =
+      of_wheels > 0. ? std::clamp(common / of_wheels, 1. / kMostFactor, kMostFactor) : 1.;
+  return (all - 2. * factor * common + factor * factor * of_wheels) / all;
 }
 
 std::vector<ChannelChange> changes_by_gyro(const std::shared_ptr<const WheelModel>& model,
                                            const Intrinsics& x_WI) {
   std::vector<ChannelChange> changes = {{}};
-  if (model->n_rows() <= 3) changes = channel_changes(model->description());
+  if (model->n_rows() <= 3) {
+    changes = channel_changes(model->description());
+    const auto gears = gear_changes(model->description());
+    changes.insert(changes.end(), gears.begin(), gears.end());
+  }
   const auto sides = side_changes(model, x_WI);
   changes.insert(changes.end(), sides.begin(), sides.end());
   return changes;

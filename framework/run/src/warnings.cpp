@@ -237,6 +237,11 @@ void doubt(RunResult& result) {
     text = "it is off by " + significant(ate_m, 3) +
            " m, root mean square, and who had stayed in the middle by " + significant(extent, 3) +
            " m";
+  } else if (!result.updates.empty() && parts.least >= kAgrees &&
+             result.accuracy->end_m > std::max(1., kAgrees * result.accuracy->path_length_m)) {
+    // With a gyro, whatever the wheels are.
+    text = "after " + eval::length_text(std::round(result.accuracy->path_length_m)) +
+           " m it is off by " + eval::length_text(std::round(result.accuracy->end_m)) + " m";
   } else {
     return;
   }

@@ -266,6 +266,28 @@ TEST(Doubts, AreOfAnEstimateThatIsWorseThanNone) {
   EXPECT_THAT(doubts(1.2), ElementsAre());
 }
 
+TEST(Doubts, AreOfAFilterThatEndsFarOffAndIsNoBetterOnTheWay) {
+  RunResult result;
+  result.status = RunStatus::kOk;
+  for (int i = 0; i < 100; ++i) result.reference.push_back({i, {10. * i, 0., 0.}});
+  result.accuracy.emplace();
+  result.accuracy->path_length_m = 1000.;
+  const auto doubts = [&result](double part, double end_m, bool is_filter) {
+    result.doubts.clear();
+    result.accuracy->rpe = {{.length_m = 100., .count = 100, .mean_m = 100. * part},
+                            {.length_m = 250., .count = 50, .mean_m = 250. * part}};
+    result.accuracy->end_m = end_m;
+    result.updates.resize(is_filter ? 1 : 0);
+    doubt(result);
+    return result.doubts;
+  };
+  EXPECT_THAT(doubts(0.13, 150., true), ElementsAre(HasSubstr("after 1000 m it is off by 150 m")));
+  // Lost at the end, or on the way, or by slip that nothing but wheels measures.
+  EXPECT_THAT(doubts(0.05, 150., true), ElementsAre());
+  EXPECT_THAT(doubts(0.13, 60., true), ElementsAre());
+  EXPECT_THAT(doubts(0.13, 150., false), ElementsAre());
+}
+
 TEST(Suspicions, AreOfAPartAndHaveTimesSinceTheStartOfTheRun) {
   const auto place = [](const std::string& first) {
     const RejectionCount count{"what", 30, first, 100};

@@ -170,8 +170,9 @@ struct JointSearch {
   std::vector<int> drive_signs;  ///< -1 for a drive that turns backwards
   Intrinsics x_WI;               ///< of the best solution
   double cost = 0.;
-  Intrinsics other;        ///< of the best that is another one
-  double other_cost = 0.;  ///< infinite where there is none
+  Intrinsics other;                    ///< of the best that is another one
+  std::vector<int> other_drive_signs;  ///< likewise
+  double other_cost = 0.;              ///< infinite where there is none
 };
 
 /// A recording that a fit has not seen, with nominal and with calibrated intrinsics.

@@ -24,13 +24,13 @@ struct ChannelChange {
     kSteerSigns,
     kWheelsExchanged,
     kSteersInDegrees,
-    kSideSign,
+    kSideScale,   ///< of all drives of a side: as kDriveScale
     kNoSteering,  ///< never done: what angles in degrees have to be told from
   };
   Kind kind = kNone;
   std::size_t a = 0, b = 0;  ///< channels
-  std::uint32_t side = 0;    ///< drives of kSideSign, one bit each
-  double scale = -1.;        ///< that undoes kDriveScale
+  std::uint32_t side = 0;    ///< drives of kSideScale, one bit each
+  double scale = -1.;        ///< that undoes kDriveScale, kSideScale
 
   void undo(EncoderSample& sample) const;
   /// "drive_2 turns opposite to what the other wheels say: its sign"
@@ -44,12 +44,12 @@ struct ChannelChange {
 /// Signs, orders and units, one change at a time; the first is none.
 std::vector<ChannelChange> channel_changes(const ModelDescription& description);
 
-/// One drive that tells half or twice of what its wheel turns: what a gyro alone could not tell
-/// from the size of the base.
+/// One drive that tells half or twice of what its wheel turns.
 std::vector<ChannelChange> gear_changes(const ModelDescription& description);
 
-/// All drives of one side reversed: of those that turn the base to the left when they turn alone,
-/// and of the others. Nothing where a side has one drive, whose sign is among the changes above.
+/// All drives of one side reversed, or telling half or twice: of those that turn the base to the
+/// left when they turn alone, and of the others. Nothing where a side has one drive, which is among
+/// the changes above.
 std::vector<ChannelChange> side_changes(const std::shared_ptr<const WheelModel>& model,
                                         const Intrinsics& x_WI);
 

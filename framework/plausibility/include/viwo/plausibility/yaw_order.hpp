@@ -20,12 +20,13 @@ class YawDifference {
   int count() const { return n_; }
   /// Of the gyro's rate, (rad/s)^2.
   double variance() const;
-  /// What the wheels leave of it; 1 where nothing is to be compared.
+  /// What the wheels leave of it, times a factor within 1.5 of 1: sizes of a base that are wrong by
+  /// that turn no wheel the other way. 1 where nothing is to be compared.
   double part() const;
 
  private:
   int n_ = 0;
-  double gyro_ = 0., gyro_squares_ = 0., off_ = 0., off_squares_ = 0.;
+  double gyro_ = 0., gyro_squares_ = 0., wheels_ = 0., wheels_squares_ = 0., products_ = 0.;
 };
 
 /// What wheels cannot say among themselves: with more than three rows, whole sides alone. The first
