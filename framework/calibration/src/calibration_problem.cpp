@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <tuple>
 
@@ -70,6 +71,7 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
   if (!(seconds_between(begin_ns, end_ns) > 0.)) {
     fail(recording.label, ": wheels and reference have no time in common");
   }
+  require_one_clock(begin_ns, end_ns);
   for (const StampedPose& pose : poses) {
     const double before = yaw_.empty() ? 0. : yaw_.back();
     yaw_.push_back(before + wrap_angle(yaw(pose) - before));
@@ -87,6 +89,20 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
     kinds_.insert(kinds_.end(), static_cast<std::size_t>(n_), ResidualKind::kParity);
   if (recording.motion.distance_m) kinds_.push_back(ResidualKind::kDistance);
   if (recording.motion.turn_rad) kinds_.push_back(ResidualKind::kTurn);
+}
+
+/// Nearly all of the time without samples, in more segments than memory is for.
+void RecordingProblem::require_one_clock(std::int64_t begin_ns, std::int64_t end_ns) const {
+  constexpr double kLeast = 0.01;
+  double covered_s = 0.;
+  for (const EncoderSample& sample : recording_.data.wheels()) {
+    covered_s += seconds_between(sample.begin_ns, sample.end_ns);
+  }
+  const double duration_s = seconds_between(begin_ns, end_ns);
+  if (covered_s >= kLeast * duration_s) return;
+  fail(recording_.label, ": " + significant(covered_s, 3) + " s of encoder samples are in " +
+                             significant(duration_s, 3) +
+                             " s: their stamps are of two clocks, or of another unit");
 }
 
 /// Where the segments end.
@@ -107,7 +123,9 @@ void RecordingProblem::cut(std::int64_t begin_ns, std::int64_t end_ns) {
                          ? std::int64_t{1}
                          : std::max<std::int64_t>(1, std::llround(duration_s / options_.segment_s));
   for (std::int64_t k = 0; k <= count; ++k) {
-    stamps_ns_.push_back(begin_ns + (end_ns - begin_ns) * k / count);
+    // (end_ns - begin_ns) * k / count, which may be too large a product.
+    const std::lldiv_t part = std::lldiv(end_ns - begin_ns, count);
+    stamps_ns_.push_back(begin_ns + part.quot * k + part.rem * k / count);
   }
 }
 

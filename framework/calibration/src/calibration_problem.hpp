@@ -77,6 +77,7 @@ class RecordingProblem {
   using Segments = std::vector<PreintegratedPose>;
 
   void cut(std::int64_t begin_ns, std::int64_t end_ns);
+  void require_one_clock(std::int64_t begin_ns, std::int64_t end_ns) const;
   void compare_with_reference();
   std::optional<Eigen::Vector3d> reference_at(std::int64_t t_ns) const;
   /// Motion of O over all segments with the reference shifted by clock_offset_s.

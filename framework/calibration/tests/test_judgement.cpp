@@ -4,6 +4,7 @@
 
 #include "joint_search.hpp"
 #include "judgement.hpp"
+#include "message_of.hpp"
 #include "unknown_swerve.hpp"
 
 namespace viwo {
@@ -65,6 +66,20 @@ TEST(Judgement, DoubtsWhatNothingWasLearnedOf) {
   CalibrationSetup straight = testing::unknown_swerve(1, "straight");
   straight.options.find_steering_zeros = true;
   EXPECT_FALSE(calibrate(straight).is_trusted());
+}
+
+TEST(Judgement, RefusesStampsOfTwoClocks) {
+  CalibrationSetup setup = differential(kRight);
+  constexpr std::int64_t kDay_ns = 86'400'000'000'000, kThen_ns = 30'000'000'000;
+  testing::change_wheels(setup, [](EncoderSample& sample) {
+    if (sample.t_ns < kThen_ns) return;
+    for (std::int64_t* stamp : {&sample.t_ns, &sample.begin_ns, &sample.end_ns}) *stamp += kDay_ns;
+  });
+  for (StampedPose& pose : setup.recordings[0].motion.poses) {
+    if (pose.t_ns >= kThen_ns) pose.t_ns += kDay_ns;
+  }
+  EXPECT_THAT(testing::error_of([&] { calibrate(setup); }),
+              HasSubstr("their stamps are of two clocks, or of another unit"));
 }
 
 TEST(Judgement, DoubtsADriveThatIsStuck) {

@@ -203,6 +203,11 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
 void write_run(const std::filesystem::path& folder, const RunSetup& setup,
                const RunResult& result) {
   log::make_folder(folder);
+  // On a full disk nothing of an earlier run stands beside what was written of this one.
+  for (const char* const last : {"summary.json", "report.html"}) {
+    std::error_code ignored;
+    std::filesystem::remove(folder / last, ignored);
+  }
   log::write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
   if (!result.on_disk) {
     log::write_tum(folder / "trajectory.tum", result.estimate);

@@ -128,6 +128,7 @@ class Ros1Recording final : public Bag {
       names.push_back(topic.name);
     }
     std::vector<std::int64_t> numbers(wanted.size(), 0);
+    std::vector<const void*> publishers(wanted.size(), nullptr);
     // From the beginning, for the numbers: what is passed over is not loaded.
     rosbag::View view(file.bag, rosbag::TopicQuery(names), ros::TIME_MIN, to);
     Bytes bytes;
@@ -136,7 +137,11 @@ class Ros1Recording final : public Bag {
       Message message;
       message.topic = index.at(instance.getTopic());
       message.number = ++numbers[message.topic];
-      if (message.number == 1) check_definition(file, instance);
+      // A topic may have several publishers.
+      const void* const publisher = instance.getConnectionHeader().get();
+      if (std::exchange(publishers[message.topic], publisher) != publisher) {
+        check_definition(file, instance);
+      }
       if (instance.getTime() < from) continue;
       message.received_ns = to_ns(instance.getTime());
       message.file = &file.name;

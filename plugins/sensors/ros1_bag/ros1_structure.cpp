@@ -28,7 +28,7 @@ constexpr std::uint32_t kMaxHeader = 1U << 20;
 constexpr std::uint64_t kMostChunk = 128U << 20, kFreeBytes = 64U << 20, kMostRatio = 300;
 /// Bytes that bz2 may give, if a chunk is decompressed whenever the next message is in another one;
 /// lz4 is that much faster.
-constexpr std::uint64_t kFreeWork = 4ULL << 30, kMostRepeated = 16, kLz4IsFaster = 16;
+constexpr std::uint64_t kFreeWork = 512ULL << 20, kMostRepeated = 16, kLz4IsFaster = 16;
 
 std::uint32_t u32_at(std::string_view bytes) {
   std::uint32_t value = 0;  // little endian, as all that rosbag_storage runs on
@@ -49,14 +49,21 @@ class Structure {
       index_is_record_ = index_is_record_ || at == index_place_;
       at = record.end;
     }
+    check_work();
     if (!index_is_record_) fail(index_place_, "there is no record where the index should begin");
+    require_all_indexed();
     for (const std::uint64_t place : wanted_chunks_) {
       if (!chunks_.contains(place)) fail(place, "there is no chunk where the index has one");
+    }
+    for (const std::uint64_t place : chunks_) {
+      if (!wanted_chunks_.contains(place)) fail(place, "there is a chunk that the index lacks");
+    }
+    if (n_chunks_ != wanted_chunks_.size() || n_connections_ != described_) {
+      fail(0, "the head of the file counts other chunks or connections than there are");
     }
     for (const std::uint32_t connection : indexed_) {
       if (!connections_.contains(connection)) fail(size_, "a connection is missing");
     }
-    check_work();
     return whole_bytes_;
   }
 
@@ -182,6 +189,7 @@ class Structure {
   /// Its data are the header that the publisher gave.
   void check_connection(const Record& record) {
     connections_.insert(number(record, "conn"));
+    ++described_;
     if (record.end - record.data > kMaxHeader) fail(record.begin, "the header of a topic is wrong");
     check_fields(read(record.data, record.end - record.data), record.begin);
   }
@@ -196,6 +204,8 @@ class Structure {
       throw InputError(file_ + "  has no index: its recording was not ended" + remedy());
     }
     if (index > size_) fail(size_, "the file ends before its index");
+    n_chunks_ = number(record, "chunk_count");
+    n_connections_ = number(record, "conn_count");
     index_place_ = index;
     index_is_record_ = index == size_;  // of a bag without topics
   }
@@ -207,7 +217,15 @@ class Structure {
     }
   }
 
+  /// Of the last chunk: rosbag finds no message by itself.
+  void require_all_indexed() const {
+    const auto found = std::find(is_indexed_.begin(), is_indexed_.end(), false);
+    if (found == is_indexed_.end()) return;
+    fail(chunk_place_, "a chunk has a message that no index has");
+  }
+
   void check_chunk(const Record& chunk) {
+    require_all_indexed();
     chunks_.insert(chunk.begin);
     chunk_place_ = chunk.begin;
     messages_.clear();
@@ -224,6 +242,7 @@ class Structure {
       if (chunk.end - chunk.data != chunk_size_) fail(chunk.begin, "a chunk has another size");
       check_messages(chunk.data, chunk.end);
     }
+    is_indexed_.assign(messages_.size(), false);
   }
 
   /// The records of a chunk.
@@ -280,8 +299,8 @@ class Structure {
     }
     if (work <= kFreeWork + kMostRepeated * whole_bytes_) return;
     throw InputError(file_ + "  has messages whose chunks alternate, so that " +
-                     std::to_string(work >> 30U) +
-                     " GiB would be decompressed - `rosbag "
+                     std::to_string(work >> 20U) +
+                     " MiB would be decompressed - `rosbag "
                      "decompress " +
                      file_ + "` makes it quick to read");
   }
@@ -294,8 +313,11 @@ class Structure {
     const std::string data = read(record.data, record.end - record.data);
     for (std::size_t i = 0; i < data.size(); i += kEntry) {
       const std::uint32_t offset = u32_at(std::string_view(data).substr(i + 8));
-      const bool is_message = std::binary_search(messages_.begin(), messages_.end(), offset);
-      if (!is_message) fail(record.begin, "there is no message where the index has one");
+      const auto message = std::lower_bound(messages_.begin(), messages_.end(), offset);
+      if (message == messages_.end() || *message != offset) {
+        fail(record.begin, "there is no message where the index has one");
+      }
+      is_indexed_[static_cast<std::size_t>(message - messages_.begin())] = true;
       if (!is_compressed_) continue;
       const auto seconds = u32_at(std::string_view(data).substr(i));
       const auto nanoseconds = u32_at(std::string_view(data).substr(i + 4));
@@ -311,7 +333,9 @@ class Structure {
   bool index_is_record_ = false;
   std::set<std::uint64_t> chunks_, wanted_chunks_;
   std::set<std::uint32_t> connections_, indexed_;
-  std::uint64_t whole_bytes_ = 0;  ///< of all chunks, decompressed
+  std::size_t n_chunks_ = 0, n_connections_ = 0;  ///< as the head of the file has them
+  std::size_t described_ = 0;                     ///< connections, behind the chunks
+  std::uint64_t whole_bytes_ = 0;                 ///< of all chunks, decompressed
   struct Entry {
     std::uint64_t time;
     std::uint32_t chunk;
@@ -321,6 +345,7 @@ class Structure {
   // Of the last chunk:
   std::vector<std::uint8_t> chunk_;      ///< while a compressed one is looked into
   std::vector<std::uint32_t> messages_;  ///< where they are in it
+  std::vector<bool> is_indexed_;         ///< of each
   std::uint64_t chunk_place_ = 0;
   std::uint32_t chunk_size_ = 0;
   bool is_compressed_ = false;

@@ -257,7 +257,7 @@ TEST_F(Ros1Bag, RefusesMessagesThatAlternateBetweenLargeChunks) {
     out.close();
   }
   EXPECT_THAT(error_of(section("image_topics: [/cam0]")),
-              HasSubstr(" GiB would be decompressed - `rosbag decompress " + file() +
+              HasSubstr(" MiB would be decompressed - `rosbag decompress " + file() +
                         "` makes it quick to read"));
 }
 
@@ -281,7 +281,39 @@ TEST_F(Ros1Bag, RefusesAnIndexThatNamesAMessageAgainAndAgain) {
   for (int k = 1; k < 49; ++k) content.replace(entry(k) + 8, 4, first);
   std::ofstream(file(), std::ios::binary) << content;
   EXPECT_THAT(error_of(section("image_topics: [/cam0]")),
-              HasSubstr("is damaged: its messages have more bytes than its chunks"));
+              HasSubstr("a chunk has a message that no index has"));
+}
+
+TEST_F(Ros1Bag, RefusesAHeadThatCountsOtherThingsThanThereAre) {
+  for (const char* field : {"chunk_count=", "conn_count="}) {
+    write_drive();
+    patch(field, 1, static_cast<std::ptrdiff_t>(std::string(field).size()), raw(std::uint32_t{1}));
+    EXPECT_THAT(error_of(section("imu_topic: /imu0")),
+                HasSubstr("the head of the file counts other chunks or connections than there are"))
+        << field;
+  }
+}
+
+TEST_F(Ros1Bag, RefusesAnotherDefinitionOfASecondPublisher) {
+  {
+    Ros1Writer out(file());
+    for (int k = 0; k < 4; ++k) {
+      const std::int64_t t_ns = kStart + k * kMs;
+      out.write_imu(k < 2 ? "/imu0" : "/imu1", {t_ns, t_ns}, {}, {});
+    }
+    out.close();
+  }
+  // The second becomes one of the same topic; its definition stands behind that of the first.
+  std::string content = read();
+  const std::string md5 = "6a62c6daae103f4ff57a132d6f95cec2";
+  for (std::size_t at = 0; (at = content.find("/imu1", at)) != std::string::npos;) {
+    content[at + 4] = '0';
+    const std::size_t definition = content.find(md5, at);
+    if (definition != std::string::npos) content[definition] = '7';
+    ++at;
+  }
+  std::ofstream(file(), std::ios::binary) << content;
+  EXPECT_THAT(error_of(section("imu_topic: /imu0")), HasSubstr("has another definition of"));
 }
 
 TEST_F(Ros1Bag, RefusesAnotherDefinitionOfAMessage) {

@@ -1,7 +1,9 @@
 #include "database.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <limits>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -58,21 +60,48 @@ Database::Database(const fs::path& file) : name_(file.string()) {
   const auto size = fs::file_size(file, error);
   if (error) throw InputError(name_ + "  cannot be read: " + error.message());
   if (size == 0) throw InputError(name_ + "  is empty");
+  for (const char* const beside : {"-journal", "-wal", "-shm"}) {
+    log::require_regular_file(name_ + beside);
+  }
   // Of a recorder that was killed most may still be in the log beside it.
-  const auto beside = fs::file_size(name_ + "-wal", error);
-  size_ = size + (error ? 0 : beside);
-  open(file);
+  const auto size_of = [this](const char* beside) {
+    std::error_code none;
+    const auto bytes = fs::file_size(name_ + beside, none);
+    return none ? 0 : bytes;
+  };
+  const auto log_size = size_of("-wal");
+  size_ = size + log_size;
+  open(file, log_size > 0              ? Beside::kLog
+             : size_of("-journal") > 0 ? Beside::kJournal
+                                       : Beside::kNothing);
   for (const char* const table : {"topics", "messages"}) require_real_table(table);
   read_topics();
 }
 
-void Database::open(const fs::path& file) {
+void Database::open(const fs::path& file, Beside beside) {
+  std::string uri = "file:";
+  for (const char c : fs::absolute(file).string()) {
+    constexpr const char* kDigits = "0123456789ABCDEF";
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_plain =
+        std::isalnum(byte) != 0 || std::string_view("/._-").find(c) != std::string_view::npos;
+    uri +=
+        is_plain ? std::string(1, c) : std::string{'%', kDigits[byte >> 4U], kDigits[byte & 15U]};
+  }
+  // Without this SQLite makes files beside one that was written with a log.
+  if (beside == Beside::kNothing) uri += "?immutable=1";
   sqlite3* database = nullptr;
-  const int status =
-      sqlite3_open_v2(file.c_str(), &database, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, nullptr);
+  const int status = sqlite3_open_v2(uri.c_str(), &database,
+                                     SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI,
+                                     beside == Beside::kLog ? "unix-none" : nullptr);
   database_.reset(database);
   if (status != SQLITE_OK) fail();
   defend(database);
+  if (beside == Beside::kLog) {
+    // The index of the log stays in memory, the log as it is.
+    sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+    step(prepare("PRAGMA locking_mode = EXCLUSIVE"));
+  }
   sqlite3_progress_handler(database, kBlock, end_of_steps, this);
   // The file has its word for the first time.
   step(prepare("PRAGMA cell_size_check = ON"));
@@ -151,21 +180,34 @@ void Database::read_topics() {
       std::clamp(std::int64_t{sqlite3_column_int64(begin.get(), 0)}, -kMaxStampNs, kMaxStampNs);
 }
 
-std::vector<Database::Row> Database::rows(const std::vector<Wanted>& wanted,
-                                          std::int64_t to_ns) const {
+std::vector<Database::Row> Database::rows(const std::vector<Wanted>& wanted, std::int64_t to_ns,
+                                          Rejections& damage) const {
   const Statement messages = prepare(
-      "SELECT rowid, topic_id, timestamp FROM messages WHERE timestamp <= ?1 "
-      "ORDER BY timestamp, rowid");
+      "SELECT rowid, topic_id, timestamp FROM messages "
+      "WHERE timestamp <= ?1 OR typeof(timestamp) <> 'integer' ORDER BY timestamp, rowid");
   sqlite3_bind_int64(messages.get(), 1, to_ns);
   std::vector<Row> rows;
+  const auto reject = [&](const char* reason) {
+    damage.add(reason, [&] {
+      return fs::path(name_).filename().string() + ": row " +
+             std::to_string(sqlite3_column_int64(messages.get(), 0));
+    });
+  };
   while (step(messages)) {
     const std::int64_t id = sqlite3_column_int64(messages.get(), 1);
     const auto known = std::find(topic_ids_.begin(), topic_ids_.end(), id);
-    if (known == topic_ids_.end()) continue;
+    if (known == topic_ids_.end()) {
+      reject("message of a topic that is described nowhere");
+      continue;
+    }
     const Topic& topic = topics_[static_cast<std::size_t>(known - topic_ids_.begin())];
     const auto found = std::find_if(wanted.begin(), wanted.end(),
                                     [&topic](const Wanted& one) { return one.name == topic.name; });
     if (found == wanted.end()) continue;
+    if (sqlite3_column_type(messages.get(), 2) != SQLITE_INTEGER) {
+      reject("message whose time of reception is no integer");
+      continue;
+    }
     if (rows.size() > size_ / kLeastRow) damaged("it has more messages than its bytes can hold");
     rows.push_back({sqlite3_column_int64(messages.get(), 0),
                     static_cast<std::size_t>(found - wanted.begin()),
@@ -191,13 +233,12 @@ void Database::load(std::int64_t id, std::size_t limit, Bytes& out) const {
 }
 
 void Database::read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
-                    const std::function<void(const Message&)>& visit,
-                    Rejections& /*damage*/) const {
+                    const std::function<void(const Message&)>& visit, Rejections& damage) const {
   constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
   std::vector<std::int64_t> numbers(wanted.size(), 0);
   Bytes bytes;
   std::uint64_t read = 0;
-  for (const Row& row : rows(wanted, to_ns)) {
+  for (const Row& row : rows(wanted, to_ns, damage)) {
     const std::int64_t number = ++numbers[row.topic];
     if (row.received_ns < from_ns) continue;
     const bool large = wanted[row.topic].large;

@@ -27,7 +27,7 @@ class Database final : public BagFile {
   const std::vector<Topic>& topics() const override { return topics_; }
   bool is_empty() const override { return is_empty_; }
   std::int64_t begin_ns() const override { return begin_ns_; }
-  /// Damage is an error.
+  /// Rows of no topic and of no time are counted; other damage is an error.
   void read(const std::vector<Wanted>& wanted, std::int64_t from_ns, std::int64_t to_ns,
             const std::function<void(const Message&)>& visit, Rejections& damage) const override;
 
@@ -49,7 +49,10 @@ class Database final : public BagFile {
 
   [[noreturn]] void fail() const;
   [[noreturn]] void damaged(const std::string& what) const;
-  void open(const std::filesystem::path& file);
+  /// What a recorder that was killed has left beside the file: a log (WAL), or a journal of what it
+  /// had begun, which only one who writes could take back.
+  enum class Beside : std::uint8_t { kNothing, kLog, kJournal };
+  void open(const std::filesystem::path& file, Beside beside);
   /// InputError for a view, a virtual table, and one with columns that are computed.
   void require_real_table(const std::string& table) const;
   static int end_of_steps(void* self);
@@ -57,7 +60,8 @@ class Database final : public BagFile {
   Statement prepare(const std::string& sql) const;
   bool step(const Statement& statement) const;
   void read_topics();
-  std::vector<Row> rows(const std::vector<Wanted>& wanted, std::int64_t to_ns) const;
+  std::vector<Row> rows(const std::vector<Wanted>& wanted, std::int64_t to_ns,
+                        Rejections& damage) const;
   /// At most `limit` bytes of a message.
   void load(std::int64_t id, std::size_t limit, Bytes& out) const;
 

@@ -136,6 +136,10 @@ class McapFile::Reading {
  private:
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 
+  /// Bytes for a message that waits, beside its own; what may wait, all together and as many times
+  /// as the file is long.
+  static constexpr std::uint64_t kPlace = 150, kFree = 64 << 20, kMostRatio = 32;
+
   /// When received; of one time as in the file: the chunk, and where in it.
   using Key = std::tuple<std::int64_t, std::size_t, std::size_t>;
   struct Lost {
@@ -197,9 +201,10 @@ class McapFile::Reading {
     if (t_ns > to_ns_) return;
     const std::size_t used =
         wanted_[topic->second].large ? std::min(data.size(), kHeadBytes) : data.size();
-    waiting_bytes_ += used;
-    if (waiting_bytes_ > mcap::kMaxBytes) {
-      throw mcap::BrokenRecord("there are too many messages that are not in the order of time");
+    waiting_bytes_ += used + kPlace;
+    if (waiting_bytes_ > kFree + kMostRatio * file_.file_.size()) {
+      throw mcap::BrokenRecord(
+          "there are too many messages in it, or too many that are not in the order of time");
     }
     waiting_[{t_ns, chunk, at + mcap::kMessageHead}] = {
         topic->second, data.size(), Bytes(data.begin(), data.begin() + static_cast<long>(used))};
@@ -221,7 +226,7 @@ class McapFile::Reading {
                         size = one.size](Bytes& out) { file.load(chunk, offset, size, out); };
       }
       if (received_ns >= from_ns_) visit_(message);
-      waiting_bytes_ -= one.bytes.size();
+      waiting_bytes_ -= one.bytes.size() + kPlace;
       waiting_.erase(waiting_.begin());
     }
   }
@@ -267,6 +272,11 @@ class McapFile::Reading {
     if (structure.has_wrong_summary) {
       damage_.add("summary that is damaged: the messages were found without it",
                   [&] { return place(structure.end); });
+    }
+    if (structure.n_missing > 0) {
+      damage_.add(
+          "chunk that the summary counts and that is not there: what it held is lost",
+          [&] { return place(structure.end); }, static_cast<std::int64_t>(structure.n_missing));
     }
     if (structure.has_end) return;
     const std::uint64_t left = file_.file_.size() - structure.end;

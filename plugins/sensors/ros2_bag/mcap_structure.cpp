@@ -234,15 +234,25 @@ class Follower {
       const auto record = next(at);
       if (record->op == kSchema || record->op == kChannel) take(at, *record);
       if (record->op == kStatistics) {
-        constexpr std::uint64_t kBefore = 8 + 2;  // the numbers of messages and of schemas
-        const std::uint64_t used = kBefore + sizeof(std::uint32_t);
+        constexpr std::uint64_t kBefore = 8 + 2;   // the numbers of messages and of schemas
+        constexpr std::uint64_t kBetween = 4 + 4;  // of attachments and metadata
+        const std::uint64_t used = kBefore + kBetween + 2 * sizeof(std::uint32_t);
         Fields statistics(window_.at(record->content, std::min(record->length, used)));
         statistics.bytes(kBefore);
         n_channels = statistics.u32();
+        statistics.bytes(kBetween);
+        count_missing(statistics.u32());
       }
       at = record->end();
     }
     out_.has_all_channels = n_channels == out_.channels.size();
+  }
+
+  /// A record of a kind that is not known is passed over: one that was damaged, too.
+  void count_missing(std::uint64_t n_chunks) {
+    const auto found = static_cast<std::uint64_t>(
+        std::ranges::count_if(out_.chunks, [](const Chunk& chunk) { return chunk.has_record; }));
+    out_.n_missing = n_chunks - std::min(n_chunks, found);
   }
 
   std::uint32_t crc_of(std::uint64_t from, std::uint64_t to) {

@@ -17,6 +17,7 @@ struct Structure {
   Channels channels;
   bool has_all_channels = false;   ///< the summary says so: the chunks need not be searched
   bool has_wrong_summary = false;  ///< by its check sum; it is not used then
+  std::uint64_t n_missing = 0;     ///< chunks that the summary counts and that are not there
   bool has_end = true;             ///< false: the file was cut off, or its recording not ended
   std::uint64_t end = 0;           ///< of the last whole record
   std::uint64_t whole_bytes = 0;   ///< of all chunks, decompressed

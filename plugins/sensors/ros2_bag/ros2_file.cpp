@@ -14,6 +14,7 @@
 #include "ros2_fields.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/config/yaml.hpp"
+#include "viwo/log/text.hpp"
 
 namespace viwo::bag {
 namespace {
@@ -53,6 +54,9 @@ std::vector<fs::path> files_of(const fs::path& folder, const fs::path& metadata)
       if (!file.is_scalar()) config::fail(file.mark(), "the name of a file must be a single value");
       // Early versions write the folder, too.
       files.push_back(folder / fs::path(file.scalar()).filename());
+      const bool is_twice =
+          std::find(files.begin(), files.end() - 1, files.back()) != files.end() - 1;
+      if (is_twice) config::fail(file.mark(), log::quoted(file.scalar()) + " is listed twice");
     }
   }
   if (files.empty()) throw InputError(metadata.string() + "  lists no files");

@@ -180,6 +180,18 @@ TEST_F(Mcap, CountsTheMessagesOfAChunkThatCannotBeDecompressed) {
   EXPECT_THAT(by_time[0].first, HasSubstr(" s: their number is that of others in this time"));
 }
 
+TEST_F(Mcap, CountsAChunkWhoseKindIsNoneAnyMore) {
+  std::string content = text_of(data("plain.mcap"));
+  content[third_chunk(content)] = '\x7f';
+  const auto sensor = make_sensor(section_of(store(content), "imu_topic: /imu0"));
+  EXPECT_LT(play(*sensor).size(), 20U);
+  const auto rejections = all_rejections(*sensor);
+  ASSERT_EQ(rejections.size(), 1U);
+  EXPECT_EQ(rejections[0].reason,
+            "chunk that the summary counts and that is not there: what it held is lost");
+  EXPECT_EQ(rejections[0].count, 1);
+}
+
 TEST_F(Mcap, NamesTheDamageOfChunksThatDescribeTheChannels) {
   std::string content = text_of(data("plain.mcap"));
   content[content.size() - 60] = static_cast<char>(content[content.size() - 60] ^ 1);  // summary

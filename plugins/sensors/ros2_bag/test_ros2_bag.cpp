@@ -1,6 +1,7 @@
 // The sensor ros2_bag as the host loads it, on bags that SQLite and fastcdr have written.
 #include <cmath>
 #include <random>
+#include <set>
 
 #include <sys/stat.h>
 
@@ -131,6 +132,83 @@ TEST_F(Ros2Bag, RefusesWhatItCannotRead) {
   }
   EXPECT_THAT(error_of(section(kAll, "json.db3")),
               HasSubstr("topic '/imu0' is serialised as 'json', what is read is cdr"));
+}
+
+TEST_F(Ros2Bag, RefusesAFileThatIsListedTwice) {
+  write_drive();
+  write_metadata("sqlite3", "", "[bag_0.db3, bag/bag_0.db3]");
+  EXPECT_THAT(error_of(section(kAll, "")), HasSubstr("'bag/bag_0.db3' is listed twice"));
+}
+
+TEST_F(Ros2Bag, LeavesNothingBesideADatabase) {
+  const auto in_folder = [this] {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      names.insert(entry.path().filename().string() + " " + testing::text_of(entry.path()));
+    }
+    return names;
+  };
+  sqlite3* database = nullptr;
+  {
+    Writer out(file("live.db3"));
+    out.topic(1, "/imu0", "sensor_msgs/msg/Imu");
+  }
+  ASSERT_EQ(sqlite3_open(file("live.db3").c_str(), &database), SQLITE_OK);
+  const auto run = [database](const std::string& sql) {
+    ASSERT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+  };
+  run("PRAGMA journal_mode = WAL");
+  sqlite3_stmt* insert = nullptr;
+  ASSERT_EQ(sqlite3_prepare_v2(database, "INSERT INTO messages VALUES (?1, 1, ?2, ?3)", -1, &insert,
+                               nullptr),
+            SQLITE_OK);
+  for (int k = 0; k < 20; ++k) {
+    const std::string data = imu(kStart + k * kMs, 0.1);
+    sqlite3_reset(insert);
+    sqlite3_bind_int(insert, 1, k + 1);
+    sqlite3_bind_int64(insert, 2, kStart + k * kMs);
+    sqlite3_bind_blob(insert, 3, data.data(), static_cast<int>(data.size()), SQLITE_TRANSIENT);
+    ASSERT_EQ(sqlite3_step(insert), SQLITE_DONE);
+  }
+  sqlite3_finalize(insert);
+  // As a recorder leaves it that is killed now: all is in the log.
+  fs::copy_file(file("live.db3"), file("killed.db3"));
+  fs::copy_file(file("live.db3-wal"), file("killed.db3-wal"));
+  sqlite3_close(database);
+  ASSERT_FALSE(fs::exists(file("live.db3-wal")));
+  const auto before = in_folder();
+  for (const char* name : {"killed.db3", "live.db3"}) {
+    EXPECT_EQ(play_only<ImuSample>(section("imu_topic: /imu0", name)).size(), 20U) << name;
+    EXPECT_TRUE(in_folder() == before) << name;
+  }
+  for (const char* beside : {"-journal", "-wal", "-shm"}) {
+    ASSERT_EQ(::mkfifo(file(std::string("live.db3") + beside).c_str(), 0600), 0);
+    EXPECT_THAT(error_of(section("imu_topic: /imu0", "live.db3")),
+                HasSubstr(file(std::string("live.db3") + beside) + "  is a pipe, not a file"));
+    fs::remove(file(std::string("live.db3") + beside));
+  }
+}
+
+TEST_F(Ros2Bag, CountsRowsOfNoTopicAndOfNoTime) {
+  sqlite3* database = nullptr;
+  {
+    Writer out(file());
+    out.topic(1, "/imu0", "sensor_msgs/msg/Imu");
+    for (int k = 0; k < 100; ++k) out.message(1, kStart + k * kMs, imu(kStart + k * kMs, 0.1));
+  }
+  ASSERT_EQ(sqlite3_open(file().c_str(), &database), SQLITE_OK);
+  for (const char* sql : {"UPDATE messages SET topic_id = 7 WHERE id IN (3, 4)",
+                          "UPDATE messages SET timestamp = 'x' || timestamp WHERE id > 95"}) {
+    EXPECT_EQ(sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK);
+  }
+  sqlite3_close(database);
+  const auto sensor = make_sensor(section("imu_topic: /imu0, max_rejected_fraction: 0.2"));
+  EXPECT_EQ(play(*sensor).size(), 93U);
+  EXPECT_THAT(
+      rejections_of(*sensor),
+      ::testing::UnorderedElementsAre(
+          HasSubstr("message of a topic that is described nowhere | 2 | bag_0.db3: row 3"),
+          HasSubstr("message whose time of reception is no integer | 5 | bag_0.db3: row ")));
 }
 
 TEST_F(Ros2Bag, RefusesADatabaseThatWasCutShort) {

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t\r\n\f\v";
 constexpr int kDeepest = 32;
+constexpr std::size_t kMostMembers = 1000;
 constexpr const char* kTooDeep = "more than 32 structs within each other";
 
 struct TypeName {
@@ -139,6 +140,7 @@ class LayoutBuilder {
   }
 
   void push(const Declaration& declaration, Member member) {
+    if (layout_.members.size() == kMostMembers) refuse(declaration.whole, "too many members");
     const auto same = [&](const Member& other) { return other.name == member.name; };
     if (std::any_of(layout_.members.begin(), layout_.members.end(), same)) {
       refuse(declaration.whole, "a member of that name is there already");

@@ -52,6 +52,12 @@ TEST(Schema, PacksBitFieldsAsTheSpecificationDoes) {
   EXPECT_EQ(layout_of("int8 a:1;double x;int8 b:1"), "a@0:1.0+1 x@1:8 b@9:1.0+1 10");
 }
 
+TEST(Schema, RefusesMoreMembersThanAStructHas) {
+  std::string many;
+  for (int i = 0; i < 1001; ++i) many += "int8 m" + std::to_string(i) + ";";
+  EXPECT_THAT(refusal_of(many), HasSubstr("too many members"));
+}
+
 TEST(Schema, PassesOverEnums) {
   EXPECT_EQ(layout_of("enum {a=1, b=2} int8 val"), "val@0:1 1");
   EXPECT_EQ(layout_of("enum{a=1,b=2,}uint32 v : 2;{a=1} int8 w;enum{} int16 u"),
