@@ -142,6 +142,17 @@ TEST_F(ResultsTest, AreAFailureOnAFullDisk) {
   }
 }
 
+TEST_F(ResultsTest, OfARunBeforeDoNotStandBesideThoseThatCouldNotBeWritten) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  write("run.yaml", kRun);
+  expect_done({"run", "run.yaml", "--out", "again"});
+  fs::remove(at("again") / "reference.tum");
+  fs::create_symlink("/dev/full", at("again") / "reference.tum");
+  EXPECT_EQ(viwo({"run", "run.yaml", "--out", "again"}).code, 1);
+  EXPECT_FALSE(fs::exists(at("again") / "summary.json"));
+  EXPECT_FALSE(fs::exists(at("again") / "report.html"));
+}
+
 TEST_F(ResultsTest, AreWrittenForARunThatDiverges) {
   write("run.yaml", kRun);
   expect_done({"simulate", "run.yaml", "--out", "log"});

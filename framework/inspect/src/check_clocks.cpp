@@ -35,33 +35,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// A clock that was set: the lags of tenths of the time are of two values, one after the other.
-struct ClockChange {
-  double at_s = 0., first_s = 0., then_s = 0.;
-};
-std::optional<ClockChange> clock_change(const std::vector<std::pair<double, double>>& parts) {
-  std::optional<ClockChange> found;
-  double least = INFINITY;
-  for (std::size_t k = 2; k + 2 <= parts.size(); ++k) {
-    std::vector<double> first, then;
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      (i < k ? first : then).push_back(parts[i].second);
-    }
-    const auto spread = [](const std::vector<double>& lags) {
-      const auto [low, high] = std::minmax_element(lags.begin(), lags.end());
-      return *high - *low;
-    };
-    // The tenth in which it was set is between the two.
-    const double within = std::max(spread(first), spread(then));
-    const double jump = eval::median(then) - eval::median(first);
-    constexpr double kLeast_s = 0.02, kClearly = 3.;
-    if (std::abs(jump) < std::max(kLeast_s, kClearly * within) || within >= least) continue;
-    least = within;
-    found = {0.5 * (parts[k - 1].first + parts[k].first), eval::median(first), eval::median(then)};
-  }
-  return found;
-}
-
 /// How the yaw rate that the gyro has comes from the twist that the wheels say, [b, c, 1]: wheels
 /// that are not quite as configured take a part of a velocity for a turn, a base that drives in
 /// curves both ways shows it, and it would be taken for a lag. Priors: 0.05 rad/m.
@@ -156,62 +129,6 @@ void check_tracks(const Recording& recording, const CameraTurns& camera, const s
 
 }  // namespace
 
-Finding clock_finding(const std::string& label, const ClockWords& words, const Lag& lag,
-                      double sigma_prior_s, double period_s) {
-  const auto ms = [](double seconds) { return significant(1e3 * seconds, 3) + " ms"; };
-  Finding finding{label,
-                  Severity::kFits,
-                  words.check,
-                  "",
-                  {{"lag", lag.lag_s, "s"},
-                   {"sigma", lag.sigma_s, "s"},
-                   {"correlation", lag.correlation, ""},
-                   {"correlation without lag", lag.at_zero, ""},
-                   {"rate, standard deviation", lag.rate_rad_per_s, "rad/s"},
-                   {"configured clock", words.configured_s, "s"}}};
-  if (const auto change = clock_change(lag.parts)) {
-    finding.severity = Severity::kFault;
-    finding.what = "its clock against that of " + words.other + " is " + ms(change->first_s) +
-                   " until about " + significant(change->at_s, 3) + " s, and " +
-                   ms(change->then_s) +
-                   " from then on: one of the two was set, or lost samples without their time";
-    finding.figures.push_back({"change", change->then_s - change->first_s, "s"});
-    return finding;
-  }
-  const std::string by = ms(std::abs(lag.lag_s)) + " +- " + ms(lag.sigma_s) + " (correlation " +
-                         significant(lag.correlation, 3) + ")";
-  // Beyond what the filter corrects by itself, from the prior it is given, and what stamps of
-  // samples of that length can mean.
-  const double most_s = 3. * std::hypot(sigma_prior_s, lag.sigma_s) + 0.25 * period_s;
-  // Two sensors that hardly say the same give no time.
-  constexpr double kTrusted = 0.8, kMostSigma_s = 0.02;
-  const bool differs = std::abs(lag.correlation) < kTrusted;
-  if (differs || (lag.sigma_s > kMostSigma_s && std::abs(lag.lag_s) < 5. * lag.sigma_s)) {
-    finding.severity = Severity::kNote;
-    finding.what = (differs ? "its rate and that of " + words.other + " are too different"
-                            : std::string("it turns too evenly")) +
-                   " to compare clocks (" + by + ")";
-    return finding;
-  }
-  if (std::abs(lag.lag_s) <= most_s) {
-    finding.what = words.clock + " fits: off by " + by + " against " + words.other;
-    return finding;
-  }
-  finding.severity = Severity::kFault;
-  finding.what =
-      std::string(lag.lag_s > 0. ? "lags behind " : "is ahead of ") + words.other + " by " + by;
-  if (words.key.empty()) {
-    finding.what +=
-        ": a run of the wheels alone does not mind; viwo calibrate finds it "
-        "(prior_sigma_clock_offset_s)";
-    return finding;
-  }
-  finding.what += ", beyond what " + words.key + " says";
-  const double value = words.configured_s - lag.lag_s;
-  finding.remedies = {{words.key, significant(1e-4 * std::round(1e4 * value), 6)}};
-  return finding;
-}
-
 /// A gyro of which another axis turns as the wheels do than the vertical. `vertically`: the largest
 /// correlation of wheels with that.
 void check_gyro_columns(const Recording& recording, double vertically, Findings& out) {
@@ -261,7 +178,8 @@ double check_wheel_clock(const Recording& recording, const Wheels& wheels, const
   std::optional<Lag> lag =
       find_lag(a, RateGrid(span.begin_ns, span.end_ns, about(of_wheels, Vector3d::UnitZ())));
   const double correlation = lag ? std::abs(lag->correlation) : 0.;
-  if (lag && lag->correlation > 0.) {
+  // What does not keep time has no constant part of a velocity.
+  if (lag && lag->correlation > 0. && !drifts(*lag)) {
     const RateGrid twists(span.begin_ns, span.end_ns, of_wheels);
     const Vector3d row = yaw_of_twist(a, twists, lag->lag_s);
     const RateGrid b(span.begin_ns, span.end_ns, about(of_wheels, row));

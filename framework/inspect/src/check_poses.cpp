@@ -179,15 +179,18 @@ bool has_jumps(const Poses& poses, const std::string& label, Findings& out) {
     if (poses.poses[i].p_BinW.norm() == 0.) zeros += 1.;
   }
   const double share = jumps / static_cast<double>(poses.poses.size());
-  constexpr double kRare = 1e-3;
+  constexpr double kRare = 1e-3, kOften = 0.3;
   if (jumps < 2. || share < kRare) return false;
+  const bool is_unit = share > kOften && zeros < 0.1 * jumps;
   out.push_back({label,
                  Severity::kFault,
                  "jumps",
                  "its positions jump " + significant(jumps, 6) + " times faster than " +
                      significant(kMost_m_per_s, 3) + " m/s, " + significant(zeros, 6) +
-                     " times to exactly zero: outliers, or records without a pose",
+                     " times to exactly zero: " +
+                     (is_unit ? "their unit, mm for m" : "outliers, or records without a pose"),
                  {{"jumps", jumps, ""}, {"to zero", zeros, ""}, {"share", share, ""}}});
+  if (is_unit) out.back().remedies = {{"sensors." + poses.sensor + ".position_unit", "mm"}};
   return true;
 }
 
@@ -205,9 +208,15 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
                   {{"wheels by poses", ratio, ""},
                    {"windows", static_cast<double>(speeds.ratio.size()), ""},
                    {"path", speeds.path_m, "m"}}};
-  const std::array<Unit, 3> units = {Unit{180. / std::numbers::pi, "deg/s"},
+  // Of rates, and of speeds and positions that somebody has made metres of.
+  const std::array<Unit, 6> units = {Unit{180. / std::numbers::pi, "deg/s"},
                                      Unit{30. / std::numbers::pi, "revolutions per minute"},
-                                     Unit{0.5 / std::numbers::pi, "revolutions per second"}};
+                                     Unit{0.5 / std::numbers::pi, "revolutions per second"},
+                                     Unit{3.6, "km/h, taken for m/s"},
+                                     Unit{100., "cm/s, taken for m/s"},
+                                     Unit{1000., "mm/s, taken for m/s"}};
+  constexpr std::array<std::pair<double, const char*>, 2> kOfPoses = {
+      {{0.01, "cm"}, {0.001, "mm"}}};
   const double spread = 1.2 *
                         (eval::quantile(speeds.ratio, 0.75) - eval::quantile(speeds.ratio, 0.25)) /
                         std::sqrt(static_cast<double>(speeds.ratio.size()));
@@ -218,7 +227,13 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
     const auto unit = std::find_if(units.begin(), units.end(), [&](const Unit& u) {
       return std::abs(ratio / u.factor - 1.) < kMostFactor;
     });
-    if (unit != units.end()) {
+    const auto* const of_poses = std::find_if(
+        kOfPoses.begin(), kOfPoses.end(),
+        [&](const auto& one) { return std::abs(ratio / one.first - 1.) < kMostFactor; });
+    if (of_poses != kOfPoses.end()) {
+      finding.what += ": positions of " + other + " are in " + of_poses->second;
+      finding.remedies = {{"sensors." + poses.sensor + ".position_unit", of_poses->second}};
+    } else if (unit != units.end()) {
       finding.what += std::string(": drives are in ") + unit->name;
       const auto entry = [&](std::size_t) { return significant(1. / unit->factor, 10); };
       const auto n = static_cast<std::size_t>(wheels.model->description().n_drive);

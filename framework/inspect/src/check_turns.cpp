@@ -80,11 +80,50 @@ void check_jumps(const Recording& recording, const Wheels& wheels, std::size_t d
                  {{"jumps", n, ""}, {"largest", most->rad, "rad"}}});
 }
 
+double fastest_of(const EncoderSample& sample) {
+  double fastest = 0.;
+  for (const double rate : sample.drive_rad_per_s) fastest = std::max(fastest, std::abs(rate));
+  return fastest;
+}
+
+/// No base stops within a sample, stands to the last bit, and goes on as fast as before.
+void check_zeros(const Recording& recording, const Wheels& wheels, Findings& out) {
+  constexpr double kLeast_s = 0.2, kFast_rad_per_s = 5., kAtOnce_s = 0.1;
+  const auto& samples = wheels.samples;
+  double longest_s = 0., n = 0., rate = 0.;
+  std::int64_t from_ns = 0;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    if (fastest_of(samples[i]) > 0. || fastest_of(samples[i - 1]) < kFast_rad_per_s) continue;
+    std::size_t end = i;
+    while (end < samples.size() && fastest_of(samples[end]) == 0.) ++end;
+    if (end == samples.size()) break;
+    const double zero_s = seconds_between(samples[i].begin_ns, samples[end].begin_ns);
+    const double before = fastest_of(samples[i - 1]), after = fastest_of(samples[end]);
+    const double dt_s = seconds_between(samples[i].begin_ns, samples[i].end_ns);
+    if (zero_s < kLeast_s || after < kFast_rad_per_s || dt_s > kAtOnce_s) continue;
+    n += 1.;
+    if (zero_s <= longest_s) continue;
+    longest_s = zero_s;
+    from_ns = samples[i].begin_ns;
+    rate = std::min(before, after);
+  }
+  if (n == 0.) return;
+  out.push_back({recording.label<EncoderSample>(wheels.sensor),
+                 Severity::kFault,
+                 "zeros",
+                 "all drives read exactly 0 for " + significant(longest_s, 2) + " s from " +
+                     time_text(from_ns - recording.begin_ns()) + " on, and turn with " +
+                     significant(rate, 2) + " rad/s right before and after (" + significant(n, 6) +
+                     " times): readings were lost and zeros written for them",
+                 {{"times", n, ""}, {"longest", longest_s, "s"}}});
+}
+
 }  // namespace
 
 void check_turns(const Recording& recording, Findings& out) {
   for (const Wheels& wheels : recording.wheels) {
     if (wheels.samples.empty()) continue;
+    check_zeros(recording, wheels, out);
     const auto n = static_cast<std::size_t>(wheels.model->description().n_drive);
     std::array<double, kMaxDrives> turns{};
     for (std::size_t i = 0; i < n; ++i) {

@@ -3,8 +3,6 @@
 #include <optional>
 #include <string>
 
-#include <Eigen/Cholesky>
-
 #include "checks.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
@@ -13,6 +11,7 @@
 #include "viwo/wheel/twist_solver.hpp"
 #include "viwo/wheel/wheel_check.hpp"
 #include "viwo/wheel/wheel_noise.hpp"
+#include "wheel_calibration.hpp"
 
 namespace viwo::inspect {
 
@@ -21,72 +20,6 @@ using series::Recording;
 using series::Wheels;
 
 namespace {
-
-/// Every so many samples, so that what is done to each is done to no more than this of them.
-std::size_t stride_for(std::size_t n, std::size_t most) {
-  return std::max<std::size_t>(1, n / most);
-}
-
-/// The intrinsic that explains most of the contradictions by itself, and where it does.
-struct Explained {
-  std::size_t intrinsic = 0;
-  double value = 0., part = 0.;
-};
-
-struct Calibration {
-  Intrinsics x_WI;
-  IntrinsicMatrix P;
-  Explained alone;
-};
-
-Explained explained(const ParityInformation& parity, const Intrinsics& x_WI) {
-  Eigen::Index i = 0;
-  const Intrinsics told = parity.Lambda.diagonal().cwiseMax(1e-12);
-  const double most = parity.eta.cwiseAbs2().cwiseQuotient(told).maxCoeff(&i);
-  return {static_cast<std::size_t>(i), x_WI[i] - parity.eta[i] / told[i],
-          parity.chi2 > 0. ? most / parity.chi2 : 0.};
-}
-
-/// Where the wheels contradict each other least, within what the prior allows: its Gauss-Newton
-/// steps (W-10). What the wheels still contradict is noise, or lies.
-std::optional<Calibration> calibrated(const Wheels& wheels) {
-  const WheelsView& view = wheels.prior.wheels;
-  const int n = wheels.model->n_intrinsics();
-  Calibration found{view.x_WI, IntrinsicMatrix::Zero(n, n), {}};
-  const Intrinsics& sigma = wheels.prior.sigma_intrinsics;
-  if (sigma.size() != n || wheels.model->n_rows() <= 3) return {};
-  TwistSolver solver(wheels.model, {.noise_weighted = true});
-  TwistSolution solution;
-  ParityInformation parity;
-  constexpr int kSteps = 3;
-  constexpr std::size_t kMost = 4000;
-  const std::size_t stride = stride_for(wheels.samples.size(), kMost);
-  for (int step = 0; step < kSteps; ++step) {
-    solver.set_intrinsics(found.x_WI);
-    parity.reset(n);
-    for (std::size_t i = 0; i < wheels.samples.size(); i += stride) {
-      if (solver.solve(wheels.samples[i], solution) != Status::kOk) continue;
-      const auto residual = solver.parity();
-      const double dof = std::max(residual.dof(), 1);
-      // As Student's t with few degrees of freedom: a liar has a bounded say.
-      solver.add_parity(residual, 1. / (1. + residual.chi2() / (10. * dof)), parity);
-    }
-    if (step == 0) found.alone = explained(parity, view.x_WI);
-    IntrinsicMatrix N = parity.Lambda;
-    Intrinsics h = -parity.eta;
-    for (int i = 0; i < n; ++i) {
-      const double information = sigma[i] > 0. ? 1. / (sigma[i] * sigma[i]) : 1e18;
-      N(i, i) += information;
-      h[i] -= information * (found.x_WI[i] - view.x_WI[i]);
-    }
-    const Eigen::LDLT<IntrinsicMatrix> solve(N);
-    const Intrinsics d = solve.solve(h);
-    if (!d.allFinite()) return {};
-    found.x_WI += d;
-    found.P = solve.solve(IntrinsicMatrix::Identity(n, n));
-  }
-  return found;
-}
 
 /// One intrinsic that is far from its prior, and explains what the wheels contradict each other by.
 void check_intrinsics(const Wheels& wheels, const Calibration& calibration,

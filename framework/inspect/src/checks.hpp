@@ -20,7 +20,7 @@ void check_tilt(const series::Recording& recording, Findings& out);
 void check_imu_noise(const series::Recording& recording, Findings& out);
 /// Channels that never change, wheels that the others contradict, noises against the configuration.
 void check_wheels(const series::Recording& recording, Findings& out);
-/// Angles of drives that begin anew after a turn.
+/// Angles of drives that begin anew after a turn, rates that no wheel has, zeros in their place.
 void check_turns(const series::Recording& recording, Findings& out);
 /// Signs and order of wheels that cannot contradict each other, by the gyro's rate.
 void check_yaw_order(const series::Recording& recording, Findings& out);

@@ -22,4 +22,7 @@ struct ClockWords {
 Finding clock_finding(const std::string& label, const ClockWords& words, const series::Lag& lag,
                       double sigma_prior_s, double period_s);
 
+/// Whether one of the two counts other seconds.
+bool drifts(const series::Lag& lag);
+
 }  // namespace viwo::inspect

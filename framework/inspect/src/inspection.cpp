@@ -66,8 +66,8 @@ bool is_fault_of(const Findings& findings, std::string_view sensor, Checks check
 constexpr std::array<std::string_view, 6> kWheelCauses = {"order",   "turn", "steering",
                                                           "channel", "rate", "steer offsets"};
 /// What the wheels alone, or poses, say of the wheels: why they turn otherwise than the gyro.
-constexpr std::array<std::string_view, 8> kNotOfGyro = {
-    "order", "turn", "steering", "channel", "steer offsets", "parity", "speed", "heading"};
+constexpr std::array<std::string_view, 9> kNotOfGyro = {
+    "order", "turn", "steering", "channel", "steer offsets", "parity", "speed", "heading", "zeros"};
 constexpr std::array<std::string_view, 2> kOrder = {"order", "steering"};
 constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
 /// What no noise is the remedy of.
@@ -184,7 +184,10 @@ void add_to_present(const config::Node& configuration, Remedy& remedy) {
 /// not the texts say what to multiply by.
 bool is_other_unit(const config::Node& configuration, const Remedy& remedy) {
   const config::Node* const there = configuration.at_path(remedy.key);
-  const std::string other = remedy.value == "deg" ? "rad" : remedy.value == "g" ? "m_per_s2" : "g";
+  const std::string other = remedy.value == "deg"                          ? "rad"
+                            : remedy.value == "g"                          ? "m_per_s2"
+                            : remedy.value == "mm" || remedy.value == "cm" ? "m"
+                                                                           : "g";
   return there != nullptr && there->is_scalar() && there->scalar() == other;
 }
 

@@ -52,6 +52,22 @@ TEST(InspectClocks, FindsAClockThatWasSet) {
   EXPECT_NEAR(figure_of(clock, "change"), 0.5, 0.01);
 }
 
+TEST(InspectClocks, FindsAClockThatCountsOtherSeconds) {
+  for (const double drift : {0.01, -0.004}) {
+    const Inspection found =
+        inspected(swerve(), {.wheels = [drift](EncoderSample& s) {
+                    for (std::int64_t* stamp : {&s.t_ns, &s.begin_ns, &s.end_ns}) {
+                      *stamp += std::llround(drift * static_cast<double>(*stamp - 20'000'000'000));
+                    }
+                    return true;
+                  }});
+    const Finding clock = finding_of(found, "wheels0", "clock");
+    EXPECT_EQ(clock.severity, Severity::kFault) << clock.what;
+    EXPECT_THAT(clock.what, HasSubstr("one of the two counts other seconds"));
+    EXPECT_NEAR(figure_of(clock, "drift"), drift, 0.2 * std::abs(drift));
+  }
+}
+
 TEST(InspectClocks, FindsAGyroWhoseColumnsAreExchangedOnABaseThatStaysLevel) {
   const auto level = [] {
     return simulated("viwo_swerve",

@@ -251,6 +251,28 @@ TEST(InspectPoses, TellThatTheWheelsTurnLessThanTheyDo) {
   EXPECT_EQ(finding_of(wide, "wheels0", "turns").severity, Severity::kNote);
 }
 
+TEST(InspectPoses, TellTheirUnitAndThatOfSpeeds) {
+  const auto what = [](double of_poses, double of_drives, const char* sensor, const char* check) {
+    const RunSetup planar = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
+    const Inspection found = inspected(planar, {.wheels =
+                                                    [=](EncoderSample& s) {
+                                                      for (double& r : s.drive_rad_per_s) {
+                                                        r *= of_drives;
+                                                      }
+                                                      return true;
+                                                    },
+                                                .poses =
+                                                    [=](PoseSample& s) {
+                                                      scale(s.p_BinW_m, of_poses);
+                                                      return true;
+                                                    }});
+    return finding_of(found, sensor, check).what;
+  };
+  EXPECT_THAT(what(100., 1., "wheels0", "speed"), HasSubstr("positions of poses0 are in cm"));
+  EXPECT_THAT(what(1000., 1., "poses0", "jumps"), HasSubstr("their unit, mm for m"));
+  EXPECT_THAT(what(1., 3.6, "wheels0", "speed"), HasSubstr("drives are in km/h"));
+}
+
 TEST(InspectPoses, ThatAreCorrectedWhileTheBaseStandsTellNoSpeed) {
   const RunSetup planar = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
   const Inspection stands = inspected(planar, {.wheels = [](EncoderSample& s) {
@@ -260,6 +282,21 @@ TEST(InspectPoses, ThatAreCorrectedWhileTheBaseStandsTellNoSpeed) {
                                       }});
   EXPECT_EQ(finding_of(stands, "wheels0", "speed").severity, Severity::kFits)
       << finding_of(stands, "wheels0", "speed").what;
+}
+
+TEST(InspectWheels, TellsZerosThatStandForReadingsThatWereLost) {
+  const auto of = [](double from_s, double to_s) {
+    const Inspection found = with_wheels(swerve(), [=](EncoderSample& s) {
+      const double t_s = 1e-9 * static_cast<double>(s.t_ns);
+      if (t_s > from_s && t_s < to_s) s.drive_rad_per_s.fill(0.);
+    });
+    return finding_of(found, "wheels0", "zeros");
+  };
+  EXPECT_EQ(of(0., 0.).what, "");
+  EXPECT_EQ(of(-1., 10.).what, "") << "a base that drives off after a rest";
+  const Finding lost = of(12., 17.);
+  EXPECT_EQ(lost.severity, Severity::kFault);
+  EXPECT_THAT(lost.what, HasSubstr("all drives read exactly 0 for 5 s from t = 12"));
 }
 
 TEST(InspectWheels, TellsACounterThatWasSet) {

@@ -189,7 +189,11 @@ bool TableReader::next() {
 
 double TableReader::number(std::size_t column) const {
   if (const auto value = parse_number(fields_[column])) return *value;
-  fail(column, quoted(fields_[column]) + " is not a number");
+  std::string with_point(fields_[column]);
+  std::replace(with_point.begin(), with_point.end(), ',', '.');
+  fail(column, quoted(fields_[column]) + (parse_number(with_point)
+                                              ? " has a decimal comma: numbers have points here"
+                                              : " is not a number"));
 }
 
 std::int64_t TableReader::integer(std::size_t column) const {

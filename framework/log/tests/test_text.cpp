@@ -249,6 +249,14 @@ TEST_F(TableReaderTest, RefusesAHeaderWithAmbiguousColumns) {
                 ":1  numbers where the header is expected: the first line names the columns");
 }
 
+TEST_F(TableReaderTest, NamesADecimalComma) {
+  const auto file = write("comma.csv", "t;v\n1;2,5\n");
+  TableReader table(file, {.separator = ';'});
+  ASSERT_TRUE(table.next());
+  EXPECT_THAT(error_of<std::exception>([&] { table.number(1); }),
+              EndsWith(":2  column 'v': '2,5' has a decimal comma: numbers have points here"));
+}
+
 TEST_F(TableReaderTest, RefusesAQuantityThatIsThereTwice) {
   const auto file = write("twice.csv", "t [ns],w [deg s^-1],v,w\n1,2,3,4\n");
   TableReader table(file);

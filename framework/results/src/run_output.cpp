@@ -206,7 +206,9 @@ void write_run(const std::filesystem::path& folder, const RunSetup& setup,
   // On a full disk nothing of an earlier run stands beside what was written of this one.
   for (const char* const last : {"summary.json", "report.html"}) {
     std::error_code ignored;
-    std::filesystem::remove(folder / last, ignored);
+    if (std::filesystem::is_regular_file(folder / last, ignored)) {
+      std::filesystem::remove(folder / last, ignored);
+    }
   }
   log::write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
   if (!result.on_disk) {

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <optional>
-
-#include "viwo/api/status.hpp"
+#include <stdexcept>
 
 // What is kept of each type, in both directions: all of its members, in their order. A member that
 // is missing here does not compile, for the names are also those of a binding to all there are.
@@ -143,7 +142,7 @@ RunResult from_record(const nlohmann::json& record) {
   // A number that its member cannot hold has become another one by now.
   if (nlohmann::json::to_cbor(to_record(run)) != nlohmann::json::to_cbor(record) ||
       !is_well_formed(run)) {
-    throw InputError("this is not the record of a run");
+    throw std::invalid_argument("this is not the record of a run");
   }
   return run;
 }

@@ -163,6 +163,10 @@ class McapFile::Reading {
       mcap::for_each_record(
           content->records, chunk.is_cut || !is_good,
           [&](std::uint8_t op, std::span<const std::uint8_t> fields, std::size_t at) {
+            if (op == mcap::kChunk) {
+              damage_.add("chunk within a chunk: it is not read",
+                          [&] { return place(chunk.place); });
+            }
             if (op != mcap::kMessage) return;
             ++n;
             if (is_good) take(i, fields, at + mcap::kRecordHead);
@@ -272,6 +276,11 @@ class McapFile::Reading {
     if (structure.has_wrong_summary) {
       damage_.add("summary that is damaged: the messages were found without it",
                   [&] { return place(structure.end); });
+    }
+    if (structure.n_behind > 0) {
+      damage_.add(
+          "chunk or message behind the end of the data: it is not read",
+          [&] { return place(structure.end); }, static_cast<std::int64_t>(structure.n_behind));
     }
     if (structure.n_missing > 0) {
       damage_.add(

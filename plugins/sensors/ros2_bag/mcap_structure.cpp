@@ -222,6 +222,7 @@ class Follower {
     const auto bytes = window_.at(footer, kRecordHead + kFooterBytes);
     if (bytes[0] != kFooter) throw BrokenRecord("the file does not end with a footer");
     Fields in(bytes.subspan(kRecordHead));
+    count_behind(footer);
     const std::uint64_t begin = in.u64();
     in.u64();  // of the offsets within the summary
     const std::uint32_t crc = in.u32();
@@ -246,6 +247,17 @@ class Follower {
       at = record->end();
     }
     out_.has_all_channels = n_channels == out_.channels.size();
+  }
+
+  /// From the end of the data to the footer at the end of the file.
+  void count_behind(std::uint64_t footer) {
+    for (std::uint64_t at = out_.end; at < footer;) {
+      const auto record = next(at);
+      if (!record) return;
+      const bool is_data = record->op == kChunk || record->op == kMessage;
+      out_.n_behind += is_data ? 1 : 0;
+      at = record->end();
+    }
   }
 
   /// A record of a kind that is not known is passed over: one that was damaged, too.

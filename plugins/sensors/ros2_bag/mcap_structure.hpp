@@ -18,6 +18,7 @@ struct Structure {
   bool has_all_channels = false;   ///< the summary says so: the chunks need not be searched
   bool has_wrong_summary = false;  ///< by its check sum; it is not used then
   std::uint64_t n_missing = 0;     ///< chunks that the summary counts and that are not there
+  std::uint64_t n_behind = 0;      ///< chunks and messages behind the end of the data, not read
   bool has_end = true;             ///< false: the file was cut off, or its recording not ended
   std::uint64_t end = 0;           ///< of the last whole record
   std::uint64_t whole_bytes = 0;   ///< of all chunks, decompressed

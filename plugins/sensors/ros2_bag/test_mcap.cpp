@@ -192,6 +192,29 @@ TEST_F(Mcap, CountsAChunkWhoseKindIsNoneAnyMore) {
   EXPECT_EQ(rejections[0].count, 1);
 }
 
+TEST_F(Mcap, CountsChunksThatStandWhereNoneIsRead) {
+  const std::string whole = text_of(data("plain.mcap"));
+  const std::size_t third = third_chunk(whole);
+  std::uint64_t length = 0;
+  std::memcpy(&length, &whole[third + 1], sizeof(length));
+  const std::string chunk = whole.substr(third, 9 + length);
+  std::size_t end = 8;  // of the data
+  for (std::uint64_t n = 0; whole[end] != '\x0f'; end += 9 + n) {
+    std::memcpy(&n, &whole[end + 1], sizeof(n));
+  }
+  const auto reasons = [&](const std::string& content) {
+    std::vector<std::string> out;
+    const auto sensor = make_sensor(section_of(store(content), "imu_topic: /imu0"));
+    for (const auto& rejection : all_rejections(*sensor)) out.push_back(rejection.reason);
+    return out;
+  };
+  EXPECT_THAT(reasons(whole), ::testing::IsEmpty());
+  const std::string behind =
+      whole.substr(0, end) + whole.substr(end, 13) + chunk + whole.substr(end + 13);
+  EXPECT_THAT(reasons(behind),
+              ::testing::Contains(HasSubstr("chunk or message behind the end of the data")));
+}
+
 TEST_F(Mcap, NamesTheDamageOfChunksThatDescribeTheChannels) {
   std::string content = text_of(data("plain.mcap"));
   content[content.size() - 60] = static_cast<char>(content[content.size() - 60] ^ 1);  // summary

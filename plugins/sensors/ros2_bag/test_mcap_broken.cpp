@@ -142,6 +142,15 @@ TEST_F(McapBroken, ALargeClaimCostsNothing) {
   EXPECT_LT(peak_mb() - before_mb, 50);
 }
 
+TEST_F(McapBroken, CountsAChunkWithinAChunk) {
+  const Buffer inner = chunk(message().bytes(), message().bytes().size());
+  const Buffer outer = all({schema(), channel(), message(), inner});
+  write(chunk(outer.bytes(), outer.bytes().size()));
+  const auto sensor = make_sensor(section("imu_topic: /imu0", "a.mcap"));
+  EXPECT_EQ(play(*sensor).size(), 1U);
+  EXPECT_THAT(rejections_of(*sensor), ::testing::Contains(HasSubstr("chunk within a chunk")));
+}
+
 /// Each message takes a place in memory until those before it have come, however short it is.
 TEST_F(McapBroken, RefusesMoreMessagesThanAFileOfItsSizeHas) {
   Buffer fields;

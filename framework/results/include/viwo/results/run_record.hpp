@@ -10,8 +10,8 @@ namespace viwo {
 /// All that thin() leaves. Numbers that are not finite stay what they are.
 nlohmann::json to_record(const RunResult& run);
 
-/// Throws nlohmann::json::exception or InputError for something that to_record() cannot have made:
-/// series that belong together are of one length, times go forward, poses are finite.
+/// Throws nlohmann::json::exception or std::invalid_argument for something that to_record() cannot
+/// have made: series that belong together are of one length, times go forward, poses are finite.
 RunResult from_record(const nlohmann::json& record);
 
 }  // namespace viwo

@@ -1,0 +1,27 @@
+// The intrinsics of wheels as their contradictions alone have them.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "viwo/series/recording.hpp"
+
+namespace viwo::inspect {
+
+/// The intrinsic that explains most of the contradictions by itself, and where it does.
+struct Explained {
+  std::size_t intrinsic = 0;
+  double value = 0., part = 0.;
+};
+
+struct Calibration {
+  Intrinsics x_WI;
+  IntrinsicMatrix P;
+  Explained alone;
+};
+
+/// Where the wheels contradict each other least, within what the prior allows: its Gauss-Newton
+/// steps (W-10). What the wheels still contradict is noise, or lies.
+std::optional<Calibration> calibrated(const series::Wheels& wheels);
+
+}  // namespace viwo::inspect
