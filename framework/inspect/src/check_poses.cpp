@@ -181,16 +181,16 @@ bool has_jumps(const Poses& poses, const std::string& label, Findings& out) {
   const double share = jumps / static_cast<double>(poses.poses.size());
   constexpr double kRare = 1e-3, kOften = 0.3;
   if (jumps < 2. || share < kRare) return false;
-  const bool is_unit = share > kOften && zeros < 0.1 * jumps;
+  const bool may_be_unit = share > kOften && zeros < 0.1 * jumps;
   out.push_back({label,
                  Severity::kFault,
                  "jumps",
                  "its positions jump " + significant(jumps, 6) + " times faster than " +
                      significant(kMost_m_per_s, 3) + " m/s, " + significant(zeros, 6) +
                      " times to exactly zero: " +
-                     (is_unit ? "their unit, mm for m" : "outliers, or records without a pose"),
+                     (may_be_unit ? "their unit (mm for m?), poses of two bodies, or outliers"
+                                  : "outliers, or records without a pose"),
                  {{"jumps", jumps, ""}, {"to zero", zeros, ""}, {"share", share, ""}}});
-  if (is_unit) out.back().remedies = {{"sensors." + poses.sensor + ".position_unit", "mm"}};
   return true;
 }
 

@@ -88,7 +88,7 @@ double fastest_of(const EncoderSample& sample) {
 
 /// No base stops within a sample, stands to the last bit, and goes on as fast as before.
 void check_zeros(const Recording& recording, const Wheels& wheels, Findings& out) {
-  constexpr double kLeast_s = 0.2, kFast_rad_per_s = 5., kAtOnce_s = 0.1;
+  constexpr double kLeast_s = 0.2, kFast_rad_per_s = 5., kMost_rad_per_s2 = 250.;
   const auto& samples = wheels.samples;
   double longest_s = 0., n = 0., rate = 0.;
   std::int64_t from_ns = 0;
@@ -100,7 +100,8 @@ void check_zeros(const Recording& recording, const Wheels& wheels, Findings& out
     const double zero_s = seconds_between(samples[i].begin_ns, samples[end].begin_ns);
     const double before = fastest_of(samples[i - 1]), after = fastest_of(samples[end]);
     const double dt_s = seconds_between(samples[i].begin_ns, samples[i].end_ns);
-    if (zero_s < kLeast_s || after < kFast_rad_per_s || dt_s > kAtOnce_s) continue;
+    if (zero_s < kLeast_s || after < kFast_rad_per_s) continue;
+    if (std::min(before, after) < kMost_rad_per_s2 * dt_s) continue;
     n += 1.;
     if (zero_s <= longest_s) continue;
     longest_s = zero_s;

@@ -47,7 +47,7 @@ struct ClockDrift {
   double per_s = 0., first_s = 0., last_s = 0.;  ///< lags at the first and the last tenth
 };
 std::optional<ClockDrift> clock_drift(const std::vector<std::pair<double, double>>& parts) {
-  constexpr std::size_t kFewest = 5;
+  constexpr std::size_t kFewest = 8;
   if (parts.size() < kFewest) return {};
   std::vector<double> slopes;  // of all pairs: a tenth that is wrong has no say in their median
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -58,15 +58,18 @@ std::optional<ClockDrift> clock_drift(const std::vector<std::pair<double, double
   const double slope = eval::median(slopes);
   const auto along = static_cast<double>(
       std::count_if(slopes.begin(), slopes.end(), [&](double one) { return one * slope > 0.; }));
-  std::vector<double> at_zero;
+  std::vector<double> at_zero, off;
   for (const auto& [t_s, lag_s] : parts) at_zero.push_back(lag_s - slope * t_s);
   const double zero_s = eval::median(at_zero);
+  for (const double lag_s : at_zero) off.push_back(std::abs(lag_s - zero_s));
   const ClockDrift drift{slope, zero_s + slope * parts.front().first,
                          zero_s + slope * parts.back().first};
   // By chance not even three quarters of all pairs go one way.
-  constexpr double kLeast_s = 0.04, kOneWay = 0.9;
+  constexpr double kLeast_s = 0.04, kClearly = 3., kOneWay = 0.9;
   const bool goes_one_way = along > kOneWay * static_cast<double>(slopes.size());
-  if (!goes_one_way || std::abs(drift.last_s - drift.first_s) < kLeast_s) return {};
+  if (!goes_one_way ||
+      std::abs(drift.last_s - drift.first_s) < std::max(kLeast_s, kClearly * eval::median(off)))
+    return {};
   return drift;
 }
 

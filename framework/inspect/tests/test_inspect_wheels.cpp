@@ -269,7 +269,7 @@ TEST(InspectPoses, TellTheirUnitAndThatOfSpeeds) {
     return finding_of(found, sensor, check).what;
   };
   EXPECT_THAT(what(100., 1., "wheels0", "speed"), HasSubstr("positions of poses0 are in cm"));
-  EXPECT_THAT(what(1000., 1., "poses0", "jumps"), HasSubstr("their unit, mm for m"));
+  EXPECT_THAT(what(1000., 1., "poses0", "jumps"), HasSubstr("their unit (mm for m?)"));
   EXPECT_THAT(what(1., 3.6, "wheels0", "speed"), HasSubstr("drives are in km/h"));
 }
 

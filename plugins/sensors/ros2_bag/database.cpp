@@ -54,19 +54,21 @@ void defend(sqlite3* database) {
 
 }  // namespace
 
-Database::Database(const fs::path& file) : name_(file.string()) {
-  log::require_regular_file(file);
+Database::Database(const fs::path& link) : name_(link.string()) {
+  log::require_regular_file(link);
   std::error_code error;
+  // SQLite looks for what is beside the file that a link leads to.
+  const fs::path file = fs::weakly_canonical(link, error);
   const auto size = fs::file_size(file, error);
   if (error) throw InputError(name_ + "  cannot be read: " + error.message());
   if (size == 0) throw InputError(name_ + "  is empty");
   for (const char* const beside : {"-journal", "-wal", "-shm"}) {
-    log::require_regular_file(name_ + beside);
+    log::require_regular_file(file.string() + beside);
   }
   // Of a recorder that was killed most may still be in the log beside it.
-  const auto size_of = [this](const char* beside) {
+  const auto size_of = [&file](const char* beside) {
     std::error_code none;
-    const auto bytes = fs::file_size(name_ + beside, none);
+    const auto bytes = fs::file_size(file.string() + beside, none);
     return none ? 0 : bytes;
   };
   const auto log_size = size_of("-wal");

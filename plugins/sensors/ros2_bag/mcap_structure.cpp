@@ -222,10 +222,10 @@ class Follower {
     const auto bytes = window_.at(footer, kRecordHead + kFooterBytes);
     if (bytes[0] != kFooter) throw BrokenRecord("the file does not end with a footer");
     Fields in(bytes.subspan(kRecordHead));
-    count_behind(footer);
     const std::uint64_t begin = in.u64();
     in.u64();  // of the offsets within the summary
     const std::uint32_t crc = in.u32();
+    count_behind(footer);                                  // moves the window
     if (begin < kMagic.size() || begin >= footer) return;  // there is none
     out_.has_wrong_summary =
         crc != 0 && crc != crc_of(begin, footer + kRecordHead + kFooterBytes - sizeof(crc));

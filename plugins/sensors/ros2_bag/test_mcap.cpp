@@ -192,6 +192,25 @@ TEST_F(Mcap, CountsAChunkWhoseKindIsNoneAnyMore) {
   EXPECT_EQ(rejections[0].count, 1);
 }
 
+/// Of a file whose summary is longer than what is held of it at once.
+TEST_F(Mcap, CountsAChunkOfManyWhoseKindIsNoneAnyMore) {
+  {
+    bag::Ros2Writer out(file("many.mcap"), bag::mcap::Compression::kNone, 1);  // each its own chunk
+    for (int k = 0; k < 200; ++k) {
+      out.write_imu("/imu0", {kStart + k * kMs, kStart + k * kMs}, {1. * k, 0., 0.}, {});
+    }
+    out.close();
+  }
+  std::string content = text_of(file("many.mcap"));
+  EXPECT_THAT(all_rejections(*make_sensor(section_of(store(content), "imu_topic: /imu0"))),
+              ::testing::IsEmpty());
+  content[third_chunk(content)] = '\x7f';
+  const auto rejections =
+      all_rejections(*make_sensor(section_of(store(content), "imu_topic: /imu0")));
+  ASSERT_EQ(rejections.size(), 1U);
+  EXPECT_THAT(rejections[0].reason, HasSubstr("chunk that the summary counts"));
+}
+
 TEST_F(Mcap, CountsChunksThatStandWhereNoneIsRead) {
   const std::string whole = text_of(data("plain.mcap"));
   const std::size_t third = third_chunk(whole);

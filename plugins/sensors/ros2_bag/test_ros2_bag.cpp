@@ -176,6 +176,10 @@ TEST_F(Ros2Bag, LeavesNothingBesideADatabase) {
   fs::copy_file(file("live.db3-wal"), file("killed.db3-wal"));
   sqlite3_close(database);
   ASSERT_FALSE(fs::exists(file("live.db3-wal")));
+  fs::create_directories(folder_ / "links");
+  fs::create_symlink(file("killed.db3"), folder_ / "links" / "a.db3");
+  EXPECT_EQ(play_only<ImuSample>(section("imu_topic: /imu0", "links/a.db3")).size(), 20U);
+  fs::remove_all(folder_ / "links");
   const auto before = in_folder();
   for (const char* name : {"killed.db3", "live.db3"}) {
     EXPECT_EQ(play_only<ImuSample>(section("imu_topic: /imu0", name)).size(), 20U) << name;
