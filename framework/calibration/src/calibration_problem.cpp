@@ -122,9 +122,9 @@ void RecordingProblem::cut(std::int64_t begin_ns, std::int64_t end_ns) {
   const auto count = whole
                          ? std::int64_t{1}
                          : std::max<std::int64_t>(1, std::llround(duration_s / options_.segment_s));
+  // (end_ns - begin_ns) * k / count, which may be too large a product.
+  const std::lldiv_t part = std::lldiv(end_ns - begin_ns, count);
   for (std::int64_t k = 0; k <= count; ++k) {
-    // (end_ns - begin_ns) * k / count, which may be too large a product.
-    const std::lldiv_t part = std::lldiv(end_ns - begin_ns, count);
     stamps_ns_.push_back(begin_ns + part.quot * k + part.rem * k / count);
   }
 }

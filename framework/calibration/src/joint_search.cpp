@@ -196,6 +196,13 @@ void reverse(const std::vector<int>& signs, EncoderSample& y) {
   for (std::size_t i = 0; i < signs.size(); ++i) y.drive_rad_per_s[i] *= signs[i];
 }
 
+/// -1 for each bit of the pattern that is set.
+std::vector<int> signs_of(std::size_t pattern, std::size_t n) {
+  std::vector<int> signs(n, 1);
+  for (std::size_t i = 0; i < n; ++i) signs[i] = (pattern >> i & 1) != 0 ? -1 : 1;
+  return signs;
+}
+
 }  // namespace
 
 std::vector<int> steering_zeros(const WheelModel& model) {
@@ -246,17 +253,6 @@ void reverse_drives(CalibrationSetup& setup, const std::vector<int>& signs) {
   }
 }
 
-namespace {
-
-/// -1 for each bit of the pattern that is set.
-std::vector<int> signs_of(std::size_t pattern, std::size_t n) {
-  std::vector<int> signs(n, 1);
-  for (std::size_t i = 0; i < n; ++i) signs[i] = (pattern >> i & 1) != 0 ? -1 : 1;
-  return signs;
-}
-
-}  // namespace
-
 JointSearch search_joints(const CalibrationSetup& setup,
                           const std::vector<std::size_t>& recordings) {
   const WheelModel& model = *setup.recordings[recordings.front()].setup.model;
@@ -288,8 +284,9 @@ JointSearch search_joints(const CalibrationSetup& setup,
   std::vector<Solution> all;
   std::vector<std::size_t> pattern_of;
   for (std::size_t pattern = 0; pattern < patterns; ++pattern) {
+    const std::vector<int> drive_signs = signs_of(pattern, n);
     auto signed_samples = samples;
-    for (TurningSample& sample : signed_samples) reverse(signs_of(pattern, n), sample.y);
+    for (TurningSample& sample : signed_samples) reverse(drive_signs, sample.y);
     const SearchCost cost(model, std::move(signed_samples), out.zeros);
     for (Solution& solution : solve(cost, out.zeros, model.nominal())) {
       all.push_back(std::move(solution));

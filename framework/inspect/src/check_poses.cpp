@@ -14,6 +14,7 @@
 #include "viwo/plausibility/channel_change.hpp"
 #include "viwo/plausibility/yaw_order.hpp"
 #include "viwo/series/lag.hpp"
+#include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::inspect {
@@ -73,9 +74,7 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
     path += solution.xi.head<2>().norm() * dt_s;
     along += solution.xi.head<2>() * dt_s;
     time_s += dt_s;
-    double fastest = 0.;
-    for (const double rate : sample.drive_rad_per_s) fastest = std::max(fastest, std::abs(rate));
-    turned_rad += fastest * dt_s;
+    turned_rad += fastest_of(sample) * dt_s;
     const double window_s = seconds_between(begin_ns, sample.end_ns);
     if (window_s < kWindow_s) continue;
     const auto from = interpolate(poses, begin_ns + clock_ns, gap_s);

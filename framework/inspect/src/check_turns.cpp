@@ -10,6 +10,7 @@
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/plausibility/channel_change.hpp"
+#include "viwo/wheel/drive_ranges.hpp"
 
 namespace viwo::inspect {
 
@@ -78,12 +79,6 @@ void check_jumps(const Recording& recording, const Wheels& wheels, std::size_t d
                      time_text(most->t_ns - recording.begin_ns()) +
                      "): its counter was set or ran over, or readings are wrong",
                  {{"jumps", n, ""}, {"largest", most->rad, "rad"}}});
-}
-
-double fastest_of(const EncoderSample& sample) {
-  double fastest = 0.;
-  for (const double rate : sample.drive_rad_per_s) fastest = std::max(fastest, std::abs(rate));
-  return fastest;
 }
 
 /// No base stops within a sample, stands to the last bit, and goes on as fast as before.

@@ -1,6 +1,5 @@
 #include "viwo/log/printable_output.hpp"
 
-#include <string_view>
 #include <utility>
 
 namespace viwo::log {

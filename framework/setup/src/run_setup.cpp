@@ -216,12 +216,14 @@ void require_wheels_for_place(const Node& run, const RunSetup& setup, config::Er
 
 /// Wheels that turn the other way are not those that were calibrated.
 void require_drive_signs(const CalibrationFile& file, const RunSetup& setup) {
-  if (file.drive_signs.empty() || !setup.model || file.drive_signs == drive_signs(setup)) return;
-  if (file.drive_signs.size() != drive_signs(setup).size()) {
+  if (file.drive_signs.empty() || !setup.model) return;
+  const std::vector<int> configured = drive_signs(setup);
+  if (file.drive_signs == configured) return;
+  if (file.drive_signs.size() != configured.size()) {
     throw InputError(file.path.string() + "  'drive_signs' has " +
                      std::to_string(file.drive_signs.size()) + " signs, but kinematics '" +
-                     setup.kinematics.info.name + "' has " +
-                     std::to_string(drive_signs(setup).size()) + " drives");
+                     setup.kinematics.info.name + "' has " + std::to_string(configured.size()) +
+                     " drives");
   }
   std::string scale;
   for (const int sign : file.drive_signs) {

@@ -11,6 +11,13 @@
 
 namespace viwo {
 
+/// The largest rate of all drives, forwards or backwards, rad/s.
+inline double fastest_of(const EncoderSample& sample) {
+  double fastest = 0.;
+  for (const double rate : sample.drive_rad_per_s) fastest = std::max(fastest, std::abs(rate));
+  return fastest;
+}
+
 class DriveRanges {
  public:
   explicit DriveRanges(int n_drive) : ranges_(static_cast<std::size_t>(n_drive)) {}
