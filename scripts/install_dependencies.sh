@@ -67,7 +67,7 @@ need_command python3 python3
 need_command npm npm
 for package in ca-certificates libeigen3-dev libboost-dev libboost-program-options-dev \
   libyaml-cpp-dev libtbb-dev nlohmann-json3-dev libceres-dev zlib1g-dev libgtest-dev \
-  libgmock-dev libbenchmark-dev libopencv-dev libpng-dev; do
+  libgmock-dev libbenchmark-dev libopencv-dev libpng-dev libjpeg-dev; do
   need_package "$package"
 done
 

@@ -9,6 +9,7 @@
 
 #include "grey_png.hpp"
 #include "image_header.hpp"
+#include "jpeg.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo {
@@ -21,7 +22,9 @@ constexpr std::uint64_t kMostBytes = 1ULL << 28;
 /// What a few bytes ask for is known before a pixel is decoded.
 void check_header(std::span<const std::uint8_t> bytes, const std::string& name) {
   const auto size = image_size(bytes);
-  if (!size) throw InputError(name + ": is no PNG, JPEG, BMP, PGM or PPM");
+  if (!size) {
+    throw InputError(name + ": is no PNG, JPEG, BMP, PGM or PPM, or its header is damaged");
+  }
   const auto [width, height] = *size;
   if (width > 0 && height > 0 && width <= kLongestSide && height <= kLongestSide &&
       width * height <= kMostPixels) {
@@ -32,36 +35,37 @@ void check_header(std::span<const std::uint8_t> bytes, const std::string& name) 
                    std::to_string(kMostPixels >> 20U) + " Mi are read");
 }
 
-/// OpenCV decodes what it finds of a file that was cut short and leaves the rest black: look at the
-/// end of the formats that have one.
-bool cut_short(std::span<const std::uint8_t> bytes) {
-  const auto begins = [&](std::string_view magic) {
-    return bytes.size() >= magic.size() &&
-           std::equal(magic.begin(), magic.end(), bytes.begin(),
-                      [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
-  };
-  const auto has_near_end = [&](std::string_view mark) {
-    // Some writers pad the file: with zeros to the end of a block, or with a few bytes of anything.
-    const auto last =
-        std::find_if(bytes.rbegin(), bytes.rend(), [](auto byte) { return byte != 0; });
-    const auto whole = bytes.first(static_cast<std::size_t>(bytes.rend() - last));
-    const auto tail = whole.last(std::min<std::size_t>(whole.size(), 64));
-    const auto same = [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); };
-    return std::search(tail.begin(), tail.end(), mark.begin(), mark.end(), same) != tail.end();
-  };
-  if (begins("\x89PNG")) return !has_near_end("IEND");
-  if (begins("\xff\xd8")) return !has_near_end("\xff\xd9");
-  return false;
+bool begins(std::span<const std::uint8_t> bytes, std::string_view magic) {
+  return bytes.size() >= magic.size() &&
+         std::equal(magic.begin(), magic.end(), bytes.begin(),
+                    [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
+}
+
+/// OpenCV decodes what it finds of a PNG that was cut short and leaves the rest black: look at the
+/// end.
+bool lacks_its_end(std::span<const std::uint8_t> png) {
+  // Some writers pad the file: with zeros to the end of a block, or with a few bytes of anything.
+  const auto last = std::find_if(png.rbegin(), png.rend(), [](auto byte) { return byte != 0; });
+  const auto whole = png.first(static_cast<std::size_t>(png.rend() - last));
+  const auto tail = whole.last(std::min<std::size_t>(whole.size(), 64));
+  constexpr std::string_view kMark = "IEND";
+  const auto same = [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); };
+  return std::search(tail.begin(), tail.end(), kMark.begin(), kMark.end(), same) == tail.end();
 }
 
 }  // namespace
 
 void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out) {
   if (bytes.empty()) throw InputError(name + ": the image is empty");
-  if (cut_short(bytes)) throw InputError(name + ": the image is cut short");
+  const bool is_png = begins(bytes, "\x89PNG");
+  if (is_png && lacks_its_end(bytes)) throw InputError(name + ": the image is cut short");
   check_header(bytes, name);
+  if (begins(bytes, "\xff\xd8")) {
+    decode_jpeg(bytes, name, out);
+    return;
+  }
 #if VIWO_HAS_LIBDEFLATE
-  if (decode_grey_png(bytes, out)) return;
+  if (is_png && decode_grey_png(bytes, out)) return;
 #endif
   const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1,
                     const_cast<std::uint8_t*>(bytes.data()));

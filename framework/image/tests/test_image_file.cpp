@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
 #include <string_view>
@@ -77,7 +79,8 @@ TEST_F(ImageFileTest, SaysWhatIsNoImage) {
             (folder_ / "none.png").string() + ": the image is missing or cannot be read");
   std::ofstream(folder_ / "text.png") << "no image";
   EXPECT_EQ(failure(folder_ / "text.png"),
-            (folder_ / "text.png").string() + ": is no PNG, JPEG, BMP, PGM or PPM");
+            (folder_ / "text.png").string() +
+                ": is no PNG, JPEG, BMP, PGM or PPM, or its header is damaged");
   std::ofstream(folder_ / "empty.png").flush();
   EXPECT_EQ(failure(folder_ / "empty.png"),
             (folder_ / "empty.png").string() + ": the image is empty");
@@ -270,6 +273,101 @@ TEST_F(ImageFileTest, EveryFormatThatIsReadIsRead) {
   EXPECT_NO_THROW(decode_image(bytes, "progressive", image));
   cv::imencode(".tiff", grey, bytes);
   EXPECT_THROW(decode_image(bytes, "tiff", image), InputError);
+}
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// Has something to be wrong in every block.
+cv::Mat waves() {
+  cv::Mat colours(64, 80, CV_8UC3);
+  for (int row = 0; row < colours.rows; ++row) {
+    for (int column = 0; column < colours.cols; ++column) {
+      colours.at<cv::Vec3b>(row, column) =
+          cv::Vec3b(static_cast<std::uint8_t>(3 * row), static_cast<std::uint8_t>(row * column),
+                    static_cast<std::uint8_t>(127 + 100 * std::sin(0.7 * column)));
+    }
+  }
+  return colours;
+}
+
+Bytes jpeg_of(const cv::Mat& pixels, const std::vector<int>& how = {}) {
+  Bytes jpeg;
+  cv::imencode(".jpg", pixels, jpeg, how);
+  return jpeg;
+}
+
+/// Where the last segment with this mark begins.
+std::ptrdiff_t last_mark(const Bytes& jpeg, std::uint8_t mark) {
+  const Bytes marks{0xff, mark};
+  return std::find_end(jpeg.begin(), jpeg.end(), marks.begin(), marks.end()) - jpeg.begin();
+}
+
+TEST_F(ImageFileTest, AJpegHasThePixelsThatOpenCvFinds) {
+  for (const cv::Mat& pixels : {waves(), cv::Mat(waves().reshape(1))}) {
+    for (const std::vector<int>& how : {std::vector<int>{},
+                                        {cv::IMWRITE_JPEG_PROGRESSIVE, 1},
+                                        {cv::IMWRITE_JPEG_RST_INTERVAL, 3}}) {
+      const Bytes jpeg = jpeg_of(pixels, how);
+      Image image;
+      decode_image(jpeg, "a.jpg", image);
+      const cv::Mat expected = cv::imdecode(jpeg, cv::IMREAD_GRAYSCALE);
+      EXPECT_EQ(image.pixels, Bytes(expected.datastart, expected.dataend));
+    }
+  }
+}
+
+TEST_F(ImageFileTest, AFrameOfAWebcamIsRead) {
+  // GIVEN a frame of motion JPEG, which leaves out the usual code tables
+  const Bytes whole = jpeg_of(waves());
+  Bytes frame = whole;
+  for (auto at = last_mark(frame, 0xc4); at < std::ssize(frame); at = last_mark(frame, 0xc4)) {
+    const auto length =
+        frame[static_cast<std::size_t>(at) + 2] << 8 | frame[static_cast<std::size_t>(at) + 3];
+    frame.erase(frame.begin() + at, frame.begin() + at + 2 + length);
+  }
+  ASSERT_LT(frame.size(), whole.size());
+  // WHEN there are a few bytes too many before its end, too
+  frame.insert(frame.end() - 2, {1, 2, 3});
+  // THEN its pixels are those of the whole file
+  Image expected, image;
+  decode_image(whole, "whole", expected);
+  decode_image(frame, "frame", image);
+  EXPECT_EQ(image.pixels, expected.pixels);
+}
+
+TEST_F(ImageFileTest, AJpegWhosePixelsAreGuessedIsRefused) {
+  Image image;
+  const auto refusal = [&image](const Bytes& bytes) {
+    return testing::error_of([&] { decode_image(bytes, "a", image); });
+  };
+  // GIVEN a JPEG of which the second half was lost, but for the mark of the end
+  Bytes bytes = jpeg_of(waves());
+  bytes.erase(bytes.begin() + std::ssize(bytes) * 2 / 3, bytes.end() - 2);
+  // THEN it is no image, and nothing is said but this
+  ::testing::internal::CaptureStderr();
+  EXPECT_EQ(refusal(bytes), "a: Corrupt JPEG data: premature end of data segment");
+  // AND so it is without the mark
+  bytes.resize(bytes.size() - 2);
+  EXPECT_EQ(refusal(bytes), "a: Premature end of JPEG file");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  // AND when the restart marks say that a part is missing
+  bytes = jpeg_of(waves(), {cv::IMWRITE_JPEG_RST_INTERVAL, 3});
+  const auto lost = last_mark(bytes, 0xd2);
+  bytes.erase(bytes.begin() + lost, bytes.begin() + lost + 40);
+  EXPECT_EQ(refusal(bytes).substr(0, 20), "a: Corrupt JPEG data");
+  // AND an image of a thousand scans takes no time
+  bytes = jpeg_of(waves(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  const Bytes begin_of_scan{0xff, 0xda}, tables_of_next{0xff, 0xc4};
+  const auto scan =
+      std::search(bytes.begin(), bytes.end(), begin_of_scan.begin(), begin_of_scan.end());
+  const auto next = std::search(scan, bytes.end(), tables_of_next.begin(), tables_of_next.end());
+  ASSERT_LT(next, bytes.end());
+  const Bytes first_scan(scan, next);
+  const auto place = scan - bytes.begin();
+  for (int i = 0; i < 1000; ++i) {
+    bytes.insert(bytes.begin() + place, first_scan.begin(), first_scan.end());
+  }
+  EXPECT_EQ(refusal(bytes), "a: has more than 64 scans");
 }
 
 TEST_F(ImageFileTest, AFullDiskIsAnError) {

@@ -1,4 +1,4 @@
-// Image files: read by OpenCV, to grey images; PNG written by libpng.
+// Image files: JPEG read by libjpeg, others by OpenCV, to grey images; PNG written by libpng.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,9 @@ namespace viwo {
 
 /// Decodes a PNG, JPEG, BMP, PGM or PPM that is in memory. Colours become grey, 16 bit become the
 /// upper 8; rows and columns stay as they are, whatever EXIF says of the orientation.
-/// InputError when it is none, is cut short, or says to have more than 2^25 pixels (then before any
-/// is decoded); `name` says where it comes from.
+/// InputError when it is none, is cut short or damaged (a JPEG: where its pixels would be guessed),
+/// or says to have more than 2^25 pixels (then before any is decoded); `name` says where it comes
+/// from.
 void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out);
 
 /// Reads an image file of at most 256 MiB. InputError when it is missing, or as for decode_image().

@@ -1,0 +1,99 @@
+#include "jpeg.hpp"
+
+#include <algorithm>
+#include <array>
+#include <csetjmp>
+#include <cstddef>
+#include <cstdio>
+
+#include <jpeglib.h>
+// After jpeglib.h.
+#include <jerror.h>
+
+#include "viwo/api/status.hpp"
+
+namespace viwo {
+namespace {
+
+/// A progressive image has about ten; each takes as long as the whole image, however few bytes.
+constexpr int kMostScans = 64;
+
+/// libjpeg goes on behind these with grey or with what it has already. Others it mends: bytes too
+/// many between two marks, as cheap cameras write them, change no pixel.
+constexpr std::array kPixelsAreGuessed{JWRN_HIT_MARKER, JWRN_JPEG_EOF, JWRN_HUFF_BAD_CODE,
+                                       JWRN_MUST_RESYNC, JWRN_ARITH_BAD_CODE};
+
+/// libjpeg calls back with its `err`, whose owner this is.
+class JpegDecoder {
+ public:
+  JpegDecoder() {
+    info_.err = jpeg_std_error(&errors_);
+    info_.client_data = this;
+    errors_.error_exit = [](j_common_ptr info) { fail(info); };
+    errors_.emit_message = [](j_common_ptr info, int level) {
+      const auto code = info->err->msg_code;
+      if (level < 0 && std::find(kPixelsAreGuessed.begin(), kPixelsAreGuessed.end(), code) !=
+                           kPixelsAreGuessed.end()) {
+        fail(info);
+      }
+    };
+    errors_.output_message = [](j_common_ptr) {};
+    progress_.progress_monitor = [](j_common_ptr info) {
+      if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number > kMostScans) {
+        std::snprintf(of(info).message_.data(), of(info).message_.size(), "has more than %d scans",
+                      kMostScans);
+        std::longjmp(of(info).failed_, 1);
+      }
+    };
+  }
+  ~JpegDecoder() { jpeg_destroy_decompress(&info_); }
+  JpegDecoder(const JpegDecoder&) = delete;
+  JpegDecoder& operator=(const JpegDecoder&) = delete;
+
+  /// False with `message()`. Has no objects of C++ but what the caller owns: libjpeg is C and
+  /// leaves by longjmp.
+  bool decode(std::span<const std::uint8_t> bytes, Image& out) {
+    if (setjmp(failed_) != 0) return false;  // NOLINT(cert-err52-cpp): as libjpeg is made for
+    jpeg_create_decompress(&info_);
+    info_.progress = &progress_;
+    jpeg_mem_src(&info_, bytes.data(), static_cast<unsigned long>(bytes.size()));
+    jpeg_read_header(&info_, TRUE);
+    info_.out_color_space = JCS_GRAYSCALE;
+    jpeg_start_decompress(&info_);
+    const std::size_t width = info_.output_width;
+    out.width_px = static_cast<int>(info_.output_width);
+    out.height_px = static_cast<int>(info_.output_height);
+    out.pixels.resize(width * info_.output_height);
+    while (info_.output_scanline < info_.output_height) {
+      JSAMPROW row = out.pixels.data() + width * info_.output_scanline;
+      jpeg_read_scanlines(&info_, &row, 1);
+    }
+    jpeg_finish_decompress(&info_);
+    return true;
+  }
+  [[nodiscard]] const char* message() const { return message_.data(); }
+
+ private:
+  static JpegDecoder& of(j_common_ptr info) {
+    return *static_cast<JpegDecoder*>(info->client_data);
+  }
+  [[noreturn]] static void fail(j_common_ptr info) {
+    info->err->format_message(info, of(info).message_.data());
+    std::longjmp(of(info).failed_, 1);  // NOLINT(cert-err52-cpp)
+  }
+
+  jpeg_decompress_struct info_{};
+  jpeg_error_mgr errors_{};
+  jpeg_progress_mgr progress_{};
+  std::jmp_buf failed_{};
+  std::array<char, JMSG_LENGTH_MAX> message_{};
+};
+
+}  // namespace
+
+void decode_jpeg(std::span<const std::uint8_t> bytes, const std::string& name, Image& out) {
+  JpegDecoder decoder;
+  if (!decoder.decode(bytes, out)) throw InputError(name + ": " + decoder.message());
+}
+
+}  // namespace viwo
