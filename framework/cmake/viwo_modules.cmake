@@ -35,6 +35,9 @@ function(viwo_add_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
+  if(VIWO_SANITIZE)  # what is instrumented is slow
+    math(EXPR ARG_TIMEOUT "5 * ${ARG_TIMEOUT}")
+  endif()
   add_executable(${name} ${ARG_SOURCES})
   # What is tested is optimised; of the tests themselves a third of the compiler's time is saved.
   target_compile_options(${name} PRIVATE ${VIWO_WARNINGS} $<$<CONFIG:Release>:-O1>)

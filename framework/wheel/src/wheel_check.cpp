@@ -23,12 +23,22 @@ constexpr double kRememberedSamples = 500.;
 constexpr double kClearly = 4.;
 /// Wheels of one sample.
 constexpr int kMostLiars = 2;
+/// Nothing turns so fast. Of a reading beyond it, a spike of a bus, the noise of the steering would
+/// leave nothing but rounding: it is judged as if it were this.
+constexpr double kFastest_rad_per_s = 1e6;
 
 TwistOptions options() {
   TwistOptions options;
   options.noise_weighted = true;
   options.fitted_jacobian = true;
   return options;
+}
+
+EncoderSample within_measure(EncoderSample y) {
+  for (double& drive : y.drive_rad_per_s) {
+    drive = std::clamp(drive, -kFastest_rad_per_s, kFastest_rad_per_s);
+  }
+  return y;
 }
 
 void mark(NoiseKind kind, int channel, EncoderSample& y) {
@@ -136,7 +146,8 @@ WheelCheck::Suspect* WheelCheck::of_same_wheel(const EncoderSample& rest, Suspec
 void WheelCheck::check(EncoderSample& y) {
   if (gates_.empty()) return;
   ++samples_;
-  Verdict verdict = judge(y);
+  EncoderSample rest = within_measure(y);
+  Verdict verdict = judge(rest);
   if (verdict.dof < 1) return;
   const Suspect* const liar_before = std::exchange(liar_, nullptr);
   const bool nobody_before = std::exchange(is_nobody_, false);
@@ -145,7 +156,6 @@ void WheelCheck::check(EncoderSample& y) {
     return;
   }
   const int dof = verdict.dof;
-  EncoderSample rest = y;
   std::array<Suspect*, kMostLiars> liars{};
   std::size_t n_liars = 0;
   while (!agrees(verdict) && n_liars < liars.size()) {

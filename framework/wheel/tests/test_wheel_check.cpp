@@ -81,6 +81,7 @@ TEST(WheelCheck, LeavesOutTheWheelThatLiesForAsLongAsItDoes) {
       {"slips", [](EncoderSample& y) { y.drive_rad_per_s[2] *= 1.5; }},
       {"is blocked", [](EncoderSample& y) { y.drive_rad_per_s[2] = 0.; }},
       {"spikes", [](EncoderSample& y) { y.drive_rad_per_s[2] = 1e20; }},
+      {"spikes to the end of numbers", [](EncoderSample& y) { y.drive_rad_per_s[2] = -1e300; }},
       {"runs backwards", [](EncoderSample& y) { y.drive_rad_per_s[2] *= -1.; }}};
   for (const auto& [name, fault] : faults) {
     SCOPED_TRACE(name);
