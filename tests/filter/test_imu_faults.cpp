@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "filter_runs.hpp"
+#include "viwo/results/run_record.hpp"
 
 namespace viwo {
 namespace {
@@ -111,6 +112,18 @@ TEST_F(ImuFaults, AnAccelerometerInGEndsTheRunWithTheReason) {
   });
   EXPECT_EQ(result.status, RunStatus::kDiverged);
   EXPECT_NE(result.cause, "");
+}
+
+TEST_F(ImuFaults, ARunThatEndsInNoNumbersKeepsThoseBefore) {
+  auto setup = testing::run_setup(
+      "runs/viwo_swerve.yaml",
+      {"sensors.simulator0.duration_s=5", "estimator.sigma_start_gyro_bias_rad_per_s=1e200"});
+  const RunResult result = viwo::run(setup, collect(setup));
+  EXPECT_EQ(result.status, RunStatus::kDiverged);
+  for (const StampedPose& pose : result.estimate) {
+    ASSERT_TRUE(pose.p_BinW.allFinite() && pose.q_BtoW.coeffs().allFinite()) << pose.t_ns;
+  }
+  EXPECT_EQ(from_record(to_record(result)).cause, result.cause);
 }
 
 }  // namespace

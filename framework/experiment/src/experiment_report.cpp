@@ -194,28 +194,30 @@ void add_failures(const ExperimentResult& result, Section& section) {
 void add_calibration_by(const ExperimentResult& result, const std::string& label,
                         Section& section) {
   Table table;
+  std::vector<std::string> names;  // of all families: variants may estimate different ones
   for (const Group& group : groups_of(result)) {
     if (group.label != label) continue;
     for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
       const auto families = calibration_families(result, v, group);
       if (families.empty()) continue;
-      if (table.columns.empty()) {
-        table.columns = {{label}, {"variant"}};
-        for (const CalibrationFamily& family : families) table.columns.push_back({family.name});
-      }
-      // A variant that calibrates other parameters has a place in the other tables.
-      if (families.size() + 2 != table.columns.size()) continue;
+      for (const CalibrationFamily& family : families) add_once(names, family.name);
       std::vector<Cell> row{group.value, result.setup.variants[v].name};
+      row.resize(2 + names.size(), "-");
       for (const CalibrationFamily& family : families) {
-        row.emplace_back(unbroken(compact(100. * family.left, 3) + " % (" +
-                                  nees_text(family.nees, family.widened_nees) + ")"));
+        const auto column = std::find(names.begin(), names.end(), family.name) - names.begin();
+        row[2 + static_cast<std::size_t>(column)] =
+            unbroken(compact(100. * family.left, 3) + " % (" +
+                     nees_text(family.nees, family.widened_nees) + ")");
       }
       table.rows.push_back(std::move(row));
     }
   }
   if (table.rows.empty()) return;
-  table.caption =
-      "Calibration by " + label + ": rmse at the end / prior sigma (NEES" + kWidened + ")";
+  table.columns = {{label}, {"variant"}};
+  for (const std::string& name : names) table.columns.push_back({name});
+  for (std::vector<Cell>& row : table.rows) row.resize(table.columns.size(), "-");
+  table.caption = "Calibration by " + label + ": rmse at the end / prior sigma (NEES" + kWidened +
+                  "), of the runs that are ok";
   section.blocks.emplace_back(std::move(table));
 }
 
@@ -223,8 +225,9 @@ void add_calibration_by(const ExperimentResult& result, const std::string& label
 void add_calibration_table(const ExperimentResult& result, const Group& all, Section& section) {
   Table table;
   table.caption =
-      std::string("Calibration at the end: root mean square error over the runs (NEES") + kWidened +
-      ")";
+      std::string(
+          "Calibration at the end: root mean square error over the runs that are ok (NEES") +
+      kWidened + ")";
   table.columns = {{"parameter"}, {"prior sigma"}};
   std::vector<std::string> names;
   std::vector<std::vector<CalibrationStatistics>> columns;

@@ -59,12 +59,17 @@ std::vector<Group> groups_of(const ExperimentResult& result) {
   return groups;
 }
 
+/// What a run stopped at, when it failed or diverged, is no result: NaN.
+static double value_of(const Metric& metric, const RunResult& run) {
+  return run.status == RunStatus::kOk ? metric.of(run) : kNan;
+}
+
 std::vector<double> values_of(const ExperimentResult& result, std::size_t variant,
                               const Metric& metric, const Group& group) {
   std::vector<double> values;
   for (const ExperimentRun& run : result.runs) {
     if (run.variant != variant || !group.passes(run)) continue;
-    const double value = metric.of(run.result);
+    const double value = value_of(metric, run.result);
     if (std::isfinite(value)) values.push_back(value);
   }
   return values;
@@ -114,18 +119,14 @@ eval::PairedDifference paired(const ExperimentResult& result, std::size_t varian
     if (run.variant != variant || !group.passes(run)) continue;
     const auto other = others.find({run.recording, run.seed});
     if (other == others.end()) continue;
-    values.push_back(metric.of(run.result));
-    baseline.push_back(metric.of(other->second->result));
+    values.push_back(value_of(metric, run.result));
+    baseline.push_back(value_of(metric, other->second->result));
   }
   return eval::paired_difference(values, baseline, kConfidence);
 }
 
 bool is_significant(const eval::PairedDifference& difference) {
   return difference.low > 0. || difference.high < 0.;
-}
-
-bool is_estimated(const RunResult& run, const CalibrationTrack& track) {
-  return !run.updates.empty() && is_estimated(track);
 }
 
 std::vector<std::string> estimated(const ExperimentResult& result,

@@ -88,10 +88,6 @@ inline constexpr const char* kWidened =
 /// "2.4"; "54 / 2.3" where sigmas that are widened by their scatter make it smaller.
 std::string nees_text(double nees, double widened_nees);
 
-/// Whether a run of the filter estimated this parameter of its own, and still had a variance at
-/// its end.
-bool is_estimated(const RunResult& run, const CalibrationTrack& track);
-
 /// Names of the parameters that some of the runs estimated, in order of appearance.
 std::vector<std::string> estimated(const ExperimentResult& result,
                                    const std::function<bool(const ExperimentRun&)>& passes);

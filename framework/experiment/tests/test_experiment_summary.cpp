@@ -73,6 +73,50 @@ TEST_F(Summary, HasMeanMedianSpreadAndQuantiles) {
   EXPECT_EQ(summary["viwo_version"], viwo_version());
 }
 
+TEST_F(Summary, LeavesOutWhatARunStoppedAtThatDiverged) {
+  // GIVEN a diverged run that has numbers of its first half second
+  ExperimentResult result = with_errors({1., 2., 3., 6., 1., 1., 1., kNan});
+  for (ExperimentRun& run : result.runs) {
+    run.result.updates = {{"parity", {8, 9}, {}, {}, {}}};
+    run.result.nees.pose = run.result.status == RunStatus::kOk ? 6. : 600.;
+  }
+  // THEN they are in no mean and in no pair
+  const auto summary = summary_of(result);
+  const auto& b = summary["variants"]["b"]["metrics"]["nees_pose"];
+  EXPECT_EQ(b["n"], 3);
+  EXPECT_EQ(b["mean"], 6.);
+  EXPECT_EQ(summary["paired"]["variants"]["b"]["nees_pose"]["pairs"], 3);
+  EXPECT_EQ(summary["paired"]["variants"]["b"]["nees_pose"]["mean"], 0.);
+}
+
+TEST_F(Summary, CalibrationOfVariantsStandsBelowItsOwnName) {
+  // GIVEN variants that estimate as many families of parameters, but others
+  ExperimentResult result = with_errors({1., 2., 3., 6., 2., 4., 6., 7.});
+  for (ExperimentRun& run : result.runs) {
+    const char* const name = run.variant == 0 ? "r_1" : "t_OtoI";
+    run.result.updates = {{"parity", {8, 9}, {}, {}, {}}};
+    run.result.calibration = {{name, "m", {0., 0.}, {10., 1.}, 0., run.variant == 0 ? 2. : 3., 1.}};
+  }
+  // WHEN the page is written
+  write_experiment(folder_ / "out", result);
+  // THEN each has a column, and nothing in that of the other
+  const std::string page = text_of(folder_ / "out" / "report.html");
+  const auto table = page.find("Calibration by motion");
+  ASSERT_NE(table, std::string::npos);
+  const std::string rows = page.substr(table, page.find("</table>", table) - table);
+  const auto first = rows.find("20.0"), second = rows.find("30.0");
+  ASSERT_NE(first, std::string::npos) << rows;
+  ASSERT_NE(second, std::string::npos) << rows;
+  const auto cells = [&rows](std::size_t from, std::size_t to) {
+    std::size_t n = 0;
+    for (auto at = rows.find("<td", from); at < to; at = rows.find("<td", at + 1)) ++n;
+    return n;
+  };
+  const auto row_of = [&rows](std::size_t at) { return rows.rfind("<tr", at); };
+  EXPECT_EQ(cells(row_of(first), first), 3U) << rows;
+  EXPECT_EQ(cells(row_of(second), second), 4U) << rows;
+}
+
 TEST_F(Summary, HasEveryMetricInEveryPlaceAlsoOfARunThatWasTakenOver) {
   ExperimentResult result = with_errors({1., 2., 3., 6., 2., 4., 6., 7.});
   RunResult& run = result.runs[0].result;

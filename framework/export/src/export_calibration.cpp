@@ -93,7 +93,7 @@ void Lost::cameras() {
 void Lost::intrinsics_beside() {
   std::string text;
   for (const std::string& name : robot_.beside) text += (text.empty() ? "" : ", ") + name;
-  if (!text.empty()) add("intrinsics without a place in it: " + text);
+  if (!text.empty()) add("what has no place in it: " + text);
   for (const auto& [name, model] : robot_.file->wheel_sets) {
     add("wheel set '" + name + "' (" + model + ")");
   }
@@ -117,6 +117,14 @@ void Lost::radii_but_the_mean(const std::vector<Wheel>& wheels) {
     add("one radius for all wheels, their mean; they are from " + significant(least, 6) + " to " +
         significant(most, 6) + " m");
   }
+}
+
+config::Node real_number(double value) {
+  std::string text = log::number_text(value);
+  if (text.find('.') == std::string::npos) {
+    text.insert(std::min(text.find('e'), text.size()), ".0");
+  }
+  return config::Node::scalar_of(text);
 }
 
 std::string head(const Robot& robot, const std::vector<std::string>& lost,

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "robot.hpp"
+#include "viwo/config/node.hpp"
 #include "viwo/export/export_calibration.hpp"
 
 namespace viwo::exports {
@@ -34,6 +35,10 @@ class Lost {
 
 /// Where the text is from, whether it is to be trusted, and what is lost: each line behind `mark`.
 std::string head(const Robot& robot, const std::vector<std::string>& lost, const std::string& mark);
+
+/// A number with a point, as YAML 1.1 wants it: 1 would be an integer, which ROS refuses for a
+/// double, and 1e-05 a text to Python, and so to Kalibr.
+config::Node real_number(double value);
 
 std::string drive_joint(const Wheel& wheel);
 std::string steer_joint(const Wheel& wheel);

@@ -12,7 +12,7 @@ template <class Numbers>
 Node list(const Numbers& values) {
   Node out = Node::list_of();
   for (const double value : values) {
-    out.items().push_back(Node::scalar_of(log::number_text(value)));
+    out.items().push_back(real_number(value));
   }
   return out;
 }
@@ -31,9 +31,13 @@ Node camera_node(const CameraView& camera, std::size_t index) {
   node.set("distortion_coeffs", list(camera.intrinsics.tail<4>()));
   node.set("distortion_model", Node::scalar_of(is_radtan ? "radtan" : "equidistant"));
   node.set("intrinsics", list(camera.intrinsics.head<4>()));
-  node.set("resolution", list(Eigen::Vector2d(camera.width_px, camera.height_px)));
+  Node resolution = Node::list_of();
+  for (const int pixels : {camera.width_px, camera.height_px}) {
+    resolution.items().push_back(Node::scalar_of(std::to_string(pixels)));
+  }
+  node.set("resolution", resolution);
   node.set("rostopic", Node::scalar_of("/cam" + std::to_string(index) + "/image_raw"));
-  node.set("timeshift_cam_imu", list(Eigen::Matrix<double, 1, 1>(camera.t_CtoI_s)).items()[0]);
+  node.set("timeshift_cam_imu", real_number(camera.t_CtoI_s));
   return node;
 }
 

@@ -101,15 +101,27 @@ void add_axles(Intrinsics& intrinsics, Robot& robot) {
   }
 }
 
-/// An Ackermann base may have encoders at its rear wheels only, which come first.
+/// An Ackermann base may have encoders at its rear wheels only, which come first; a side of others
+/// may have several drives, and the calibration does not say which ones.
 void take_signs(const CalibrationFile& file, Robot& robot) {
-  const std::size_t n = file.drive_signs.size();
+  const std::vector<int>& signs = file.drive_signs;
+  const std::size_t n = signs.size();
   if (n == 0 || robot.base == Base::kUnknown) return;
+  const bool has_sides = robot.base == Base::kDifferential || robot.base == Base::kSkidSteer;
+  if (has_sides && n > robot.wheels.size()) {
+    const bool are_alike = std::equal(signs.begin() + 1, signs.end(), signs.begin());
+    for (Wheel& wheel : robot.wheels) wheel.reversed = are_alike && signs[0] < 0;
+    if (!are_alike) {
+      robot.beside.push_back("drive_signs of " + std::to_string(n) +
+                             " drives (which of them are on which side is not known)");
+    }
+    return;
+  }
   if (n != robot.wheels.size() && !(robot.base == Base::kAckermann && n == 2)) {
     throw InputError(file.path.string() + ": 'drive_signs' has " + std::to_string(n) +
                      " signs for " + std::to_string(robot.wheels.size()) + " wheels");
   }
-  for (std::size_t i = 0; i < n; ++i) robot.wheels[i].reversed = file.drive_signs[i] < 0;
+  for (std::size_t i = 0; i < n; ++i) robot.wheels[i].reversed = signs[i] < 0;
 }
 
 /// Throws InputError for sizes that no robot has.

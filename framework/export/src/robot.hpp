@@ -44,7 +44,7 @@ struct Robot {
   double wheel_base_m = 0.;  ///< of Ackermann steering
   std::optional<Mount> mount;
   std::vector<CameraView> cameras;
-  std::vector<std::string> beside;  ///< intrinsics that are none of the above
+  std::vector<std::string> beside;  ///< what is none of the above
 
   double mean_radius_m() const;
   /// Names of the wheels whose drives turn backwards, "3, 4"; "" for none.

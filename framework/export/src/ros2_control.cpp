@@ -11,13 +11,6 @@ namespace {
 
 using config::Node;
 
-Node number(double value) {
-  // 1 would be an integer, which ROS refuses where it wants a double.
-  std::string text = log::number_text(value);
-  if (text.find_first_of(".e") == std::string::npos) text += ".0";
-  return Node::scalar_of(text);
-}
-
 Node joints(const std::vector<std::string>& names) {
   Node list = Node::list_of();
   for (const std::string& name : names) list.items().push_back(Node::scalar_of(name));
@@ -30,11 +23,11 @@ Node differential(const Robot& robot, Lost& lost) {
   Node params = Node::empty_map();
   params.set("left_wheel_names", joints({drive_joint(left)}));
   params.set("right_wheel_names", joints({drive_joint(right)}));
-  params.set("wheel_separation", number(robot.track_m));
-  params.set("wheel_separation_multiplier", number(1.));
-  params.set("wheel_radius", number(mean));
-  params.set("left_wheel_radius_multiplier", number(left.radius_m / mean));
-  params.set("right_wheel_radius_multiplier", number(right.radius_m / mean));
+  params.set("wheel_separation", real_number(robot.track_m));
+  params.set("wheel_separation_multiplier", real_number(1.));
+  params.set("wheel_radius", real_number(mean));
+  params.set("left_wheel_radius_multiplier", real_number(left.radius_m / mean));
+  params.set("right_wheel_radius_multiplier", real_number(right.radius_m / mean));
   if (robot.base == Base::kSkidSteer) {
     lost.add("x_icr: the controller takes the base to turn about a point between its wheels");
     lost.add("the middle of y_icr_left and y_icr_right: base_link is there");
@@ -49,10 +42,10 @@ Node ackermann(const Robot& robot, Lost& lost) {
   params.set("traction_joints_names", joints({drive_joint(rear[1]), drive_joint(rear[0])}));
   params.set("steering_joints_names",
              joints({steer_joint(robot.wheels[3]), steer_joint(robot.wheels[2])}));
-  params.set("wheelbase", number(robot.wheel_base_m));
-  params.set("traction_track_width", number(robot.track_m));
-  params.set("steering_track_width", number(robot.track_m));
-  params.set("traction_wheels_radius", number(0.5 * (rear[0].radius_m + rear[1].radius_m)));
+  params.set("wheelbase", real_number(robot.wheel_base_m));
+  params.set("traction_track_width", real_number(robot.track_m));
+  params.set("steering_track_width", real_number(robot.track_m));
+  params.set("traction_wheels_radius", real_number(0.5 * (rear[0].radius_m + rear[1].radius_m)));
   lost.radii_but_the_mean(rear);
   lost.add("radii of the front wheels");
   if (robot.wheels[2].zero_rad != 0. || robot.wheels[3].zero_rad != 0.) {
@@ -74,8 +67,8 @@ Node mecanum(const Robot& robot, Lost& lost) {
     most_deg = std::max(most_deg, off * 180. / M_PI);
   }
   Node kinematics = Node::empty_map();
-  kinematics.set("wheels_radius", number(robot.mean_radius_m()));
-  kinematics.set("sum_of_robot_center_projection_on_X_Y_axis", number(sum / 4.));
+  kinematics.set("wheels_radius", real_number(robot.mean_radius_m()));
+  kinematics.set("sum_of_robot_center_projection_on_X_Y_axis", real_number(sum / 4.));
   params.set("kinematics", kinematics);
   lost.radii_but_the_mean(wheels);
   lost.add("one lever arm for all wheels, the mean of |k_1| .. |k_4|");

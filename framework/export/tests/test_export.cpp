@@ -94,6 +94,18 @@ TEST(Export, WritesNoTextOfTheFileThatEndsAComment) {
   EXPECT_THAT(export_calibration(file, "urdf").text, Not(HasSubstr("--><robot/>")));
 }
 
+TEST(Export, KnowsSidesOfSeveralDrives) {
+  CalibrationFile file = differential();
+  file.drive_signs = {-1, -1, -1, -1};
+  EXPECT_THAT(export_calibration(file, "urdf").text, HasSubstr("<axis xyz=\"0 -1 0\"/>"));
+  // Which of them are on which side is not in the file.
+  file.drive_signs = {1, -1, 1, -1};
+  const Exported urdf = export_calibration(file, "urdf");
+  EXPECT_THAT(urdf.text, Not(HasSubstr("<axis xyz=\"0 -1 0\"/>")));
+  EXPECT_THAT(urdf.text, HasSubstr("drive_signs of 4 drives (which of them are on which side"));
+  EXPECT_THAT(export_calibration(file, "csv").text, HasSubstr("drive_sign_4,-1,0,"));
+}
+
 TEST(Export, RefusesWhatIsNoRobot) {
   for (const double size : {0., -0.1}) {
     CalibrationFile file = differential();
@@ -103,9 +115,9 @@ TEST(Export, RefusesWhatIsNoRobot) {
                           " m is no size of a robot"));
   }
   CalibrationFile file = differential();
-  file.drive_signs = {1, 1, 1, -1, 1};
+  file.drive_signs = {-1};
   EXPECT_EQ(error_of([&] { export_calibration(file, "csv"); }),
-            "robot/calibration.yaml: 'drive_signs' has 5 signs for 2 wheels");
+            "robot/calibration.yaml: 'drive_signs' has 1 signs for 2 wheels");
   // Of an Ackermann base the rear wheels alone may have encoders.
   file = ackermann();
   file.drive_signs = {1, -1};
@@ -241,6 +253,17 @@ TEST(Export, AsKalibrChainIsReadBackAsTheSameCameras) {
     EXPECT_EQ(camera.width_px, file.camera_models[i].width_px);
     EXPECT_EQ(camera.height_px, file.camera_models[i].height_px);
   }
+}
+
+TEST(Export, WritesNumbersAsYamlKnowsThem) {
+  CalibrationFile file = with_rig(differential());
+  for (CalibrationEntry& entry : file.cameras) {
+    if (entry.name == "cam0.t_CtoI") entry.estimate = 1e-5;
+  }
+  const std::string text = export_calibration(file, "kalibr").text;
+  EXPECT_THAT(text, HasSubstr("timeshift_cam_imu: 1.0e-05\n"));
+  EXPECT_THAT(text, HasSubstr("[0.0, 0.0, 0.0, 1.0]"));
+  EXPECT_THAT(text, HasSubstr("resolution: [848, 800]"));
 }
 
 TEST(Export, AsTableHasEveryNumberWithSigmaAndUnit) {

@@ -123,7 +123,7 @@ void check_tilt(const Recording& recording, Findings& out) {
                    {"left with the gyro as it is", as_is, "rad"},
                    {"left with the best", least, "rad"},
                    {"left with the next", std::sqrt(second), "rad"}}};
-  // The gyro explains half of what tilts, and twice as much as any other reading of it.
+  // The gyro explains half of what tilts; what any other reading of it leaves is 1.5 times as much.
   constexpr double kClearly = 2.;
   if (best == all.begin()) {
     if (none > kClearly * as_is) out.push_back(finding);

@@ -8,9 +8,7 @@
 
 #include "checks.hpp"
 #include "plots.hpp"
-#include "viwo/config/yaml.hpp"
-#include "viwo/math/significant.hpp"
-#include "viwo/plausibility/channel_change.hpp"
+#include "remedies.hpp"
 
 namespace viwo::inspect {
 
@@ -144,53 +142,6 @@ void demote_consequences(const Recording& recording, Findings& findings) {
   }
 }
 
-/// Scales and shifts are found of the joints of a model; the configuration has them of the channels
-/// of the log, of which several may make a joint, or none.
-void give_to_channels(const config::Node& configuration, Remedy& remedy) {
-  const std::size_t dot = remedy.key.rfind('.') + 1;
-  const bool scales = remedy.key.ends_with("_scale");
-  if (!scales && !remedy.key.ends_with("_shift_rad") && !remedy.key.ends_with("_turn")) return;
-  const std::string joint = remedy.key.substr(dot, 5);  // drive or steer
-  const auto* channels = configuration.at_path(remedy.key.substr(0, dot) + joint + "_channel");
-  if (channels == nullptr || channels->items().empty()) return;
-  const config::Node of_joints = config::parse(remedy.value, "remedy");
-  std::string list;
-  for (const config::Node& channel : channels->items()) {
-    const auto i = static_cast<std::size_t>(std::stod(channel.scalar()));
-    if (i > of_joints.items().size()) return;
-    list += (list.empty() ? "" : ", ");
-    list += i == 0 ? (scales ? "1" : "0") : of_joints.items()[i - 1].scalar();
-  }
-  remedy.value = "[" + list + "]";
-}
-
-/// What is found is found behind what the configuration does to the channels already: scales
-/// multiply, shifts add.
-void add_to_present(const config::Node& configuration, Remedy& remedy) {
-  const bool scales = remedy.key.ends_with("_scale");
-  const config::Node* const there = configuration.at_path(remedy.key);
-  if (!(scales || remedy.key.ends_with("_shift_rad")) || there == nullptr) return;
-  const config::Node found = config::parse(remedy.value, "remedy");
-  const std::size_t n = there->items().size();
-  if (n == 0 || found.items().size() != n) return;
-  remedy.value = yaml_list(n, [&](std::size_t i) {
-    const double a = std::stod(there->items()[i].scalar());
-    const double b = std::stod(found.items()[i].scalar());
-    return significant(scales ? a * b : a + b, 10);
-  });
-}
-
-/// A sensor that knows of units takes what it reads for the other one of two; for those that do
-/// not the texts say what to multiply by.
-bool is_other_unit(const config::Node& configuration, const Remedy& remedy) {
-  const config::Node* const there = configuration.at_path(remedy.key);
-  const std::string other = remedy.value == "deg"                          ? "rad"
-                            : remedy.value == "g"                          ? "m_per_s2"
-                            : remedy.value == "mm" || remedy.value == "cm" ? "m"
-                                                                           : "g";
-  return there != nullptr && there->is_scalar() && there->scalar() == other;
-}
-
 }  // namespace
 
 const char* name(Severity severity) {
@@ -232,15 +183,7 @@ Inspection inspect(RunSetup& setup) {
       findings.push_back(std::move(finding));
     }
   }
-  for (Finding& finding : findings) {
-    for (Remedy& remedy : finding.remedies) {
-      give_to_channels(setup.resolved, remedy);
-      add_to_present(setup.resolved, remedy);
-    }
-    std::erase_if(finding.remedies, [&](const Remedy& remedy) {
-      return remedy.key.ends_with("_unit") && !is_other_unit(setup.resolved, remedy);
-    });
-  }
+  for (Finding& finding : findings) put_into(setup.resolved, finding.remedies);
   demote_consequences(recording, findings);
   std::vector<std::string> sensors;
   for (const Finding& finding : findings) {

@@ -53,15 +53,12 @@ std::string plural(std::size_t n, const std::string& what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
 
-/// The first one that wants a key has it.
 std::vector<std::pair<Remedy, std::string>> remedies_of(const Inspection& inspection) {
   std::vector<std::pair<Remedy, std::string>> all;
   for (const Finding& finding : inspection.findings) {
     if (finding.severity != Severity::kFault) continue;
     for (const Remedy& remedy : finding.remedies) {
-      const bool is_known = std::any_of(
-          all.begin(), all.end(), [&](const auto& other) { return other.first.key == remedy.key; });
-      if (!is_known) all.emplace_back(remedy, finding.sensor + ": " + finding.what);
+      all.emplace_back(remedy, finding.sensor + ": " + finding.what);
     }
   }
   return all;
@@ -165,27 +162,61 @@ void write_inspection(const std::filesystem::path& folder, const Inspection& ins
   log::write_text(folder / "report.html", report::to_html(report_of(inspection)));
 }
 
-std::string fixed_configuration(const RunSetup& setup, const Inspection& inspection,
-                                PluginRegistry& plugins) {
+namespace {
+
+/// The configuration with the remedies that can be written, and why the others cannot.
+/// `one_by_one`: those with which the recording can be read no more are among these.
+std::string with_remedies(const RunSetup& setup, const Inspection& inspection,
+                          PluginRegistry& plugins, bool one_by_one) {
   config::Node fixed = setup.resolved;
   std::string head = "# " + setup.name + ", as viwo inspect would have it.\n";
   std::map<std::string, std::string> comments;
   for (const auto& [remedy, reason] : remedies_of(inspection)) {
+    const auto leave_out = [&, &remedy = remedy, &reason = reason](const std::string& why) {
+      head += "# " + why + ": " + line_of(remedy) + "  (" + reason + ")\n";
+    };
     // All keys that there are have a value here.
     if (fixed.at_path(remedy.key) == nullptr) {
-      head += "# Not in here, for want of such a key: " + line_of(remedy) + "  (" + reason + ")\n";
+      leave_out("Not in here, for want of such a key");
       continue;
     }
     if (is_for_hands(fixed, remedy)) {
-      head += "# To be combined by hand with what is there: " + line_of(remedy) + "  (" + reason +
-              ")\n";
+      leave_out("To be combined by hand with what is there");
       continue;
     }
-    config::set_path(fixed, remedy.key, config::parse(remedy.value, "--fix"));
+    if (comments.contains(remedy.key)) {
+      leave_out("Not in here, for what is found first has this key");
+      continue;
+    }
+    config::Node next = fixed;
+    config::set_path(next, remedy.key, config::parse(remedy.value, "--fix"));
+    if (one_by_one) {
+      try {
+        read_run(config::parse(config::to_yaml(next), "--fix"), plugins);
+      } catch (const InputError& error) {
+        const std::string what = error.what();
+        leave_out("Not in here, for with it nothing can be read (" +
+                  what.substr(0, what.find('\n')) + ")");
+        continue;
+      }
+    }
+    fixed = std::move(next);
     comments[remedy.key] = reason;
   }
-  std::string text = head + config::to_yaml(fixed, comments);
-  read_run(config::parse(text, "--fix"), plugins);
+  return head + config::to_yaml(fixed, comments);
+}
+
+}  // namespace
+
+std::string fixed_configuration(const RunSetup& setup, const Inspection& inspection,
+                                PluginRegistry& plugins) {
+  std::string text = with_remedies(setup, inspection, plugins, false);
+  try {
+    read_run(config::parse(text, "--fix"), plugins);
+  } catch (const InputError&) {
+    text = with_remedies(setup, inspection, plugins, true);
+    read_run(config::parse(text, "--fix"), plugins);
+  }
   return text;
 }
 

@@ -41,6 +41,18 @@ TEST(InspectClocks, FindsTheLagOfTheWheelsAndWritesTheClock) {
   }
 }
 
+TEST(InspectClocks, FindsWheelsThatAreSecondsLate) {
+  for (const double late_s : {1.2, -4.}) {
+    const Inspection late = inspected(swerve(), {.wheels = [late_s](EncoderSample& s) {
+                                        shift(s, late_s);
+                                        return true;
+                                      }});
+    const Finding clock = finding_of(late, "wheels0", "clock");
+    EXPECT_EQ(clock.severity, Severity::kFault) << clock.what;
+    EXPECT_NEAR(figure_of(clock, "lag"), late_s, 0.06) << clock.what;
+  }
+}
+
 TEST(InspectClocks, FindsAClockThatWasSet) {
   const Inspection set = inspected(simulated("viwo_ackermann"), {.wheels = [](EncoderSample& s) {
                                      if (s.t_ns > 30'000'000'000) shift(s, 0.5);
@@ -158,6 +170,17 @@ TEST(InspectCameras, FindsPointsThatAreElsewhereInTheNextImage) {
                                          }});
   EXPECT_THAT(faults_of(exchanged),
               ElementsAre("images0, camera 0 tracks", "images0, camera 1 tracks"));
+}
+
+/// On a circle nothing but noise tells an axis.
+TEST(InspectPoses, SaysNothingOfAxesThatNoMotionTells) {
+  for (const char* const motion : {"circle", "stationary"}) {
+    const Inspection found =
+        inspected(simulated("viwo_swerve", {"sensors.simulator0.duration_s=20",
+                                            std::string("sensors.simulator0.motion=") + motion}),
+                  {});
+    EXPECT_THAT(faults_of(found), ::testing::Not(Contains(HasSubstr("axes")))) << motion;
+  }
 }
 
 TEST(InspectPoses, FindsTheLagOfAReferenceAndWritesIt) {

@@ -1,4 +1,6 @@
 // What is to be written is written, and then it is well.
+#include <array>
+#include <cmath>
 #include <numbers>
 
 #include <gmock/gmock.h>
@@ -94,7 +96,69 @@ TEST_F(FixedConfiguration, GivesScalesToTheChannelsOfTheLog) {
   setup = read_run(setup.resolved, testing::registry());
   const std::string text = fixed_configuration(setup, found, testing::registry());
   setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  EXPECT_EQ(drive_signs(setup), (std::vector<int>{1, -1, 1, 1}));
   EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
+}
+
+TEST_F(FixedConfiguration, TurnsTheShiftWithTheSign) {
+  // GIVEN a steering encoder that is reversed, and a shift that is right for it: z = s y + o
+  RunSetup faulty = changed(swerve(), {.wheels = [](EncoderSample& s) {
+                              s.steer_rad[0] = -(s.steer_rad[0] - 0.3);
+                              return true;
+                            }});
+  write_log(faulty, folder_);
+  config::Node run = on_log(folder_);
+  // WHEN the configuration has the shift of the other sign, as of an encoder that is not reversed
+  config::set_path(run, "sensors.wheels0.steer_shift_rad",
+                   config::parse("[-0.3, 0, 0, 0]", "test"));
+  RunSetup setup = read_run(run, testing::registry());
+  const Finding order = finding_of(inspect(setup), "wheels0", "order");
+  // THEN both are turned
+  EXPECT_EQ(remedy_of(order, "sensors.wheels0.steer_scale"), "[-1, 1, 1, 1]");
+  EXPECT_EQ(remedy_of(order, "sensors.wheels0.steer_shift_rad"), "[0.3, 0, 0, 0]");
+}
+
+TEST_F(FixedConfiguration, GivesATurnInTheUnitOfTheReading) {
+  // GIVEN drives in degrees that begin anew after a turn, and the scale for them
+  constexpr double kDegree = std::numbers::pi / 180.;
+  std::array<double, 4> angle{};
+  std::int64_t last_ns = 0;
+  RunSetup faulty = changed(
+      swerve(), {.wheels = [&](EncoderSample& s) {
+        const double dt_s = last_ns == 0 ? 0. : 1e-9 * static_cast<double>(s.t_ns - last_ns);
+        last_ns = s.t_ns;
+        for (std::size_t i = 0; i < angle.size(); ++i) {
+          angle[i] += dt_s * s.drive_rad_per_s[i] / kDegree;
+          s.drive_rad_per_s[i] = angle[i] - 360. * std::floor(angle[i] / 360.);
+        }
+        return true;
+      }});
+  write_log(faulty, folder_);
+  config::Node run = on_log(folder_);
+  config::set_path(run, "sensors.wheels0.drive_input", config::Node::scalar_of("angle"));
+  config::set_path(
+      run, "sensors.wheels0.drive_scale",
+      config::parse("[0.0174532925, 0.0174532925, 0.0174532925, 0.0174532925]", "test"));
+  RunSetup setup = read_run(run, testing::registry());
+  const Inspection found = inspect(setup);
+  EXPECT_EQ(remedy_of(finding_of(found, "wheels0", "turn"), "sensors.wheels0.drive_turn"),
+            "[360, 360, 360, 360]");
+  const std::string text = fixed_configuration(setup, found, testing::registry());
+  setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
+}
+
+TEST_F(FixedConfiguration, LeavesOutWhatCannotBeRead) {
+  RunSetup setup = swerve();
+  Inspection inspection;
+  inspection.name = setup.name;
+  inspection.findings = {
+      {"wheels0", Severity::kFault, "clock", "lags", {}, {{"wheels.t_OtoI_s", "-0.05"}}},
+      {"wheels0", Severity::kFault, "x", "is no text", {}, {{"estimator.clones", "soon"}}}};
+  const std::string text = fixed_configuration(setup, inspection, testing::registry());
+  EXPECT_THAT(text, HasSubstr("t_OtoI_s: -0.05  # wheels0: lags"));
+  EXPECT_THAT(text, HasSubstr("# Not in here, for with it nothing can be read ("));
+  EXPECT_THAT(text, HasSubstr("): estimator.clones: soon  (wheels0: is no text)"));
 }
 
 TEST_F(FixedConfiguration, WritesTheUnitsOfAnImuThatHasKeysForThem) {
@@ -134,11 +198,14 @@ TEST_F(FixedConfiguration, SaysWhyAKeyIsChangedAndWhatItHasNoKeyFor) {
   inspection.findings = {
       {"wheels0", Severity::kFault, "clock", "lags behind", {}, {{"wheels.t_OtoI_s", "-0.05"}}},
       {"wheels0", Severity::kNote, "other", "not to be written", {}, {{"wheels.t_OtoI_s", "7"}}},
+      {"wheels0", Severity::kFault, "late", "is late", {}, {{"wheels.t_OtoI_s", "9"}}},
       {"wheels0", Severity::kFault, "x", "no such key", {}, {{"sensors.nowhere.key", "[1, 2]"}}}};
   const std::string text = fixed_configuration(setup, inspection, testing::registry());
   EXPECT_THAT(text, HasSubstr("t_OtoI_s: -0.05  # wheels0: lags behind"));
   EXPECT_THAT(text,
               HasSubstr("# Not in here, for want of such a key: sensors.nowhere.key: [1, 2]"));
+  EXPECT_THAT(text, HasSubstr("# Not in here, for what is found first has this key: "
+                              "wheels.t_OtoI_s: 9  (wheels0: is late)"));
   const RunSetup fixed = read_run(config::parse(text, "fixed.yaml"), testing::registry());
   EXPECT_EQ(fixed.filter->wheels.front().prior.wheels.t_OtoI_s, -0.05);
 }

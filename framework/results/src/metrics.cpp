@@ -17,7 +17,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 double largest_scatter(const RunResult& run) {
   double most = kNone;
   for (const CalibrationTrack& track : run.calibration) {
-    if (is_estimated(track)) most = std::fmax(most, track.scatter);
+    if (is_estimated(run, track)) most = std::fmax(most, track.scatter);
   }
   return most;
 }

@@ -203,8 +203,9 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
 void write_run(const std::filesystem::path& folder, const RunSetup& setup,
                const RunResult& result) {
   log::make_folder(folder);
-  // On a full disk nothing of an earlier run stands beside what was written of this one.
-  for (const char* const last : {"summary.json", "report.html"}) {
+  // Nothing of an earlier run stands beside this one: on a full disk, or where this one has none.
+  for (const char* const last :
+       {"summary.json", "report.html", "calibration.yaml", "reference.tum"}) {
     std::error_code ignored;
     if (std::filesystem::is_regular_file(folder / last, ignored)) {
       std::filesystem::remove(folder / last, ignored);

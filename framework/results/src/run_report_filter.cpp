@@ -246,7 +246,7 @@ void add_calibration_section(const RunResult& result, Document& document) {
   std::vector<Block> plots;
   std::string held;
   for (const CalibrationTrack& track : result.calibration) {
-    if (!is_estimated(track)) {
+    if (!is_estimated(result, track)) {
       held += (held.empty() ? "" : ", ") + track.name;
       continue;
     }

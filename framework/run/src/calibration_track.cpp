@@ -4,8 +4,9 @@
 
 namespace viwo {
 
-bool is_estimated(const CalibrationTrack& track) {
-  return !track.sigma.empty() && track.sigma.front() > 0. && track.sigma.back() > 0.;
+bool is_estimated(const RunResult& run, const CalibrationTrack& track) {
+  return !run.updates.empty() && !track.sigma.empty() && track.sigma.front() > 0. &&
+         track.sigma.back() > 0.;
 }
 
 void widen(CalibrationFile& file, const std::vector<CalibrationTrack>& tracks) {

@@ -213,6 +213,9 @@ class FilterRun {
       const bool stepped = step(*estimator_, result_.cause);
       wall_s_ += seconds_since(begin);
       if (!stepped) break;
+      // It has failed in this epoch and will say so: there is no state to be kept.
+      const ImuState& imu = estimator_->filter().imu();
+      if (!imu.p_IinG.allFinite() || !imu.R_GtoI.allFinite()) continue;
       recorder_->record(*estimator_);
       if (healthy_) healthy_->epoch(*estimator_);
       if (result_.epochs == 1) plausibility_.begin_at(result_.pieces.front().begin_ns);

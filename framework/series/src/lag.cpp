@@ -92,9 +92,55 @@ ByLag total_of(const std::array<ByLag, kParts>& parts, int without) {
   return total;
 }
 
-}  // namespace
+/// Means over so many cells.
+std::vector<std::optional<Eigen::Vector3d>> coarse(const RateGrid& grid, std::size_t cells) {
+  std::vector<std::optional<Eigen::Vector3d>> means(grid.size() / cells);
+  for (std::size_t k = 0; k < means.size(); ++k) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t i = k * cells; i < (k + 1) * cells; ++i) sum += grid[i];
+    if (sum.allFinite()) means[k] = sum / static_cast<double>(cells);
+  }
+  return means;
+}
 
-std::optional<Lag> find_lag(const RateGrid& a, const RateGrid& b, double most_s) {
+/// Half a minute to both sides, to a part of a tenth of a second. What turns alike only where most
+/// of the time is left out is no lag.
+std::optional<Lag> far_lag(const RateGrid& a, const RateGrid& b) {
+  constexpr std::size_t kCells = 10;
+  constexpr double kStep_s = kCells * RateGrid::kCell_s, kLeastShare = 0.7;
+  const auto of_a = coarse(a, kCells), of_b = coarse(b, kCells);
+  const auto n = static_cast<int>(std::min(of_a.size(), of_b.size()));
+  const int most = std::min(300, n / 3);
+  ByLag sums(static_cast<std::size_t>(2 * most + 1));
+  for (int i = 0; i < n; ++i) {
+    if (!of_a[static_cast<std::size_t>(i)]) continue;
+    for (int lag = std::max(-most, -i); lag <= std::min(most, n - 1 - i); ++lag) {
+      const auto& there = of_b[static_cast<std::size_t>(i + lag)];
+      if (!there) continue;
+      sums[static_cast<std::size_t>(lag + most)].add(*of_a[static_cast<std::size_t>(i)], *there);
+    }
+  }
+  const Sums& middle = sums[static_cast<std::size_t>(most)];
+  const std::optional<Peak> peak = peak_of(sums);
+  if (!peak) return {};
+  const Sums& there = sums[peak->cell];
+  const double least = kLeastShare * std::max(middle.variance_a(), kLeastRate * kLeastRate);
+  if (there.n * kStep_s < 2. * kFewest_s ||
+      there.n < kLeastShare * (n - std::abs(static_cast<int>(peak->cell) - most)) ||
+      there.variance_a() < least) {
+    return {};
+  }
+  Lag lag;
+  lag.lag_s = (peak->place - most) * kStep_s;
+  lag.sigma_s = kStep_s / std::sqrt(12.);
+  lag.correlation = there.correlation();
+  lag.at_zero = middle.correlation();
+  lag.slope = there.covariance() / there.variance_a();
+  lag.rate_rad_per_s = std::sqrt(there.variance_a());
+  return lag;
+}
+
+std::optional<Lag> near_lag(const RateGrid& a, const RateGrid& b, double most_s) {
   const int most = static_cast<int>(std::lround(most_s / RateGrid::kCell_s));
   const auto parts = sums_by_part(a, b, most);
   const ByLag total = total_of(parts, -1);
@@ -136,22 +182,37 @@ std::optional<Lag> find_lag(const RateGrid& a, const RateGrid& b, double most_s)
   return lag;
 }
 
+}  // namespace
+
+std::optional<Lag> find_lag(const RateGrid& a, const RateGrid& b, double most_s) {
+  constexpr double kAlike = 0.8;
+  const std::optional<Lag> near = near_lag(a, b, most_s);
+  const double r = near ? std::abs(near->correlation) : 0.;
+  if (r >= kAlike) return near;
+  const std::optional<Lag> far = far_lag(a, b);
+  const bool is_found = far && std::abs(far->lag_s) > most_s &&
+                        std::abs(far->correlation) > std::max(kAlike, 1.25 * r);
+  return is_found ? far : near;
+}
+
 std::optional<Eigen::Matrix3d> rotation_between(const RateGrid& a, const RateGrid& b) {
   constexpr std::int64_t kMostLag = 50, kStep = 2;
-  constexpr double kLeastShare = 0.1;
+  constexpr double kLeastShare = 0.1, kAlike = 0.8;
   const auto n = static_cast<std::int64_t>(std::min(a.size(), b.size()));
   std::optional<Eigen::Matrix3d> found;
   double best = 0.;
   for (std::int64_t lag = -kMostLag; lag <= kMostLag; lag += kStep) {
     Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
     Eigen::Vector3d mean_a = Eigen::Vector3d::Zero(), mean_b = Eigen::Vector3d::Zero();
-    double count = 0.;
+    double count = 0., squares_a = 0., squares_b = 0.;
     for (std::int64_t i = kMostLag; i + kMostLag < n; ++i) {
       const auto k = static_cast<std::size_t>(i), j = static_cast<std::size_t>(i + lag);
       if (!a.has(k) || !b.has(j)) continue;
       H += b[j] * a[k].transpose();
       mean_a += a[k];
       mean_b += b[j];
+      squares_a += a[k].squaredNorm();
+      squares_b += b[j].squaredNorm();
       count += 1.;
     }
     if (count < 100.) continue;
@@ -159,7 +220,10 @@ std::optional<Eigen::Matrix3d> rotation_between(const RateGrid& a, const RateGri
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
     if (svd.singularValues().sum() <= best) continue;
     best = svd.singularValues().sum();
-    if (svd.singularValues()[1] < kLeastShare * svd.singularValues()[0]) {
+    const double all = std::sqrt((squares_a / count - (mean_a / count).squaredNorm()) *
+                                 (squares_b / count - (mean_b / count).squaredNorm()));
+    // What has nothing in common is turned into each other by noise.
+    if (best < kAlike * all || svd.singularValues()[1] < kLeastShare * svd.singularValues()[0]) {
       found.reset();
       continue;
     }

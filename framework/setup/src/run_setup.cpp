@@ -274,10 +274,16 @@ void warn_of(const CalibrationStart& start, RunSetup& setup) {
 std::vector<int> drive_signs(const RunSetup& setup) {
   std::vector<int> signs(static_cast<std::size_t>(setup.model->description().n_drive), 1);
   const std::string sensor = setup.routes.sensor_of(Consumer::kWheels);
-  const Node* const scale = setup.resolved.at_path("sensors." + sensor + ".drive_scale");
+  const std::string section = "sensors." + sensor + ".drive_";
+  const Node* const scale = setup.resolved.at_path(section + "scale");
   if (scale == nullptr) return signs;
-  for (std::size_t i = 0; i < std::min(signs.size(), scale->items().size()); ++i) {
-    if (scale->items()[i].scalar().starts_with('-')) signs[i] = -1;
+  const Node* const channel = setup.resolved.at_path(section + "channel");
+  const bool has_order = channel != nullptr && channel->items().size() == scale->items().size();
+  for (std::size_t i = 0; i < scale->items().size(); ++i) {
+    if (!scale->items()[i].scalar().starts_with('-')) continue;
+    // Of the log's channel (J-3), counted from 1; 0 is none.
+    const std::size_t drive = has_order ? std::stoul(channel->items()[i].scalar()) - 1 : i;
+    if (drive < signs.size()) signs[drive] = -1;
   }
   return signs;
 }

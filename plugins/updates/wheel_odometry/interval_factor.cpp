@@ -57,8 +57,11 @@ Linearised IntervalFactor::linearise(const Point& at, const PreintegratedPose& p
       calibration_jacobian(pose.g, out.tilt, interval_.rate.g, p_IinO);
   const States& states = interval_.states;
   const auto n = states.n_intrinsics();
-  out.lasting =
-      (pose.J_g_WI * states.P.bottomRightCorner(n, n)).cwiseProduct(pose.J_g_WI).rowwise().sum();
+  out.lasting.setZero();
+  if (n > 0) {  // held intrinsics are no states
+    const auto& J = pose.J_g_WI;
+    out.lasting = (J * states.P.bottomRightCorner(n, n)).cwiseProduct(J).rowwise().sum();
+  }
   Eigen::Vector3d motion_of_O = planar_part(pose.g, out.R.diagonal() + out.lasting);
   if (motion_of_O[0] == 0.) motion_of_O[0] = before_.turn.expected(pose.duration_s);
   // Free of the noise of this interval.

@@ -8,8 +8,9 @@
 
 namespace viwo {
 
-/// Not held at its prior from one end of the run to the other.
-bool is_estimated(const CalibrationTrack& track);
+/// Whether a filter estimated this parameter: not held from one end of the run to the other, nor
+/// of wheels alone.
+bool is_estimated(const RunResult& run, const CalibrationTrack& track);
 
 /// Sigmas times what the parameter of that name scatters by (CalibrationTrack::scatter): such as
 /// can be believed.
