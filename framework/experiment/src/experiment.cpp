@@ -175,7 +175,6 @@ class Runner {
     for (std::size_t i = 0; i < result_.runs.size(); ++i) {
       ExperimentRun& run = result_.runs[i];
       if (!is_mine(i)) continue;
-      if (options_.keep_runs && !exists(run_folder(run) / "summary.json")) continue;
       std::optional<RunResult> kept = journal_.read(key_of(run));
       if (!kept) continue;
       // A run that failed may do better once its cause is mended.
@@ -183,6 +182,9 @@ class Runner {
         ++failed;
         continue;
       }
+      // What failed before it was a run has left none.
+      const bool wants_folder = options_.keep_runs && kept->status != RunStatus::kFailed;
+      if (wants_folder && !exists(run_folder(run) / "summary.json")) continue;
       run.result = std::move(*kept);
       run.taken_over = true;
       ++taken;

@@ -3,7 +3,6 @@
 
 #include "formats.hpp"
 #include "viwo/config/yaml.hpp"
-#include "viwo/log/text.hpp"
 #include "viwo/math/significant.hpp"
 
 namespace viwo::exports {
