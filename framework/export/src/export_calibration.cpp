@@ -90,10 +90,12 @@ void Lost::cameras() {
   if (!robot_.cameras.empty()) add("cameras (format kalibr)");
 }
 
-void Lost::intrinsics_beside() {
+void Lost::beside() {
   std::string text;
   for (const std::string& name : robot_.beside) text += (text.empty() ? "" : ", ") + name;
   if (!text.empty()) add("what has no place in it: " + text);
+  const CalibrationFile::Entries& reference = robot_.file->reference;
+  if (!reference.empty()) add("the pose and the clock of the reference: " + names_of(reference));
   for (const auto& [name, model] : robot_.file->wheel_sets) {
     add("wheel set '" + name + "' (" + model + ")");
   }
@@ -104,7 +106,7 @@ void Lost::all_but_geometry() {
   mount();
   clocks();
   cameras();
-  intrinsics_beside();
+  beside();
 }
 
 void Lost::radii_but_the_mean(const std::vector<Wheel>& wheels) {

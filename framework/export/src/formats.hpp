@@ -21,7 +21,7 @@ class Lost {
   void mount();
   void clocks();
   void cameras();
-  void intrinsics_beside();
+  void beside();
   /// All of these, of a format that has the geometry of the wheels alone.
   void all_but_geometry();
   /// What differs from wheel to wheel where the format has one number for all.

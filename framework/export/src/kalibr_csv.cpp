@@ -1,4 +1,6 @@
 // The cameras as a camera chain of Kalibr; everything as a table.
+#include <Eigen/Geometry>
+
 #include "formats.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/log/text.hpp"
@@ -17,15 +19,26 @@ Node list(const Numbers& values) {
   return out;
 }
 
-Node camera_node(const CameraView& camera, std::size_t index) {
-  Eigen::Matrix4d T_cam_imu = Eigen::Matrix4d::Identity();
-  T_cam_imu.topLeftCorner<3, 3>() = camera.R_ItoC;
-  T_cam_imu.topRightCorner<3, 1>() = camera.p_IinC;
+Eigen::Isometry3d T_cam_imu_of(const CameraView& camera) {
+  Eigen::Isometry3d T_cam_imu = Eigen::Isometry3d::Identity();
+  T_cam_imu.linear() = camera.R_ItoC;
+  T_cam_imu.translation() = camera.p_IinC;
+  return T_cam_imu;
+}
+
+Node matrix(const Eigen::Isometry3d& T) {
   Node rows = Node::list_of();
-  for (int i = 0; i < 4; ++i) rows.items().push_back(list(T_cam_imu.row(i)));
+  for (int i = 0; i < 4; ++i) rows.items().push_back(list(T.matrix().row(i)));
+  return rows;
+}
+
+/// `before`: the camera before it in the chain; null for the first.
+Node camera_node(const CameraView& camera, std::size_t index, const CameraView* before) {
+  const Eigen::Isometry3d T_cam_imu = T_cam_imu_of(camera);
   const bool is_radtan = camera.distortion == CameraDistortion::kRadtan;
   Node node = Node::empty_map();
-  node.set("T_cam_imu", rows);
+  node.set("T_cam_imu", matrix(T_cam_imu));
+  if (before != nullptr) node.set("T_cn_cnm1", matrix(T_cam_imu * T_cam_imu_of(*before).inverse()));
   node.set("cam_overlaps", Node::list_of());
   node.set("camera_model", Node::scalar_of("pinhole"));
   node.set("distortion_coeffs", list(camera.intrinsics.tail<4>()));
@@ -58,7 +71,8 @@ Exported to_kalibr(const Robot& robot) {
       "up");
   Node root = Node::empty_map();
   for (std::size_t i = 0; i < robot.cameras.size(); ++i) {
-    root.set("cam" + std::to_string(i), camera_node(robot.cameras[i], i));
+    root.set("cam" + std::to_string(i),
+             camera_node(robot.cameras[i], i, i == 0 ? nullptr : &robot.cameras[i - 1]));
   }
   return {head(robot, lost.texts(), "# ") + config::to_yaml(root), lost.texts()};
 }

@@ -69,7 +69,7 @@ std::vector<std::string> lost_in_urdf(const Robot& robot) {
   Lost lost(robot);
   lost.sigmas();
   lost.clocks();
-  lost.intrinsics_beside();
+  lost.beside();
   if (!robot.cameras.empty()) lost.add("intrinsics and distortion of the cameras (format kalibr)");
   if (!robot.mount) lost.add("the mount of the IMU, which this calibration does not have");
   if (!robot.mount && !robot.cameras.empty()) lost.add("the places of the cameras, likewise");

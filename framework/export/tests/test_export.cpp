@@ -264,6 +264,9 @@ TEST(Export, WritesNumbersAsYamlKnowsThem) {
   EXPECT_THAT(text, HasSubstr("timeshift_cam_imu: 1.0e-05\n"));
   EXPECT_THAT(text, HasSubstr("[0.0, 0.0, 0.0, 1.0]"));
   EXPECT_THAT(text, HasSubstr("resolution: [848, 800]"));
+  // Each camera but the first has its place in the one before it.
+  EXPECT_EQ(text.find("T_cn_cnm1"), text.rfind("T_cn_cnm1"));
+  EXPECT_GT(text.find("T_cn_cnm1"), text.find("cam1"));
 }
 
 TEST(Export, AsTableHasEveryNumberWithSigmaAndUnit) {
