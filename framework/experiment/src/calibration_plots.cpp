@@ -7,6 +7,7 @@
 #include "experiment_plots.hpp"
 #include "experiment_statistics.hpp"
 #include "viwo/report/curves.hpp"
+#include "viwo/run/calibration_track.hpp"
 
 namespace viwo::experiment {
 namespace {

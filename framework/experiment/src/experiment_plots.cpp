@@ -10,6 +10,7 @@
 #include "viwo/eval/consistency.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/report/curves.hpp"
+#include "viwo/run/calibration_track.hpp"
 
 namespace viwo::experiment {
 namespace {
