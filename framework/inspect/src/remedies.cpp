@@ -65,6 +65,9 @@ void add_to_present(const config::Node& configuration, Remedy& remedy) {
   for (std::size_t i = 0; i < list.size(); ++i) {
     if (is_turn(remedy)) {
       list[i] /= std::abs(there[i]);
+      // Degrees, counts and revolutions are whole.
+      const double whole = std::round(list[i]);
+      if (std::abs(list[i] - whole) < 1e-4 * whole) list[i] = whole;
     } else {
       list[i] = is_scale(remedy) ? list[i] * there[i] : list[i] + there[i];
     }
