@@ -292,10 +292,11 @@ TEST(InspectNoise, TellsTheRandomWalkWhereTheRestIsLongEnoughAndHowLongThatIs) {
   const auto walks = [](double times) {
     double bias = 0.;
     std::mt19937 random(2);
-    std::normal_distribution<double> draw(0., times * 3e-3 * std::sqrt(0.005));
+    std::normal_distribution<double> draw;
+    const double sigma = times * 3e-3 * std::sqrt(0.005);
     return finding_of(inspected(standing(100.), {.imu =
                                                      [&](ImuSample& s) {
-                                                       bias += draw(random);
+                                                       bias += sigma * draw(random);
                                                        s.accel_m_per_s2[0] += bias;
                                                        return true;
                                                      }}),
