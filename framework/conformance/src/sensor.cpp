@@ -247,7 +247,8 @@ bool is_refused(const Subject& subject, const Node& section) {
 void check_files(const Subject& subject, Findings& findings) {
   const fs::path garbage =
       fs::temp_directory_path() / ("viwo_conformance_" + std::to_string(::getpid()));
-  std::ofstream(garbage, std::ios::binary) << std::string("\x1f\x8b\0not,a\nlog \xff\xfe", 18);
+  constexpr char kGarbage[] = "\x1f\x8b\0not,a\nlog \xff\xfe";
+  std::ofstream(garbage, std::ios::binary).write(kGarbage, sizeof kGarbage);
   int paths = 0;
   for (const ParamSpec& spec : subject.info().params) {
     if (spec.type != ParamType::kPath) continue;

@@ -5,10 +5,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include "in_folder.hpp"
 #include "message_of.hpp"
+#include "peak_memory.hpp"
 #include "simulated.hpp"
 #include "viwo/setup/calibration_file.hpp"
 
@@ -121,14 +121,9 @@ TEST_F(CalibrationFileTest, TakesNoPlaceForCorrelationsThatAreNotThere) {
     entries += "  " + name + ": {estimate: 1, sigma: 1}\n";
     rows += "  " + name + ": []\n";
   }
-  const auto most_kb = [] {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return usage.ru_maxrss;
-  };
-  const long before_kb = most_kb();
+  const long before_mb = testing::peak_mb();
   const std::string error = error_of_file(entries + rows);
-  EXPECT_LT(most_kb() - before_kb, 300'000) << "a matrix of them all has 648 MB";
+  EXPECT_LT(testing::peak_mb() - before_mb, 300) << "a matrix of them all has 648 MB";
   EXPECT_THAT(error, HasSubstr("correlations.e1: expected a list of 1 numbers"));
 }
 

@@ -12,6 +12,7 @@
 #include <sqlite3.h>
 
 #include "cdr_message.hpp"
+#include "peak_memory.hpp"
 #include "support.hpp"
 #include "viwo/image/image_file.hpp"
 
@@ -21,6 +22,7 @@ namespace fs = std::filesystem;
 using eprosima::fastcdr::Cdr;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using testing::peak_mb;
 
 inline constexpr std::int64_t kStart = 1'700'000'000'123'456'789;
 inline constexpr std::int64_t kMs = 1'000'000;

@@ -3,8 +3,6 @@
 #include <fstream>
 #include <thread>
 
-#include <sys/resource.h>
-
 #include "expect_same.hpp"
 #include "ros2_writer.hpp"
 #include "test_fixture.hpp"
@@ -321,11 +319,6 @@ TEST_F(Mcap, HoldsFewImagesAtOnce) {
     }
     out.close();
   }
-  const auto peak_mb = [] {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return usage.ru_maxrss / 1024;
-  };
   const auto before_mb = peak_mb();
   const auto images = play_only<ImageSample>(section("image_topics: [/cam0]", "a.mcap"));
   ASSERT_EQ(images.size(), static_cast<std::size_t>(kImages));

@@ -1,7 +1,6 @@
 // Files in MCAP that say what cannot be: clear errors, in little memory.
 #include <random>
 
-#include <sys/resource.h>
 #include <zstd.h>
 
 #include "mcap_records.hpp"
@@ -77,11 +76,6 @@ class McapBroken : public Ros2Bag {
   std::string error(const Buffer& records, const std::string& rest = "imu_topic: /imu0") const {
     write(records);
     return error_of(section(rest, "a.mcap"));
-  }
-  static long peak_mb() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return usage.ru_maxrss / 1024;
   }
 };
 

@@ -73,7 +73,8 @@ HuskyRun run_husky(const std::filesystem::path& data, std::vector<std::string> a
       {VIWO_TEST_PLUGIN_DIR},
       [&](const PluginInfo&, LogLevel, std::string_view text) { frames.read(std::string(text)); });
   auto all = read_husky(registry, data, assignments);
-  const auto fixes = collect(all).recorded.of<GnssSample>();
+  const auto recorded = collect(all).recorded;
+  const auto fixes = recorded.of<GnssSample>();
   std::vector<GnssSample> left_out;
   for (std::size_t i = 1; i < fixes.size(); i += 2) left_out.push_back(fixes[i]);
   assignments.push_back("sensors.bag0.gnss_stride=2");
