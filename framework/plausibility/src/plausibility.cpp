@@ -255,6 +255,9 @@ Plausibility::~Plausibility() = default;
 
 void Plausibility::add(const std::string& sensor, SampleView sample) {
   if (!checks_) return;
+  // The estimator refuses such a one; here times would overflow.
+  const SampleExtent extent = sample.extent();
+  if (!is_stamp(extent.t_ns) || !is_stamp(extent.begin_ns) || !is_stamp(extent.end_ns)) return;
   if (const auto* imu = sample.get_if<ImuSample>(); imu != nullptr && sensor == checks_->imu_name) {
     checks_->imu.add(*imu, checks_->moves);
     for (auto& wheels : checks_->wheels) wheels.twist.add_imu(*imu);

@@ -279,7 +279,7 @@ TEST(LandmarkRows, GateIsTheDenseChiSquare) {
     seen.window.set_poses();
     LandmarkRows rows = rows_for(seen, 1.);
     ASSERT_TRUE(rows.linearize(seen.sights, seen.window, seen.landmark));
-    const Eigen::MatrixXd H = seen.dense(rows);
+    const Eigen::MatrixXd H = seen.dense(rows).leftCols(n);  // of which the landmark is a part now
     const Eigen::MatrixXd S =
         H * A * H.transpose() + Eigen::MatrixXd::Identity(rows.rows(), rows.rows());
     const Eigen::VectorXd r = rows.residual();
