@@ -71,5 +71,16 @@ TEST(FilterCalibration, FindsEveryParameterOfARobotThatIsNotAsConfigured) {
   expect_found(errors_of(testing::paper_runs("bad_init_calib_on", kSeeds, {})), 1. - 0.01 / 20.);
 }
 
+/// Builds with assertions see that the matrices of wheel_odometry fit, too.
+TEST(FilterCalibration, IntrinsicsMayBeHeld) {
+  auto setup = testing::run_setup("runs/viwo_swerve.yaml", {"sensors.simulator0.duration_s=5",
+                                                            "wheels.calibrate_intrinsics=false",
+                                                            "estimator.calibration_error_scale=0"});
+  const RunResult result = run(setup, collect(setup));
+  EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
+  ASSERT_TRUE(result.accuracy);
+  EXPECT_LT(result.accuracy->ate_m, 0.01);
+}
+
 }  // namespace
 }  // namespace viwo
