@@ -35,12 +35,6 @@ void check_header(std::span<const std::uint8_t> bytes, const std::string& name) 
                    std::to_string(kMostPixels >> 20U) + " Mi are read");
 }
 
-bool begins(std::span<const std::uint8_t> bytes, std::string_view magic) {
-  return bytes.size() >= magic.size() &&
-         std::equal(magic.begin(), magic.end(), bytes.begin(),
-                    [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
-}
-
 /// OpenCV decodes what it finds of a PNG that was cut short and leaves the rest black: look at the
 /// end.
 bool lacks_its_end(std::span<const std::uint8_t> png) {

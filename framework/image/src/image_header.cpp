@@ -10,12 +10,6 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-bool begins(Bytes bytes, std::string_view magic) {
-  return bytes.size() >= magic.size() &&
-         std::equal(magic.begin(), magic.end(), bytes.begin(),
-                    [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
-}
-
 std::uint64_t big_endian(Bytes bytes) {
   std::uint64_t value = 0;
   for (const std::uint8_t byte : bytes) value = value << 8U | byte;
@@ -90,6 +84,12 @@ std::optional<ImageSize> netpbm_size(Bytes bytes) {
 }
 
 }  // namespace
+
+bool begins(Bytes bytes, std::string_view magic) {
+  return bytes.size() >= magic.size() &&
+         std::equal(magic.begin(), magic.end(), bytes.begin(),
+                    [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
+}
 
 std::optional<ImageSize> image_size(Bytes bytes) {
   if (begins(bytes, "\x89PNG\r\n\x1a\n")) return png_size(bytes);

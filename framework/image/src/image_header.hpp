@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 
 namespace viwo {
 
@@ -11,6 +12,9 @@ struct ImageSize {
   std::uint64_t width_px = 0;
   std::uint64_t height_px = 0;
 };
+
+/// Whether a file begins as its kind does.
+bool begins(std::span<const std::uint8_t> bytes, std::string_view magic);
 
 /// Of a PNG, JPEG, BMP, PGM or PPM; nothing for other formats, and for a header that is broken.
 std::optional<ImageSize> image_size(std::span<const std::uint8_t> bytes);

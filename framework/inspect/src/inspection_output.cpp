@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "remedies.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/yaml.hpp"
@@ -66,13 +67,11 @@ std::vector<std::pair<Remedy, std::string>> remedies_of(const Inspection& inspec
 
 /// Where channels have another order already, or are not those of the joints.
 bool is_for_hands(const config::Node& configuration, const Remedy& remedy) {
-  const std::size_t dot = remedy.key.rfind('.') + 1;
-  const std::string joint = remedy.key.substr(dot, 5);  // drive or steer
-  const auto* channels = configuration.at_path(remedy.key.substr(0, dot) + joint + "_channel");
-  const bool has_order = channels != nullptr && !channels->items().empty();
+  const std::size_t n = channels_of(configuration, remedy).size();
+  const bool has_order = n > 0;
   if (remedy.key.ends_with("_channel")) return has_order;
   const config::Node value = config::parse(remedy.value, "--fix");
-  return has_order && value.is_list() && value.items().size() != channels->items().size();
+  return has_order && value.is_list() && value.items().size() != n;
 }
 
 }  // namespace

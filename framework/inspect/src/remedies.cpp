@@ -12,9 +12,9 @@
 namespace viwo::inspect {
 namespace {
 
-/// "sensors.wheels0.drive_" of "sensors.wheels0.drive_scale".
+/// "sensors.wheels0.drive" of "sensors.wheels0.drive_scale".
 std::string joint_of(const Remedy& remedy) {
-  return remedy.key.substr(0, remedy.key.rfind('_') + 1);
+  return remedy.key.substr(0, remedy.key.find('_', remedy.key.rfind('.')));
 }
 
 std::vector<double> numbers(const config::Node* list) {
@@ -41,8 +41,7 @@ bool is_turn(const Remedy& remedy) { return remedy.key.ends_with("_turn"); }
 /// of the log, of which several may make a joint, or none.
 void give_to_channels(const config::Node& configuration, Remedy& remedy) {
   if (!is_scale(remedy) && !is_shift(remedy) && !is_turn(remedy)) return;
-  const std::string joint = remedy.key.substr(0, remedy.key.find('_', remedy.key.rfind('.')));
-  const std::vector<double> channels = numbers(configuration.at_path(joint + "_channel"));
+  const std::vector<double> channels = channels_of(configuration, remedy);
   if (channels.empty()) return;
   const std::vector<double> of_joints = numbers(remedy);
   std::vector<double> list;
@@ -58,7 +57,7 @@ void give_to_channels(const config::Node& configuration, Remedy& remedy) {
 /// multiply, shifts add, turns are those of a reading before its scale (J-1).
 void add_to_present(const config::Node& configuration, Remedy& remedy) {
   if (!is_scale(remedy) && !is_shift(remedy) && !is_turn(remedy)) return;
-  const std::string key = is_turn(remedy) ? joint_of(remedy) + "scale" : remedy.key;
+  const std::string key = is_turn(remedy) ? joint_of(remedy) + "_scale" : remedy.key;
   const std::vector<double> there = numbers(configuration.at_path(key));
   std::vector<double> list = numbers(remedy);
   if (there.empty() || list.size() != there.size()) return;
@@ -107,11 +106,14 @@ bool is_other_unit(const config::Node& configuration, const Remedy& remedy) {
 
 }  // namespace
 
+std::vector<double> channels_of(const config::Node& configuration, const Remedy& remedy) {
+  return numbers(configuration.at_path(joint_of(remedy) + "_channel"));
+}
+
 void put_into(const config::Node& configuration, std::vector<Remedy>& remedies) {
   std::vector<Remedy> with_them;
   for (Remedy& remedy : remedies) {
-    const std::string joint = joint_of(remedy),
-                      section = remedy.key.substr(0, joint.rfind('.') + 1);
+    const std::string section = remedy.key.substr(0, remedy.key.rfind('.') + 1);
     const bool is_drive = remedy.key.ends_with(".drive_scale");
     const bool is_steer = remedy.key.ends_with(".steer_scale");
     if (is_drive || is_steer) {  // by joint of the model, as its key is

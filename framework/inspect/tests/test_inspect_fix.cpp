@@ -25,6 +25,12 @@ RunSetup wrong() {
                                    "wheels.rpy_ItoO_rad=[3.14159265, 0, 0]"});
 }
 
+/// Read again as it would be written.
+RunSetup fixed(const RunSetup& setup, const Inspection& found) {
+  const std::string text = fixed_configuration(setup, found, testing::registry());
+  return read_run(config::parse(text, "fixed.yaml"), testing::registry());
+}
+
 TEST_F(FixedConfiguration, HasNoFindingsAnyMore) {
   RunSetup setup = wrong();
   EXPECT_TRUE(inspect(setup).has_faults());
@@ -32,8 +38,7 @@ TEST_F(FixedConfiguration, HasNoFindingsAnyMore) {
   constexpr int kRounds = 2;
   for (int round = 0; round < kRounds; ++round) {
     setup = read_run(setup.resolved, testing::registry());
-    const std::string text = fixed_configuration(setup, inspect(setup), testing::registry());
-    setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+    setup = fixed(setup, inspect(setup));
   }
   EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
   EXPECT_NEAR(setup.filter->wheels.front().prior.wheels.t_OtoI_s, 0.005, 2e-3);
@@ -64,8 +69,7 @@ TEST_F(FixedConfiguration, MendsTheJointsOfALog) {
   constexpr int kRounds = 2;  // the sign hides the offset
   for (int round = 0; round < kRounds && has_keys; ++round) {
     setup = read_run(setup.resolved, testing::registry());
-    const std::string text = fixed_configuration(setup, inspect(setup), testing::registry());
-    setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+    setup = fixed(setup, inspect(setup));
   }
   const Inspection mended = inspect(setup);
   if (!has_keys) GTEST_SKIP() << "sensors have no key drive_scale";
@@ -94,8 +98,7 @@ TEST_F(FixedConfiguration, GivesScalesToTheChannelsOfTheLog) {
       remedy_of(finding_of(inspect(other), "wheels0", "order"), "sensors.wheels0.drive_scale"),
       "[-1, 1.01, 1, 1]");
   setup = read_run(setup.resolved, testing::registry());
-  const std::string text = fixed_configuration(setup, found, testing::registry());
-  setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  setup = fixed(setup, found);
   EXPECT_EQ(drive_signs(setup), (std::vector<int>{1, -1, 1, 1}));
   EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
 }
@@ -143,8 +146,7 @@ TEST_F(FixedConfiguration, GivesATurnInTheUnitOfTheReading) {
   const Inspection found = inspect(setup);
   EXPECT_EQ(remedy_of(finding_of(found, "wheels0", "turn"), "sensors.wheels0.drive_turn"),
             "[360, 360, 360, 360]");
-  const std::string text = fixed_configuration(setup, found, testing::registry());
-  setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  setup = fixed(setup, found);
   EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
 }
 
@@ -186,8 +188,7 @@ TEST_F(FixedConfiguration, WritesTheUnitsOfAnImuThatHasKeysForThem) {
   const Inspection found = inspect(setup);
   EXPECT_EQ(remedy_of(finding_of(found, "imu0", "gravity"), "sensors.imu0.accel_unit"), "g");
   EXPECT_EQ(remedy_of(finding_of(found, "imu0", "rate"), "sensors.imu0.gyro_unit"), "deg");
-  const std::string text = fixed_configuration(setup, found, testing::registry());
-  setup = read_run(config::parse(text, "fixed.yaml"), testing::registry());
+  setup = fixed(setup, found);
   EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
 }
 

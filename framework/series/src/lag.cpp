@@ -12,6 +12,7 @@ namespace {
 constexpr int kParts = 10;
 constexpr double kLeastRate = 0.03;  ///< rad/s, standard deviation: what turns less tells no time
 constexpr double kFewest_s = 5.;     ///< of cells that both have
+constexpr double kAlike = 0.8;       ///< correlation of two that say the same
 
 /// Sums over pairs of cells.
 struct Sums {
@@ -185,7 +186,6 @@ std::optional<Lag> near_lag(const RateGrid& a, const RateGrid& b, double most_s)
 }  // namespace
 
 std::optional<Lag> find_lag(const RateGrid& a, const RateGrid& b, double most_s) {
-  constexpr double kAlike = 0.8;
   const std::optional<Lag> near = near_lag(a, b, most_s);
   const double r = near ? std::abs(near->correlation) : 0.;
   if (r >= kAlike) return near;
@@ -197,7 +197,7 @@ std::optional<Lag> find_lag(const RateGrid& a, const RateGrid& b, double most_s)
 
 std::optional<Eigen::Matrix3d> rotation_between(const RateGrid& a, const RateGrid& b) {
   constexpr std::int64_t kMostLag = 50, kStep = 2;
-  constexpr double kLeastShare = 0.1, kAlike = 0.8;
+  constexpr double kLeastShare = 0.1;
   const auto n = static_cast<std::int64_t>(std::min(a.size(), b.size()));
   std::optional<Eigen::Matrix3d> found;
   double best = 0.;
