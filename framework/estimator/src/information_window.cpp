@@ -39,7 +39,7 @@ InformationWindow::InformationWindow(int first_column, const Eigen::VectorXd& si
   }
   measured_.setZero(sigma_.size(), sigma_.size());
   bins_.assign(bins, measured_);
-  solver_.compute(measured_);
+  if (!columns_.empty()) solver_.compute(measured_);  // of which none may be asked
 }
 
 bool InformationWindow::measure(const ResidualFactor& factor, const Eigen::MatrixXd& P) {

@@ -37,10 +37,17 @@ bool StreamWatch::is_set_back(std::int64_t t_ns) {
   return n_behind_ > kMostBehind;
 }
 
+std::optional<std::int64_t> StreamWatch::common_time_ns(std::int64_t stamp_ns) const {
+  std::int64_t t_ns = 0;
+  if (__builtin_add_overflow(stamp_ns, offset_ns_, &t_ns) || !is_stamp(t_ns)) return std::nullopt;
+  return t_ns;
+}
+
 void StreamWatch::add(std::int64_t stamp_ns, int number, std::int64_t now_ns) {
   if (!is_stamp(stamp_ns)) return;
   // A first stamp that the next one contradicts says nothing of the clock.
-  if (n_samples_ == 1 && std::abs(now_ns - stamp_ns - offset_ns_) > kLongNs) {
+  if (const auto t_ns = common_time_ns(stamp_ns);
+      n_samples_ == 1 && (!t_ns || std::abs(now_ns - *t_ns) > kLongNs)) {
     has_begun_ = false;
     offset_ns_ = 0;
     jump_ = StampJump{1.};
@@ -52,15 +59,17 @@ void StreamWatch::add(std::int64_t stamp_ns, int number, std::int64_t now_ns) {
     first_offset_ns_ = offset_ns_;
   }
   ++n_samples_;
-  std::int64_t t_ns = stamp_ns + offset_ns_;
+  const std::optional<std::int64_t> stamped_ns = common_time_ns(stamp_ns);
+  if (!stamped_ns) return;
+  std::int64_t t_ns = *stamped_ns;
   if (has_begun_ && t_ns <= newest_ns_) {
     if (!is_set_back(t_ns)) {
       // Of another camera at the same instant.
       if (n_behind_ == 0) raise(channel(number).newest_ns, t_ns);
       return;
     }
-    offset_ns_ += now_ns + 1 - t_ns;
     t_ns = now_ns + 1;
+    offset_ns_ = t_ns - stamp_ns;
   }
   n_behind_ = 0;
   if (!jump_.is_believed(t_ns)) {

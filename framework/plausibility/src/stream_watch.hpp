@@ -50,6 +50,8 @@ class StreamWatch {
     std::int64_t begin_ns = 0, length_ns = 0;
   };
   std::int64_t longest_spacing_ns() const;
+  /// None where that is no time of any clock.
+  std::optional<std::int64_t> common_time_ns(std::int64_t stamp_ns) const;
   void find_silent_channels(std::int64_t now_ns, std::int64_t zero_ns, std::int64_t longest_ns,
                             Findings& out) const;
   bool is_set_back(std::int64_t t_ns);

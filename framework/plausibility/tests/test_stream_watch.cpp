@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "stream_watch.hpp"
+#include "viwo/api/stamp_order.hpp"
 #include "viwo/math/time_text.hpp"
 
 namespace viwo {
@@ -160,6 +161,18 @@ TEST(StreamWatch, IsNotDisturbedByOneStampFarAhead) {
   broken.give(0, 1000, 5);
   for (const std::int64_t stamp : {INT64_MAX, INT64_MIN}) broken.watch.add(stamp, 0, kStart);
   EXPECT_THAT(broken.at_end(1000), IsEmpty());
+}
+
+TEST(StreamWatch, DoesNotCountBeyondWhatAClockMayShow) {
+  StreamWatch watch{"imu0", 0.2};
+  std::int64_t now_ns = -kMaxStampNs;
+  for (int i = 0; i < 200; ++i, now_ns += 5 * kMs) {
+    watch.add(kMaxStampNs - kMs * (1000 - 5 * i), 0, now_ns);  // a clock 250 years ahead
+  }
+  for (int i = 0; i < 3; ++i) watch.add(-kMaxStampNs + kMs * 5 * i, 0, now_ns);
+  Findings found;
+  watch.findings(now_ns, -kMaxStampNs, "recording", found);
+  EXPECT_THAT(Bench::texts(found), IsEmpty());
 }
 
 TEST(StreamWatch, FollowsAClockOfAnotherTimeAndOneThatIsSetBack) {
