@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "viwo/estimator/start_search.hpp"
+#include "viwo/math/extent.hpp"
 #include "viwo/math/stamp.hpp"
 
 namespace viwo {
@@ -22,15 +23,6 @@ constexpr std::size_t kFewestToForget = 64;
 /// A sample of a channel beyond has a number that is broken: the order of its stamps is not
 /// watched.
 constexpr std::size_t kMostChannels = 64;
-
-/// Why no sample can have these times; nullptr: one can.
-const char* fault_of(const SampleExtent& extent) {
-  if (!is_stamp(extent.t_ns) || !is_stamp(extent.begin_ns) || !is_stamp(extent.end_ns)) {
-    return "stamp that is none";
-  }
-  const bool is_within = extent.begin_ns <= extent.t_ns && extent.t_ns <= extent.end_ns;
-  return is_within ? nullptr : "stamp outside of the time that it stands for";
-}
 
 }  // namespace
 
@@ -74,11 +66,7 @@ const char* Stream::objection(const Arrival& arrival, const StateBlocks& blocks,
   }
   const SampleExtent& extent = arrival.extent;
   if (const auto* last = last_of(arrival.channel); last != nullptr && *last) {
-    const SampleExtent& before = (*last)->extent;
-    if (extent.begin_ns < before.end_ns || extent.t_ns <= before.t_ns) {
-      return extent.begin_ns < extent.end_ns ? "begins before the end of the last"
-                                             : "stamp not after the last";
-    }
+    if (const char* why = fault_of(extent, (*last)->extent)) return why;
   }
   if (last_ && last_->channel != arrival.channel) {  // stamps of two clocks
     const std::int64_t last_ns = last_->extent.t_ns + offset_ns(last_->channel, blocks);

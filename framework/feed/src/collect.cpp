@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "channels.hpp"
+#include "sample_gate.hpp"
 #include "viwo/feed/inputs.hpp"
 #include "viwo/feed/run_data.hpp"
 #include "viwo/math/arrays.hpp"
@@ -57,7 +58,7 @@ class Collector {
     bool is_wanted = false;
     setup_.routes.dispatch(sensor, sample.type(), [&](const Route& route) {
       if (route.consumer == Consumer::kReferencePoses) {
-        add_reference(*sample.get_if<PoseSample>());
+        if (gate_.accept(sensor, sample)) add_reference(*sample.get_if<PoseSample>());
       } else if (route.consumer == Consumer::kTrueCalibration) {
         const auto& truth = *sample.get_if<CalibrationSample>();
         data_.calibration[truth.name] = truth.value;
@@ -65,8 +66,13 @@ class Collector {
         is_wanted = true;
       }
     });
-    if (is_wanted) data_.recorded.add(sensor, sample);
+    // What goes to the estimator is looked at there.
+    const bool is_measured = setup_.filter && sample.get_if<StateSample>() == nullptr;
+    if (is_wanted && (is_measured || gate_.accept(sensor, sample))) {
+      data_.recorded.add(sensor, sample);
+    }
   }
+  void report() const { gate_.append_to(data_.rejections); }
 
  private:
   void add_reference(const PoseSample& sample) {
@@ -77,6 +83,7 @@ class Collector {
 
   const RunSetup& setup_;
   RunData& data_;
+  SampleGate gate_;
 };
 
 /// Whether a sensor may be read while the filter runs: what else than streams it gives, such as
@@ -164,6 +171,7 @@ RunData collect(RunSetup& setup, LiveSensors live) {
       }
     });
   }
+  collector.report();
   require_channels(setup, data.recorded);
   if (setup.filter) {
     require_what_the_filter_needs(setup, data);

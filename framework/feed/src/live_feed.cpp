@@ -25,6 +25,7 @@
 #include "channels.hpp"
 #include "image_arrivals.hpp"
 #include "live_input.hpp"
+#include "sample_gate.hpp"
 #include "viwo/feed/bounded_series.hpp"
 #include "viwo/feed/estimate_sample.hpp"
 #include "viwo/feed/feed.hpp"
@@ -138,6 +139,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
       return std::find(left.begin(), left.end(), name) == left.end();
     };
     report.reference = reference_.points();
+    gate_.append_to(report.rejections);
     if (!has_imu_) report.cause = kNothingCame;
     for (const Worker& worker : workers_) {
       if (!has_ended(worker.stream.name)) continue;
@@ -323,7 +325,9 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
           estimator.add(route.stream, sample);
           break;
         case Consumer::kReferencePoses:
-          reference_.add(stamped_pose(*sample.get_if<PoseSample>()));
+          if (gate_.accept(sensor, sample)) {
+            reference_.add(stamped_pose(*sample.get_if<PoseSample>()));
+          }
           break;
         default:
           break;
@@ -339,6 +343,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   bool has_imu_ = false;
   std::set<std::string> checked_;  ///< sensors whose encoder channels have been looked at
   BoundedSeries<StampedPose> reference_{kMostReference};
+  SampleGate gate_;  ///< of the reference
   ImageArrivals arrivals_of_images_;
   TimeStatistics latency_ms_;
   std::optional<Clock::time_point> interrupted_at_;

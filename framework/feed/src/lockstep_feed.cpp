@@ -13,6 +13,7 @@
 #include "channels.hpp"
 #include "in_order.hpp"
 #include "played_sensor.hpp"
+#include "sample_gate.hpp"
 #include "viwo/feed/estimate_sample.hpp"
 #include "viwo/feed/feed.hpp"
 #include "viwo/math/trajectory.hpp"
@@ -59,6 +60,7 @@ class LockstepFeed final : public Feed {
     stop();
     streams_->finish(report);
     report.reference = reference_;
+    gate_.append_to(report.rejections);
     if (!has_imu_) report.cause = kNothingCame;
     for (const auto& played : played_) {
       std::vector<RejectionCount> all;
@@ -117,7 +119,9 @@ class LockstepFeed final : public Feed {
     has_imu_ = has_imu_ || sample.get_if<ImuSample>() != nullptr;
     setup_.routes.dispatch(sensor, sample.type(), [&](const Route& route) {
       if (route.consumer != Consumer::kReferencePoses) return;
-      reference_.push_back(stamped_pose(*sample.get_if<PoseSample>()));
+      if (gate_.accept(sensor, sample)) {
+        reference_.push_back(stamped_pose(*sample.get_if<PoseSample>()));
+      }
     });
     const EstimatorRoutes& routes = routes_of(sensor, sample.type());
     if (routes.routes.empty()) return;
@@ -140,6 +144,7 @@ class LockstepFeed final : public Feed {
   std::deque<Known> known_;
   std::set<std::string> checked_;  ///< sensors whose encoder channels have been looked at
   Trajectory reference_;
+  SampleGate gate_;  ///< of the reference
   bool has_imu_ = false;
 };
 

@@ -11,8 +11,8 @@
 #include "stereo_check.hpp"
 #include "stream_watch.hpp"
 #include "twist_check.hpp"
+#include "viwo/math/extent.hpp"
 #include "viwo/math/significant.hpp"
-#include "viwo/math/stamp.hpp"
 #include "viwo/plausibility/periods.hpp"
 
 namespace viwo {
@@ -256,8 +256,7 @@ Plausibility::~Plausibility() = default;
 void Plausibility::add(const std::string& sensor, SampleView sample) {
   if (!checks_) return;
   // The estimator refuses such a one; here times would overflow.
-  const SampleExtent extent = sample.extent();
-  if (!is_stamp(extent.t_ns) || !is_stamp(extent.begin_ns) || !is_stamp(extent.end_ns)) return;
+  if (fault_of(sample.extent()) != nullptr) return;
   if (const auto* imu = sample.get_if<ImuSample>(); imu != nullptr && sensor == checks_->imu_name) {
     checks_->imu.add(*imu, checks_->moves);
     for (auto& wheels : checks_->wheels) wheels.twist.add_imu(*imu);

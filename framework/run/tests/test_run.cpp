@@ -1,4 +1,6 @@
 // One run: configuration errors, dead reckoning of a simulated robot, consistency, files.
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 
@@ -6,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "message_of.hpp"
+#include "sensors_in_memory.hpp"
 #include "simulated.hpp"
 #include "viwo/eval/consistency.hpp"
 #include "viwo/log/tum.hpp"
@@ -16,6 +19,7 @@ namespace viwo {
 namespace {
 
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using testing::error_of;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -237,6 +241,41 @@ TEST(Run, OfWheelsThatAGyroContradictsIsDoubtful) {
               Contains(HasSubstr("turns opposite to")));
   EXPECT_THAT(doubts("sensors.simulator0.drive_scale=[7, 7]"),
               Contains(HasSubstr("unit or scale of the drives")));
+}
+
+/// Of a sensor of others: those of viwo look at what they read themselves.
+TEST(Run, CountsWhatASensorMustNotGive) {
+  RunSetup setup = read_run(simulated("circle"), registry(), 1);
+  const RunData whole = collect(setup);
+  std::vector<Measurement> all;
+  for (const EncoderSample& wheels : whole.wheels()) {
+    all.emplace_back(wheels);
+    if (all.size() % 500 == 0) all.emplace_back(wheels);
+  }
+  for (const StampedPose& pose : whole.reference) {
+    const Eigen::Vector3d& p = pose.p_BinW;
+    const Eigen::Vector4d& q = pose.q_BtoW.coeffs();
+    all.emplace_back(PoseSample{pose.t_ns, {p.x(), p.y(), p.z()}, {q[0], q[1], q[2], q[3]}});
+  }
+  all.emplace_back(PoseSample{whole.reference.back().t_ns + 1, {}, {0., 0., 0., 0.}});
+  all.emplace_back(PoseSample{whole.reference.back().t_ns + 2, {0., 0., std::nan("")}});
+  all.emplace_back(PoseSample{INT64_MAX, {}});
+  all.emplace_back(PoseSample{whole.reference[7].t_ns, {5., 5., 0.}});
+  const auto sensor =
+      std::make_shared<testing::InMemory>(sample_types<EncoderSample, PoseSample>(), all);
+  testing::set_sensors(setup, {{"robot", sensor}});
+  const RunResult result = run_odometry(setup, collect(setup));
+  ASSERT_EQ(result.status, RunStatus::kOk) << result.cause;
+  EXPECT_EQ(result.accuracy->end_m, run_odometry(setup, whole).accuracy->end_m);
+  std::vector<std::string> told;
+  for (const auto& [name, rejection] : result.rejections) {
+    told.push_back(name + " " + rejection.reason + " " + std::to_string(rejection.count));
+  }
+  EXPECT_THAT(told, ElementsAre("robot encoders: begins before the end of the last 4",
+                                "robot poses: quaternion that is not of unit norm 1",
+                                "robot poses: value that is not finite 1",
+                                "robot poses: stamp that is none 1",
+                                "robot poses: stamp not after the last 1"));
 }
 
 TEST(Output, HasTheNamesThatScriptsRelyOn) {
