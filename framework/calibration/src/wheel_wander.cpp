@@ -18,7 +18,6 @@ std::vector<ParityInformation> pieces_of(const CalibrationRecording& recording,
   options.parity = true;
   Preintegrator preintegrator(recording.setup.model, options);
   preintegrator.set_intrinsics(x_WI);
-  preintegrator.set_weights_at(x_WI);
   const Intrinsics sigma = recording.setup.model->prior_sigma();
   const auto& wheels = recording.data.wheels();
   const auto piece_ns = static_cast<std::int64_t>(1e9 * kPiece_s);
@@ -65,7 +64,7 @@ WheelWander find_wander(const CalibrationSetup& setup, const Intrinsics& x_WI) {
       for (std::size_t i = 0; i + k < pieces.size(); ++i) {
         const ParityInformation& now = pieces[i];
         const ParityInformation& later = pieces[i + k];
-        if (now.dof == 0 || later.dof == 0) continue;
+        if (now.dof == 0. || later.dof == 0.) continue;
         products[k] += now.eta.dot(later.eta);
         expected[k] += now.Lambda.cwiseProduct(later.Lambda).sum();
         ++pairs[k];

@@ -22,7 +22,7 @@ Measured measure(const WheelModel& model, const std::vector<EncoderSample>& samp
   PreintegrationOptions options;
   options.twist.noise_weighted = true;
   Preintegrator preintegrator(std::make_shared<const WheelModel>(model), options);
-  preintegrator.set_intrinsics(x_WI);
+  preintegrator.move_intrinsics(x_WI);
   PreintegratedPose pose;
   Measured out;
   const std::int64_t begin_ns = samples.front().begin_ns, end_ns = samples.back().end_ns;

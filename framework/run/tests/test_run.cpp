@@ -156,6 +156,33 @@ TEST(Run, IsConsistentWithItsNoiseAndWithTheUncertaintyOfItsIntrinsics) {
             bounds.high);
 }
 
+/// The rows are weighed by the calibration, wherever the zeros were thought to be.
+TEST(Run, OfACalibrationIsThatOfTheSameNominalValues) {
+  const std::string zeros = "steer_offset_rad=[0, 1.5, 1.5, -1.5]";
+  const std::vector<std::string> robot{"odometry.twist=noise_weighted",
+                                       "sensors.simulator0.robot." + zeros};
+  const auto end_m = [&](const std::string& more) {
+    auto all = robot;
+    all.push_back(more);
+    return testing::run(simulated("icr_sweep", all)).accuracy->end_m;
+  };
+  const auto folder = fresh_folder("far_zeros");
+  std::filesystem::create_directories(folder);
+  const auto file = folder / "calibration.yaml";
+  const auto model = read_run(simulated("icr_sweep", robot), registry()).model;
+  std::ofstream out(file);
+  out << "model: four_wis_wid\ntwist: noise_weighted\nintrinsics:\n";
+  out.precision(17);
+  for (int i = 0; i < model->n_intrinsics(); ++i) {
+    const std::string& name = model->description().intrinsics[static_cast<std::size_t>(i)].name;
+    const bool is_zero = name.starts_with("delta_o") && name != "delta_o1";
+    const double value = is_zero ? (name == "delta_o4" ? -1.5 : 1.5) : model->nominal()[i];
+    out << "  " << name << ": {estimate: " << value << ", sigma: 1.0e-6}\n";
+  }
+  out.close();
+  EXPECT_NEAR(end_m("kinematics.calibration=" + file.string()), end_m("kinematics." + zeros), 1e-9);
+}
+
 TEST(Run, GivesTheSameBitsForTheSameSeedAndOthersForAnother) {
   const auto configuration = simulated("figure_eight");
   const auto first = testing::run(configuration, 3), second = testing::run(configuration, 3),

@@ -93,6 +93,7 @@ class Window {
   /// are. Why the measurements cannot be used, or nothing.
   std::string_view measure() {
     const VectorXd none = VectorXd::Zero(kIntrinsics + options_.wheels.wheels.x_WI.size());
+    preintegrator_.set_intrinsics(options_.wheels.wheels.x_WI);
     if (!integrate(none)) return kUnusableWheels;
     const double T = span_s_;
     covariance_ = MatrixXd::Zero(none.size(), none.size());
@@ -190,7 +191,7 @@ class Window {
 
   bool integrate(const VectorXd& offset) {
     const WheelsView& wheels = options_.wheels.wheels;
-    preintegrator_.set_intrinsics(wheels.x_WI + offset.tail(wheels.x_WI.size()));
+    preintegrator_.move_intrinsics(wheels.x_WI + offset.tail(wheels.x_WI.size()));
     const std::int64_t clock_ns = to_ns(wheels.t_OtoI_s + offset[kClock]);
     const std::int64_t first_ns = imu_[first_].t_ns - clock_ns;
     const std::int64_t last_ns = imu_[last_].t_ns - clock_ns;

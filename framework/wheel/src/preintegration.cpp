@@ -140,7 +140,8 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   // A hole between cells: the mean of its neighbours, a piece of its own.
   const auto bridge_hole = [&](std::size_t next, std::int64_t until_ns) {
     const double dt = seconds_between(reached_ns, until_ns);
-    add_piece(blend(samples[next - 1], samples[next], 0.5), dt, {}, out);
+    // Its parity says nothing that those do not.
+    add_piece(blend(samples[next - 1], samples[next], 0.5), dt, {.parity = 0.}, out);
     out.bridged_s += dt;
     --out.samples;
     previous_own = 0.;
@@ -166,7 +167,10 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
       double share = 0.;
       const EncoderSample piece = cut(samples, k, from_ns, to_ns, share);
       const double own = 1. + share;
-      add_piece(piece, dt, {own * own + share * share, -share * previous_own}, out);
+      const double variance = own * own + share * share;
+      // It counts in each of its intervals by its part of the cell.
+      const double cell = seconds_between(sample.begin_ns, sample.end_ns);
+      add_piece(piece, dt, {variance, -share * previous_own, dt / cell}, out);
       previous_own = own;
       // A sample that is cut counts where its stamp is.
       if (sample.t_ns < from_ns || sample.t_ns >= to_ns) --out.samples;
@@ -223,10 +227,10 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
         return;
       }
     }
-    // A cut sample appears in two intervals: its parity counts in each by its share of the cell.
-    const double cell = seconds_between(y.begin_ns, y.end_ns);
-    if (options_.parity && dof > 0) {
-      solver_.add_parity(parity, cell > 0. ? std::min(dt / cell, 1.) : 1., out.parity);
+    if (options_.parity && dof > 0 && noise.parity > 0.) {
+      solver_.add_parity(parity, noise.parity, out.parity);
+      // What is seen of a cut sample is as noisy as its piece; what it tells is told once.
+      out.parity.dof += noise.parity * (noise.variance - 1.) * dof;
     }
   }
   if (solution.rank_deficient) ++out.rank_deficient;

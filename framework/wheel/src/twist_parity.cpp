@@ -34,7 +34,7 @@ void TwistSolver::add_parity(const Parity& parity, double weight, ParityInformat
     add_information<kSize>(fit, weight, out);
   });
   out.chi2 += weight * parity.chi2();
-  out.dof += parity.dof();
+  out.dof += weight * parity.dof();
 }
 
 /// W J: of each column the rows of the noise blocks that it touches.

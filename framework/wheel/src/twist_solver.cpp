@@ -101,17 +101,17 @@ TwistSolver::TwistSolver(std::shared_ptr<const WheelModel> model, const TwistOpt
     }
   }
   set_intrinsics(model_->nominal());
-  set_weights_at(model_->nominal());
 }
 
 void TwistSolver::set_intrinsics(const Intrinsics& x_WI) {
-  x_WI_ = x_WI;
-  A_is_current_ = false;
-}
-
-void TwistSolver::set_weights_at(const Intrinsics& x_WI) {
+  move_intrinsics(x_WI);
   weights_at_ = x_WI;
   weight_A_is_current_ = false;
+}
+
+void TwistSolver::move_intrinsics(const Intrinsics& x_WI) {
+  x_WI_ = x_WI;
+  A_is_current_ = false;
 }
 
 Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {

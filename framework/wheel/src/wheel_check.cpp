@@ -71,7 +71,6 @@ WheelCheck::WheelCheck(std::shared_ptr<const WheelModel> model, double probabili
 
 void WheelCheck::set_calibration(const Intrinsics& x_WI, const IntrinsicMatrix& P) {
   solver_.set_intrinsics(x_WI);
-  solver_.set_weights_at(x_WI);
   P_ = P;
 }
 

@@ -124,7 +124,7 @@ TEST(Preintegration, HasTheJacobianOfCentralDifferences) {
       Preintegrator preintegrator(model, {.twist = {.rank_tolerance = 1e-9}});
       PreintegratedPose pose;
       const auto g_of = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
-        preintegrator.set_intrinsics(x);
+        preintegrator.move_intrinsics(x);
         preintegrator.integrate(samples, 33'000'000, 977'000'000, pose);
         return pose.g;
       };

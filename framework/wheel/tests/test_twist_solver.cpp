@@ -109,7 +109,7 @@ TEST_P(EveryModel, HasTheSensitivityOfCentralDifferences) {
       TwistSolver solver(model_, {.noise_weighted = weighted, .rank_tolerance = 1e-9});
       const auto twist_of = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
         TwistSolution solution;
-        solver.set_intrinsics(x);
+        solver.move_intrinsics(x);
         solver.solve(y, solution);
         return solution.xi;
       };

@@ -37,8 +37,8 @@ class Instrument {
 
   /// The weights of the rows stay there whatever the intrinsics.
   void set_weights_at(const Intrinsics& x_WI) {
-    preintegrator_.set_weights_at(x_WI);
-    shifted_.set_weights_at(x_WI);
+    preintegrator_.set_intrinsics(x_WI);
+    shifted_.set_intrinsics(x_WI);
   }
 
   /// Nothing where samples do not cover the interval.
@@ -62,7 +62,7 @@ class Instrument {
  private:
   static std::optional<PreintegratedPose> integrate(Preintegrator& preintegrator, const Readings& y,
                                                     const Intrinsics& x_WI) {
-    preintegrator.set_intrinsics(x_WI);
+    preintegrator.move_intrinsics(x_WI);
     std::optional<PreintegratedPose> pose(std::in_place);
     if (!preintegrator.integrate(y.samples, y.begin_ns, y.end_ns, *pose)) pose.reset();
     return pose;

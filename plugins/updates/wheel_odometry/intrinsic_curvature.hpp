@@ -70,10 +70,10 @@ class IntrinsicCurvature {
     // Row i of M[a]: how the derivatives of g[a] change along direction i.
     std::array<IntrinsicMatrix, 3> M;
     for (IntrinsicMatrix& of_row : M) of_row.setZero(n, n);
-    preintegrator_->set_weights_at(x_WI);
+    preintegrator_->set_intrinsics(x_WI);
     for (Eigen::Index i = 0; i < n; ++i) {
       if (L.col(i).isZero(0.)) continue;
-      preintegrator_->set_intrinsics(x_WI + kCurvatureStep * L.col(i));
+      preintegrator_->move_intrinsics(x_WI + kCurvatureStep * L.col(i));
       preintegrator_->integrate(encoders, begin_ns, end_ns, moved_);
       const IntrinsicJacobian change = (moved_.J_g_WI - pose.J_g_WI) * L / kCurvatureStep;
       for (int a = 0; a < 3; ++a) M[static_cast<std::size_t>(a)].row(i) = change.row(a);

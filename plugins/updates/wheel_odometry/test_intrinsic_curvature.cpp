@@ -32,7 +32,7 @@ class Circle : public ::testing::Test {
 
   PreintegratedPose at(const Intrinsics& x_WI) const {
     Preintegrator preintegrator(model_, options_);
-    preintegrator.set_intrinsics(x_WI);
+    preintegrator.move_intrinsics(x_WI);
     PreintegratedPose pose;
     EXPECT_TRUE(preintegrator.integrate(encoders_, 1000 * kMs, 1100 * kMs, pose));
     return pose;

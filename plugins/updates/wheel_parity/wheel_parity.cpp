@@ -117,7 +117,7 @@ class WheelParity final : public Update {
       return;
     }
     // (WP-5): what no change of the intrinsics within their prior explains.
-    const int dof = pose_.parity.dof;
+    const double dof = pose_.parity.dof;
     const double threshold = gate(dof);
     const bool believed = cost_ - gain <= threshold;
     if (++intervals_seen_ <= kFirstIntervals) {
@@ -184,9 +184,8 @@ class WheelParity final : public Update {
     double gain = std::numeric_limits<double>::quiet_NaN();
     for (int i = 0; i < params_.max_iterations; ++i) {
       preintegrator_->set_intrinsics(x);
-      preintegrator_->set_weights_at(x);
       preintegrator_->integrate(encoders, interval.begin_ns, interval.end_ns, pose_);
-      if (pose_.parity.dof == 0 || !pose_.parity.eta.allFinite()) break;
+      if (pose_.parity.dof == 0. || !pose_.parity.eta.allFinite()) break;
       linearise(x0, x);
       // (WP-4): the step is C z in units of sigma.
       Square M = Lambda_ * C_;
@@ -243,7 +242,7 @@ class WheelParity final : public Update {
     for (int i = 0; i < n_free_; ++i) {
       Intrinsics x = at_;
       for (int k = 0; k < n_free_; ++k) x[free(k)] += kCurvatureStep * sigma_[k] * L(k, i);
-      preintegrator_->set_intrinsics(x);
+      preintegrator_->move_intrinsics(x);
       preintegrator_->integrate(encoders, interval.begin_ns, interval.end_ns, moved_);
       for (int k = 0; k < n_free_; ++k) {
         for (int l = 0; l < n_free_; ++l) {
@@ -290,7 +289,7 @@ class WheelParity final : public Update {
     Lambda_ = to_eta * W * to_eta.transpose();
   }
 
-  double gate(int dof) {
+  double gate(double dof) {
     if (params_.gate_probability <= 0.) return std::numeric_limits<double>::infinity();
     if (dof != gate_dof_) {
       gate_dof_ = dof;
@@ -336,7 +335,7 @@ class WheelParity final : public Update {
   Tally gated_{"interval dropped by the chi-square gate"};
   std::optional<Preintegrator> preintegrator_;
   double gate_ = 0.;
-  int gate_dof_ = 0;
+  double gate_dof_ = 0.;
   double intervals_used_ = 0.;
   int intervals_seen_ = 0;
   int unchecked_ = 0;  // intervals for which curvature needs no look

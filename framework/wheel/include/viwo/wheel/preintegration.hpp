@@ -52,8 +52,9 @@ class Preintegrator {
  public:
   Preintegrator(std::shared_ptr<const WheelModel> model, const PreintegrationOptions& options);
 
+  /// As TwistSolver has them.
   void set_intrinsics(const Intrinsics& x_WI) { solver_.set_intrinsics(x_WI); }
-  void set_weights_at(const Intrinsics& x_WI) { solver_.set_weights_at(x_WI); }
+  void move_intrinsics(const Intrinsics& x_WI) { solver_.move_intrinsics(x_WI); }
   const Intrinsics& intrinsics() const { return solver_.intrinsics(); }
   const WheelModel& model() const { return solver_.model(); }
 
@@ -66,10 +67,12 @@ class Preintegrator {
                  PreintegratedPose& out);
 
  private:
-  /// Noise of a piece relative to one sample: variance, and covariance with the piece before.
+  /// Noise of a piece relative to one sample: variance, and covariance with the piece before; and
+  /// how much its parity counts.
   struct PieceNoise {
     double variance = 1.;
     double with_previous = 0.;
+    double parity = 1.;
   };
   void find_motion(std::span<const EncoderSample> samples, std::int64_t end_ns);
   void add_piece(const EncoderSample& y, double dt, PieceNoise noise, PreintegratedPose& out);

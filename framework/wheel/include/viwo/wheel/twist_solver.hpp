@@ -56,7 +56,7 @@ struct ParityInformation {
   IntrinsicMatrix Lambda;  ///< n x n: sum H^T R^-1 H
   Intrinsics eta;          ///< n: sum H^T R^-1 e
   double chi2 = 0.;        ///< sum e^T R^-1 e
-  int dof = 0;
+  double dof = 0.;         ///< what chi2 is to be expected to be: of cut samples there are parts
 
   void reset(int n);
 };
@@ -71,14 +71,13 @@ class TwistSolver {
   const TwistOptions& options() const { return options_; }
   const Intrinsics& intrinsics() const { return x_WI_; }
 
-  /// Linearisation point of all that follows. Throws InputError when it makes a model with constant
-  /// A lose rank for good (all wheels at one place).
+  /// Linearisation point of all that follows, and where the noise of the rows is taken, of which
+  /// their weights are the inverse; the nominal intrinsics until told otherwise.
   void set_intrinsics(const Intrinsics& x_WI);
 
-  /// Where the noise of the rows is taken, of which their weights are the inverse; the nominal
-  /// intrinsics until told otherwise. They do not move with set_intrinsics(): what changes by the
-  /// weights is not what the rows say.
-  void set_weights_at(const Intrinsics& x_WI);
+  /// The linearisation point alone: for derivatives, and for a fit. What changes by the weights is
+  /// not what the rows say.
+  void move_intrinsics(const Intrinsics& x_WI);
 
   /// Whether the base moves for sure in the samples that follow (W-16), although a sample alone may
   /// not show it.
