@@ -9,8 +9,10 @@
 
 #include "calibration_problem.hpp"
 #include "fit_costs.hpp"
+#include "recording_name.hpp"
 #include "undetermined.hpp"
 #include "viwo/calibration/calibrate.hpp"
+#include "viwo/math/chi2.hpp"
 #include "viwo/math/se2.hpp"
 
 namespace viwo::calibration {
@@ -28,23 +30,37 @@ struct NoiseGroup {
 /// All residuals at a solution, by kind.
 using Linearisation = std::array<NoiseGroup, kResidualKinds>;
 
-/// By how much what is left adds up over time, where it would cancel if it were white: 1 for white
-/// noise (CAL-14).
-double persistence(const NoiseGroup& group) {
+/// How the gradients of the batches scatter (CAL-14).
+struct Persistence {
+  /// By how much what is left adds up over time, where it would cancel if it were white: 1 for
+  /// white noise.
+  double ratio = 0.;
+  /// About their mean: variance times a chi-square of so many degrees of freedom.
+  double squares = 0., dof = 0.;
+};
+
+Persistence persistence(const NoiseGroup& group) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(group.information);
   const Eigen::VectorXd& values = eigen.eigenvalues();
   const double smallest = 1e-9 * values[values.size() - 1];
-  double sum = 0.;
-  int rank = 0;
+  const auto n_batches = static_cast<double>(group.batches.size());
+  Persistence out;
+  double rank = 0.;
   for (int i = 0; i < values.size(); ++i) {
     if (!(values[i] > smallest)) continue;
-    ++rank;
+    double squares = 0., all = 0.;
     for (const Eigen::VectorXd& gradient : group.batches) {
       const double along = eigen.eigenvectors().col(i).dot(gradient);
-      sum += along * along / values[i];
+      squares += along * along;
+      all += along;
     }
+    ++rank;
+    out.ratio += squares / values[i];
+    out.squares += (n_batches * squares - all * all) / values[i];
   }
-  return rank > 0 ? sum / rank : 0.;
+  if (rank > 0.) out.ratio /= rank;
+  out.dof = rank * (n_batches - 1.);
+  return out;
 }
 
 class Fit {
@@ -59,8 +75,9 @@ class Fit {
         own_(recordings.size(), {0., 0.}) {
     for (const std::size_t index : recordings) {
       problems_.push_back(std::make_unique<RecordingProblem>(setup.recordings[index], options));
-      problems_.back()->set_weights_at(start.x_WI);
+      problems_.back()->weigh_rows_at(start.x_WI);
     }
+    require_some_to_compare();
   }
 
   CalibrationEstimate run() {
@@ -69,7 +86,9 @@ class Fit {
     constexpr int kMostRounds = 50, kFewIterations = 2, kMostIterations = 50;
     constexpr double kUnchanged = 1e-3;
     solve(kMostIterations);
-    for (int round = 0; round < kMostRounds && rescale(linearise()) > kUnchanged; ++round) {
+    for (int round = 0; round < kMostRounds; ++round) {
+      for (std::size_t k = 0; k < problems_.size(); ++k) problems_[k]->weigh_rows_at(point(k).x_WI);
+      if (rescale(linearise()) <= kUnchanged) break;
       for (const auto& problem : problems_) problem->weigh_segments();
       solve(kFewIterations);
     }
@@ -78,6 +97,18 @@ class Fit {
   }
 
  private:
+  void require_some_to_compare() const {
+    int all = 0, with_holes = 0;
+    for (const auto& problem : problems_) {
+      all += static_cast<int>(problem->motions().size());
+      with_holes += problem->n_with_holes();
+    }
+    if (all == 0 || with_holes < all) return;
+    fail(setup_.recordings[recordings_.front()].label,
+         ": all segments have holes in which wheels or gyro were not seen: choose shorter ones "
+         "(segment_s)");
+  }
+
   CalibrationPoint point(std::size_t k) const {
     return prior_.point(shared_.data(), own_[k].data());
   }
@@ -182,30 +213,62 @@ class Fit {
            static_cast<std::size_t>(problems_[k]->n_segments());
   }
 
-  /// Variance components: squares over redundancy, group by group. Returns by what part the most
-  /// changed of them did.
+  /// Variance components (CAL-5), group by group. Returns by what part the most changed of them
+  /// did.
   double rescale(const Linearisation& at) {
     const Eigen::MatrixXd P = covariance(at, true);
-    const auto factor = [&](const NoiseGroup& group) {
-      const double redundancy = group.residuals - (P * group.information).trace();
-      // What fits exactly, or has nothing to spare, says nothing about its own size.
-      if (redundancy < 1. || group.squares < 1e-12) return 0.;
-      return std::sqrt(group.squares / redundancy);
-    };
     double most = 0.;
-    const auto rescale_noise = [&](ResidualKind kind, double& noise) {
-      const NoiseGroup& group = at[static_cast<std::size_t>(kind)];
-      double by = factor(group);
-      // What is left of the parity is not in its residuals but in how it comes and goes.
-      if (kind == ResidualKind::kParity) by = std::max(by, std::sqrt(persistence(group)));
-      if (by < 1e-6) return;
+    const auto rescale_noise = [&](ResidualKind kind, double& noise, bool& is_found) {
+      const double variance = kind == ResidualKind::kParity ? variance_of_parity(at, P)
+                                                            : variance_of(at[index(kind)], P);
+      if (variance < 1e-12) return;
+      const double by = std::sqrt(variance);
       noise *= by;
+      is_found = true;
       most = std::max(most, std::abs(by - 1.));
     };
-    rescale_noise(ResidualKind::kPosition, estimate_.noise.position_m);
-    rescale_noise(ResidualKind::kYaw, estimate_.noise.yaw_rad);
-    rescale_noise(ResidualKind::kParity, estimate_.noise.parity_scale);
+    CalibrationNoise& noise = estimate_.noise;
+    rescale_noise(ResidualKind::kPosition, noise.position_m, noise.position_is_found);
+    rescale_noise(ResidualKind::kYaw, noise.yaw_rad, noise.yaw_is_found);
+    bool is_found = false;
+    rescale_noise(ResidualKind::kParity, noise.parity_scale, is_found);
     return most;
+  }
+
+  static std::size_t index(ResidualKind kind) { return static_cast<std::size_t>(kind); }
+
+  static double redundancy(const NoiseGroup& group, const Eigen::MatrixXd& P) {
+    return group.residuals - (P * group.information).trace();
+  }
+
+  /// Squares over redundancy. What fits exactly, or has nothing to spare, says nothing about its
+  /// own size: 0.
+  static double variance_of(const NoiseGroup& group, const Eigen::MatrixXd& P) {
+    const double spare = redundancy(group, P);
+    return spare < 1. || group.squares < 1e-12 ? 0. : group.squares / spare;
+  }
+
+  /// What the residuals of the parity, of which there are few, and its batches, which are many, say
+  /// together; the residuals alone where chance does not let the two differ as much (CAL-17).
+  static double variance_of_parity(const Linearisation& at, const Eigen::MatrixXd& P) {
+    constexpr double kChance = 0.001, kNothingToSpare = 0.01;
+    const NoiseGroup& parity = at[index(ResidualKind::kParity)];
+    const Persistence batches = persistence(parity);
+    if (!(batches.dof > 0.) || !(batches.squares > 0.)) return variance_of(parity, P);
+    // Where the reference is off for long, so are the wheels from the estimate.
+    double expected = redundancy(parity, P);
+    const Eigen::MatrixXd PN = P * parity.information * P;
+    for (const ResidualKind kind : {ResidualKind::kYaw, ResidualKind::kPosition}) {
+      const NoiseGroup& group = at[index(kind)];
+      if (group.residuals == 0) continue;
+      const double more = std::max(0., persistence(group).ratio - 1.);
+      expected += more * PN.cwiseProduct(group.information).sum();
+    }
+    const double variance = batches.squares / batches.dof;
+    if (expected < kNothingToSpare) return variance;
+    const double most = variance * chi2_quantile(1. - kChance, expected);
+    if (parity.squares > most) return parity.squares / expected;
+    return (batches.squares + parity.squares) / (batches.dof + expected);
   }
 
   /// `white`: as if what is left did not persist.
@@ -213,7 +276,7 @@ class Fit {
     const auto size = at[0].information.rows();
     Eigen::MatrixXd information = Eigen::MatrixXd::Identity(size, size);
     for (const NoiseGroup& group : at) {
-      information += group.information / (white ? 1. : std::max(1., persistence(group)));
+      information += group.information / (white ? 1. : std::max(1., persistence(group).ratio));
     }
     return information.llt().solve(Eigen::MatrixXd::Identity(size, size));
   }
@@ -273,8 +336,11 @@ class Fit {
     for (std::size_t p = 0; p < problems_.size(); ++p) {
       const auto& problem = problems_[p];
       estimate_.weighed_down += problem->n_weighed_down();
+      estimate_.with_holes += problem->n_with_holes();
       problem->add_turns(estimate_.gyro_bias_rad_per_s[p], estimate_.turns);
-      for (const Eigen::Vector3d& motion : problem->motions()) {
+      for (std::size_t k = 0; k < problem->motions().size(); ++k) {
+        if (!problem->is_compared(k)) continue;
+        const Eigen::Vector3d& motion = problem->motions()[k];
         estimate_.turn_rms_rad += motion[0] * motion[0];
         estimate_.way_rms_m += motion.tail<2>().squaredNorm();
         ++segments;

@@ -151,13 +151,13 @@ json smoothed_json(const CalibrationResult& result) {
 
 json summary_of(const CalibrationResult& result) {
   const CalibrationEstimate& estimate = result.all;
-  const ReferenceKind kind = result.setup->recordings.front().motion.kind;
   std::vector<json> left_out;
   json by_label = json::object();
   for (const LeftOut& one : result.left_out) {
     left_out.push_back(errors_json(*result.setup, one.runs));
     by_label[one.by] = left_out.back();
   }
+  const CalibrationNoise& noise = estimate.noise;
   return {
       {"status", status_of(result)},
       {"doubts", result.doubts},
@@ -174,9 +174,9 @@ json summary_of(const CalibrationResult& result) {
       {"residuals", estimate.residuals},
       {"unknowns", estimate.unknowns},
       {"noise",
-       {{"position_m", number_if(kind == ReferenceKind::kPoses, estimate.noise.position_m)},
-        {"yaw_rad", number_if(kind != ReferenceKind::kNone, estimate.noise.yaw_rad)},
-        {"parity_scale", estimate.noise.parity_scale}}},
+       {{"position_m", number_if(noise.position_is_found, noise.position_m)},
+        {"yaw_rad", number_if(noise.yaw_is_found, noise.yaw_rad)},
+        {"parity_scale", noise.parity_scale}}},
       {"wander", {{"sigma", result.wander.sigma}, {"time_s", result.wander.time_s}}},
       {"clock_offset_s", estimate.clock_offset_s},
       {"clock_offset_sigma_s", estimate.clock_offset_sigma_s},
@@ -295,6 +295,7 @@ std::string describe(const CalibrationResult& result) {
 
 void write_calibration(const std::filesystem::path& folder, const CalibrationResult& result) {
   log::make_folder(folder);
+  log::remove_results(folder, {"summary.json", "report.html"});
   log::write_text(folder / "calibration.yaml",
                   calibration_text(calibration_file_of(result), "viwo calibrate"));
   log::write_text(folder / "summary.json", json_text(summary_of(result)));

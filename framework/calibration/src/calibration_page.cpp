@@ -57,8 +57,11 @@ report::Table length_table(const CalibrationResult& result) {
                    {"left-out ends [mm]", {report::NumberFormat::Style::kSignificant, 3}},
                    {"log volume", {report::NumberFormat::Style::kFixed, 1}}};
   for (const CalibrationEstimate& estimate : result.lengths) {
+    const CalibrationNoise& noise = estimate.noise;
+    const double nan = std::nan("");
     table.rows.push_back({segments_text(estimate), static_cast<double>(estimate.residuals),
-                          1e3 * estimate.noise.position_m, estimate.noise.yaw_rad,
+                          noise.position_is_found ? 1e3 * noise.position_m : nan,
+                          noise.yaw_is_found ? noise.yaw_rad : nan,
                           1e3 * estimate.prediction_m.value_or(std::nan("")), estimate.log_volume});
   }
   return table;

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <numbers>
+#include <span>
 #include <tuple>
+#include <vector>
 
 #include <Eigen/Dense>
 
@@ -25,6 +28,31 @@ constexpr double kPathPiece_s = 0.05;
 constexpr double kBelievable = 0.999;
 /// Longest piece whose parity gradient is told.
 constexpr double kParityPiece_s = 1.;
+
+struct Hole {
+  std::int64_t begin_ns, end_ns;
+  double length_s() const { return seconds_between(begin_ns, end_ns); }
+};
+
+/// Where samples are missing, more than now and then one, and the wheels turn before or after.
+std::vector<Hole> holes_of(std::span<const EncoderSample> wheels) {
+  constexpr double kLeast_s = 0.2, kLeastCells = 2.;
+  const auto turns = [](const EncoderSample& sample) {
+    constexpr double kTurns_rad_per_s = 0.1;
+    return std::any_of(sample.drive_rad_per_s.begin(),
+                       sample.drive_rad_per_s.begin() + sample.n_drive,
+                       [](double rate) { return std::abs(rate) > kTurns_rad_per_s; });
+  };
+  std::vector<Hole> holes;
+  for (std::size_t i = 1; i < wheels.size(); ++i) {
+    const EncoderSample &before = wheels[i - 1], &after = wheels[i];
+    const Hole hole{before.end_ns, after.begin_ns};
+    const double cell_s = seconds_between(before.begin_ns, before.end_ns);
+    if (hole.length_s() <= std::max(kLeast_s, kLeastCells * cell_s)) continue;
+    if (turns(before) || turns(after)) holes.push_back(hole);
+  }
+  return holes;
+}
 
 PreintegrationOptions preintegration_of(const CalibrationRecording& recording,
                                         const CalibrationOptions& options) {
@@ -81,6 +109,7 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
   for (auto* segments : {&segments_, &later_, &earlier_}) segments->resize(stamps_ns_.size() - 1);
   squares_.assign(motions_.size(), 0.);
   weights_.assign(motions_.size(), 1.);
+  leave_out_holes();
   for (std::size_t k = 0; k < motions_.size(); ++k) {
     kinds_.push_back(ResidualKind::kYaw);
     if (rows_per_segment() == 3) kinds_.insert(kinds_.end(), 2, ResidualKind::kPosition);
@@ -165,8 +194,36 @@ void RecordingProblem::compare_with_reference() {
   }
 }
 
+/// What is bridged is no measurement: of wheels that turned, and of a gyro, which is integrated.
+void RecordingProblem::leave_out_holes() {
+  std::vector<Hole> holes = holes_of(recording_.data.wheels());
+  const MotionReference& motion = recording_.motion;
+  if (!holes.empty() && (motion.distance_m || motion.turn_rad)) {
+    const double at_s =
+        seconds_between(recording_.data.wheels().front().begin_ns, holes.front().begin_ns);
+    fail(recording_.label,
+         ": distance_m and turn_deg are of a whole drive, and the wheels turned unseen for " +
+             significant(holes.front().length_s(), 2) + " s, " + significant(at_s, 4) +
+             " s after the begin");
+  }
+  if (motion.kind == ReferenceKind::kGyro && !recording_.data.imu().empty()) {
+    const std::int64_t offset_ns = to_ns(motion.offset_s);
+    for (std::size_t i = 1; i < motion.poses.size(); ++i) {
+      const Hole hole{motion.poses[i - 1].t_ns - offset_ns, motion.poses[i].t_ns - offset_ns};
+      if (hole.length_s() > motion.max_gap_s) holes.push_back(hole);
+    }
+  }
+  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
+  for (std::size_t k = 0; k < weights_.size(); ++k) {
+    const std::int64_t begin_ns = stamps_ns_[from_start ? 0 : k], end_ns = stamps_ns_[k + 1];
+    for (const Hole& hole : holes) {
+      if (hole.begin_ns < end_ns && hole.end_ns > begin_ns) weights_[k] = 0.;
+    }
+  }
+}
+
 void RecordingProblem::integrate(const CalibrationPoint& point, Segments& segments) {
-  preintegrator_.set_intrinsics(point.x_WI);
+  preintegrator_.move_intrinsics(point.x_WI);
   const std::int64_t shift_ns = to_ns(point.clock_offset_s);
   parity_.reset(n_);
   parity_gradients_.clear();
@@ -254,6 +311,7 @@ void RecordingProblem::add_turns(double gyro_bias_rad_per_s, TurnAgreement& out)
   const bool gyro = recording_.motion.kind == ReferenceKind::kGyro;
   const double bias = gyro ? gyro_bias_rad_per_s : 0.;
   for (std::size_t k = 0; k < motions_.size(); ++k) {
+    if (!is_compared(k)) continue;
     const bool first = !from_start || k == 0;
     const double duration_s = seconds_between(stamps_ns_[k], stamps_ns_[k + 1]);
     out.add(segments_[k].g[0] - (first ? 0. : segments_[k - 1].g[0]),
@@ -265,13 +323,18 @@ void RecordingProblem::weigh_segments() {
   if (weights_.empty()) return;
   const double most = chi2_quantile(kBelievable, rows_per_segment());
   for (std::size_t k = 0; k < weights_.size(); ++k) {
+    if (!is_compared(k)) continue;
     weights_[k] = squares_[k] <= most ? 1. : most / squares_[k];
   }
 }
 
 int RecordingProblem::n_weighed_down() const {
-  return static_cast<int>(
-      std::count_if(weights_.begin(), weights_.end(), [](double weight) { return weight < 1.; }));
+  return static_cast<int>(std::count_if(weights_.begin(), weights_.end(),
+                                        [](double weight) { return weight > 0. && weight < 1.; }));
+}
+
+int RecordingProblem::n_with_holes() const {
+  return static_cast<int>(std::count(weights_.begin(), weights_.end(), 0.));
 }
 
 /// r = D^-1/2 V^T eta and J = D^1/2 V^T with Lambda = V D V^T have the gradient and the curvature
@@ -296,7 +359,7 @@ void RecordingProblem::add_measured_by_hand(int row, const CalibrationPoint& poi
   if (!distance_m && !turn_rad) return;
   const auto wheels = recording_.data.wheels();
   const std::int64_t step_ns = to_ns(kPathPiece_s);
-  preintegrator_.set_intrinsics(point.x_WI);
+  preintegrator_.move_intrinsics(point.x_WI);
   double path_m = 0., yaw_rad = 0.;
   Eigen::RowVectorXd J_path = Eigen::RowVectorXd::Zero(n_), J_yaw = J_path;
   guarded(recording_.setup.kinematics.info, "preintegration", [&] {

@@ -64,12 +64,18 @@ class RecordingProblem {
 
   /// Noise that whitens the residuals (CAL-3).
   void set_noise(const CalibrationNoise& noise) { noise_ = noise; }
+  /// Whether the motion over a segment is known: wheels and gyro have no hole in it.
+  bool is_compared(std::size_t segment) const { return weights_[segment] > 0.; }
+  int n_with_holes() const;
   /// Weighs down the segments that fit no normal noise where they were evaluated last (CAL-15).
   void weigh_segments();
   /// Segments that count for less than one.
   int n_weighed_down() const;
   /// Where the weights of the wheels' rows are taken.
-  void set_weights_at(const Intrinsics& x_WI) { preintegrator_.set_weights_at(x_WI); }
+  void weigh_rows_at(const Intrinsics& x_WI) {
+    preintegrator_.set_intrinsics(x_WI);
+    integrated_.reset();
+  }
 
   void evaluate(const CalibrationPoint& point, bool jacobian, RecordingResiduals& out);
 
@@ -79,6 +85,7 @@ class RecordingProblem {
   void cut(std::int64_t begin_ns, std::int64_t end_ns);
   void require_one_clock(std::int64_t begin_ns, std::int64_t end_ns) const;
   void compare_with_reference();
+  void leave_out_holes();
   std::optional<Eigen::Vector3d> reference_at(std::int64_t t_ns) const;
   /// Motion of O over all segments with the reference shifted by clock_offset_s.
   void integrate(const CalibrationPoint& point, Segments& segments);
@@ -91,10 +98,11 @@ class RecordingProblem {
   CalibrationOptions options_;
   int n_;  ///< intrinsics
   Preintegrator preintegrator_;
-  std::vector<double> yaw_;                ///< of the poses of the reference, turns counted
-  std::vector<std::int64_t> stamps_ns_;    ///< segment ends, clock of the wheels
-  std::vector<Eigen::Vector3d> motions_;   ///< of B over each segment; empty without a reference
-  std::vector<double> squares_, weights_;  ///< of each segment: whitened squares, and their weight
+  std::vector<double> yaw_;               ///< of the poses of the reference, turns counted
+  std::vector<std::int64_t> stamps_ns_;   ///< segment ends, clock of the wheels
+  std::vector<Eigen::Vector3d> motions_;  ///< of B over each segment; empty without a reference
+  /// Of each segment: whitened squares, and their weight; 0 where it is not compared.
+  std::vector<double> squares_, weights_;
   std::vector<ResidualKind> kinds_;
   CalibrationNoise noise_;
   Segments segments_, later_, earlier_;

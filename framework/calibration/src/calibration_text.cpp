@@ -131,11 +131,15 @@ std::string left_over_text(const CalibrationResult& result) {
   const ReferenceKind kind = result.setup->recordings.front().motion.kind;
   std::string text = "what the fit leaves";
   if (kind != ReferenceKind::kNone) {
+    const CalibrationNoise& noise = estimate.noise;
     text += " per segment (" + segments_text(estimate) + "): ";
-    if (kind == ReferenceKind::kPoses) {
-      text += significant(1e3 * estimate.noise.position_m, 3) + " mm, ";
+    if (noise.position_is_found) text += significant(1e3 * noise.position_m, 3) + " mm, ";
+    text +=
+        noise.yaw_is_found ? significant(noise.yaw_rad, 3) + " rad; " : "too few to say how much; ";
+    if (estimate.with_holes > 0) {
+      text += std::to_string(estimate.with_holes) +
+              " segments with holes of wheels or gyro are left out; ";
     }
-    text += significant(estimate.noise.yaw_rad, 3) + " rad; ";
     if (estimate.weighed_down > 0) {
       text += std::to_string(estimate.weighed_down) + " segments that do not fit count for less; ";
     }

@@ -253,10 +253,10 @@ void judge_left_over(CalibrationResult& result) {
                             "are exchanged, or clocks (find_drive_signs, find_steering_zeros, "
                             "prior_sigma_clock_offset_s)");
   };
-  const ReferenceKind kind = result.setup->recordings.front().motion.kind;
-  if (kind == ReferenceKind::kNone) return;
-  doubt(all.noise.yaw_rad, all.turn_rms_rad, kLeast_rad, "of turns [rad]");
-  if (kind == ReferenceKind::kPoses) {
+  if (all.noise.yaw_is_found) {
+    doubt(all.noise.yaw_rad, all.turn_rms_rad, kLeast_rad, "of turns [rad]");
+  }
+  if (all.noise.position_is_found) {
     doubt(all.noise.position_m, all.way_rms_m, kLeast_m, "of ways [m]");
   }
 }

@@ -7,50 +7,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "motion_reference.hpp"
-#include "simulated.hpp"
+#include "simulated_calibration.hpp"
 #include "told.hpp"
-#include "viwo/calibration/calibrate.hpp"
 #include "viwo/eval/consistency.hpp"
-#include "viwo/sim/encoder_simulator.hpp"
 
 namespace viwo {
 namespace {
 
 using namespace calibration;
+using testing::fit_all;
+using testing::fit_of;
 using testing::registry;
+using testing::setup_of;
 using testing::simulated;
-
-CalibrationSetup setup_of(const std::vector<std::string>& motions, std::uint64_t seed,
-                          const std::vector<std::string>& assignments = {}) {
-  CalibrationSetup setup;
-  setup.name = "test";
-  setup.options.segments = Segments::kLength;
-  setup.options.segment_s = 2.;
-  setup.options.estimate_extrinsics = true;
-  for (const std::string& motion : motions) {
-    auto all = assignments;
-    all.emplace_back("sensors.simulator0.true_intrinsics_scale=1");
-    all.emplace_back("odometry.twist=noise_weighted");
-    RunSetup run = read_run(simulated(motion, all), registry(), seed);
-    RunData data = collect(run);
-    const Recording label{motion, {{"motion", motion}}};
-    MotionReference reference = motion_reference(label, run, data, setup.options.reference);
-    setup.recordings.push_back({label, std::move(run), std::move(data), std::move(reference)});
-  }
-  return setup;
-}
-
-CalibrationEstimate fit_of(const CalibrationSetup& setup, const std::vector<std::size_t>& used) {
-  return fit(setup, used, setup.options, start_of(setup, {}));
-}
-
-CalibrationEstimate fit_all(const CalibrationSetup& setup) { return fit_of(setup, all_of(setup)); }
-
-/// True intrinsics of the simulated robot: the sensor's seed is 1000 times the run's.
-Intrinsics truth_of(const CalibrationSetup& setup, std::uint64_t seed) {
-  return sim::perturbed_intrinsics(setup.recordings[0].setup.model->description(), 1., 1000 * seed);
-}
+using testing::truth_of;
 
 TEST(Calibrate, FindsTheTrueIntrinsicsWithHonestSigmas) {
   const int seeds = 12;

@@ -60,6 +60,8 @@ struct CalibrationNoise {
   double position_m = 0.01;
   double yaw_rad = 0.01;
   double parity_scale = 1.;
+  /// Whether there was enough to find it in.
+  bool position_is_found = false, yaw_is_found = false;
 };
 
 /// What the wheels of a recording are compared with.
@@ -140,6 +142,7 @@ struct CalibrationEstimate {
   int residuals = 0;      ///< of turns, positions and what was measured by hand
   std::vector<ByHand> by_hand;
   int weighed_down = 0;       ///< segments that fit no normal noise (CAL-15)
+  int with_holes = 0;         ///< segments that are not compared, for holes of wheels or gyro
   int unknowns = 0;           ///< that were estimated, those of the recordings with them
   int parity_directions = 0;  ///< about which the wheels alone tell more than the prior
   double turn_rms_rad = 0., way_rms_m = 0.;  ///< of the segments, by the reference
