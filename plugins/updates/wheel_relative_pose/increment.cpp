@@ -64,19 +64,19 @@ bool IncrementIntegrator::integrate(std::span<const EncoderSample> samples, std:
     return options_.holds_from_stamp ? samples[k].t_ns : samples[k].begin_ns;
   };
   if (samples.empty() || start_of(0) > begin_ns || samples.back().end_ns < end_ns) return false;
-  double hold_s = 0.;
   for (std::size_t k = 0; k < samples.size() && start_of(k) < end_ns; ++k) {
     const std::int64_t stop_ns = k + 1 < samples.size() ? start_of(k + 1) : samples[k].end_ns;
     if (stop_ns <= begin_ns) continue;
-    const double dt_s = seconds_between(std::max(start_of(k), begin_ns), std::min(stop_ns, end_ns));
+    const std::int64_t from_ns = std::max(start_of(k), begin_ns);
+    const std::int64_t to_ns = std::min(stop_ns, end_ns);
     if (is_believed(samples[k], out)) {
       std::swap(believed_, solution_);
-      has_believed_ = true;
-      hold_s = 0.;
+      believed_from_ns_ = from_ns;
     }
-    hold_s += has_believed_ ? dt_s : std::numeric_limits<double>::infinity();
+    const double hold_s = believed_from_ns_ ? seconds_between(*believed_from_ns_, to_ns)
+                                            : std::numeric_limits<double>::infinity();
     out.longest_hold_s = std::max(out.longest_hold_s, hold_s);
-    if (has_believed_) advance(believed_, dt_s, out);
+    if (believed_from_ns_) advance(believed_, seconds_between(from_ns, to_ns), out);
   }
   return true;
 }

@@ -58,9 +58,9 @@ class IncrementIntegrator {
 
   IncrementOptions options_;
   TwistSolver solver_;
-  TwistSolution solution_;  ///< of the reading at hand
-  TwistSolution believed_;  ///< of the last one that was not left out
-  bool has_believed_ = false;
+  TwistSolution solution_;                        ///< of the reading at hand
+  TwistSolution believed_;                        ///< of the last one that was not left out
+  std::optional<std::int64_t> believed_from_ns_;  ///< in this interval or one before
 };
 
 }  // namespace viwo::wheel_relative_pose

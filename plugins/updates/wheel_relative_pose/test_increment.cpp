@@ -329,5 +329,24 @@ TEST(Increment, SaysWhereReadingsAreMissing) {
   EXPECT_TRUE(std::isinf(out.longest_hold_s));
 }
 
+TEST(Increment, DoesNotDriveOnFromIntervalToIntervalWithoutReadings) {
+  const auto model = load_model(kAllRows);
+  auto samples = testing::sample_motion(*model, sweep, 1., 100.);
+  IncrementOptions options = plain();
+  options.residual_gate_m_per_s = 0.05;
+  for (std::size_t k = 50; k < samples.size(); ++k) samples[k].drive_rad_per_s[2] += 10.;
+  IncrementIntegrator integrator(model, options);
+  Increment out;
+  for (int i = 0; i < 30; ++i) {  // epochs that are shorter than what is to be noticed
+    const std::int64_t begin_ns = 300'000'000 + i * 20'000'000;
+    ASSERT_TRUE(integrator.integrate(samples, begin_ns, begin_ns + 20'000'000, out));
+    const double since_s = 0.02 * (i + 1) - 0.19;  // the last reading that is believed
+    if (since_s > 0.05) {
+      EXPECT_NEAR(out.longest_hold_s, since_s, 0.011) << i;
+    }
+  }
+  EXPECT_GT(out.longest_hold_s, 0.39);
+}
+
 }  // namespace
 }  // namespace viwo::wheel_relative_pose

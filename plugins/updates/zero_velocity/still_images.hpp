@@ -32,12 +32,26 @@ class StillImages {
   /// What was remembered is of a base that moved.
   void forget() { old_.valid = young_.valid = false; }
 
-  /// kUnknown: no image, or too few points in common; kTooEarly: none that is old enough.
+  /// kUnknown: no image of that camera, or too few points in common; kTooEarly: none that is old
+  /// enough.
   Verdict compare(std::span<const FeatureSample> features) {
     if (features.empty()) return kUnknown;
-    take(features.front());
+    auto of_it = features.begin();
+    if (young_.valid) {
+      // Cameras may take turns: an epoch is of one, the next one of another.
+      of_it = std::find_if(features.begin(), features.end(), [this](const FeatureSample& sample) {
+        return sample.camera == young_.camera;
+      });
+      const std::int64_t now_ns = features.front().t_ns;
+      const bool has_ended = seconds_between(young_.t_ns, now_ns) > 2. * window_s_;
+      if (of_it == features.end()) {
+        if (!has_ended) return kUnknown;
+        forget();
+        of_it = features.begin();
+      }
+    }
+    take(*of_it);
     if (now_.points.size() < min_points_) return kUnknown;
-    if (young_.valid && young_.camera != now_.camera) forget();
     if (!young_.valid) {
       std::swap(young_, now_);
       return kTooEarly;

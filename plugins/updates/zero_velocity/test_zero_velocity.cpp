@@ -19,13 +19,15 @@ constexpr double kRateHz = 200.;
 /// IMU, image and encoder data of epochs of 0.1 s of a robot that stands, or creeps along x.
 class Robot {
  public:
-  explicit Robot(double speed_m_per_s, double vibration = 1.)
-      : speed_(speed_m_per_s), vibration_(vibration) {
+  explicit Robot(double speed_m_per_s, double vibration = 1., int cameras = 1)
+      : speed_(speed_m_per_s), vibration_(vibration), cameras_(cameras) {
     for (int i = 0; i < 60; ++i) {
       const VectorXd n = testing::gaussian(3, rng_);
       points_.emplace_back(2. * n[0], n[1], 3. + std::abs(n[2]));
     }
   }
+
+  int first_reading = 0;  ///< of ten in an epoch
 
   EpochData epoch(int k, bool images, const testing::UpdateHost& host) {
     const ImuNoise noise;
@@ -44,6 +46,7 @@ class Robot {
     }
     image_.points.clear();
     image_.t_ns = 100 * k * kMs;
+    image_.camera = k % cameras_;
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const VectorXd n = testing::gaussian(2, rng_);
       const Vector3d p = points_[i] - Vector3d(speed_ * 0.1 * k, 0., 0.);
@@ -51,7 +54,7 @@ class Robot {
                                400. * p.y() / p.z() + n[1]});
     }
     encoders_.clear();
-    for (int i = 0; i < 10; ++i) {
+    for (int i = first_reading; i < 10; ++i) {
       EncoderSample sample;
       sample.begin_ns = 100 * (k - 1) * kMs + 10 * i * kMs;
       sample.end_ns = sample.begin_ns + 10 * kMs;
@@ -69,6 +72,7 @@ class Robot {
 
  private:
   double speed_, vibration_;
+  int cameras_;  ///< that take turns
   std::mt19937_64 rng_{17};
   std::vector<Vector3d> points_;
   std::vector<ImuSample> imu_;
@@ -125,11 +129,22 @@ TEST(ZeroVelocity, SeesAStandstillAndSlowMotionInImagesWhateverTheFilterKnows) {
   EXPECT_EQ(believed("", Robot(0.05), true, unsure), 0);
 }
 
+TEST(ZeroVelocity, SeesThemInTheImagesOfOneOfTwoCamerasThatTakeTurns) {
+  const testing::SmallFilter unsure = standing_filter(1.);
+  EXPECT_EQ(believed("", Robot(0., 1., 2), true, unsure), 10);
+  EXPECT_EQ(believed("", Robot(0.05, 1., 2), true, unsure), 0);
+  // A filter that would notice does not wait for the other camera.
+  EXPECT_EQ(believed("", Robot(0., 1., 2), true, standing_filter(0.01)), 25);
+}
+
 TEST(ZeroVelocity, SeesAStandstillAndSlowMotionInTheWheels) {
   const testing::SmallFilter unsure = standing_filter(1.);
   // The first epoch has no beginning.
   EXPECT_EQ(believed(", detector: wheels", Robot(0.), false, unsure), 29);
   EXPECT_EQ(believed(", detector: wheels", Robot(0.05), false, unsure), 0);
+  Robot late(0.);  // the last tenth of each epoch
+  late.first_reading = 9;
+  EXPECT_EQ(believed(", detector: wheels", late, false, unsure), 0);
 }
 
 TEST(ZeroVelocity, DoesNotBelieveAShakingImu) {

@@ -160,17 +160,17 @@ class ZeroVelocity final : public Update {
     const std::int64_t offset_ns = std::llround(1e9 * filter.block(wheels_.clock).numbers()[0]);
     const std::int64_t from_ns = data.begin_ns - offset_ns;
     const std::int64_t to_ns = data.end_ns - offset_ns;
-    std::int64_t reached_ns = from_ns;
+    std::int64_t seen_ns = 0;
     for (const EncoderSample& sample : data.samples<EncoderSample>(encoders_)) {
       if (sample.end_ns <= from_ns || sample.begin_ns >= to_ns) continue;
       for (int i = 0; i < sample.n_drive; ++i) {
         const double rate = sample.drive_rad_per_s[static_cast<std::size_t>(i)];
         if (!(std::abs(rate) <= params_.max_drive_rad_per_s)) return false;
       }
-      reached_ns = sample.end_ns;
+      seen_ns += std::min(sample.end_ns, to_ns) - std::max(sample.begin_ns, from_ns);
     }
     // Most of the epoch must have been seen; samples may be a little late.
-    return 2 * (reached_ns - from_ns) >= to_ns - from_ns;
+    return 2 * seen_ns >= to_ns - from_ns;
   }
 
   /// (ZV-2): the slowest motion would not pass the gate.
