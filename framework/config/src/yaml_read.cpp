@@ -135,6 +135,7 @@ class TreeBuilder final : public YAML::EventHandler {
                 const std::string& value) override {
     count(mark, {.characters = value.size()});
     if (value.find('\0') != std::string::npos) fail(mark_of(mark), "a text with a zero byte");
+    require_closed(mark);
     add(Node::scalar_of(value, mark_of(mark), tag == "!"), anchor, mark);
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
@@ -158,6 +159,23 @@ class TreeBuilder final : public YAML::EventHandler {
   void OnMapEnd() override { close(); }
 
  private:
+  /// The parser takes the end of the text for that of a quoted value, with all that is between.
+  void require_closed(const YAML::Mark& mark) const {
+    const auto begin = static_cast<std::size_t>(std::max(mark.pos, 0));
+    if (begin >= text_.size()) return;
+    const char quote = text_[begin];
+    if (quote != '"' && quote != '\'') return;
+    for (std::size_t i = begin + 1; i < text_.size(); ++i) {
+      if (quote == '"' && text_[i] == '\\') {
+        ++i;
+      } else if (text_[i] == quote) {
+        if (quote == '"' || i + 1 == text_.size() || text_[i + 1] != quote) return;
+        ++i;
+      }
+    }
+    fail(mark_of(mark), std::string("not valid YAML: this quote (") + quote + ") is never closed");
+  }
+
   /// A list or a section.
   struct Open {
     YAML::anchor_t anchor;

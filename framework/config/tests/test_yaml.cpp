@@ -84,6 +84,23 @@ TEST(Yaml, ReportsASyntaxErrorWithItsPosition) {
       ::testing::StartsWith("f.yaml:1:4  not valid YAML: the referenced anchor is not defined"));
 }
 
+/// Its end would be the end of the text, and all keys between a part of it.
+TEST(Yaml, RefusesAQuoteThatIsNeverClosed) {
+  EXPECT_EQ(parse_error("a: 1\nname: \"abc\n# no\nseed: 77\n"),
+            "f.yaml:2:7  not valid YAML: this quote (\") is never closed");
+  EXPECT_EQ(parse_error("a:\n  - 'it''s\nb: 2\n"),
+            "f.yaml:2:5  not valid YAML: this quote (') is never closed");
+  EXPECT_EQ(parse_error("a: \"x\\\"\n"),
+            "f.yaml:1:4  not valid YAML: this quote (\") is never closed");
+  const Node closed =
+      parse("\"a\": 'it''s'\nb: \"\\\"\\\\\"\nc: \"two\n  lines\"\nd: 5'\ne: é\nf: 'é'", "f.yaml");
+  EXPECT_EQ(closed.find("a")->scalar(), "it's");
+  EXPECT_EQ(closed.find("b")->scalar(), "\"\\");
+  EXPECT_EQ(closed.find("c")->scalar(), "two lines");
+  EXPECT_EQ(closed.find("d")->scalar(), "5'");
+  EXPECT_EQ(closed.find("f")->scalar(), "é");
+}
+
 TEST(Yaml, RefusesASecondDocument) {
   EXPECT_EQ(parse_error("---\na: 1\n---\nb: 2\n"),
             "f.yaml:3:1  a second YAML document: only one is allowed");
