@@ -175,6 +175,9 @@ TEST_F(ViwoBag, RefusesWrongInputAndWritesNothing) {
   std::ofstream(path("recorded/metadata.yaml")) << "rosbag2_bagfile_information:\n";
   std::ofstream(path("recorded/recorded_0.mcap")) << "\x89MCAP0\r\n ros2 libmcap 0.8.0";
   EXPECT_EQ(run(path("log") + " " + path("recorded")), 2);
+  EXPECT_EQ(run(path("log") + " " + path("recorded/recorded_0.mcap")), 2);
+  EXPECT_EQ(output_, path("recorded/recorded_0.mcap") +
+                         "  exists and is no bag that viwo_bag has written\n");
   EXPECT_TRUE(fs::exists(folder_ / "recorded/recorded_0.mcap"));
   fs::remove(folder_ / "log/cam1/data/2.png");
   EXPECT_EQ(run(path("log") + " " + out), 2);

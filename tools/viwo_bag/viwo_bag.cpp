@@ -223,6 +223,8 @@ Format format_of(const fs::path& out) {
                    "of a ROS 2 bag");
 }
 
+constexpr const char* kNotOwn = "  exists and is no bag that viwo_bag has written";
+
 /// A file that is no bag is not replaced.
 void check_file(const fs::path& file, std::string_view magic) {
   std::error_code ignored;
@@ -232,6 +234,15 @@ void check_file(const fs::path& file, std::string_view magic) {
   std::ifstream(file, std::ios::binary)
       .read(begin.data(), static_cast<std::streamsize>(begin.size()));
   if (begin != magic) throw InputError(file.string() + "  exists and is no bag");
+}
+
+/// By the header: its lengths, profile and library.
+bool is_own_mcap(const fs::path& file) {
+  constexpr std::string_view kHeader("\x04\0\0\0ros2\x04\0\0\0viwo", 16);
+  std::string begin(64, '\0');
+  std::ifstream(file, std::ios::binary)
+      .read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return begin.find(kHeader) != std::string::npos;
 }
 
 std::string file_of_folder(const fs::path& out) { return out.filename().string() + "_0.mcap"; }
@@ -247,20 +258,19 @@ void check_folder(const fs::path& out) {
       is_own = is_own && (name == "metadata.yaml" || name == file_of_folder(out));
     }
   }
-  if (is_own) {
-    // The header: its lengths, profile and library.
-    constexpr std::string_view kHeader("\x04\0\0\0ros2\x04\0\0\0viwo", 16);
-    std::string begin(64, '\0');
-    std::ifstream(out / file_of_folder(out), std::ios::binary)
-        .read(begin.data(), static_cast<std::streamsize>(begin.size()));
-    is_own = begin.find(kHeader) != std::string::npos;
-  }
-  if (!is_own) throw InputError(out.string() + "  exists and is no bag that viwo_bag has written");
+  if (is_own && is_own_mcap(out / file_of_folder(out))) return;
+  throw InputError(out.string() + kNotOwn);
 }
 
 void check_output(const fs::path& out, Format format) {
   if (format == Format::kRos1) return check_file(out, "#ROSBAG V");
-  if (format == Format::kMcap) return check_file(out, "\x89MCAP");
+  if (format == Format::kMcap) {
+    check_file(out, "\x89MCAP");
+    std::error_code ignored;
+    const bool is_there = fs::is_regular_file(out, ignored) && fs::file_size(out, ignored) > 0;
+    if (is_there && !is_own_mcap(out)) throw InputError(out.string() + kNotOwn);
+    return;
+  }
   check_folder(out);
 }
 

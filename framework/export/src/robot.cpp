@@ -10,6 +10,15 @@
 namespace viwo::exports {
 namespace {
 
+struct Named {
+  const char* begin;
+  const char* unit;
+};
+/// Of what the formats hold.
+constexpr Named kUnits[] = {{"r_", "m"},         {"x_", "m"},        {"y_", "m"},
+                            {"k_", "m"},         {"baseline", "m"},  {"track", "m"},
+                            {"wheel_base", "m"}, {"delta_o", "rad"}, {"gamma_", "rad"}};
+
 /// Looks intrinsics up and remembers which were used. Those of further wheel sets are left out.
 class Intrinsics {
  public:
@@ -124,10 +133,16 @@ void take_signs(const CalibrationFile& file, Robot& robot) {
   for (std::size_t i = 0; i < n; ++i) robot.wheels[i].reversed = signs[i] < 0;
 }
 
-/// Throws InputError for sizes that no robot has.
+/// Throws InputError for sizes that no robot has, also because they are in another unit.
 void check_sizes(const CalibrationFile& file) {
   for (const CalibrationEntry& entry : file.intrinsics) {
     const std::string name = entry.name.substr(entry.name.rfind('.') + 1);
+    for (const Named& known : kUnits) {
+      if (!name.starts_with(known.begin) || entry.unit.empty() || entry.unit == known.unit)
+        continue;
+      config::fail(entry.mark, "intrinsics." + entry.name + ".unit: '" + entry.unit + "', not '" +
+                                   known.unit + "', which is that of every model");
+    }
     const bool is_size =
         name.starts_with("r_") || name == "baseline" || name == "track" || name == "wheel_base";
     if (!is_size || entry.estimate > 0.) continue;

@@ -115,6 +115,10 @@ TEST(Export, RefusesWhatIsNoRobot) {
                           " m is no size of a robot"));
   }
   CalibrationFile file = differential();
+  file.intrinsics[1].unit = "mm";
+  EXPECT_THAT(error_of([&] { export_calibration(file, "urdf"); }),
+              HasSubstr("intrinsics.r_right.unit: 'mm', not 'm'"));
+  file = differential();
   file.drive_signs = {-1};
   EXPECT_EQ(error_of([&] { export_calibration(file, "csv"); }),
             "robot/calibration.yaml: 'drive_signs' has 1 signs for 2 wheels");

@@ -18,6 +18,9 @@ namespace {
 /// A progressive image has about ten; each takes as long as the whole image, however few bytes.
 constexpr int kMostScans = 64;
 
+/// Bytes of what libjpeg keeps of one that is progressive: up to 6 a pixel, and 3 of most.
+constexpr long kMostKept = 64L << 20;
+
 /// libjpeg goes on behind these with grey or with what it has already. Others it mends: bytes too
 /// many between two marks, as cheap cameras write them, change no pixel.
 constexpr std::array kPixelsAreGuessed{JWRN_HIT_MARKER, JWRN_JPEG_EOF, JWRN_HUFF_BAD_CODE,
@@ -56,6 +59,7 @@ class JpegDecoder {
     if (setjmp(failed_) != 0) return false;  // NOLINT(cert-err52-cpp): as libjpeg is made for
     jpeg_create_decompress(&info_);
     info_.progress = &progress_;
+    info_.mem->max_memory_to_use = kMostKept;
     jpeg_mem_src(&info_, bytes.data(), static_cast<unsigned long>(bytes.size()));
     jpeg_read_header(&info_, TRUE);
     info_.out_color_space = JCS_GRAYSCALE;
@@ -78,7 +82,12 @@ class JpegDecoder {
     return *static_cast<JpegDecoder*>(info->client_data);
   }
   [[noreturn]] static void fail(j_common_ptr info) {
-    info->err->format_message(info, of(info).message_.data());
+    auto& message = of(info).message_;
+    info->err->format_message(info, message.data());
+    if (info->err->msg_code == JERR_NO_BACKING_STORE) {
+      std::snprintf(message.data(), message.size(), "is progressive and needs more than %ld MiB",
+                    kMostKept >> 20);
+    }
     std::longjmp(of(info).failed_, 1);  // NOLINT(cert-err52-cpp)
   }
 

@@ -368,6 +368,12 @@ TEST_F(ImageFileTest, AJpegWhosePixelsAreGuessedIsRefused) {
     bytes.insert(bytes.begin() + place, first_scan.begin(), first_scan.end());
   }
   EXPECT_EQ(refusal(bytes), "a: has more than 64 scans");
+  // AND a few kilobytes do not ask for hundreds of megabytes
+  const cv::Mat one_colour(5000, 5000, CV_8UC3, cv::Scalar(90, 91, 92));
+  cv::imencode(".jpg", one_colour, bytes, {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  EXPECT_EQ(refusal(bytes), "a: is progressive and needs more than 64 MiB");
+  cv::imencode(".jpg", one_colour, bytes);
+  EXPECT_NO_THROW(decode_image(bytes, "a", image));
 }
 
 TEST_F(ImageFileTest, AFullDiskIsAnError) {
