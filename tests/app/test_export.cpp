@@ -42,8 +42,8 @@ TEST_F(ExportTest, ARunStartsFromItAndDoesNotOverwriteIt) {
   const Outcome refused = viwo(run({"--set", from, "--out", "first"}));
   EXPECT_EQ(refused.code, 2);
   EXPECT_EQ(refused.err,
-            "the run starts from TMP/first/calibration.yaml, which its results would overwrite - "
-            "choose another --out\n");
+            "first/calibration.yaml  is an input, which the results would replace - write them "
+            "elsewhere\n");
   EXPECT_EQ(read("first/calibration.yaml"), first);
   expect_done(run({"--set", from, "--out", "second"}));
   // What it was told is what it begins with: three further seconds teach little.

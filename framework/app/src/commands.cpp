@@ -16,10 +16,10 @@
 #include "viwo/eval/accuracy.hpp"
 #include "viwo/eval/json.hpp"
 #include "viwo/experiment/experiment.hpp"
-#include "viwo/experiment/folder_lock.hpp"
 #include "viwo/export/export_calibration.hpp"
 #include "viwo/inspect/inspection.hpp"
 #include "viwo/log/files.hpp"
+#include "viwo/log/folder_lock.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/observability/observability.hpp"
@@ -29,6 +29,7 @@
 #include "viwo/results/run_stream.hpp"
 #include "viwo/run/simulate.hpp"
 #include "viwo/setup/configuration.hpp"
+#include "viwo/setup/input_files.hpp"
 #include "viwo/view/pictures.hpp"
 
 namespace viwo::app {
@@ -44,6 +45,28 @@ std::filesystem::path out_folder(const Arguments& arguments) {
   return std::filesystem::path("results") / std::filesystem::path(arguments.positional[0]).stem();
 }
 
+/// It is made, and belongs to this command: whether results can be written shows before the work.
+class OutFolder {
+ public:
+  explicit OutFolder(const Arguments& arguments)
+      : folder_(made(arguments)), lock_(folder_, false) {}
+  const std::filesystem::path& path() const { return folder_; }
+
+ private:
+  static std::filesystem::path made(const Arguments& arguments) {
+    std::filesystem::path folder = out_folder(arguments);
+    std::error_code not_there;
+    if (std::filesystem::is_regular_file(folder, not_there)) {
+      throw InputError(folder.string() + "  is a file, not a folder");
+    }
+    make_folder(folder);
+    return folder;
+  }
+
+  std::filesystem::path folder_;
+  log::FolderLock lock_;
+};
+
 /// --figures: the plots of a page, beside it.
 class Figures {
  public:
@@ -54,7 +77,7 @@ class Figures {
                                            : report::FigureFormat::kSvg),
         folder_(folder / "figures") {
     if (!wanted_) return;
-    make_folder(folder_);
+    log::make_folder_in(folder, "figures");
     report::write_figures(folder_, {}, format_);
   }
   void write(const report::Document& document) const {
@@ -128,18 +151,12 @@ RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
   return read_run(configuration, plugins, arguments.seed);
 }
 
-/// The calibration that a run starts from must not be lost when the run diverges.
-void refuse_to_overwrite(const RunSetup& setup, const std::filesystem::path& folder) {
-  const auto written = folder / "calibration.yaml";
-  for (const char* key : {"calibration", "kinematics.calibration"}) {
-    const config::Node* const file = setup.resolved.at_path(key);
-    std::error_code not_there;
-    if (!setup.filter || file == nullptr || !file->is_scalar() ||
-        !std::filesystem::equivalent(written, file->scalar(), not_there)) {
-      continue;
-    }
-    throw InputError("the run starts from " + file->scalar() +
-                     ", which its results would overwrite - choose another --out");
+/// The calibration that a run starts from, and what it is compared with, must not be lost.
+void refuse_to_replace_inputs(const std::filesystem::path& folder, const config::Node& resolved) {
+  const std::vector<std::filesystem::path> inputs = input_files(resolved);
+  for (const char* const name : {"calibration.yaml", "calibration.csv", "trajectory.tum",
+                                 "reference.tum", "summary.json", "report.html"}) {
+    refuse_to_replace(folder / name, inputs);
   }
 }
 
@@ -165,14 +182,14 @@ int shard_is_done(const ExperimentResult& result, const Shard& shard, const std:
 int run_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
-  refuse_to_overwrite(setup, out_folder(arguments));
+  refuse_to_replace_inputs(out_folder(arguments), setup.resolved);
   std::optional<ForecastOutput> forecast;
   if (!arguments.plan.empty()) forecast.emplace(arguments.plan, setup, plugins);
   view::PictureSinks sinks = view::open_sinks(setup, arguments.show, arguments.video);
   const RunData data = collect(setup, LiveSensors::kAllowed);
   view::RunPictures pictures(setup, data, std::move(sinks));
-  const auto folder = out_folder(arguments);
-  make_folder(folder);  // whether results can be written shows before the work
+  const OutFolder out(arguments);
+  const std::filesystem::path& folder = out.path();
   const Figures figures(arguments, folder);
   std::optional<EstimateOutput> mcap;  // behind what else may be refused: it empties its file
   if (!arguments.mcap.empty()) mcap.emplace(arguments.mcap, setup);
@@ -220,7 +237,7 @@ int experiment_command(const Arguments& arguments) {
   options.interrupted = [&interrupt] { return interrupt.raised(); };
   const ExperimentSetup setup = read_experiment(arguments.positional[0], options);
   const auto folder = out_folder(arguments);
-  std::optional<FolderLock> lock;
+  std::optional<log::FolderLock> lock;
   options.folder_is_there = [&] { lock.emplace(folder, options.shard.has_value()); };
   const Figures figures(arguments, folder);
   const ExperimentResult result = [&] {
@@ -245,8 +262,8 @@ int observability_command(const Arguments& arguments) {
   ExperimentOptions options;
   options.assignments = arguments.assignments;
   const ExperimentSetup setup = observability::read_observability(arguments.positional[0], options);
-  const auto folder = out_folder(arguments);
-  make_folder(folder);
+  const OutFolder out(arguments);
+  const std::filesystem::path& folder = out.path();
   const Figures figures(arguments, folder);
   const observability::ObservabilityReport report = [&] {
     Progress progress;
@@ -264,8 +281,11 @@ int calibrate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   calibration::CalibrationSetup setup =
       calibration::read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
-  const auto folder = out_folder(arguments);
-  make_folder(folder);
+  for (const calibration::CalibrationRecording& recording : setup.recordings) {
+    refuse_to_replace_inputs(out_folder(arguments), recording.setup.resolved);
+  }
+  const OutFolder out(arguments);
+  const std::filesystem::path& folder = out.path();
   const calibration::CalibrationResult result = [&] {
     Progress progress;
     return calibrate(setup, progress);
@@ -280,6 +300,7 @@ int export_command(const Arguments& arguments) {
   const CalibrationFile calibration = read_calibration(arguments.positional[0]);
   const exports::Exported exported = exports::export_calibration(calibration, arguments.to);
   if (arguments.out) {
+    refuse_to_replace(*arguments.out, {arguments.positional[0]});
     write_text(*arguments.out, exported.text);
   } else {
     std::cout << exported.text;
@@ -296,8 +317,9 @@ int plan_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   const plan::PlanSetup setup =
       plan::read_plan_setup(arguments.positional[0], arguments.assignments, plugins);
+  const OutFolder out(arguments);
+  const std::filesystem::path& folder = out.path();
   const plan::Plan found = plan::make_plan(setup);
-  const auto folder = out_folder(arguments);
   write_plan(folder, setup, found);
   std::cout << describe(setup, found) << "motion: " << (folder / "plan.csv").string()
             << "\nreport: " << (folder / "report.html").string() << "\n";
@@ -313,8 +335,9 @@ int inspect_command(const Arguments& arguments) {
   }
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
-  const auto folder = out_folder(arguments);
-  make_folder(folder);
+  if (!arguments.fix.empty()) refuse_to_replace(arguments.fix, input_files(setup.resolved));
+  const OutFolder out(arguments);
+  const std::filesystem::path& folder = out.path();
   const inspect::Inspection inspection = inspect::inspect(setup);
   write_inspection(folder, inspection);
   std::cout << describe(inspection) << "report: " << (folder / "report.html").string() << "\n";
@@ -328,6 +351,8 @@ int inspect_command(const Arguments& arguments) {
 int simulate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
+  refuse_to_empty(*arguments.out, input_files(setup.resolved));
+  const OutFolder out(arguments);
   const SimulateResult result = write_log(setup, *arguments.out);
   std::cout << describe(result) << " in " << arguments.out->string() << "\n";
   return 0;

@@ -1,5 +1,6 @@
 // viwo: visual-inertial-wheel odometry from the command line.
 // Exit codes: 0 done; 1 the run failed, diverged or is doubtful; 2 the input is wrong.
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -7,6 +8,9 @@
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include <poll.h>
+#include <unistd.h>
 
 #include "command_line.hpp"
 #include "out_of_memory.hpp"
@@ -108,11 +112,18 @@ int dispatch(const std::vector<std::string>& words) {
                    config::did_you_mean(words[0], names));
 }
 
+/// Who reads a pipe may go when he has seen enough (head): no reason to lose results.
+bool reader_is_gone() {
+  pollfd out{STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&out, 1, 0) > 0 && (out.revents & POLLERR) != 0;
+}
+
 }  // namespace
 }  // namespace viwo::app
 
 int main(int argc, char** argv) {
   viwo::app::end_well_without_memory();
+  std::signal(SIGPIPE, SIG_IGN);
   const viwo::log::PrintableOutput out(std::cout), err(std::cerr);
   try {
     viwo::become_faster_copy(argv);
@@ -121,7 +132,9 @@ int main(int argc, char** argv) {
       return 1;
     }
     const int code = viwo::app::dispatch({argv + 1, argv + argc});
-    if (!std::cout.flush()) throw std::runtime_error("viwo: the standard output cannot be written");
+    if (!std::cout.flush() && !viwo::app::reader_is_gone()) {
+      throw std::runtime_error("viwo: the standard output cannot be written");
+    }
     return code;
   } catch (const viwo::InputError& error) {
     std::cerr << error.what() << "\n";

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <fstream>
 #include <iterator>
+#include <stdexcept>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "viwo/api/build_record.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/log/files.hpp"
 #include "viwo/plugin_host/installation.hpp"
 
 namespace viwo::app {
@@ -91,10 +93,8 @@ std::string replaced(std::string text, const Replacements& replacements) {
 void copy_template(const fs::path& from, const fs::path& to, const Replacements& replacements) {
   std::ifstream source(from, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(source), {}};
-  std::ofstream target(to, std::ios::binary);
-  target << replaced(text, replacements);
-  target.close();
-  if (!source || !target) throw InputError("cannot write " + to.string());
+  if (!source) throw std::runtime_error("cannot read " + from.string());
+  log::write_bytes(to, replaced(text, replacements));
 }
 
 }  // namespace
@@ -118,13 +118,18 @@ void write_new_plugin(PluginRegistry& plugins, const std::string& kind, const st
                                      {"@kind@", kind},
                                      {"@version@", VIWO_VERSION},
                                      {"@api@", std::to_string(kApiVersion)}};
-  for (const fs::path& part : {templates / "common", templates / kind}) {
-    for (const fs::directory_entry& entry : fs::directory_iterator(part)) {
-      std::string file = replaced(entry.path().filename().string(), replacements);
-      if (!file.ends_with(kTemplateSuffix)) continue;
-      file.resize(file.size() - kTemplateSuffix.size());
-      copy_template(entry.path(), folder / file, replacements);
+  try {
+    for (const fs::path& part : {templates / "common", templates / kind}) {
+      for (const fs::directory_entry& entry : fs::directory_iterator(part)) {
+        std::string file = replaced(entry.path().filename().string(), replacements);
+        if (!file.ends_with(kTemplateSuffix)) continue;
+        file.resize(file.size() - kTemplateSuffix.size());
+        copy_template(entry.path(), folder / file, replacements);
+      }
     }
+  } catch (...) {
+    fs::remove_all(folder, error);  // half a plugin would be in the way of a whole one
+    throw;
   }
 }
 

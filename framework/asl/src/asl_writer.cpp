@@ -89,7 +89,10 @@ void check_is_ours(const fs::path& folder) {
         check_images_are_ours(folder, name / kImages);
         continue;
       }
-      if (file.path().filename() != kData || file.is_directory()) {
+      // Of a command that was killed there may be one that is not whole.
+      const bool is_ours =
+          file.path().filename() == kData || file.path().filename() == std::string(kData) + ".tmp";
+      if (!is_ours || file.is_directory()) {
         refuse(folder, name / file.path().filename());
       }
     }

@@ -296,7 +296,10 @@ class Runner {
   void write_run_of(const ExperimentRun& run, const RunSetup& setup) const {
     if (!options_.keep_runs) return;
     try {
-      write_run(run_folder(run), setup, run.result);
+      const std::filesystem::path folder = run_folder(run);
+      log::require_no_link(folder.parent_path());
+      log::require_no_link(folder);
+      write_run(folder, setup, run.result);
     } catch (const std::exception& error) {
       throw Unwritable{error.what()};
     }

@@ -9,6 +9,7 @@
 #include "checksum.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/results/run_output.hpp"
+#include "viwo/setup/input_files.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -75,16 +76,11 @@ const std::string& RunIdentity::content_of(const fs::path& path) {
   return at->second;
 }
 
-/// A resolved configuration has absolute paths only. A log may be there as FILE.gz.
 void RunIdentity::replace_paths(config::Node& node) {
   for (config::Node& item : node.items()) replace_paths(item);
   for (config::Node::Entry& entry : node.entries()) replace_paths(entry.value);
-  if (!node.is_scalar() || !node.scalar().starts_with('/')) return;
-  for (const char* extension : {"", ".gz"}) {
-    const fs::path path = node.scalar() + extension;
-    if (!fs::is_regular_file(path) && !fs::is_directory(path)) continue;
-    node = config::Node::scalar_of(path.filename().string() + ": " + content_of(path));
-    return;
+  if (const auto file = input_file(node)) {
+    node = config::Node::scalar_of(file->filename().string() + ": " + content_of(*file));
   }
 }
 

@@ -126,13 +126,6 @@ void RunJournal::write(const RunKey& key, const RunResult& run) const {
   log::write_bytes(file_of(key), bytes);
 }
 
-void RunJournal::require_own_folder() const {
-  std::error_code ignored;
-  if (!fs::is_symlink(fs::symlink_status(folder_, ignored))) return;
-  throw InputError(folder_.string() +
-                   "  is a link; runs are kept in a folder of their own - remove it");
-}
-
 void RunJournal::remove() const {
   require_own_folder();
   std::error_code ignored;  // what stays is a file too many, not a wrong result

@@ -7,7 +7,7 @@
 #include "experiment_file.hpp"
 #include "message_of.hpp"
 #include "run_identity.hpp"
-#include "viwo/experiment/folder_lock.hpp"
+#include "viwo/log/folder_lock.hpp"
 
 namespace viwo {
 namespace {
@@ -178,16 +178,16 @@ TEST(FolderLock, IsOfOneOrOfShards) {
   const fs::path folder = fs::path(::testing::TempDir()) / "viwo_folder_lock";
   fs::create_directories(folder);
   {
-    const FolderLock shard(folder, true);
-    const FolderLock another(folder, true);
-    EXPECT_THROW(FolderLock(folder, false), InputError);
+    const log::FolderLock shard(folder, true);
+    const log::FolderLock another(folder, true);
+    EXPECT_THROW(log::FolderLock(folder, false), InputError);
   }
   {
-    const FolderLock whole(folder, false);
-    EXPECT_THROW(FolderLock(folder, true), InputError);
-    EXPECT_THROW(FolderLock(folder, false), InputError);
+    const log::FolderLock whole(folder, false);
+    EXPECT_THROW(log::FolderLock(folder, true), InputError);
+    EXPECT_THROW(log::FolderLock(folder, false), InputError);
   }
-  const FolderLock again(folder, false);
+  const log::FolderLock again(folder, false);
 }
 
 }  // namespace

@@ -157,6 +157,7 @@ report::Document report_of(const Inspection& inspection) {
 }
 
 void write_inspection(const std::filesystem::path& folder, const Inspection& inspection) {
+  log::remove_results(folder, {"inspection.json", "report.html"});
   log::write_text(folder / "inspection.json", json_text(to_json(inspection)));
   log::write_text(folder / "report.html", report::to_html(report_of(inspection)));
 }

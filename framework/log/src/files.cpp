@@ -9,6 +9,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "viwo/api/status.hpp"
 #include "viwo/math/utf8.hpp"
 
 namespace viwo::log {
@@ -35,6 +36,29 @@ void make_folder(const std::filesystem::path& folder) {
   if (error) {
     throw std::runtime_error("cannot create the folder " + folder.string() + ": " +
                              error.message());
+  }
+}
+
+void require_no_link(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  if (!std::filesystem::is_symlink(std::filesystem::symlink_status(folder, ignored))) return;
+  throw InputError(folder.string() +
+                   "  is a link; results are kept in a folder of their own - remove it");
+}
+
+std::filesystem::path make_folder_in(const std::filesystem::path& folder, const std::string& name) {
+  make_folder(folder);
+  require_no_link(folder / name);
+  make_folder(folder / name);
+  return folder / name;
+}
+
+void remove_results(const std::filesystem::path& folder, std::initializer_list<const char*> names) {
+  for (const char* const name : names) {
+    std::error_code ignored;  // what cannot be removed cannot be replaced either, which is told
+    if (std::filesystem::is_regular_file(folder / name, ignored)) {
+      std::filesystem::remove(folder / name, ignored);
+    }
   }
 }
 

@@ -203,14 +203,7 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
 void write_run(const std::filesystem::path& folder, const RunSetup& setup,
                const RunResult& result) {
   log::make_folder(folder);
-  // Nothing of an earlier run stands beside this one: on a full disk, or where this one has none.
-  for (const char* const last :
-       {"summary.json", "report.html", "calibration.yaml", "reference.tum"}) {
-    std::error_code ignored;
-    if (std::filesystem::is_regular_file(folder / last, ignored)) {
-      std::filesystem::remove(folder / last, ignored);
-    }
-  }
+  log::remove_results(folder, {"summary.json", "report.html", "calibration.yaml", "reference.tum"});
   log::write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
   if (!result.on_disk) {
     log::write_tum(folder / "trajectory.tum", result.estimate);

@@ -65,7 +65,8 @@ Table accuracy_table(const eval::Accuracy& accuracy) {
                           1e3 * segment.mean_m, segment.mean_deg,
                           std::to_string(segment.count) + " segments"});
   }
-  table.rows.push_back({"at the end, aligned at the start", 1e3 * accuracy.end_m, accuracy.end_deg,
+  const bool is_aligned = accuracy.alignment != eval::Alignment::kNone;
+  table.rows.push_back({is_aligned ? "at the end, aligned at the start" : "at the end", 1e3 * accuracy.end_m, accuracy.end_deg,
                         significant(accuracy.path_length_m, 4) + " m"});
   return table;
 }
@@ -153,7 +154,9 @@ void add_trajectory_section(const RunResult& result, Document& document) {
   position.series.push_back(
       report::error_series("error", *result.accuracy, report::kMaxCurvePoints));
   position.series.back().colour = kEstimateColour;
-  position.caption = "Distance to the truth after aligning the first poses.";
+  position.caption = result.accuracy->alignment == eval::Alignment::kNone
+                         ? "Distance to the truth, without aligning the two."
+                         : "Distance to the truth after aligning the first poses.";
   section.blocks.emplace_back(std::move(top));
   section.blocks.emplace_back(std::move(position));
   if (result.errors.empty()) {  // else the yaw is shown with its band

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
+#include <string>
 #include <string_view>
 
 #include "viwo/config/regular_file.hpp"
@@ -10,6 +12,15 @@
 namespace viwo::log {
 
 void make_folder(const std::filesystem::path& folder);
+
+/// A folder of its own in that of the results. InputError for a link: what is there may be somebody
+/// else's.
+std::filesystem::path make_folder_in(const std::filesystem::path& folder, const std::string& name);
+void require_no_link(const std::filesystem::path& folder);
+
+/// Results of an earlier command, files of these names, do not stand beside those of this one where
+/// it has none, or on a full disk.
+void remove_results(const std::filesystem::path& folder, std::initializer_list<const char*> names);
 
 using config::require_regular_file;
 

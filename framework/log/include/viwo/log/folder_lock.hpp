@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-namespace viwo::experiment {
+namespace viwo::log {
 
 /// Held until it goes, also when the process is killed. File systems without locks have none.
 class FolderLock {
@@ -18,4 +18,4 @@ class FolderLock {
   int fd_;
 };
 
-}  // namespace viwo::experiment
+}  // namespace viwo::log

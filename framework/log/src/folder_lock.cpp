@@ -1,4 +1,4 @@
-#include "viwo/experiment/folder_lock.hpp"
+#include "viwo/log/folder_lock.hpp"
 
 #include <cerrno>
 #include <stdexcept>
@@ -11,7 +11,7 @@
 
 #include "viwo/api/status.hpp"
 
-namespace viwo::experiment {
+namespace viwo::log {
 
 FolderLock::FolderLock(const std::filesystem::path& folder, bool shared)
     : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
@@ -28,4 +28,4 @@ FolderLock::FolderLock(const std::filesystem::path& folder, bool shared)
 
 FolderLock::~FolderLock() { ::close(fd_); }
 
-}  // namespace viwo::experiment
+}  // namespace viwo::log
