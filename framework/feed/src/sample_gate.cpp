@@ -20,11 +20,6 @@ const char* fault_of_numbers(SampleView sample) {
   if (const char* fault = sample.type().fault(sample.data())) return fault;
   const auto* const pose = sample.get_if<PoseSample>();
   const auto* const state = sample.get_if<StateSample>();
-  if (state != nullptr &&
-      !(all_finite(state->p_IinG_m) && all_finite(state->v_IinG_m_per_s) &&
-        all_finite(state->gyro_bias_rad_per_s) && all_finite(state->accel_bias_m_per_s2))) {
-    return "value that is not finite";
-  }
   const bool has_orientation = (pose == nullptr || is_unit(pose->q_BtoW_xyzw)) &&
                                (state == nullptr || is_unit(state->q_ItoG_xyzw));
   return has_orientation ? nullptr : "quaternion that is not of unit norm";

@@ -19,6 +19,44 @@ std::int64_t median_spacing_ns(const std::vector<EncoderSample>& samples) {
   return upper_median(spacings);
 }
 
+double most_drive(const EncoderReading& reading) {
+  double most = 0.;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(reading.n_drive); ++i) {
+    most = std::max(most, std::abs(reading.drive[i]));
+  }
+  return most;
+}
+
+/// Whether the wheels stood between two readings, of which what is between was not written.
+bool is_rest(const EncoderReading& a, const EncoderReading& b, bool drive_is_angle) {
+  constexpr double kStill_rad = 0.5, kSetsOff_rad_per_s = 2.;
+  if (!drive_is_angle) return most_drive(a) == 0. && most_drive(b) < kSetsOff_rad_per_s;
+  if (b.is_start) return false;
+  EncoderReading turned = b;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(a.n_drive); ++i) {
+    turned.drive[i] -= a.drive[i];
+  }
+  return most_drive(turned) < kStill_rad;
+}
+
+/// Readings between the two, at about `spacing_ns`, that say what stands.
+void hold(const EncoderReading& a, const EncoderReading& b, bool drive_is_angle,
+          std::int64_t spacing_ns, std::vector<EncoderReading>& out) {
+  constexpr std::int64_t kMost = 20'000;
+  const std::int64_t gap_ns = b.t_ns - a.t_ns;
+  const std::int64_t n = std::clamp<std::int64_t>(gap_ns / spacing_ns, 1, kMost);
+  for (std::int64_t k = 1; k < n; ++k) {
+    EncoderReading between = a;
+    const double part = static_cast<double>(k) / static_cast<double>(n);
+    between.t_ns = a.t_ns + std::llround(part * static_cast<double>(gap_ns));
+    between.is_start = false;
+    for (std::size_t i = 0; drive_is_angle && i < static_cast<std::size_t>(a.n_drive); ++i) {
+      between.drive[i] += part * (b.drive[i] - a.drive[i]);
+    }
+    out.push_back(between);
+  }
+}
+
 EncoderSample cell_between(const EncoderReading& a, const EncoderReading& b) {
   EncoderSample cell;
   cell.begin_ns = a.t_ns;
@@ -75,8 +113,28 @@ std::vector<EncoderSample> cells_from_angles(std::span<const EncoderReading> ang
   return cells;
 }
 
-std::vector<EncoderSample> samples_from(std::span<const EncoderReading> readings,
+std::vector<EncoderReading> with_rests(std::span<const EncoderReading> readings,
+                                       bool drive_is_angle, double max_gap_s) {
+  std::vector<EncoderReading> out;
+  std::vector<std::int64_t> spacings;
+  for (std::size_t i = 1; i < readings.size(); ++i) {
+    spacings.push_back(readings[i].t_ns - readings[i - 1].t_ns);
+  }
+  std::vector<std::int64_t> ordered = spacings;
+  const std::int64_t spacing_ns = ordered.empty() ? 0 : upper_median(ordered);
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const bool is_gap = i > 0 && 1e-9 * static_cast<double>(spacings[i - 1]) > max_gap_s;
+    if (is_gap && spacing_ns > 0 && is_rest(readings[i - 1], readings[i], drive_is_angle)) {
+      hold(readings[i - 1], readings[i], drive_is_angle, spacing_ns, out);
+    }
+    out.push_back(readings[i]);
+  }
+  return out;
+}
+
+std::vector<EncoderSample> samples_from(std::span<const EncoderReading> written,
                                         bool drive_is_angle, double max_gap_s, int stride) {
+  const std::vector<EncoderReading> readings = with_rests(written, drive_is_angle, max_gap_s);
   if (drive_is_angle) return cells_from_angles(readings, max_gap_s, stride);
   std::vector<EncoderSample> samples;
   samples.reserve(readings.size());

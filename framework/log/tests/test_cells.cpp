@@ -103,5 +103,63 @@ TEST(CellsFromAngles, UseEveryNthReadingAndStartAgainBehindAGap) {
   EXPECT_TRUE(cells_from_angles(readings(), 0.2, 3).empty());
 }
 
+/// A base that drives, stands for 20 s, of which nothing is written, and drives on: 50 Hz.
+std::vector<EncoderReading> written_on_change(bool angles) {
+  std::vector<EncoderReading> out;
+  double angle = 3.;
+  for (int k = 0; k <= 1100; ++k) {
+    const double t_s = 0.02 * k;
+    const double rate = t_s < 1. ? 10. * (1. - t_s) : t_s > 21. ? 10. * (t_s - 21.) : 0.;
+    angle += 0.02 * rate;
+    EncoderReading reading;
+    reading.t_ns = std::int64_t{k} * 20'000'000;
+    reading.n_drive = 1;
+    reading.n_steer = 1;
+    reading.drive[0] = angles ? angle : rate;
+    reading.steer_rad[0] = 0.3;
+    if (t_s > 1.001 && t_s < 21.001) continue;
+    out.push_back(reading);
+  }
+  return out;
+}
+
+double turned_rad(const std::vector<EncoderSample>& cells) {
+  double sum = 0.;
+  for (const EncoderSample& cell : cells) {
+    sum += cell.drive_rad_per_s[0] * seconds_between(cell.begin_ns, cell.end_ns);
+  }
+  return sum;
+}
+
+TEST(SamplesFrom, ReadingsThatAreWrittenOnChangeStandAsLongAsNothingIsWritten) {
+  for (const bool angles : {false, true}) {
+    const auto readings = written_on_change(angles);
+    const auto cells = samples_from(readings, angles, 0.2, 1);
+    for (std::size_t i = 1; i < cells.size(); ++i) {
+      ASSERT_EQ(cells[i].begin_ns, cells[i - 1].end_ns) << "a hole";
+    }
+    EXPECT_NEAR(turned_rad(cells), 10., 0.01);
+    EXPECT_NEAR(static_cast<double>(cells.size()), 1100., 3.) << "as who writes always";
+    EXPECT_EQ(cells[500].steer_rad[0], 0.3);
+  }
+}
+
+TEST(SamplesFrom, AGapInWhichTheWheelsTurnIsAHole) {
+  for (const bool angles : {false, true}) {
+    auto readings = written_on_change(angles);
+    std::erase_if(readings, [](const EncoderReading& reading) {
+      return reading.t_ns > 500'000'000 && reading.t_ns < 21'500'000'000;
+    });
+    const auto cells = samples_from(readings, angles, 0.2, 1);
+    EXPECT_LT(cells.size(), 60U);
+  }
+  // Nor is it a rest where the wheels are fast at once: readings were lost.
+  auto lost = written_on_change(false);
+  std::erase_if(lost, [](const EncoderReading& reading) {
+    return reading.t_ns > 1'000'000'000 && reading.t_ns < 21'500'000'000;
+  });
+  EXPECT_LT(samples_from(lost, false, 0.2, 1).size(), 90U);
+}
+
 }  // namespace
 }  // namespace viwo::log

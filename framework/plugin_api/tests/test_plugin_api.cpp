@@ -11,6 +11,7 @@
 
 #include "in_folder.hpp"
 #include "viwo/api/build_record.hpp"
+#include "viwo/api/stamp_order.hpp"
 
 namespace viwo {
 namespace {
@@ -182,6 +183,23 @@ TEST_F(ChangedApi, IsToldWithWhatToDo) {
   EXPECT_EQ(text.substr(0, text.find(" (")),
             "plugin_api changed: bump kApiVersion in viwo/api/build_record.hpp");
   EXPECT_NE(text.find("then regenerate with"), std::string::npos);
+}
+
+TEST(StampJump, BelievesThePausesOfWhoHasPausedBefore) {
+  constexpr std::int64_t kPeriodNs = 20'000'000, kPauseNs = 15'000'000'000;
+  StampJump jump;
+  std::int64_t t_ns = 0;
+  int refused = 0;
+  for (int pause = 0; pause < 20; ++pause, t_ns += kPauseNs) {
+    for (int i = 0; i < 50; ++i) refused += jump.is_believed(t_ns += kPeriodNs) ? 0 : 1;
+  }
+  EXPECT_EQ(refused, 1) << "of the first pause alone";
+  EXPECT_FALSE(jump.is_believed(t_ns + 3'600'000'000'000)) << "which is another thing";
+  EXPECT_TRUE(jump.is_believed(t_ns + kPeriodNs));
+  StampJump never(1., 0);
+  for (const std::int64_t second : {0, 5, 6, 11, 12}) {
+    EXPECT_EQ(never.is_believed(second * 1'000'000'000), second != 5 && second != 11) << second;
+  }
 }
 
 }  // namespace

@@ -137,6 +137,13 @@ struct StateSample {
   std::array<double, 3> v_IinG_m_per_s{};
   std::array<double, 3> gyro_bias_rad_per_s{};
   std::array<double, 3> accel_bias_m_per_s2{};
+
+  const char* fault() const {
+    const bool is_finite = all_finite(q_ItoG_xyzw) && all_finite(p_IinG_m) &&
+                           all_finite(v_IinG_m_per_s) && all_finite(gyro_bias_rad_per_s) &&
+                           all_finite(accel_bias_m_per_s2);
+    return is_finite ? nullptr : "value that is not finite";
+  }
 };
 
 /// True value of one calibration parameter, from a simulator. Names are those of the estimate:

@@ -20,7 +20,8 @@ namespace viwo {
 inline constexpr std::int64_t kMaxStampNs = 4'000'000'000'000'000'000;
 
 /// Says of increasing stamps which are not to be believed: one far ahead of the last, until another
-/// one is behind it. Taken as it comes, a single broken stamp would make all that follow late.
+/// one is behind it. Taken as it comes, a single broken stamp would make all that follow late. Who
+/// has paused is believed the next time, for twice as long.
 class StampJump {
  public:
   /// Far is more than `far_s`, and more than `times` the longest spacing so far: sources whose data
@@ -33,7 +34,10 @@ class StampJump {
     const bool is_confirmed = suspect_ns_ && t_ns > *suspect_ns_;
     const std::uint64_t ahead_ns = distance_ns(is_confirmed ? *suspect_ns_ : last_ns_, t_ns);
     if (is_first_ || is_confirmed || ahead_ns <= std::max(far_ns_, times_ * longest_ns_)) {
-      if (!is_first_) longest_ns_ = std::clamp(ahead_ns, longest_ns_, kLongestNs);
+      if (!is_first_) {
+        learn(ahead_ns);
+        if (is_confirmed) learn(distance_ns(last_ns_, *suspect_ns_));
+      }
       is_first_ = false;
       suspect_ns_.reset();
       last_ns_ = t_ns;
@@ -46,6 +50,13 @@ class StampJump {
  private:
   static std::uint64_t distance_ns(std::int64_t from_ns, std::int64_t to_ns) {
     return static_cast<std::uint64_t>(to_ns) - static_cast<std::uint64_t>(from_ns);
+  }
+
+  /// Of what is far already, so much that twice as far is believed.
+  void learn(std::uint64_t ahead_ns) {
+    if (times_ == 0) return;
+    const std::uint64_t most_ns = std::max(far_ns_, ahead_ns / times_ * 2);
+    longest_ns_ = std::clamp(std::min(ahead_ns, most_ns), longest_ns_, kLongestNs);
   }
 
   static constexpr std::uint64_t kLongestNs = 1'000'000'000'000'000'000;
