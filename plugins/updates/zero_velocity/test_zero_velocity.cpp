@@ -91,13 +91,15 @@ testing::SmallFilter standing_filter(double sigma_v) {
 }
 
 /// Epochs of three seconds in which a factor came, and passed its own gate against `filter`.
-int believed(const std::string& more, Robot robot, bool images, testing::SmallFilter filter) {
+int believed(const std::string& more, Robot robot, bool images, testing::SmallFilter filter,
+             int* given = nullptr) {
   const auto update = testing::load_update("{type: zero_velocity" + more + "}");
   filter.start(*update);
   int count = 0;
   for (int k = 1; k <= 30; ++k) {
     FactorSink sink(1, 60);
     update->update(filter.view(), robot.epoch(k, images, filter), sink);
+    if (given != nullptr) *given += static_cast<int>(sink.residuals().size());
     for (const ResidualFactor& factor : sink.residuals()) {
       const Eigen::MatrixXd H =
           testing::SmallFilter::spread(factor.columns, factor.H, filter.P.rows());
@@ -120,7 +122,12 @@ TEST(ZeroVelocity, DoesNotTakeSlowMotionForAStandstillWithTheImuAlone) {
   testing::SmallFilter sure = standing_filter(0.009);
   sure.imu.v_IinG = sure.imu.v_IinG_fej = Vector3d(0.05, 0., 0.);
   sure.clones[1].p_IinG = sure.clones[1].p_IinG_fej = Vector3d(0.005, 0., 0.);
-  EXPECT_EQ(believed("", Robot(0.05), false, sure), 0);
+  int given = 0;
+  EXPECT_EQ(believed("", Robot(0.05), false, sure, &given), 0);
+  EXPECT_EQ(given, 0) << "even motion contradicts nothing";
+  // Wheels that stand while the filter moves do.
+  EXPECT_EQ(believed(", detector: wheels", Robot(0.), false, sure, &given), 0);
+  EXPECT_EQ(given, 29);
 }
 
 TEST(ZeroVelocity, SeesAStandstillAndSlowMotionInImagesWhateverTheFilterKnows) {
@@ -160,7 +167,7 @@ TEST(ZeroVelocity, HasTheDerivativesOfItsResidualAtFirstEstimates) {
     filter.plus(random);
     filter.first_estimates();
     Robot robot(0.);
-    const auto update = testing::load_update("{type: zero_velocity}");
+    const auto update = testing::load_update("{type: zero_velocity, gate_probability: 0}");
     filter.start(*update);
     const EpochData data = robot.epoch(2, false, filter);
     const auto factor = [&](const testing::SmallFilter& at) {
@@ -200,7 +207,7 @@ TEST(ZeroVelocity, IsConsistentAndWithAWrongSignNot) {
   }();
   const std::string yaml =
       "{type: zero_velocity, sigma_velocity_m_per_s: 0.002, sigma_rotation_rad: 0.0005, "
-      "sigma_position_m: 0.001}";
+      "sigma_position_m: 0.001, gate_probability: 0}";
   for (int run = 0; run < kRuns; ++run) {
     testing::SmallFilter filter = standing_filter(0.005);
     const auto size = filter.P.rows();

@@ -13,11 +13,13 @@
 #include "still_images.hpp"
 #include "tally.hpp"
 #include "viwo/api/plugin.hpp"
+#include "viwo/math/chi2.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
 namespace {
 
+using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -82,6 +84,8 @@ struct Params {
   }
 };
 
+constexpr int kMostRows = 9, kMostColumns = 6 + 2 * kPoseSize;
+
 /// The IMU must have so many samples in an epoch to be judged quiet.
 constexpr std::size_t kFewestSamples = 5;
 
@@ -109,6 +113,7 @@ class ZeroVelocity final : public Update {
       images_.forget();
       return;
     }
+    bool is_seen = true;
     if (use_wheels_) {
       if (!wheels_stand(filter, data)) return;
     } else {
@@ -122,10 +127,14 @@ class ZeroVelocity final : public Update {
           break;
         case StillImages::kUnknown:
           if (!would_notice(filter)) return;
+          is_seen = false;
           break;
       }
     }
-    emit(filter, sink.add_residual());
+    emit(filter, factor_);
+    // Then motion is no contradiction: nothing but the filter has said that there is none.
+    if (!is_seen && !is_likely(filter)) return;
+    sink.add_residual() = factor_;
   }
 
   void rejections(std::vector<RejectionCount>& out) const override { images_moved_.append_to(out); }
@@ -183,9 +192,44 @@ class ZeroVelocity final : public Update {
            4. * largest_sigma(kGyroBiasColumn) < params_.slowest_rad_per_s;
   }
 
+  /// Whether the factor passes its gate.
+  bool is_likely(const FilterView& filter) {
+    if (params_.gate_probability <= 0.) return true;
+    const FilterView::Covariance P = filter.P();
+    std::array<int, kMostColumns> columns{};
+    std::size_t n = 0;
+    for (const ColumnRange& block : factor_.columns.blocks()) {
+      for (int i = 0; i < block.count; ++i) columns[n++] = block.first + i;
+    }
+    const auto size = static_cast<Index>(n);
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostColumns,
+                  kMostColumns>
+        P_f(size, size);
+    for (Index i = 0; i < size; ++i) {
+      for (Index k = 0; k < size; ++k) {
+        P_f(i, k) = P(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(k)]);
+      }
+    }
+    const Index rows = factor_.residual.size();
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostRows, kMostColumns>
+        HP = factor_.H.lazyProduct(P_f);
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostRows, kMostRows> S =
+        factor_.R;
+    S += HP.lazyProduct(factor_.H.transpose());
+    Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMostRows, 1> white =
+        factor_.residual;
+    S.llt().matrixL().solveInPlace(white);
+    if (rows != gate_rows_) {
+      gate_rows_ = rows;
+      gate_ = chi2_quantile(1. - params_.gate_probability, static_cast<double>(rows));
+    }
+    return white.squaredNorm() <= gate_;
+  }
+
   void emit(const FilterView& filter, ResidualFactor& factor) const {
     const CloneState& now = filter.clones.back();
     const bool two = filter.clones.size() > 1;
+    factor.columns.clear();
     const int theta = factor.columns.add(kThetaColumn, 3);
     const int velocity = factor.columns.add(kVelocityColumn, 3);
     int first = 0, last = 0;
@@ -225,6 +269,9 @@ class ZeroVelocity final : public Update {
   WheelsBlocks wheels_;
   StreamId encoders_, features_;
   StillImages images_;
+  ResidualFactor factor_;
+  double gate_ = 0.;
+  Index gate_rows_ = 0;
   Tally images_moved_{"quiet IMU, but the images move"};
 };
 
