@@ -81,6 +81,25 @@ void check_jumps(const Recording& recording, const Wheels& wheels, std::size_t d
                  {{"jumps", n, ""}, {"largest", most->rad, "rad"}}});
 }
 
+/// Of the fastest drive over the tenth of a second before sample `end`, or from it on: where a
+/// counter is coarse, one sample is no speed.
+double mean_fastest(std::span<const EncoderSample> samples, std::size_t end, int step) {
+  constexpr double kOver_s = 0.1;
+  std::array<double, kMaxDrives> turned_rad{};
+  double sum_s = 0.;
+  for (std::size_t i = end; i < samples.size() && sum_s < kOver_s;
+       i += static_cast<std::size_t>(step)) {
+    const double dt_s = seconds_between(samples[i].begin_ns, samples[i].end_ns);
+    for (std::size_t k = 0; k < kMaxDrives; ++k) {
+      turned_rad[k] += dt_s * samples[i].drive_rad_per_s[k];
+    }
+    sum_s += dt_s;
+  }
+  double most = 0.;
+  for (const double rad : turned_rad) most = std::max(most, std::abs(rad));
+  return sum_s > 0. ? most / sum_s : 0.;
+}
+
 /// No base stops within a sample, stands to the last bit, and goes on as fast as before.
 void check_zeros(const Recording& recording, const Wheels& wheels, Findings& out) {
   constexpr double kLeast_s = 0.2, kFast_rad_per_s = 5., kMost_rad_per_s2 = 250.;
@@ -97,6 +116,10 @@ void check_zeros(const Recording& recording, const Wheels& wheels, Findings& out
     const double dt_s = seconds_between(samples[i].begin_ns, samples[i].end_ns);
     if (zero_s < kLeast_s || after < kFast_rad_per_s) continue;
     if (std::min(before, after) < kMost_rad_per_s2 * dt_s) continue;
+    if (std::min(mean_fastest(samples, i - 1, -1), mean_fastest(samples, end, 1)) <
+        kFast_rad_per_s) {
+      continue;
+    }
     n += 1.;
     if (zero_s <= longest_s) continue;
     longest_s = zero_s;

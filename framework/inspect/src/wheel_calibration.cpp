@@ -16,8 +16,11 @@ Explained explained(const ParityInformation& parity, const Intrinsics& x_WI) {
   Eigen::Index i = 0;
   const Intrinsics told = parity.Lambda.diagonal().cwiseMax(1e-12);
   const double most = parity.eta.cwiseAbs2().cwiseQuotient(told).maxCoeff(&i);
+  // Copies of one reading contradict each other by rounding alone, of which nothing explains more
+  // than all.
+  const bool is_any = parity.chi2 > 1e-6 * parity.dof && most <= 1.001 * parity.chi2;
   return {static_cast<std::size_t>(i), x_WI[i] - parity.eta[i] / told[i],
-          parity.chi2 > 0. ? most / parity.chi2 : 0.};
+          is_any ? most / parity.chi2 : 0.};
 }
 
 }  // namespace

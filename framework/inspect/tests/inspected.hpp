@@ -83,6 +83,22 @@ inline Inspection inspected(RunSetup setup, const Fault& fault) {
   return inspect(other);
 }
 
+inline Inspection with_wheels(RunSetup setup, const std::function<void(EncoderSample&)>& fault) {
+  return inspected(std::move(setup), {.wheels = [&fault](EncoderSample& s) {
+                     fault(s);
+                     return true;
+                   }});
+}
+
+/// Two drives on each side, as a base that skids has them.
+inline RunSetup four_drives(const std::string& motion = "figure_eight") {
+  return simulated("viwo_skid_steer",
+                   {"placeholders.motion=" + motion, "sensors.simulator0.duration_s=30",
+                    "sensors.simulator0.robot.left_drives=[1, 3]",
+                    "sensors.simulator0.robot.right_drives=[2, 4]", "kinematics.left_drives=[1, 3]",
+                    "kinematics.right_drives=[2, 4]"});
+}
+
 /// "imu0 gravity", ... of what is wrong.
 inline std::vector<std::string> faults_of(const Inspection& inspection) {
   std::vector<std::string> faults;
