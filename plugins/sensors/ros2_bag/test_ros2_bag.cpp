@@ -13,6 +13,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::EndsWith;
+using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 TEST_F(Ros2Bag, GivesAllTopicsInTimeOrderToTheBit) {
@@ -284,6 +285,17 @@ TEST_F(Ros2Bag, CountsMessagesThatAreBroken) {
                   section("imu_topic: /imu0, start_s: 1e-9, max_rejected_fraction: 0.7"))),
               ElementsAre(EndsWith(" | bag_0.db3: message 3")))
       << "of the file, wherever reading begins";
+}
+
+TEST_F(Ros2Bag, OneTopicIsForOneKindOfSamples) {
+  { Writer out(file()); }
+  EXPECT_THAT(testing::error_of([&] {
+                make_sensor(
+                    section("joint_topic: /odom, drive_joints: [v_x, omega_z], "
+                            "odometry_topic: /odom"));
+              }),
+              HasSubstr("odometry_topic: '/odom' is wanted twice: of an Odometry that is to give "
+                        "both twist and poses make two sensors"));
 }
 
 TEST_F(Ros2Bag, ABrokenImageIsAnErrorWhenItIsRead) {

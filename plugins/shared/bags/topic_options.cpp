@@ -1,5 +1,8 @@
 #include "topic_options.hpp"
 
+#include <set>
+#include <string>
+
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/asl/asl.hpp"
@@ -25,11 +28,28 @@ void TopicOptions::check(const std::string& key, const std::string& verb) const 
                      "names of joints need the joint_topic that they are on");
   }
   joint_map();
+  require_each_once();
   if (!pose_topic.empty() && !odometry_topic.empty()) {
     throw ParamError("odometry_topic",
                      "pose_topic and odometry_topic both give poses, which could not be told "
                      "apart: make two sensors of them");
   }
+}
+
+void TopicOptions::require_each_once() const {
+  std::set<std::string> seen;
+  const auto add = [&](const char* key, const std::string& topic, const char* advice = "") {
+    if (topic.empty() || seen.insert(topic).second) return;
+    throw ParamError(key, "'" + topic + "' is wanted twice" + advice);
+  };
+  constexpr const char* kTwoSensors =
+      ": of an Odometry that is to give both twist and poses make two sensors";
+  add("imu_topic", imu_topic);
+  for (const std::string& topic : image_topics) add("image_topics", topic);
+  add("joint_topic", joint_topic);
+  add("pose_topic", pose_topic, kTwoSensors);
+  add("odometry_topic", odometry_topic, kTwoSensors);
+  add("gnss_topic", gnss_topic);
 }
 
 log::JointMap TopicOptions::joint_map() const {

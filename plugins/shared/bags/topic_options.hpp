@@ -48,6 +48,7 @@ struct TopicOptions : log::JointParams, log::MaxGapParams {
   /// ParamError for parameters that contradict each other; where no topic is wanted, for `key`:
   /// "nothing to <verb>".
   void check(const std::string& key, const std::string& verb) const;
+  void require_each_once() const;
 };
 
 /// The kinds of samples that the topics give.
