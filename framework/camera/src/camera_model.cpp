@@ -15,8 +15,14 @@ struct Distorted {
   Eigen::Matrix<double, 2, 3> J_point;  ///< by p_C
 };
 
+/// Whether 1 + 3 k1 r^2 + 5 k2 r^4, the slope of the distorted radius, was negative nearer to the
+/// axis, though it need not be any more: the image has been folded back and out again.
+bool is_beyond_folds(double k1, double k2, double r2) {
+  return k1 < 0. && k2 > 0. && 9. * k1 * k1 > 20. * k2 && r2 > -0.3 * k1 / k2;
+}
+
 /// Distorted point for one of the plane z = 1, with the derivative by it; false where the model
-/// folds back.
+/// folds back, and beyond.
 bool distort_radtan(const CameraView& camera, double x, double y, Eigen::Vector2d& xy,
                     Eigen::Matrix2d& J) {
   const double k1 = camera.intrinsics[4], k2 = camera.intrinsics[5];
@@ -24,7 +30,7 @@ bool distort_radtan(const CameraView& camera, double x, double y, Eigen::Vector2
   const double r2 = x * x + y * y;
   const double radial = 1. + r2 * (k1 + r2 * k2);
   const double radial_slope = 2. * (k1 + 2. * k2 * r2);  // d radial / d x = radial_slope * x
-  if (!(radial + r2 * radial_slope > 0.)) return false;
+  if (!(radial + r2 * radial_slope > 0.) || is_beyond_folds(k1, k2, r2)) return false;
   xy << x * radial + 2. * p1 * x * y + p2 * (r2 + 2. * x * x),
       y * radial + p1 * (r2 + 2. * y * y) + 2. * p2 * x * y;
   J << radial + x * x * radial_slope + 2. * p1 * y + 6. * p2 * x,
@@ -158,17 +164,22 @@ std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::
     const double s = std::sin(theta) / d;
     return Eigen::Vector3d(s * target.x(), s * target.y(), std::cos(theta));
   }
-  // Newton's method on the distortion, from the distorted point.
-  Eigen::Vector2d point = target, distorted;
+  // Newton's method on the distortion, from the distorted point; half a step where it would leave
+  // what is not folded.
+  Eigen::Vector2d point = target, step = -target, distorted;
   Eigen::Matrix2d J;
-  for (int i = 0; i < 30; ++i) {
-    if (!distort_radtan(camera, point.x(), point.y(), distorted, J)) return std::nullopt;
+  for (int i = 0; i < 50; ++i) {
+    if (!distort_radtan(camera, point.x(), point.y(), distorted, J)) {
+      step *= 0.5;
+      point += step;
+      continue;
+    }
     const Eigen::Vector2d residual = distorted - target;
     const double determinant = J.determinant();
     if (!(std::abs(determinant) > 1e-12)) return std::nullopt;
     Eigen::Matrix2d inverse;
     inverse << J(1, 1), -J(0, 1), -J(1, 0), J(0, 0);
-    const Eigen::Vector2d step = inverse * residual / determinant;
+    step = inverse * residual / determinant;
     point -= step;
     if (step.squaredNorm() < kStepTolerance * kStepTolerance) return direction_of(point);
   }

@@ -164,6 +164,18 @@ TEST(CameraModel, HasNoImageOfWhatIsBehindOrFoldedBack) {
   const Eigen::Vector2d centre = folding.intrinsics.segment<2>(2);
   EXPECT_TRUE(unproject(folding, centre + Eigen::Vector2d(0.60 * 458.7, 0.)).has_value());
   EXPECT_FALSE(unproject(folding, centre + Eigen::Vector2d(0.62 * 458.7, 0.)).has_value());
+  // x (1 - 0.28 x^2 + 0.03 x^4) turns back at x = 1.311 and out again at 1.970: the same pixels
+  // once more.
+  folding.intrinsics.tail<4>() << -0.28, 0.03, 0., 0.;
+  EXPECT_TRUE(project(folding, {1.30, 0., 1.}, uv));
+  for (const double x : {1.32, 1.9, 1.98, 2.5, 9.}) EXPECT_FALSE(project(folding, {x, 0., 1.}, uv));
+  for (double off = 0.; off < 0.9; off += 0.01) {  // of the focal length; the largest is 0.796
+    const auto direction = unproject(folding, centre + Eigen::Vector2d(off * 458.7, 0.));
+    ASSERT_EQ(direction.has_value(), off < 0.796) << off;
+    if (direction) {
+      EXPECT_LT(direction->x() / direction->z(), 1.312);
+    }
+  }
   // theta (1 - 0.2 theta^2) turns back at 1.291 rad.
   CameraView fisheye = fisheye_camera();
   fisheye.intrinsics.tail<4>() << -0.2, 0., 0., 0.;
