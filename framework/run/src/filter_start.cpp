@@ -63,6 +63,7 @@ Initializer from_standstill(const Estimator& estimator, const FilterSetup& setup
   for (const CameraPrior& camera : setup.cameras) {
     options.t_CtoI_s.push_back(camera.camera.t_CtoI_s);
   }
+  for (const auto& set : setup.wheels) options.t_OtoI_s.push_back(set.prior.wheels.t_OtoI_s);
   std::optional<StreamId> tracks;
   if (tracks_of(setup.streams) != nullptr) tracks = estimator.extra(wheels.size());
   return [options, wheels, tracks](const StartData& data) {

@@ -9,6 +9,7 @@
 #include "still_tracks.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo {
 namespace {
@@ -80,11 +81,18 @@ double mean_square_of_integral(std::span<const ImuSample> samples, const Vector3
 
 enum class Wheels : std::uint8_t { kSilent, kStand, kTurn };
 
-/// Whether wheels turn faster than encoder noise and resolution explain.
-Wheels wheels_of(std::span<const std::span<const EncoderSample>> encoders, double window_s) {
-  constexpr double kWheelStillRadPerS = 0.05;
+/// Whether wheels turn faster than encoder noise and resolution explain, in the window that ends at
+/// `end_ns`; those of which the last samples are older say nothing.
+Wheels wheels_of(std::span<const std::span<const EncoderSample>> encoders,
+                 std::span<const double> t_OtoI_s, std::int64_t end_ns, double window_s) {
+  constexpr double kWheelStillRadPerS = 0.05, kMaxLate_s = 0.25;
   Wheels wheels = Wheels::kSilent;
-  for (const auto& samples : encoders) {
+  for (std::size_t set = 0; set < encoders.size(); ++set) {
+    const auto& samples = encoders[set];
+    const std::int64_t clock_ns = set < t_OtoI_s.size() ? to_ns(t_OtoI_s[set]) : 0;
+    if (samples.empty()) continue;
+    const std::int64_t last_ns = std::max(samples.back().t_ns, samples.back().end_ns) + clock_ns;
+    if (seconds_between(last_ns, end_ns) > kMaxLate_s) continue;
     for (auto s = samples.rbegin(); s != samples.rend(); ++s) {
       if (seconds_between(s->t_ns, samples.back().t_ns) > window_s) break;
       for (int i = 0; i < s->n_drive; ++i) {
@@ -194,7 +202,7 @@ StartAttempt start_from_standstill(std::span<const ImuSample> imu,
   const auto window = imu.subspan(first);
   if (window.size() < 2 * kBatches) return no_start(kTooShort);
 
-  const Wheels wheels = wheels_of(encoders, span_s);
+  const Wheels wheels = wheels_of(encoders, options.t_OtoI_s, window.back().t_ns, span_s);
   if (wheels == Wheels::kTurn) return no_start("a wheel turns faster than 0.05 rad/s");
   const Stillness images =
       stillness_of(tracks, options.t_CtoI_s, window.front().t_ns, window.back().t_ns);

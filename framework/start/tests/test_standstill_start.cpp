@@ -272,7 +272,7 @@ TEST(StandstillStart, RefusesVibrationBeyondThreeTimesTheNoise) {
 TEST(StandstillStart, RefusesWheelsThatTurnWithinTheWindow) {
   std::vector<EncoderSample> samples(150);
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    samples[i].t_ns = static_cast<std::int64_t>(i) * 10'000'000;
+    samples[i].t_ns = 4'710'000'000 + static_cast<std::int64_t>(i) * 10'000'000;
     samples[i].n_drive = 4;
   }
   EXPECT_TRUE(starts({.bias_scale = 0.}, {samples}));
@@ -300,7 +300,7 @@ TEST(StandstillStart, SaysWhatIsInItsWay) {
   EXPECT_EQ(obstacle({.vibration_accel = 1., .bias_scale = 0.}),
             "the accelerometer's readings scatter by more than three times their noise");
   std::vector<EncoderSample> turning(1);
-  turning[0].t_ns = 0;
+  turning[0].t_ns = 6'200'000'000;
   turning[0].n_drive = 4;
   turning[0].drive_rad_per_s[2] = 1.;
   EXPECT_EQ(obstacle({.bias_scale = 0.}, {turning}), "a wheel turns faster than 0.05 rad/s");

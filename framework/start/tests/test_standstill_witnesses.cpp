@@ -138,6 +138,13 @@ TEST(StandstillWitnesses, VibrationIsNoMotionWhereWheelsStand) {
   }
   EXPECT_EQ(obstacle(kShaken, {}, wheels), "");
   EXPECT_EQ(obstacle(kShaken, tracks({.px_per_s = 20.}), wheels), "the images move") << "carried";
+  // Those that have fallen silent since do not know.
+  std::vector<EncoderSample> silent = wheels;
+  for (EncoderSample& sample : silent) sample.t_ns -= 2'000'000'000;
+  EXPECT_EQ(obstacle(kShaken, {}, silent), kGyroScatters);
+  StandstillOptions late_clock;
+  late_clock.t_OtoI_s = {2.};
+  EXPECT_EQ(obstacle(kShaken, {}, silent, late_clock), "");
   const std::vector<EncoderSample> late(wheels.begin() + 80, wheels.end());
   EXPECT_EQ(obstacle(kShaken, {}, late), kGyroScatters) << "0.3 s of wheels";
   wheels[60].drive_rad_per_s[1] = 0.2;

@@ -12,6 +12,7 @@ namespace viwo {
 
 struct StandstillOptions : StartOptions {
   std::vector<double> t_CtoI_s = {};  ///< by camera: t_imu = t_camera + t_CtoI
+  std::vector<double> t_OtoI_s = {};  ///< by wheel set, likewise
 };
 
 /// The state at the end of the last `window_s` of the IMU (5 % less will do) if the base stood
