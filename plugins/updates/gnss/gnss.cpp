@@ -215,6 +215,15 @@ class Gnss final : public Update {
     } else if (!frame_) {
       frame_.emplace(fix.latitude_deg, fix.longitude_deg, fix.altitude_m);
       at.p_EinG = place.p_G;
+    } else {
+      // Far from the origin the yaw moves the fix: linearised where this fix says that the origin
+      // is, unless that is known better.
+      const LocalFix local = frame_->at(fix, options_.noise);
+      const double by_yaw_m = options_.sigma_yaw_rad * local.p_AinE.norm();
+      const double told_m2 = local.R.trace() + by_yaw_m * by_yaw_m;
+      if (options_.sigma_p_EinG_m * options_.sigma_p_EinG_m > told_m2) {
+        at.p_EinG = place.p_G - R_GtoE(at.yaw_EtoG).transpose() * local.p_AinE;
+      }
     }
     is_aligned_ = true;
     tell(at);

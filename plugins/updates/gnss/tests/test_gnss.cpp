@@ -221,6 +221,24 @@ TEST_F(Fixes, AreTakenAtTheTimeOfTheirClock) {
   EXPECT_EQ(truth_.streams[0].clocks.at(0).constant_s, -0.15);
 }
 
+/// The yaw moves a fix that is far from the origin: linearised at a place of the origin that nobody
+/// knows, the first fix would tell of a yaw that it does not know.
+TEST_F(Fixes, TellWhereAnOriginIsThatIsOnlyGivenOnTheEarth) {
+  const auto update = testing::load_update(
+      "{type: gnss, p_AinI_m: [0.2, -0.1, 0.5], yaw_EtoG_rad: 2.2, sigma_yaw_rad: 0.1, "
+      "origin_deg: [48.14, 11.58], origin_altitude_m: 520}");
+  UpdateHost unknown = truth_;
+  unknown.start(*update);
+  unknown.layout();
+  unknown.set_priors();
+  const Rows far = rows_of(*update, unknown, {fix(1.3)})[0];
+  const auto known = load();  // the same of an origin that is known
+  const Rows right = rows_of(*known, truth_, {fix(1.3)})[0];
+  EXPECT_LT((far.H.rightCols<4>() - right.H.rightCols<4>()).topRows<2>().cwiseAbs().maxCoeff(),
+            1e-3);
+  EXPECT_GT(right.H.rightCols<4>().col(0).head<2>().norm(), 3.);
+}
+
 TEST_F(Fixes, LeaveOutBlocksThatAreHeld) {
   const auto update = testing::load_update(
       "{type: gnss, p_AinI_m: [0.2, -0.1, 0.5], sigma_p_AinI_m: [0, 0, 0], yaw_EtoG_rad: 2.2, "
