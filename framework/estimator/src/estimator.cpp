@@ -89,6 +89,8 @@ ImuPrior moved_to(const Continuation::Place& place, ImuPrior prior) {
   turned.block<3, 3>(kPositionColumn, kPositionColumn) = R;
   turned.block<3, 3>(kVelocityColumn, kVelocityColumn) = R;
   prior.P = turned * prior.P * turned.transpose();
+  const double gone_m = place.speed_m_per_s * std::max(0., seconds_between(place.t_ns, prior.t_ns));
+  prior.P.diagonal().segment<3>(kPositionColumn).array() += gone_m * gone_m;
   return prior;
 }
 

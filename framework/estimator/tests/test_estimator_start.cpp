@@ -95,6 +95,8 @@ TEST(EstimatorStart, OfAContinuationIsWhereTheImuWasWithTheBlocksOfThen) {
   Continuation::Place place;
   place.R_GtoI = exp_so3({0.1, -0.2, 2.5});
   place.p_IinG = {1., 2., 3.};
+  place.t_ns = kStart - 4'000'000'000;
+  place.speed_m_per_s = 0.5;
   options.continuation = {{{"base.clock", {0.009}}, {"unknown", {1.}}}, place};
   Bench bench({.cells = true}, {}, options);
   ImuPrior found = level_prior(kStart);
@@ -128,6 +130,9 @@ TEST(EstimatorStart, OfAContinuationIsWhereTheImuWasWithTheBlocksOfThen) {
   const Eigen::Vector3d along = imu.v_IinG.normalized();
   const Eigen::Matrix3d P_v = filter.covariance().block<3, 3>(kVelocityColumn, kVelocityColumn);
   EXPECT_NEAR(along.dot(P_v * along), 4., 1e-12);
+  // In the meantime it may have gone on.
+  EXPECT_NEAR(filter.covariance()(kPositionColumn, kPositionColumn),
+              found.P(kPositionColumn, kPositionColumn) + 4., 1e-9);
 }
 
 TEST(EstimatorStart, FromThereOnMakesEpochs) {

@@ -193,10 +193,18 @@ void Filter::correct() {
   imu_.v_IinG += dx_.segment<3>(kVelocityColumn);
   imu_.gyro_bias += dx_.segment<3>(kGyroBiasColumn);
   imu_.accel_bias += dx_.segment<3>(kAccelBiasColumn);
+  if (!options_.first_estimates) {
+    imu_.R_GtoI_fej = imu_.R_GtoI;
+    imu_.p_IinG_fej = imu_.p_IinG;
+    imu_.v_IinG_fej = imu_.v_IinG;
+  }
   for (CloneState& clone : clones_) {
     turn(clone.R_GtoI, dx_.segment<3>(clone.column));
     clone.p_IinG += dx_.segment<3>(clone.column + 3);
     if (!options_.first_estimates) {
+      // Of the clone it is the velocity in I that is held.
+      const Eigen::Vector3d v_IinI = clone.R_GtoI_fej * clone.v_IinG;
+      clone.v_IinG = clone.R_GtoI.transpose() * v_IinI;
       clone.R_GtoI_fej = clone.R_GtoI;
       clone.p_IinG_fej = clone.p_IinG;
     }

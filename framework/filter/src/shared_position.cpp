@@ -23,23 +23,36 @@ int axis_of(int column, std::span<const CloneState> clones) {
   return axis;
 }
 
-/// Whether moving all poses together changes what a row of a Jacobian, by the columns of a factor,
-/// is of: more than rounding leaves of what was added up.
-template <class Row>
-bool is_seen_in(const Row& row, const FactorColumns& columns, std::span<const CloneState> clones) {
-  Eigen::Array3d sum = Eigen::Array3d::Zero();
-  double largest = 0.;
-  int at = 0;
-  for (const ColumnRange& block : columns.blocks()) {
-    for (int i = 0; i < block.count; ++i, ++at) {
-      const int axis = axis_of(block.first + i, clones);
-      if (axis < 0) continue;
-      sum[axis] += row(at);
-      largest = std::max(largest, std::abs(row(at)));
+/// What moving all poses together changes in the rows of a factor: what is left of sums whose terms
+/// are large is rounding, and so is all of a row that others have made zero.
+class Shift {
+ public:
+  /// A row of a Jacobian, or of normal equations, by the columns of a factor; in units of its
+  /// noise.
+  template <class Row>
+  void add(const Row& row, double scale, const FactorColumns& columns,
+           std::span<const CloneState> clones) {
+    Eigen::Array3d sum = Eigen::Array3d::Zero();
+    int at = 0;
+    for (const ColumnRange& block : columns.blocks()) {
+      for (int i = 0; i < block.count; ++i, ++at) {
+        const int axis = axis_of(block.first + i, clones);
+        if (axis < 0) continue;
+        sum[axis] += scale * row(at);
+        largest_ = std::max(largest_, std::abs(scale * row(at)));
+      }
     }
+    most_ = std::max(most_, sum.abs().maxCoeff());
   }
-  return sum.abs().maxCoeff() > kRounding * largest;
-}
+  /// `least`: below it nothing is told, wherever all of it is.
+  bool is_seen(double least) const { return most_ > std::max(kRounding * largest_, least); }
+
+ private:
+  double most_ = 0., largest_ = 0.;
+};
+
+/// Of a place that is told to no more than a kilometre nobody knows the digits that are lost.
+constexpr double kLeastInformation = 1e-6;  // 1/m^2
 
 }  // namespace
 
@@ -54,21 +67,24 @@ void SharedPosition::take_from(Eigen::Ref<Eigen::Matrix3d> P_position) {
 
 bool SharedPosition::is_seen_by(const ResidualFactor& factor,
                                 std::span<const CloneState> clones) const {
+  Shift shift;
   for (Eigen::Index i = 0; i < factor.H.rows(); ++i) {
-    if (is_seen_in(factor.H.row(i), factor.columns, clones)) return true;
+    const double noise = factor.R(i, i) > 0. ? std::sqrt(factor.R(i, i)) : 1.;
+    shift.add(factor.H.row(i), 1. / noise, factor.columns, clones);
   }
-  return false;
+  return shift.is_seen(std::sqrt(kLeastInformation));
 }
 
 bool SharedPosition::is_seen_by(const InformationFactor& factor,
                                 std::span<const CloneState> clones) const {
+  Shift shift;
   const int n = factor.columns.size();
   for (int i = 0; i < n; ++i) {
     // Only the lower triangle is filled.
     const auto row = [&](int j) { return factor.Lambda(std::max(i, j), std::min(i, j)); };
-    if (is_seen_in(row, factor.columns, clones)) return true;
+    shift.add(row, 1., factor.columns, clones);
   }
-  return false;
+  return shift.is_seen(kLeastInformation);
 }
 
 void SharedPosition::return_to(Covariance& covariance, std::span<const CloneState> clones) {

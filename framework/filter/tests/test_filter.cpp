@@ -106,11 +106,18 @@ TEST(Filter, WithoutFirstEstimatesTheyFollowTheEstimate) {
   FilterOptions options = kOptions;
   options.first_estimates = false;
   Filter filter = running_filter(random, 3, options);
+  const std::vector<CloneState> before(filter.clones().begin(), filter.clones().end());
   ASSERT_EQ(filter.apply(random_factor(random)), FactorResult::kApplied);
-  for (const CloneState& clone : filter.clones()) {
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const CloneState& clone = filter.clones()[i];
     EXPECT_EQ(clone.R_GtoI_fej, clone.R_GtoI);
     EXPECT_EQ(clone.p_IinG_fej, clone.p_IinG);
+    // The velocity that it had is known in I.
+    EXPECT_NE(clone.v_IinG, before[i].v_IinG);
+    EXPECT_LT((clone.R_GtoI * clone.v_IinG - before[i].R_GtoI * before[i].v_IinG).norm(), 1e-12);
   }
+  EXPECT_EQ(filter.imu().R_GtoI_fej, filter.imu().R_GtoI);
+  EXPECT_EQ(filter.imu().v_IinG_fej, filter.imu().v_IinG);
   // The transition starts at the present estimate: as that of a filter that was started there.
   ImuPrior prior;
   prior.t_ns = filter.t_ns();

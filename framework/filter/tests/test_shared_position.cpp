@@ -68,6 +68,26 @@ TEST(SharedPosition, ChangesNothingOfWhatRelativeMeasurementsDo) {
   EXPECT_NEAR(far.imu_covariance()(kPositionColumn, kPositionColumn), 1e8, 1e-3);
 }
 
+/// Of a point that has been eliminated rows are left that would be zero.
+TEST(SharedPosition, IsNotSeenInTheRoundingOfRelativeMeasurements) {
+  Filter near = on_its_way(10.), far = on_its_way(10e3);
+  for (Filter* filter : {&near, &far}) {
+    InformationFactor factor;
+    factor.columns.add(filter->clones()[0].column, 6);
+    factor.columns.add(filter->clones()[1].column, 6);
+    factor.Lambda = Eigen::MatrixXd::Zero(filter->size(), filter->size());
+    factor.eta = Eigen::VectorXd::Zero(filter->size());
+    const Eigen::Matrix3d information = 1e4 * Eigen::Matrix3d::Identity();
+    factor.Lambda.block<3, 3>(3, 3) = factor.Lambda.block<3, 3>(9, 9) = information;
+    factor.Lambda.block<3, 3>(9, 3) = -information;
+    factor.Lambda(3, 0) = factor.Lambda(10, 6) = 1.16e-10;
+    factor.eta[3] = 1.;
+    factor.eta[9] = -1.;
+    ASSERT_EQ(filter->apply(factor), FactorResult::kApplied);
+  }
+  EXPECT_EQ(near.covariance(), far.covariance());
+}
+
 TEST(SharedPosition, IsFoundByAFix) {
   Filter filter = on_its_way(10e3);
   const Eigen::Vector3d off(4000., -7000., 300.);

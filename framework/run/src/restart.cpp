@@ -24,7 +24,8 @@ HealthyState::HealthyState(const Filter& filter)
     : declared_(filter.blocks().specs().begin(), filter.blocks().specs().end()) {}
 
 HealthyState::State HealthyState::state_of(const Filter& filter) const {
-  State state{filter.t_ns(), {filter.imu().R_GtoI, filter.imu().p_IinG}, {}};
+  const ImuState& imu = filter.imu();
+  State state{filter.t_ns(), {imu.R_GtoI, imu.p_IinG, filter.t_ns(), imu.v_IinG.norm()}, {}};
   for (std::size_t i = 0; i < declared_.size(); ++i) {
     state.blocks.push_back(filter.blocks().value(i));
   }

@@ -34,6 +34,8 @@ struct Continuation {
   struct Place {
     Eigen::Matrix3d R_GtoI = Eigen::Matrix3d::Identity();
     Eigen::Vector3d p_IinG = Eigen::Vector3d::Zero();
+    std::int64_t t_ns = 0;  ///< when; by the start it may have gone on
+    double speed_m_per_s = 0.;
   };
   std::optional<Place> place;
 };
