@@ -55,10 +55,6 @@ class OutFolder {
  private:
   static std::filesystem::path made(const Arguments& arguments) {
     std::filesystem::path folder = out_folder(arguments);
-    std::error_code not_there;
-    if (std::filesystem::is_regular_file(folder, not_there)) {
-      throw InputError(folder.string() + "  is a file, not a folder");
-    }
     make_folder(folder);
     return folder;
   }
@@ -317,9 +313,9 @@ int plan_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   const plan::PlanSetup setup =
       plan::read_plan_setup(arguments.positional[0], arguments.assignments, plugins);
+  const plan::Plan found = plan::make_plan(setup);
   const OutFolder out(arguments);
   const std::filesystem::path& folder = out.path();
-  const plan::Plan found = plan::make_plan(setup);
   write_plan(folder, setup, found);
   std::cout << describe(setup, found) << "motion: " << (folder / "plan.csv").string()
             << "\nreport: " << (folder / "report.html").string() << "\n";
@@ -352,6 +348,9 @@ int simulate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
   refuse_to_empty(*arguments.out, input_files(setup.resolved));
+  if (std::filesystem::is_regular_file(*arguments.out)) {
+    throw InputError(arguments.out->string() + "  is a file, not a folder");
+  }
   const OutFolder out(arguments);
   const SimulateResult result = write_log(setup, *arguments.out);
   std::cout << describe(result) << " in " << arguments.out->string() << "\n";

@@ -218,20 +218,20 @@ class Fit {
   double rescale(const Linearisation& at) {
     const Eigen::MatrixXd P = covariance(at, true);
     double most = 0.;
-    const auto rescale_noise = [&](ResidualKind kind, double& noise, bool& is_found) {
-      const double variance = kind == ResidualKind::kParity ? variance_of_parity(at, P)
-                                                            : variance_of(at[index(kind)], P);
-      if (variance < 1e-12) return;
+    // Whether there was enough to find it in.
+    const auto rescale_noise = [&](double variance, double& noise) {
+      if (variance < 1e-12) return false;
       const double by = std::sqrt(variance);
       noise *= by;
-      is_found = true;
       most = std::max(most, std::abs(by - 1.));
+      return true;
     };
     CalibrationNoise& noise = estimate_.noise;
-    rescale_noise(ResidualKind::kPosition, noise.position_m, noise.position_is_found);
-    rescale_noise(ResidualKind::kYaw, noise.yaw_rad, noise.yaw_is_found);
-    bool is_found = false;
-    rescale_noise(ResidualKind::kParity, noise.parity_scale, is_found);
+    noise.position_is_found |=
+        rescale_noise(variance_of(at[index(ResidualKind::kPosition)], P), noise.position_m);
+    noise.yaw_is_found |=
+        rescale_noise(variance_of(at[index(ResidualKind::kYaw)], P), noise.yaw_rad);
+    rescale_noise(variance_of_parity(at, P), noise.parity_scale);
     return most;
   }
 

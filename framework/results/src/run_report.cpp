@@ -66,7 +66,8 @@ Table accuracy_table(const eval::Accuracy& accuracy) {
                           std::to_string(segment.count) + " segments"});
   }
   const bool is_aligned = accuracy.alignment != eval::Alignment::kNone;
-  table.rows.push_back({is_aligned ? "at the end, aligned at the start" : "at the end", 1e3 * accuracy.end_m, accuracy.end_deg,
+  table.rows.push_back({is_aligned ? "at the end, aligned at the start" : "at the end",
+                        1e3 * accuracy.end_m, accuracy.end_deg,
                         significant(accuracy.path_length_m, 4) + " m"});
   return table;
 }

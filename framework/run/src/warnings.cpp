@@ -225,6 +225,13 @@ void doubt(RunResult& result) {
                             std::to_string(wheels.samples) +
                             " encoder samples are refused by the kinematic model");
   }
+  constexpr double kMostUnseen = 0.2;
+  if (result.updates.empty() && wheels.bridged_s > kMostUnseen * wheels.duration_s) {
+    result.doubts.push_back("the wheels were not seen for " + significant(wheels.bridged_s, 3) +
+                            " s of " + significant(wheels.duration_s, 3) +
+                            " s, in which the mean of the readings before and after is taken: gaps "
+                            "of the log, readings that are refused, or a log of what changes only");
+  }
   if (parts.shortest == nullptr) return;
   const double ate_m = result.accuracy->ate_m, extent = extent_m(result.reference);
   std::string text;

@@ -15,7 +15,9 @@ struct WheelUpdateParams {
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(gate_probability),
-      {.min = 0., .max = 0.5, .help = "intervals less likely than this are left out; 0: none"});
+      {.min = 0.,
+       .max = 0.5,
+       .help = "intervals less likely than this are weighed down (F-32) and counted; 0: none"});
     b(VIWO_PARAM(sample_gate_probability),
       {.min = 0.,
        .max = 0.5,

@@ -39,7 +39,7 @@ struct Params {
     b(VIWO_PARAM(gate_probability),
       {.min = 0.,
        .max = 0.5,
-       .help = "intervals less likely than this are left out: the ground is no plane "
+       .help = "intervals less likely than this are weighed down (F-32): the ground is no plane "
                "there; 0: none"});
   }
 };

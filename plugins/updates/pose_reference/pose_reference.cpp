@@ -67,7 +67,9 @@ struct Params {
     b(VIWO_PARAM(max_span_s),
       {.unit = "s", .above = 0., .help = "fixes between clones further apart are left out"});
     b(VIWO_PARAM(gate_probability),
-      {.min = 0., .max = 0.5, .help = "fixes less likely than this are left out; 0: none"});
+      {.min = 0.,
+       .max = 0.5,
+       .help = "fixes less likely than this are weighed down (F-32) and counted; 0: none"});
   }
 };
 
