@@ -1,5 +1,6 @@
 // How landmarks begin in the state.
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -99,6 +100,25 @@ TEST(Landmarks, BeginWithAllTheirSightsAndEstimateThemselvesConsistently) {
   EXPECT_TRUE(broken < low || broken > high) << broken << " in " << low << " .. " << high;
 }
 
+/// What a factor says of the first `n` states when the landmarks behind them are eliminated.
+std::pair<Eigen::MatrixXd, Eigen::VectorXd> without_landmarks(const FactorSink& sink,
+                                                              Eigen::Index n, Eigen::Index size) {
+  Eigen::MatrixXd Lambda = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd eta = Eigen::VectorXd::Zero(size);
+  testing::scatter(*sink.information(), Lambda, eta);
+  const Eigen::Index n_new = size - n;
+  for (Eigen::Index i = n; i < size; ++i) {
+    if (Lambda(i, i) == 0.) Lambda(i, i) = 1.;  // room that no landmark has taken
+  }
+  if (n_new > 0) {
+    const Eigen::MatrixXd F = Lambda.bottomRightCorner(n_new, n_new).inverse();
+    const Eigen::MatrixXd G = Lambda.topRightCorner(n, n_new);
+    Lambda.topLeftCorner(n, n) -= G * F * G.transpose();
+    eta.head(n) -= G * F * eta.tail(n_new);
+  }
+  return {Lambda.topLeftCorner(n, n), eta.head(n)};
+}
+
 TEST(Landmarks, BeginWithTheRowsThatTheEliminatedTracksWouldHave) {
   // Eliminating the landmarks from their factor gives the factor of the same tracks without them.
   Random random(66);
@@ -123,21 +143,44 @@ TEST(Landmarks, BeginWithTheRowsThatTheEliminatedTracksWouldHave) {
     }
     ASSERT_EQ(sink.applied(), 3);
     ASSERT_EQ(sink.added().size(), most == 0 ? 0u : 3u);
-    const auto size = estimate.P.cols(), n_new = size - n;
-    Eigen::MatrixXd Lambda = Eigen::MatrixXd::Zero(size, size);
-    Eigen::VectorXd eta = Eigen::VectorXd::Zero(size);
-    testing::scatter(*sink.information(), Lambda, eta);
-    if (n_new > 0) {
-      const Eigen::MatrixXd F = Lambda.bottomRightCorner(n_new, n_new).inverse();
-      const Eigen::MatrixXd G = Lambda.topRightCorner(n, n_new);
-      Lambda.topLeftCorner(n, n) -= G * F * G.transpose();
-      eta.head(n) -= G * F * eta.tail(n_new);
-    }
-    Lambdas.emplace_back(Lambda.topLeftCorner(n, n));
-    etas.emplace_back(eta.head(n));
+    const auto [Lambda, eta] = without_landmarks(sink, n, estimate.P.cols());
+    Lambdas.push_back(Lambda);
+    etas.push_back(eta);
   }
   EXPECT_LT((Lambdas[0] - Lambdas[1]).norm(), 1e-9 * Lambdas[0].norm());
   EXPECT_LT((etas[0] - etas[1]).norm(), 1e-8 * etas[0].norm());
+}
+
+/// A false match that is left out of a track stays out of its landmark.
+TEST(Landmarks, DoNotBeginWithStrays) {
+  Random random(66);
+  const SceneOptions options{
+      .n_clones = 8, .n_cameras = 1, .calibrates = false, .sigma_theta = 1e-3, .sigma_p = 1e-2};
+  Scene scene = testing::make_scene(options, 0, random);
+  scene.landmarks = {{0.4, 0.1, 4.}, {0.7, -0.2, 5.}, {0.2, 0.3, 3.5}};
+  const auto n = scene.P.cols();
+  for (const int most : {0, 3}) {
+    Random noise(67);
+    Scene estimate = scene;
+    Params params = testing::default_params();
+    params.max_landmarks = most;
+    VisualFeatures update(params, HostServices{});
+    estimate.start(update);
+    FactorSink sink = estimate.sink();
+    for (std::size_t k = 0; k < 8; ++k) {
+      auto images = testing::images(scene, k, 1., noise);
+      for (FeaturePoint& point : images[0].points) {
+        if (k == 3 && point.id == 100) point.u_px += 60.;
+      }
+      testing::epoch(update, estimate, k + 1, images, sink, k == 7);
+    }
+    EXPECT_EQ(sink.applied(), 3);
+    EXPECT_EQ(sink.added().size(), most == 0 ? 0u : 2u);
+    const auto [Lambda, eta] = without_landmarks(sink, n, estimate.P.cols());
+    const Eigen::MatrixXd known = scene.P.inverse();
+    const Eigen::VectorXd dx = (Lambda + known).llt().solve(eta);
+    EXPECT_LT(dx.dot(known * dx), 10.) << most;
+  }
 }
 
 }  // namespace

@@ -245,20 +245,27 @@ bool VisualFeatures::passes_gate() {
   if (!std::isfinite(chi2)) return false;
   moves_ = may_move && gate_.chi2_of_motion() > threshold(kMotionDof);
   if (tells_noise) {
-    ++weighed_;
     const double most = threshold(dof_of_noise);
-    if (chi2 - gate_.chi2_of_motion() <= most) {
-      gate_.tell(noise_);
-    } else {
-      noise_.add_beyond(most / dof_of_noise);
-    }
+    const bool is_beyond = chi2 - gate_.chi2_of_motion() > most;
+    told_ = Told{is_beyond ? most / dof_of_noise : 0.};
   }
   return !moves_ && chi2 <= threshold(dof);
+}
+
+void VisualFeatures::tell_noise() {
+  if (!told_) return;
+  ++weighed_;
+  if (told_->beyond > 0.) {
+    noise_.add_beyond(told_->beyond);
+  } else {
+    gate_.tell(noise_);
+  }
 }
 
 /// Triangulates and linearises the sights of the feature, and asks the gate.
 FeatureStatus VisualFeatures::try_feature(bool& passes) {
   passes = false;
+  told_.reset();
   FeatureStatus status = feature_.triangulate(window_);
   if (status == FeatureStatus::kOk) status = feature_.linearize(window_);
   if (status != FeatureStatus::kOk) return status;
@@ -277,19 +284,22 @@ void VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
     return refuse(kShort);
   }
   bool passes = false;
+  int strays = 0;
   FeatureStatus status = try_feature(passes);
   if (!passes) {
     // A few strays, false matches, must not cost the track.
-    const int strays = feature_.leave_out_strays();
+    strays = feature_.leave_out_strays();
     if (strays > 0 && static_cast<int>(feature_.sights().size()) >= params_.min_observations) {
       status = try_feature(passes);
       if (passes) reject(kStray, candidate.id, strays);
     }
   }
+  tell_noise();  // of what is left: what is left out is no noise of it
   if (status != FeatureStatus::kOk) return refuse(reason_of(status));
   ++tried_;
   if (passes) {
-    if (landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) return;
+    // A landmark takes the track as it is, strays and all.
+    if (strays == 0 && landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) return;
     equations_.add(feature_, window_, factor(sink));
     sink.count(1, 0);
   } else {

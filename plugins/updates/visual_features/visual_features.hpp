@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -56,6 +57,7 @@ class VisualFeatures final : public Update {
   void select(const FilterView& filter);
   void use(const Candidate& candidate, FactorSink& sink);
   bool passes_gate();
+  void tell_noise();
   /// Of the gate.
   double threshold(int dof) const {
     return thresholds_.empty() ? std::numeric_limits<double>::infinity()
@@ -79,8 +81,14 @@ class VisualFeatures final : public Update {
   NormalEquations equations_;
   Chi2Gate gate_;
   Landmarks landmarks_;
-  NoiseScale noise_{50., 2000., 10.};    ///< of sigma_px
-  int weighed_ = 0;                      ///< tracks of this epoch that told it
+  NoiseScale noise_{50., 2000., 10.};  ///< of sigma_px
+  int weighed_ = 0;                    ///< tracks of this epoch that told it
+  /// What the track that passes_gate() was asked for last has to tell of it: what the gate has, or
+  /// that it is beyond so much.
+  struct Told {
+    double beyond = 0.;
+  };
+  std::optional<Told> told_;
   InformationFactor* factor_ = nullptr;  ///< of this epoch, once there is a feature
   std::vector<Candidate> candidates_;
   std::vector<std::int64_t> seen_epoch_;  ///< per track
