@@ -87,10 +87,14 @@ bool Spacing::is_free(const cv::Point2f& uv) const {
 
 bool Spacing::add_if_free(const cv::Point2f& uv) {
   if (!is_free(uv)) return false;
+  add(uv);
+  return true;
+}
+
+void Spacing::add(const cv::Point2f& uv) {
   int& first = first_of(bucket_of(uv));
   points_.push_back({uv, first});
   first = static_cast<int>(points_.size()) - 1;
-  return true;
 }
 
 Detector::Detector(const CameraView& camera, const TrackerOptions& options, cv::Mat mask)
@@ -222,7 +226,7 @@ std::vector<cv::Point2f> Detector::choose(std::span<Lacking> cells, int wanted, 
 
 void Detector::detect(const Frame& frame, std::vector<cv::Point2f>& points) const {
   Spacing spacing(size_, static_cast<float>(options_.min_px_dist));
-  for (const cv::Point2f& uv : points) spacing.add_if_free(uv);
+  for (const cv::Point2f& uv : points) spacing.add(uv);  // tracks may be nearer to each other
   std::vector<Lacking> lacking = lacking_cells(points);
   int missing = options_.num_pts - static_cast<int>(points.size());
   std::vector<cv::Point2f> fresh;

@@ -23,6 +23,7 @@ class Spacing {
   bool is_free(const cv::Point2f& uv) const;
   /// The same; then the point is added.
   bool add_if_free(const cv::Point2f& uv);
+  void add(const cv::Point2f& uv);
 
  private:
   static constexpr int kNone = -1;

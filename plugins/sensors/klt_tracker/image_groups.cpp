@@ -30,6 +30,7 @@ void ImageGroups::begin_again() {
   clocks_.fill(SetBackClock(kMostBehind));
   newest_ns_.reset();
   group_ns_.reset();
+  ++n_begun_;
 }
 
 std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& rejections) {
@@ -77,6 +78,7 @@ bool ImageGroups::next(Sensor& input, Rejections& rejections, ImageGroup& out) {
       ahead_ ? std::exchange(ahead_, std::nullopt) : next_image(input, rejections);
   if (!image) return false;
   const std::int64_t begin_ns = image->t_ns;
+  const int n_begun = n_begun_;
   std::int64_t newest_ns = begin_ns;
   for (int count = 0; image; image = next_image(input, rejections)) {
     auto& slot = out.images[static_cast<std::size_t>(image->camera)];
@@ -88,7 +90,8 @@ bool ImageGroups::next(Sensor& input, Rejections& rejections, ImageGroup& out) {
     newest_ns = std::max(newest_ns, slot.t_ns);
     if (++count == n_cameras_) break;
   }
-  group_ns_ = newest_ns;
+  // Behind a clock that is set back meanwhile the stamps of this group are of another time.
+  if (n_begun == n_begun_) group_ns_ = newest_ns;
   return true;
 }
 

@@ -64,6 +64,7 @@ class ImageGroups {
       SetBackClock(kMostBehind)};
   std::optional<std::int64_t> newest_ns_;
   std::optional<std::int64_t> group_ns_;  ///< newest of the last group
+  int n_begun_ = 0;                       ///< times that a clock was set back
   std::optional<std::int64_t> nearest_ns_;
   std::int64_t images_ = 0;
   std::int64_t others_ = 0;

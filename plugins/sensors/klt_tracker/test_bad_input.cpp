@@ -109,6 +109,21 @@ TEST(KltTracker, GoesOnWithAClockThatIsSetBack) {
   EXPECT_EQ(left[7].t_ns, stamp_of(9) - 2'000'000'000);
 }
 
+TEST(KltTracker, GoesOnWithAClockThatIsSetBackWhileAnImageIsMissing) {
+  std::vector<Measurement> input = drive(20, 2);
+  for (int i = 4; i < 20; ++i) {
+    for (const int camera : {0, 1}) {
+      input[static_cast<std::size_t>(2 * i + camera)] =
+          sample_of(rig().render(i, camera), camera, stamp_of(i) - 2'000'000'000);
+    }
+  }
+  input.erase(input.begin() + 7);  // the right one of the last pair before
+  const Played played = track(input, section({}, 2), /*is_set_back=*/true);
+  EXPECT_LE(played.rejections.at("image whose stamp is not after the previous one").count, 5);
+  EXPECT_GE(played.of(0).size(), 17U);
+  EXPECT_GE(played.of(1).size(), 16U);
+}
+
 /// `n` images of camera 0, those of [from, to) of another size.
 std::vector<Measurement> drive_with_small_images(int n, int from, int to) {
   std::vector<Measurement> input = drive(n, 1);

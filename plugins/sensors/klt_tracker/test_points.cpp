@@ -232,5 +232,25 @@ TEST(Frame, EqualisationFindsPointsInADimImage) {
   EXPECT_GT(detect(pinhole(320, 240), options, dim).size(), 40U);
 }
 
+/// Tracks may come nearer to each other than points are detected.
+TEST(Detector, KeepsPointsAwayFromAllTracks) {
+  TrackerOptions options;
+  options.num_pts = 50;
+  options.grid_x = options.grid_y = 2;
+  const Detector detector(pinhole(320, 240), options, {});
+  Frame frame;
+  frame.blank = false;
+  frame.image = cv::Mat(240, 320, CV_8UC1, cv::Scalar(40));
+  cv::rectangle(frame.image, {111, 100}, {150, 140}, cv::Scalar(200), cv::FILLED);
+  cv::GaussianBlur(frame.image, frame.image, {5, 5}, 1.);
+  const cv::Point2f near{109.2F, 100.F};  // 9.2 px from the other one, 2 from the corner
+  std::vector<cv::Point2f> points{{100.F, 100.F}, near};
+  detector.detect(frame, points);
+  EXPECT_GT(points.size(), 2U);
+  for (std::size_t i = 2; i < points.size(); ++i) {
+    EXPECT_GT(std::hypot(points[i].x - near.x, points[i].y - near.y), options.min_px_dist - 2.);
+  }
+}
+
 }  // namespace
 }  // namespace viwo::klt
