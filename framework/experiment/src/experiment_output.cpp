@@ -61,7 +61,10 @@ json rpe_json(const ExperimentResult& result, std::size_t variant) {
   for (const double length_m : segment_lengths_m(result)) {
     std::vector<double> m, deg;
     for (const ExperimentRun& run : result.runs) {
-      if (run.variant != variant || !std::isfinite(rpe(run.result, length_m, false))) continue;
+      if (run.variant != variant || run.result.status != RunStatus::kOk ||
+          !std::isfinite(rpe(run.result, length_m, false))) {
+        continue;
+      }
       m.push_back(rpe(run.result, length_m, false));
       deg.push_back(rpe(run.result, length_m, true));
     }
@@ -91,7 +94,9 @@ json variant_json(const ExperimentResult& result, std::size_t variant, const Gro
   for (const ExperimentRun& run : result.runs) {
     if (run.variant != variant) continue;
     rank_deficient += run.result.total.rank_deficient;
-    if (std::isfinite(run.result.nees.pose)) nees.push_back(run.result.nees.pose);
+    if (run.result.status == RunStatus::kOk && std::isfinite(run.result.nees.pose)) {
+      nees.push_back(run.result.nees.pose);
+    }
   }
   entry["rank_deficient_samples"] = rank_deficient;
   entry["rpe"] = rpe_json(result, variant);
