@@ -241,11 +241,13 @@ class Fit {
     return group.residuals - (P * group.information).trace();
   }
 
-  /// Squares over redundancy. What fits exactly, or has nothing to spare, says nothing about its
-  /// own size: 0.
+  /// Squares over redundancy, less the two by which the variance of what is estimated is larger
+  /// where its noise is found in as few numbers (Student's t). What fits exactly, or has little to
+  /// spare, says nothing about its own size: 0.
   static double variance_of(const NoiseGroup& group, const Eigen::MatrixXd& P) {
+    constexpr double kLeastToSpare = 4.;
     const double spare = redundancy(group, P);
-    return spare < 1. || group.squares < 1e-12 ? 0. : group.squares / spare;
+    return spare < kLeastToSpare || group.squares < 1e-12 ? 0. : group.squares / (spare - 2.);
   }
 
   /// What the residuals of the parity, of which there are few, and its batches, which are many, say

@@ -132,8 +132,11 @@ CalibrationOptions choose_segments(const CalibrationSetup& setup, const FitStart
   if (fitted.empty()) throw InputError(failures.front());
   for (const auto& [why, which] : failed) result.failed_lengths.push_back(which + ": " + why);
   const std::vector<CalibrationEstimate>& tried = result.lengths;
-  const auto rank = [](const CalibrationEstimate& estimate) {
-    return std::tuple(!estimate.converged, !estimate.has_enough_residuals(),
+  const bool has_positions = setup.recordings.front().motion.kind == ReferenceKind::kPoses;
+  const auto rank = [has_positions](const CalibrationEstimate& estimate) {
+    const CalibrationNoise& noise = estimate.noise;
+    const bool is_found = noise.yaw_is_found && (noise.position_is_found || !has_positions);
+    return std::tuple(!estimate.converged, !is_found, !estimate.has_enough_residuals(),
                       estimate.prediction_m.value_or(0.), estimate.log_volume);
   };
   const auto best = std::min_element(
