@@ -1,5 +1,6 @@
 #include "viwo/api/stamp_order.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -36,6 +37,12 @@ void StampOrder::require_enough(const std::string& source, const char* data) con
   const std::int64_t total = accepted_ + rejected_;
   const double fraction = static_cast<double>(rejected_) / static_cast<double>(total);
   if (accepted_ > 0 && fraction <= limits_.max_rejected_fraction) return;
+  // Of few data that are far apart the second one cannot have been expected.
+  const bool is_far_only =
+      rejected_ == 1 && std::any_of(counts().begin(), counts().end(), [this](const auto& known) {
+        return known.reason == prefix_ + kStampFarAhead;
+      });
+  if (is_far_only && accepted_ > 2 && limits_.max_rejected_fraction > 0.) return;
   std::string text = source + "  " + std::to_string(rejected_) + " of " + std::to_string(total) +
                      " " + data + " rejected, allowed is a fraction of " +
                      number_text(limits_.max_rejected_fraction) + ":";

@@ -6,12 +6,14 @@
 #include <regex>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "in_folder.hpp"
 #include "viwo/api/build_record.hpp"
 #include "viwo/api/stamp_order.hpp"
+#include "viwo/api/status.hpp"
 
 namespace viwo {
 namespace {
@@ -200,6 +202,22 @@ TEST(StampJump, BelievesThePausesOfWhoHasPausedBefore) {
   for (const std::int64_t second : {0, 5, 6, 11, 12}) {
     EXPECT_EQ(never.is_believed(second * 1'000'000'000), second != 5 && second != 11) << second;
   }
+}
+
+TEST(StampOrder, ASurveyOfFewPointsIsAsFarApartAsItIs) {
+  const auto played = [](std::vector<std::int64_t> seconds, double most) {
+    StampOrder order({.max_gap_s = 60., .max_rejected_fraction = most});
+    for (const std::int64_t t : seconds) {
+      order.accept(t * 1'000'000'000, [t] { return std::to_string(t); });
+    }
+    order.require_enough("survey", "poses");
+    return order.counts().size();
+  };
+  EXPECT_EQ(played({0, 20, 40, 60, 80, 100}, 0.1), 1U);
+  EXPECT_THROW(played({0, 20, 40, 60, 80, 100}, 0.), InputError);
+  EXPECT_THROW(played({0, 20, 40}, 0.1), InputError);
+  EXPECT_THROW(played({0, 20, 40, 60, 60, 100}, 0.1), InputError);
+  EXPECT_THROW(played({0, 1, 2, 2, 3, 4}, 0.1), InputError);
 }
 
 }  // namespace
