@@ -1,4 +1,5 @@
 // What a fit takes for the noise of the wheels and of the reference, and what it must not.
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -18,6 +19,7 @@ using namespace calibration;
 using testing::error_of;
 using testing::fit_all;
 using testing::setup_of;
+using testing::truth_of;
 
 /// Two redundant residuals are no measure of a noise that three thousand samples show.
 TEST(ParityScale, OfOneRecordingIsThatOfItsNoise) {
@@ -44,6 +46,45 @@ TEST(ParityScale, DoesNotKnowHowFarTheZerosWereOff) {
   const auto near = fit_all(setup_of({"icr_sweep", "figure_eight"}, 1));
   const auto off = fit_all(setup_of({"icr_sweep", "figure_eight"}, 1, far));
   EXPECT_NEAR(off.noise.parity_scale, near.noise.parity_scale, 0.03);
+}
+
+/// Of few segments some leave next to nothing by chance: they are not the surest.
+TEST(SegmentChoice, IsNotOfTheLuckiest) {
+  double squares = 0.;
+  int beyond = 0;
+  constexpr int kSeeds = 16;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    CalibrationSetup setup;
+    setup.name = "test";
+    RunSetup run = read_run(
+        config::parse("sensors: {s: {type: simulator, motion: figure_eight, duration_s: 44, "
+                      "features: 0, pose_rate_hz: 20, sigma_pose_position_m: 0.003, "
+                      "sigma_pose_orientation_rad: 0.002, true_intrinsics_scale: 1, robot: &robot "
+                      "{type: differential, radius_left_m: 0.05, radius_right_m: 0.05, baseline_m: "
+                      "0.3, prior_sigma_baseline_m: 0.01}}}\nkinematics: *robot\n",
+                      "run.yaml"),
+        testing::registry(), seed);
+    RunData data = collect(run);
+    const Recording label{"drive", {}};
+    MotionReference reference = motion_reference(label, run, data, ReferenceKind::kPoses);
+    setup.recordings.push_back({label, std::move(run), std::move(data), std::move(reference)});
+    const CalibrationResult result = calibrate(setup);
+    const Intrinsics truth = truth_of(setup, seed);
+    EXPECT_TRUE(result.all.noise.yaw_is_found && result.all.noise.position_is_found);
+    for (const CalibrationEstimate& one : result.lengths) {
+      if (one.residuals <= 6) {
+        EXPECT_FALSE(one.noise.yaw_is_found) << one.residuals;
+      }
+    }
+    for (int i = 0; i < 3; ++i) {
+      const double off = (result.all.x_WI[i] - truth[i]) / result.all.sigma[i];
+      squares += off * off / (3. * kSeeds);
+      if (std::abs(off) > 3.5) ++beyond;
+    }
+  }
+  EXPECT_LT(squares, 2.);
+  EXPECT_GT(squares, 0.3);
+  EXPECT_EQ(beyond, 0);
 }
 
 class Holes : public ::testing::Test {
