@@ -25,15 +25,20 @@ struct Params {
   double sigma_front_lateral_m_per_s = 0.001;
 
   void bind(ParamBinder& b) {
-    b(VIWO_PARAM(wheel_base_m),
-      {.unit = "m", .above = 0., .required = true, .help = "distance between the axles"});
+    b(VIWO_PARAM(wheel_base_m), {.unit = "m",
+                                 .above = 0.,
+                                 .max = 50.,
+                                 .required = true,
+                                 .help = "distance between the axles"});
     b(VIWO_PARAM(track_m),
       {.unit = "m",
        .above = 0.,
+       .max = 50.,
        .required = true,
        .help = "distance between the left and right contact lines, of both axles"});
     b(VIWO_PARAM(radius_m), {.unit = "m",
                              .above = 0.,
+                             .max = 10.,
                              .required = true,
                              .help = "wheel radii, one for all or one per measured wheel"});
     b(VIWO_PARAM(wheel_speeds),

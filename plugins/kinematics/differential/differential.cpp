@@ -19,12 +19,19 @@ struct Params : sides::SideParams {
   double sigma_lateral_m_per_s = 0.001;
 
   void bind(ParamBinder& b) {
-    b(VIWO_PARAM(radius_left_m),
-      {.unit = "m", .above = 0., .required = true, .help = "radius of the left wheels"});
-    b(VIWO_PARAM(radius_right_m),
-      {.unit = "m", .above = 0., .required = true, .help = "radius of the right wheels"});
+    b(VIWO_PARAM(radius_left_m), {.unit = "m",
+                                  .above = 0.,
+                                  .max = 10.,
+                                  .required = true,
+                                  .help = "radius of the left wheels"});
+    b(VIWO_PARAM(radius_right_m), {.unit = "m",
+                                   .above = 0.,
+                                   .max = 10.,
+                                   .required = true,
+                                   .help = "radius of the right wheels"});
     b(VIWO_PARAM(baseline_m), {.unit = "m",
                                .above = 0.,
+                               .max = 50.,
                                .required = true,
                                .help = "distance between the left and right contact lines"});
     SideParams::bind(b);

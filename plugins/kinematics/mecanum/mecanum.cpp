@@ -24,9 +24,13 @@ struct Params {
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(x_m), {.unit = "m",
+                        .min = -50.,
+                        .max = 50.,
                         .required = true,
                         .help = "wheel contact points along x (forward) in O, one per wheel"});
     b(VIWO_PARAM(y_m), {.unit = "m",
+                        .min = -50.,
+                        .max = 50.,
                         .required = true,
                         .help = "wheel contact points along y (left) in O, one per wheel"});
     b(VIWO_PARAM(roller_angle_rad),
@@ -38,6 +42,7 @@ struct Params {
                "usual: -0.7854 front left and back right, 0.7854 the others"});
     b(VIWO_PARAM(radius_m), {.unit = "m",
                              .above = 0.,
+                             .max = 10.,
                              .required = true,
                              .help = "wheel radii, one for all or one per wheel"});
     b(VIWO_PARAM(prior_sigma_radius_m),

@@ -26,11 +26,13 @@ struct Params : sides::SideParams {
     b(VIWO_PARAM(radius_left_m),
       {.unit = "m",
        .above = 0.,
+       .max = 10.,
        .required = true,
        .help = "effective radius of the left side: slip factor times radius"});
     b(VIWO_PARAM(radius_right_m),
       {.unit = "m",
        .above = 0.,
+       .max = 10.,
        .required = true,
        .help = "effective radius of the right side: slip factor times radius"});
     b(VIWO_PARAM(y_icr_left_m),

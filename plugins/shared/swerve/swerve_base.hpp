@@ -28,13 +28,18 @@ struct Params {
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(x_m), {.unit = "m",
+                        .min = -50.,
+                        .max = 50.,
                         .required = true,
                         .help = "wheel contact points along x (forward) in O, one per wheel"});
     b(VIWO_PARAM(y_m), {.unit = "m",
+                        .min = -50.,
+                        .max = 50.,
                         .required = true,
                         .help = "wheel contact points along y (left) in O, one per wheel"});
     b(VIWO_PARAM(radius_m), {.unit = "m",
                              .above = 0.,
+                             .max = 10.,
                              .required = true,
                              .help = "wheel radii, one for all or one per wheel"});
     b(VIWO_PARAM(steer_offset_rad),
