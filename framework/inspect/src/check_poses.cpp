@@ -35,6 +35,9 @@ using Eigen::Vector3d;
 constexpr std::size_t kFewestWindows = 5;
 /// Slip, tyres and poses that are decimetres off stay within; a wrong diameter does not.
 constexpr double kMostFactor = 0.15;
+/// Of units that gears may look like: with a radius that is wrong, too, it is not known which it
+/// is.
+double most_off(double factor) { return factor > 50. ? kMostFactor : 0.05; }
 
 /// Turns about the vertical of the world, of a pose source.
 std::vector<Turn> yaw_turns_of(const Trajectory& poses) {
@@ -133,17 +136,34 @@ void check_heading(const Speeds& speeds, const std::string& label, const std::st
   out.push_back(heading);
 }
 
+/// By how much the wheels contradict each other, rms of the rows, m/s.
+double contradiction(const Wheels& wheels) {
+  TwistSolver solver(wheels.model, {});
+  solver.set_intrinsics(wheels.prior.wheels.x_WI);
+  TwistSolution solution;
+  double squares = 0., rows = 0.;
+  for (const EncoderSample& sample : wheels.samples) {
+    if (solver.solve(sample, solution) != Status::kOk) continue;
+    squares += solution.e.squaredNorm();
+    rows += static_cast<double>(solution.e.size());
+  }
+  return rows > 0. ? std::sqrt(squares / rows) : 0.;
+}
+constexpr double kNoContradiction_m_per_s = 0.005;
+
 /// Of a side, or a drive of two, that is reversed or has another gear: where the base goes straight
 /// the one change without which the wheels go as far as the poses, and to where those go.
 bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& label,
                  const std::string& other, Findings& out) {
   std::optional<Finding> found;
+  const double as_it_is = contradiction(wheels);
   for (const ChannelChange& change : changes_by_gyro(wheels.model, wheels.prior.wheels.x_WI)) {
     const bool is_scale =
         change.kind == ChannelChange::kSideScale || change.kind == ChannelChange::kDriveScale;
     if (!is_scale) continue;
     Wheels changed = wheels;
     for (EncoderSample& sample : changed.samples) change.undo(sample);
+    if (contradiction(changed) > 1.1 * as_it_is + kNoContradiction_m_per_s) continue;
     const Speeds speeds = speeds_of(changed, poses.poses);
     if (speeds.ratio.size() < kFewestWindows || speeds.cosine.empty()) continue;
     const double ratio = eval::median(speeds.ratio);
@@ -222,13 +242,16 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
   finding.figures.push_back({"sigma", spread, ""});
   if (std::abs(ratio - 1.) > std::max(kMostFactor, 3. * spread)) {
     finding.severity = Severity::kFault;
-    if (check_sides(wheels, poses, label, other, out)) return;
+    // A gyro tells it, if there is one.
+    const bool has_gyro = !recording.imu.empty() || !recording.headings.empty();
+    if (!has_gyro && check_sides(wheels, poses, label, other, out)) return;
     const auto unit = std::find_if(units.begin(), units.end(), [&](const Unit& u) {
-      return std::abs(ratio / u.factor - 1.) < kMostFactor;
+      return std::abs(ratio / u.factor - 1.) < most_off(u.factor);
     });
-    const auto* const of_poses = std::find_if(
-        kOfPoses.begin(), kOfPoses.end(),
-        [&](const auto& one) { return std::abs(ratio / one.first - 1.) < kMostFactor; });
+    const auto* const of_poses =
+        std::find_if(kOfPoses.begin(), kOfPoses.end(), [&](const auto& one) {
+          return std::abs(ratio / one.first - 1.) < most_off(1. / one.first);
+        });
     if (of_poses != kOfPoses.end()) {
       finding.what += ": positions of " + other + " are in " + of_poses->second;
       finding.remedies = {{"sensors." + poses.sensor + ".position_unit", of_poses->second}};
