@@ -91,7 +91,8 @@ void EncoderCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {
         {name_ + " stuck " + channel,
          name_ + ": " + channel + " reads " + significant(drive.value(), 4) +
              " rad/s all the time from " + time_text(drive.from_ns() - zero_ns) + " on, for " +
-             significant(seconds_between(drive.from_ns(), drive.to_ns()), 3) + " s: it was stuck",
+             significant(seconds_between(drive.from_ns(), drive.to_ns()), 3) + " s: it was stuck" +
+             (drive.value() != 0. ? ", or it is an angle or a count (drive_input: angle)" : ""),
          false,
          {},
          are_all});

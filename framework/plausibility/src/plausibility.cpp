@@ -273,6 +273,18 @@ void Plausibility::add(const std::string& sensor, SampleView sample) {
   watch(sensor, sample);
 }
 
+namespace {
+
+bool rests(SampleView sample) {
+  const auto* const wheels = sample.get_if<EncoderSample>();
+  return wheels != nullptr &&
+         std::all_of(wheels->drive_rad_per_s.begin(),
+                     wheels->drive_rad_per_s.begin() + std::clamp(wheels->n_drive, 0, kMaxDrives),
+                     [](double rate) { return rate == 0.; });
+}
+
+}  // namespace
+
 void Plausibility::watch(const std::string& sensor, SampleView sample) {
   for (Checks::Watched& stream : checks_->streams) {
     if (stream.sensor != sensor || !(*stream.type == sample.type())) continue;
@@ -282,7 +294,7 @@ void Plausibility::watch(const std::string& sensor, SampleView sample) {
     if (!now_ns_ || is_single) now_ns_ = next_look_ns_ = t_ns;
     if (!zero_ns_ || (is_single && !is_begun_at_)) zero_ns_ = now_ns_;
     ++n_watched_;
-    stream.watch.add(t_ns, sample.type().channel(sample.data()), *now_ns_);
+    stream.watch.add(t_ns, sample.type().channel(sample.data()), *now_ns_, rests(sample));
     if (stream.watch.has_begun() && !checks_->is_of_another_clock(stream)) {
       now_ns_ = std::max(*now_ns_, stream.watch.newest_ns());
     }

@@ -19,6 +19,8 @@ constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr std::int64_t kLongNs = 10 * kSecondNs;
 /// Who ends a recording stops its sensors one after the other.
 constexpr std::int64_t kEndNs = 2 * kSecondNs;
+/// Nothing may be written of a rest at the end, for as long.
+constexpr std::int64_t kRestNs = 10 * kSecondNs;
 constexpr std::int64_t kMostSaid = 10;  ///< gaps that are told one by one
 constexpr const char* kLook = ": look at its cable, driver and bus";
 
@@ -43,8 +45,9 @@ std::optional<std::int64_t> StreamWatch::common_time_ns(std::int64_t stamp_ns) c
   return t_ns;
 }
 
-void StreamWatch::add(std::int64_t stamp_ns, int number, std::int64_t now_ns) {
+void StreamWatch::add(std::int64_t stamp_ns, int number, std::int64_t now_ns, bool rests) {
   if (!is_stamp(stamp_ns)) return;
+  rests_ = rests;
   // A first stamp that the next one contradicts says nothing of the clock.
   if (const auto t_ns = common_time_ns(stamp_ns);
       n_samples_ == 1 && (!t_ns || std::abs(now_ns - *t_ns) > kLongNs)) {
@@ -218,6 +221,7 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, const char
   }
   const std::int64_t silent_ns = now_ns - newest_ns_;
   const std::int64_t longest_ns = std::max(longest_spacing_ns(), kEndNs);
+  if (rests_ && silent_ns <= kRestNs) return;
   if (silent_ns <= longest_ns) return find_silent_channels(now_ns, zero_ns, longest_ns, out);
   out.push_back({name_ + " end", name_ + ": ended " + seconds(silent_ns) +
                                      " before the end of the " + of_what + " (" +

@@ -28,8 +28,9 @@ class StreamWatch {
         longest_period_ns_(1e9 * longest_period_s) {}
 
   /// A sample has come, of camera `number` if there are several. `now_ns`: the newest time of all
-  /// streams, which begins with the first one.
-  void add(std::int64_t stamp_ns, int number, std::int64_t now_ns);
+  /// streams, which begins with the first one. `rests`: of a base that stands, which a log that is
+  /// written on change may end with.
+  void add(std::int64_t stamp_ns, int number, std::int64_t now_ns, bool rests = false);
   const std::string& name() const { return name_; }
   bool has_begun() const { return has_begun_; }
   /// From its stamps to the common time, when it began: 0 but for stamps of another clock.
@@ -64,6 +65,7 @@ class StreamWatch {
   double longest_period_ns_;
   StampJump jump_{1.};
   bool has_begun_ = false;
+  bool rests_ = false;
   std::int64_t n_samples_ = 0;
   std::int64_t offset_ns_ = 0;  ///< from its stamps to the common time
   std::int64_t first_offset_ns_ = 0;

@@ -89,6 +89,14 @@ TEST(StreamWatch, TellsAnEarlyEnd) {
                           "at its cable and driver, or the log was cut"));
 }
 
+TEST(StreamWatch, DoesNotAskWhatIsWrittenOnChangeToGoOnAtRest) {
+  Bench bench;
+  bench.give(0, 20'000, 5);
+  bench.watch.add(kStart + 20'000 * kMs, 0, kStart + 20'000 * kMs, true);
+  EXPECT_THAT(bench.at_end(25'000), IsEmpty());
+  EXPECT_THAT(bench.at_end(35'000), ::testing::SizeIs(1)) << "too long to know";
+}
+
 TEST(StreamWatch, JudgesByTheUsualPeriodWhateverTheOthersDo) {
   Bench slow;  // a gap of two seconds is two samples that were lost
   for (std::int64_t t = 0; t < 60'000; t += 500) {
