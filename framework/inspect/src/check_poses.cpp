@@ -136,19 +136,6 @@ void check_heading(const Speeds& speeds, const std::string& label, const std::st
   out.push_back(heading);
 }
 
-/// By how much the wheels contradict each other, rms of the rows, m/s.
-double contradiction(const Wheels& wheels) {
-  TwistSolver solver(wheels.model, {});
-  solver.set_intrinsics(wheels.prior.wheels.x_WI);
-  TwistSolution solution;
-  double squares = 0., rows = 0.;
-  for (const EncoderSample& sample : wheels.samples) {
-    if (solver.solve(sample, solution) != Status::kOk) continue;
-    squares += solution.e.squaredNorm();
-    rows += static_cast<double>(solution.e.size());
-  }
-  return rows > 0. ? std::sqrt(squares / rows) : 0.;
-}
 constexpr double kNoContradiction_m_per_s = 0.005;
 
 /// Of a side, or a drive of two, that is reversed or has another gear: where the base goes straight
@@ -156,14 +143,15 @@ constexpr double kNoContradiction_m_per_s = 0.005;
 bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& label,
                  const std::string& other, Findings& out) {
   std::optional<Finding> found;
-  const double as_it_is = contradiction(wheels);
-  for (const ChannelChange& change : changes_by_gyro(wheels.model, wheels.prior.wheels.x_WI)) {
+  const Intrinsics& x_WI = wheels.prior.wheels.x_WI;
+  const double as_it_is = contradiction_of(wheels, x_WI);
+  for (const ChannelChange& change : changes_by_gyro(wheels.model, x_WI)) {
     const bool is_scale =
         change.kind == ChannelChange::kSideScale || change.kind == ChannelChange::kDriveScale;
     if (!is_scale) continue;
     Wheels changed = wheels;
     for (EncoderSample& sample : changed.samples) change.undo(sample);
-    if (contradiction(changed) > 1.1 * as_it_is + kNoContradiction_m_per_s) continue;
+    if (contradiction_of(changed, x_WI) > 1.1 * as_it_is + kNoContradiction_m_per_s) continue;
     const Speeds speeds = speeds_of(changed, poses.poses);
     if (speeds.ratio.size() < kFewestWindows || speeds.cosine.empty()) continue;
     const double ratio = eval::median(speeds.ratio);

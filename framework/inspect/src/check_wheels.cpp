@@ -320,6 +320,10 @@ void check_noises(const Wheels& wheels, const Calibration& calibration, const Pa
 
 }  // namespace
 
+double contradiction_of(const Wheels& wheels, const Intrinsics& x_WI) {
+  return parity_of(wheels, x_WI).rms;
+}
+
 void check_wheels(const Recording& recording, Findings& out) {
   for (const Wheels& wheels : recording.wheels) {
     const std::string label = recording.label<EncoderSample>(wheels.sensor);
