@@ -14,6 +14,7 @@ namespace viwo::inspect {
 
 using series::gather;
 using series::Headings;
+using series::Poses;
 using series::Recording;
 using series::Wheels;
 
@@ -100,15 +101,22 @@ void demote_consequences(const Recording& recording, Findings& findings) {
   for (const Headings& other : recording.headings) {
     gyros.push_back(recording.label<HeadingSample>(other.sensor));
   }
-  std::string wheels;
+  std::string wheels, in_disorder;
   for (const Wheels& set : recording.wheels) {
     const std::string label = recording.label<EncoderSample>(set.sensor);
     if (is_fault_of(findings, label, kNotOfGyro)) wheels = label;
+    if (is_fault_of(findings, label, kOrder)) in_disorder = label;
   }
+  const auto is_of_poses = [&](const std::string& sensor) {
+    return std::any_of(recording.poses.begin(), recording.poses.end(),
+                       [&](const Poses& poses) { return recording.label(poses) == sensor; });
+  };
   for (Finding& finding : findings) {
     const bool is_of_gyro = std::find(gyros.begin(), gyros.end(), finding.sensor) != gyros.end();
     if (is_of_gyro && finding.check == "rate" && !wheels.empty()) {
       demote(finding, wheels);
+    } else if (finding.check == "clock" && !in_disorder.empty() && is_of_poses(finding.sensor)) {
+      demote(finding, in_disorder);  // which is compared with those wheels
     } else if (is_one_of(finding.check, kOfColumns) &&
                is_fault_of(findings, finding.sensor, kColumns)) {
       demote(finding, finding.sensor);
