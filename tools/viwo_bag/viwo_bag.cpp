@@ -225,15 +225,16 @@ Format format_of(const fs::path& out) {
 
 constexpr const char* kNotOwn = "  exists and is no bag that viwo_bag has written";
 
-/// A file that is no bag is not replaced.
-void check_file(const fs::path& file, std::string_view magic) {
+/// A file that is no bag is not replaced. True where there is one.
+bool check_file(const fs::path& file, std::string_view magic) {
   std::error_code ignored;
   if (fs::is_directory(file, ignored)) throw InputError(file.string() + "  is a folder");
-  if (!fs::is_regular_file(file, ignored) || fs::file_size(file, ignored) == 0) return;
+  if (!fs::is_regular_file(file, ignored) || fs::file_size(file, ignored) == 0) return false;
   std::string begin(magic.size(), '\0');
   std::ifstream(file, std::ios::binary)
       .read(begin.data(), static_cast<std::streamsize>(begin.size()));
   if (begin != magic) throw InputError(file.string() + "  exists and is no bag");
+  return true;
 }
 
 /// By the header: its lengths, profile and library.
@@ -263,15 +264,11 @@ void check_folder(const fs::path& out) {
 }
 
 void check_output(const fs::path& out, Format format) {
-  if (format == Format::kRos1) return check_file(out, "#ROSBAG V");
-  if (format == Format::kMcap) {
-    check_file(out, "\x89MCAP");
-    std::error_code ignored;
-    const bool is_there = fs::is_regular_file(out, ignored) && fs::file_size(out, ignored) > 0;
-    if (is_there && !is_own_mcap(out)) throw InputError(out.string() + kNotOwn);
-    return;
+  if (format == Format::kMcapFolder) return check_folder(out);
+  const bool is_there = check_file(out, format == Format::kRos1 ? "#ROSBAG V" : "\x89MCAP");
+  if (is_there && format == Format::kMcap && !is_own_mcap(out)) {
+    throw InputError(out.string() + kNotOwn);
   }
-  check_folder(out);
 }
 
 /// `file` is for ROS 2 a file in any case.

@@ -62,7 +62,7 @@ report::Table length_table(const CalibrationResult& result) {
     table.rows.push_back({segments_text(estimate), static_cast<double>(estimate.residuals),
                           noise.position_is_found ? 1e3 * noise.position_m : nan,
                           noise.yaw_is_found ? noise.yaw_rad : nan,
-                          1e3 * estimate.prediction_m.value_or(std::nan("")), estimate.log_volume});
+                          1e3 * estimate.prediction_m.value_or(nan), estimate.log_volume});
   }
   return table;
 }

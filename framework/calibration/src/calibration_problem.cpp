@@ -16,6 +16,7 @@
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
+#include "viwo/wheel/drive_ranges.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -36,20 +37,14 @@ struct Hole {
 
 /// Where samples are missing, more than now and then one, and the wheels turn before or after.
 std::vector<Hole> holes_of(std::span<const EncoderSample> wheels) {
-  constexpr double kLeast_s = 0.2, kLeastCells = 2.;
-  const auto turns = [](const EncoderSample& sample) {
-    constexpr double kTurns_rad_per_s = 0.1;
-    return std::any_of(sample.drive_rad_per_s.begin(),
-                       sample.drive_rad_per_s.begin() + sample.n_drive,
-                       [](double rate) { return std::abs(rate) > kTurns_rad_per_s; });
-  };
+  constexpr double kLeast_s = 0.2, kLeastCells = 2., kTurns_rad_per_s = 0.1;
   std::vector<Hole> holes;
   for (std::size_t i = 1; i < wheels.size(); ++i) {
     const EncoderSample &before = wheels[i - 1], &after = wheels[i];
     const Hole hole{before.end_ns, after.begin_ns};
     const double cell_s = seconds_between(before.begin_ns, before.end_ns);
     if (hole.length_s() <= std::max(kLeast_s, kLeastCells * cell_s)) continue;
-    if (turns(before) || turns(after)) holes.push_back(hole);
+    if (std::max(fastest_of(before), fastest_of(after)) > kTurns_rad_per_s) holes.push_back(hole);
   }
   return holes;
 }

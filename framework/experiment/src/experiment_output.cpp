@@ -56,20 +56,12 @@ json paired_json(const ExperimentResult& result, const Group& group) {
 }
 
 /// Mean relative pose errors by length.
-json rpe_json(const ExperimentResult& result, std::size_t variant) {
+json rpe_json(const ExperimentResult& result, const json& metrics) {
   json all = json::object();
   for (const double length_m : segment_lengths_m(result)) {
-    std::vector<double> m, deg;
-    for (const ExperimentRun& run : result.runs) {
-      if (run.variant != variant || run.result.status != RunStatus::kOk ||
-          !std::isfinite(rpe(run.result, length_m, false))) {
-        continue;
-      }
-      m.push_back(rpe(run.result, length_m, false));
-      deg.push_back(rpe(run.result, length_m, true));
-    }
-    all[eval::length_text(length_m)] = {{"m", number_or_null(eval::mean(m))},
-                                        {"deg", number_or_null(eval::mean(deg))}};
+    const std::string length = eval::length_text(length_m);
+    all[length] = {{"m", metrics.at("rpe_" + length + "_m").at("mean")},
+                   {"deg", metrics.at("rpe_" + length + "_deg").at("mean")}};
   }
   return all;
 }
@@ -90,20 +82,16 @@ json calibration_json(const ExperimentResult& result, std::size_t variant, const
 json variant_json(const ExperimentResult& result, std::size_t variant, const Group& all) {
   json entry = counts_json(result, variant, all);
   std::int64_t rank_deficient = 0;
-  std::vector<double> nees;
   for (const ExperimentRun& run : result.runs) {
-    if (run.variant != variant) continue;
-    rank_deficient += run.result.total.rank_deficient;
-    if (run.result.status == RunStatus::kOk && std::isfinite(run.result.nees.pose)) {
-      nees.push_back(run.result.nees.pose);
-    }
+    if (run.variant == variant) rank_deficient += run.result.total.rank_deficient;
   }
+  const json metrics = metrics_json(result, variant, all);
   entry["rank_deficient_samples"] = rank_deficient;
-  entry["rpe"] = rpe_json(result, variant);
-  entry["nees_pose"] = number_or_null(eval::mean(nees));
-  entry["nees_pose_median"] = number_or_null(eval::median(nees));
+  entry["rpe"] = rpe_json(result, metrics);
+  entry["nees_pose"] = metrics.at("nees_pose").at("mean");
+  entry["nees_pose_median"] = metrics.at("nees_pose").at("median");
   entry["calibration"] = calibration_json(result, variant, all);
-  entry["metrics"] = metrics_json(result, variant, all);
+  entry["metrics"] = metrics;
   return entry;
 }
 

@@ -7,7 +7,6 @@
 #include "experiment_file.hpp"
 #include "message_of.hpp"
 #include "run_identity.hpp"
-#include "viwo/log/folder_lock.hpp"
 
 namespace viwo {
 namespace {
@@ -172,22 +171,6 @@ TEST(RunIdentity, IsOfContentsWhereverTheyLie) {
   fs::rename(folder / "there" / "images" / "cam0" / "1.png",
              folder / "there" / "images" / "cam0" / "2.png");
   EXPECT_NE(first, identity("there"));
-}
-
-TEST(FolderLock, IsOfOneOrOfShards) {
-  const fs::path folder = fs::path(::testing::TempDir()) / "viwo_folder_lock";
-  fs::create_directories(folder);
-  {
-    const log::FolderLock shard(folder, true);
-    const log::FolderLock another(folder, true);
-    EXPECT_THROW(log::FolderLock(folder, false), InputError);
-  }
-  {
-    const log::FolderLock whole(folder, false);
-    EXPECT_THROW(log::FolderLock(folder, true), InputError);
-    EXPECT_THROW(log::FolderLock(folder, false), InputError);
-  }
-  const log::FolderLock again(folder, false);
 }
 
 }  // namespace

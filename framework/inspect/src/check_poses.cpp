@@ -136,13 +136,12 @@ void check_heading(const Speeds& speeds, const std::string& label, const std::st
   out.push_back(heading);
 }
 
-constexpr double kNoContradiction_m_per_s = 0.005;
-
 /// Of a side, or a drive of two, that is reversed or has another gear: where the base goes straight
 /// the one change without which the wheels go as far as the poses, and to where those go.
 bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& label,
                  const std::string& other, Findings& out) {
   std::optional<Finding> found;
+  constexpr double kNoContradiction_m_per_s = 0.005;  // where nothing contradicts anything
   const Intrinsics& x_WI = wheels.prior.wheels.x_WI;
   const double as_it_is = contradiction_of(wheels, x_WI);
   for (const ChannelChange& change : changes_by_gyro(wheels.model, x_WI)) {

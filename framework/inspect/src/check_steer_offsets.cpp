@@ -12,6 +12,7 @@
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/plausibility/channel_change.hpp"
+#include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::inspect {
@@ -26,9 +27,7 @@ using Matrix = Eigen::MatrixXd;
 
 bool moves(const EncoderSample& sample) {
   constexpr double kMoves_rad_per_s = 0.1;
-  const auto& rates = sample.drive_rad_per_s;
-  return std::any_of(rates.begin(), rates.begin() + sample.n_drive,
-                     [](double r) { return std::abs(r) > kMoves_rad_per_s; });
+  return fastest_of(sample) > kMoves_rad_per_s;
 }
 
 /// The contradictions of the wheels as a function of constants that are added to their steering

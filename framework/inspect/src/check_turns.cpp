@@ -81,13 +81,13 @@ void check_jumps(const Recording& recording, const Wheels& wheels, std::size_t d
                  {{"jumps", n, ""}, {"largest", most->rad, "rad"}}});
 }
 
-/// Of the fastest drive over the tenth of a second before sample `end`, or from it on: where a
-/// counter is coarse, one sample is no speed.
-double mean_fastest(std::span<const EncoderSample> samples, std::size_t end, int step) {
+/// Of the fastest drive over a tenth of a second from sample `first` on, or back (`step` -1): where
+/// a counter is coarse, one sample is no speed.
+double mean_fastest(std::span<const EncoderSample> samples, std::size_t first, int step) {
   constexpr double kOver_s = 0.1;
   std::array<double, kMaxDrives> turned_rad{};
   double sum_s = 0.;
-  for (std::size_t i = end; i < samples.size() && sum_s < kOver_s;
+  for (std::size_t i = first; i < samples.size() && sum_s < kOver_s;
        i += static_cast<std::size_t>(step)) {
     const double dt_s = seconds_between(samples[i].begin_ns, samples[i].end_ns);
     for (std::size_t k = 0; k < kMaxDrives; ++k) {

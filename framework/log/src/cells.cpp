@@ -10,12 +10,12 @@
 namespace viwo::log {
 namespace {
 
-std::int64_t median_spacing_ns(const std::vector<EncoderSample>& samples) {
+/// Of at least two.
+template <class Stamped>
+std::int64_t median_spacing_ns(std::span<const Stamped> all) {
   std::vector<std::int64_t> spacings;
-  spacings.reserve(samples.size() - 1);
-  for (std::size_t i = 1; i < samples.size(); ++i) {
-    spacings.push_back(samples[i].t_ns - samples[i - 1].t_ns);
-  }
+  spacings.reserve(all.size() - 1);
+  for (std::size_t i = 1; i < all.size(); ++i) spacings.push_back(all[i].t_ns - all[i - 1].t_ns);
   return upper_median(spacings);
 }
 
@@ -57,6 +57,23 @@ void hold(const EncoderReading& a, const EncoderReading& b, bool drive_is_angle,
   }
 }
 
+std::vector<EncoderReading> with_rests(std::span<const EncoderReading> written, bool drive_is_angle,
+                                       double max_gap_s) {
+  if (written.size() < 2) return {written.begin(), written.end()};
+  const std::int64_t spacing_ns = median_spacing_ns(written);
+  std::vector<EncoderReading> out;
+  out.reserve(written.size());
+  out.push_back(written.front());
+  for (std::size_t i = 1; i < written.size(); ++i) {
+    const EncoderReading &a = written[i - 1], &b = written[i];
+    if (seconds_between(a.t_ns, b.t_ns) > max_gap_s && is_rest(a, b, drive_is_angle)) {
+      hold(a, b, drive_is_angle, spacing_ns, out);
+    }
+    out.push_back(b);
+  }
+  return out;
+}
+
 EncoderSample cell_between(const EncoderReading& a, const EncoderReading& b) {
   EncoderSample cell;
   cell.begin_ns = a.t_ns;
@@ -82,7 +99,7 @@ void make_cells(std::vector<EncoderSample>& rates, double max_gap_s) {
   rates.front().begin_ns = rates.front().t_ns;
   rates.back().end_ns = rates.back().t_ns;
   if (rates.size() == 1) return;
-  const std::int64_t reach_ns = median_spacing_ns(rates) / 2;
+  const std::int64_t reach_ns = median_spacing_ns(std::span<const EncoderSample>(rates)) / 2;
   for (std::size_t i = 1; i < rates.size(); ++i) {
     EncoderSample& left = rates[i - 1];
     EncoderSample& right = rates[i];
@@ -111,25 +128,6 @@ std::vector<EncoderSample> cells_from_angles(std::span<const EncoderReading> ang
     }
   }
   return cells;
-}
-
-std::vector<EncoderReading> with_rests(std::span<const EncoderReading> readings,
-                                       bool drive_is_angle, double max_gap_s) {
-  std::vector<EncoderReading> out;
-  std::vector<std::int64_t> spacings;
-  for (std::size_t i = 1; i < readings.size(); ++i) {
-    spacings.push_back(readings[i].t_ns - readings[i - 1].t_ns);
-  }
-  std::vector<std::int64_t> ordered = spacings;
-  const std::int64_t spacing_ns = ordered.empty() ? 0 : upper_median(ordered);
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    const bool is_gap = i > 0 && 1e-9 * static_cast<double>(spacings[i - 1]) > max_gap_s;
-    if (is_gap && spacing_ns > 0 && is_rest(readings[i - 1], readings[i], drive_is_angle)) {
-      hold(readings[i - 1], readings[i], drive_is_angle, spacing_ns, out);
-    }
-    out.push_back(readings[i]);
-  }
-  return out;
 }
 
 std::vector<EncoderSample> samples_from(std::span<const EncoderReading> written,

@@ -14,6 +14,7 @@
 #include "viwo/math/extent.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/plausibility/periods.hpp"
+#include "viwo/wheel/drive_ranges.hpp"
 
 namespace viwo {
 
@@ -277,10 +278,7 @@ namespace {
 
 bool rests(SampleView sample) {
   const auto* const wheels = sample.get_if<EncoderSample>();
-  return wheels != nullptr &&
-         std::all_of(wheels->drive_rad_per_s.begin(),
-                     wheels->drive_rad_per_s.begin() + std::clamp(wheels->n_drive, 0, kMaxDrives),
-                     [](double rate) { return rate == 0.; });
+  return wheels != nullptr && fastest_of(*wheels) == 0.;
 }
 
 }  // namespace

@@ -39,14 +39,11 @@ void make_cells(std::vector<EncoderSample>& rates, double max_gap_s);
 std::vector<EncoderSample> cells_from_angles(std::span<const EncoderReading> angles,
                                              double max_gap_s, int stride = 1);
 
-/// Of who writes what changes only, the readings that were not written while the wheels stood: in
-/// gaps longer than `max_gap_s` that begin with rates of zero and end with slow ones, or in which
-/// no angle changes by more than half a radian. At the median spacing, at most 20 000 in a gap.
-std::vector<EncoderReading> with_rests(std::span<const EncoderReading> readings,
-                                       bool drive_is_angle, double max_gap_s);
-
-/// Samples from readings at increasing stamps, with_rests(): cells_from_angles(), or make_cells()
-/// of rates.
+/// Samples from readings at increasing stamps: cells_from_angles(), or make_cells() of rates. Of
+/// who writes what changes only, the readings that were not written while the wheels stood are put
+/// in: in gaps longer than `max_gap_s` that begin with rates of zero and end with slow ones, or in
+/// which no angle changes by more than half a radian. At the median spacing, at most 20 000 in a
+/// gap.
 std::vector<EncoderSample> samples_from(std::span<const EncoderReading> written,
                                         bool drive_is_angle, double max_gap_s, int stride);
 
