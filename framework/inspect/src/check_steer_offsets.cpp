@@ -12,8 +12,8 @@
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/plausibility/channel_change.hpp"
-#include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
+#include "wheel_calibration.hpp"
 
 namespace viwo::inspect {
 
@@ -25,11 +25,6 @@ namespace {
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
-bool moves(const EncoderSample& sample) {
-  constexpr double kMoves_rad_per_s = 0.1;
-  return fastest_of(sample) > kMoves_rad_per_s;
-}
-
 /// The contradictions of the wheels as a function of constants that are added to their steering
 /// angles, of any kinematic model: its rows alone are asked.
 class Offsets {
@@ -38,16 +33,10 @@ class Offsets {
   explicit Offsets(const Wheels& wheels, double unit = 1.)
       : solver_(wheels.model, {}), n_(wheels.model->description().n_steer) {
     solver_.set_intrinsics(wheels.prior.wheels.x_WI);
-    // Those that move: a base at rest contradicts nothing.
     constexpr std::size_t kMost = 1500;
-    std::vector<const EncoderSample*> moving;
-    for (const EncoderSample& sample : wheels.samples) {
-      if (moves(sample)) moving.push_back(&sample);
-    }
-    const std::size_t stride = std::max<std::size_t>(1, moving.size() / kMost);
-    for (std::size_t i = 0; i < moving.size(); i += stride) {
-      samples_.push_back(*moving[i]);
-      for (double& angle : samples_.back().steer_rad) angle *= unit;
+    samples_ = moving_samples(wheels, kMost);
+    for (EncoderSample& sample : samples_) {
+      for (double& angle : sample.steer_rad) angle *= unit;
     }
   }
 
@@ -237,15 +226,17 @@ bool go_on(const Wheels& wheels) {
 }
 
 /// Angles that no constants make fit, and that fit when they are as small as they are in degrees.
-/// Where the base drives nearly straight on, no angles at all would fit as well: then the motion
-/// does not tell the unit, only that it is not this one.
+/// Where the base drives nearly straight on, no angles at all fit as well: then the motion does not
+/// tell the unit, only that these are wrong.
 bool check_unit(const Recording& recording, const Wheels& wheels, Offsets& problem,
                 const std::string& label, Findings& out) {
-  const bool is_told = std::any_of(
-      recording.implausible.begin(), recording.implausible.end(), [&](const viwo::Finding& found) {
-        return found.key == label + " steering" || found.key == label + " order";
+  const bool is_known =
+      std::any_of(recording.implausible.begin(), recording.implausible.end(),
+                  [&](const viwo::Finding& found) { return found.key == label + " steering"; }) ||
+      std::any_of(out.begin(), out.end(), [&](const Finding& found) {
+        return found.sensor == label && found.check == "order";
       });
-  if (is_told || !go_on(wheels)) return false;
+  if (is_known || !go_on(wheels)) return false;
   const double before = problem.cost(Vector::Zero(problem.n()));
   constexpr double kLeast_m_per_s = 0.01;
   const double rows = wheels.model->n_rows() * static_cast<double>(problem.size());
@@ -255,14 +246,18 @@ bool check_unit(const Recording& recording, const Wheels& wheels, Offsets& probl
   const double left = in_degrees.fit(Vector::Zero(problem.n())).cost;
   if (left > kMost * std::min(before, best_fit(problem, before).cost)) return false;
   const auto mm = [&](double cost) { return significant(1e3 * std::sqrt(cost / rows), 2); };
+  constexpr double kAsWell = 3.;
+  const bool is_told = kAsWell * left < Offsets(wheels, 0.).fit(Vector::Zero(problem.n())).cost;
   out.push_back({label,
                  Severity::kFault,
                  "steering",
                  "the wheels contradict each other by " + mm(before) +
                      " mm/s, whatever constants are added to the steering angles, and by " +
                      mm(left) +
-                     " mm/s if these are in degrees (steer_scale: 0.0174533), or are taken "
-                     "before a gear, as at a steering wheel",
+                     (is_told ? " mm/s if these are in degrees (steer_scale: 0.0174533), or are "
+                                "taken before a gear, as at a steering wheel"
+                              : " mm/s without any steering: its unit, order, signs, or that they "
+                                "are of a joint before a gear"),
                  {{"residual as configured", std::sqrt(before / rows), "m/s"},
                   {"residual in degrees", std::sqrt(left / rows), "m/s"}}});
   return true;

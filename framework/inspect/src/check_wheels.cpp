@@ -111,12 +111,14 @@ void check_channels(const Recording& recording, const Wheels& wheels, const std:
 }
 
 /// What the others contradict (W-12), channel by channel: now and then it is slip, for long it is a
-/// fault.
-void check_liars(const Recording& recording, const Wheels& wheels, const Calibration& calibration,
+/// fault. Gives the wheels without the samples in which one is contradicted.
+Wheels check_liars(const Recording& recording, const Wheels& wheels, const Calibration& calibration,
                  const std::string& label, Findings& out) {
   constexpr double kProbability = 1e-4;
   WheelCheck check(wheels.model, kProbability);
-  if (!check.is_on()) return;
+  if (!check.is_on()) return wheels;
+  Wheels left = wheels;
+  left.samples.clear();
   check.set_calibration(calibration.x_WI, calibration.P);
   struct Run {
     std::int64_t samples = 0;                         ///< left out in all
@@ -130,6 +132,7 @@ void check_liars(const Recording& recording, const Wheels& wheels, const Calibra
   for (const EncoderSample& sample : wheels.samples) {
     EncoderSample checked = sample;
     check.check(checked);
+    if (checked.bad_drives == 0 && checked.bad_steers == 0) left.samples.push_back(sample);
     for (std::size_t i = 0; i < n; ++i) {
       Run& run = runs[i];
       const bool is_bad = i < n_drive ? (checked.bad_drives >> i & 1u) != 0
@@ -163,6 +166,7 @@ void check_liars(const Recording& recording, const Wheels& wheels, const Calibra
                        " on: it was dead, blocked, slipped, or its encoder jumped",
                    {{"share", share, ""}, {"longest", longest_s, "s"}}});
   }
+  return left;
 }
 
 /// Samples of a tenth of a second each: means of those in it.
@@ -342,7 +346,13 @@ void check_wheels(const Recording& recording, Findings& out) {
     const Parity parity = parity_of(wheels, calibration->x_WI);
     check_parity(parity, label, out);
     check_intrinsics(wheels, *calibration, label, out);
-    check_liars(recording, wheels, *calibration, label, out);
+    const std::size_t before = out.size();
+    const Wheels left = check_liars(recording, wheels, *calibration, label, out);
+    // Of wheels that contradict each other all the time one or the other is in the way of its
+    // fellows now and then.
+    if (parity.is_gross() && parity_of(left, calibration->x_WI).is_gross()) {
+      for (std::size_t i = before; i < out.size(); ++i) out[i].severity = Severity::kNote;
+    }
     check_noises(wheels, *calibration, parity, label, out);
   }
 }

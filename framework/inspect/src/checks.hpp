@@ -25,8 +25,9 @@ double contradiction_of(const series::Wheels& wheels, const Intrinsics& x_WI);
 void check_wheels(const series::Recording& recording, Findings& out);
 /// Angles of drives that begin anew after a turn, rates that no wheel has, zeros in their place.
 void check_turns(const series::Recording& recording, Findings& out);
-/// Signs and order of wheels that cannot contradict each other, by the gyro's rate.
-void check_yaw_order(const series::Recording& recording, Findings& out);
+/// Signs, gears and order of the channels: by what the wheels contradict each other, and by the
+/// gyro's rate.
+void check_order(const series::Recording& recording, Findings& out);
 /// Constant offsets of steering angles that stop the wheels from contradicting each other.
 void check_steer_offsets(const series::Recording& recording, Findings& out);
 /// Clock, sign and scale of the wheels' yaw rate against the gyro's.

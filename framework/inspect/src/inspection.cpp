@@ -76,8 +76,8 @@ constexpr std::array<std::string_view, 6> kImuCauses = {"gravity", "rate",    "u
 /// What exchanged columns look like besides.
 constexpr std::array<std::string_view, 1> kColumns = {"columns"};
 constexpr std::array<std::string_view, 3> kOfColumns = {"rate", "up", "tilt"};
-/// Of Plausibility: by check_wheel_clocks(), check_yaw_order() and check_stamps().
-constexpr std::array<std::string_view, 3> kToldWithMore = {"lag", "yaw order", "unit"};
+/// Of Plausibility: by check_wheel_clocks(), check_order() and check_stamps().
+constexpr std::array<std::string_view, 4> kToldWithMore = {"lag", "yaw order", "order", "unit"};
 bool is_one_of(const std::string& check, Checks checks) {
   return std::find(checks.begin(), checks.end(), check) != checks.end();
 }
@@ -180,7 +180,7 @@ Inspection inspect(RunSetup& setup) {
   check_imu_noise(recording, findings);
   check_wheels(recording, findings);
   check_turns(recording, findings);
-  check_yaw_order(recording, findings);
+  check_order(recording, findings);
   check_steer_offsets(recording, findings);
   check_wheel_clocks(recording, findings);
   check_camera_clocks(recording, findings);

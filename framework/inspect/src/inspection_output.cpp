@@ -65,13 +65,11 @@ std::vector<std::pair<Remedy, std::string>> remedies_of(const Inspection& inspec
   return all;
 }
 
-/// Where channels have another order already, or are not those of the joints.
+/// Where the channels are not those of the joints.
 bool is_for_hands(const config::Node& configuration, const Remedy& remedy) {
   const std::size_t n = channels_of(configuration, remedy).size();
-  const bool has_order = n > 0;
-  if (remedy.key.ends_with("_channel")) return has_order;
   const config::Node value = config::parse(remedy.value, "--fix");
-  return has_order && value.is_list() && value.items().size() != n;
+  return n > 0 && value.is_list() && value.items().size() != n;
 }
 
 }  // namespace

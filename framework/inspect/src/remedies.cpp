@@ -36,6 +36,21 @@ std::string text_of(const std::vector<double>& list) {
 bool is_scale(const Remedy& remedy) { return remedy.key.ends_with("_scale"); }
 bool is_shift(const Remedy& remedy) { return remedy.key.ends_with("_shift_rad"); }
 bool is_turn(const Remedy& remedy) { return remedy.key.ends_with("_turn"); }
+bool is_order(const Remedy& remedy) { return remedy.key.ends_with("_channel"); }
+
+/// What is found is the place of each joint of the model; the configuration has that of each
+/// channel of the log, in which one may be left out, or given several.
+void order_channels(const config::Node& configuration, Remedy& remedy) {
+  const std::vector<double> places = numbers(remedy);
+  std::vector<double> list = channels_of(configuration, remedy);
+  if (list.empty()) return;
+  for (double& channel : list) {
+    const auto i = static_cast<std::size_t>(channel);
+    if (i > places.size()) return;
+    if (i > 0) channel = places[i - 1];
+  }
+  remedy.value = text_of(list);
+}
 
 /// Scales and shifts are found of the joints of a model; the configuration has them of the channels
 /// of the log, of which several may make a joint, or none.
@@ -119,6 +134,7 @@ void put_into(const config::Node& configuration, std::vector<Remedy>& remedies) 
     if (is_drive || is_steer) {  // by joint of the model, as its key is
       scale_with(remedy, section + "drive_per_steer", configuration, is_steer, with_them);
     }
+    if (is_order(remedy)) order_channels(configuration, remedy);
     give_to_channels(configuration, remedy);
     if (is_steer) {
       scale_with(remedy, section + "steer_shift_rad", configuration, true, with_them);

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::inspect {
@@ -62,6 +63,22 @@ std::optional<Calibration> calibrated(const Wheels& wheels) {
     found.P = solve.solve(IntrinsicMatrix::Identity(n, n));
   }
   return found;
+}
+
+bool moves(const EncoderSample& sample) {
+  constexpr double kMoves_rad_per_s = 0.1;
+  return fastest_of(sample) > kMoves_rad_per_s;
+}
+
+std::vector<EncoderSample> moving_samples(const Wheels& wheels, std::size_t most) {
+  std::vector<const EncoderSample*> moving;
+  for (const EncoderSample& sample : wheels.samples) {
+    if (moves(sample)) moving.push_back(&sample);
+  }
+  const std::size_t stride = std::max<std::size_t>(1, moving.size() / most);
+  std::vector<EncoderSample> samples;
+  for (std::size_t i = 0; i < moving.size(); i += stride) samples.push_back(*moving[i]);
+  return samples;
 }
 
 }  // namespace viwo::inspect

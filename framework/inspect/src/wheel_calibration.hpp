@@ -1,8 +1,10 @@
-// The intrinsics of wheels as their contradictions alone have them.
+// What wheels say by themselves: their intrinsics as their contradictions alone have them, and when
+// they move.
 #pragma once
 
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "viwo/series/recording.hpp"
 
@@ -23,5 +25,10 @@ struct Calibration {
 /// Where the wheels contradict each other least, within what the prior allows: its Gauss-Newton
 /// steps (W-10). What the wheels still contradict is noise, or lies.
 std::optional<Calibration> calibrated(const series::Wheels& wheels);
+
+/// Whether any of the wheels turns: a base at rest contradicts nothing.
+bool moves(const EncoderSample& sample);
+/// Those that move, evenly over the recording, not many more than `most`.
+std::vector<EncoderSample> moving_samples(const series::Wheels& wheels, std::size_t most);
 
 }  // namespace viwo::inspect

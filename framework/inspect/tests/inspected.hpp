@@ -139,4 +139,23 @@ inline std::filesystem::path shared_data() {
   return std::filesystem::path(VIWO_TEST_SOURCE_DIR) / "../shared/data";
 }
 
+/// Of two wheels, without a filter.
+inline RunSetup two_drives(const std::vector<std::string>& more = {}) {
+  std::vector<std::string> all{"sensors.simulator0.duration_s=30"};
+  all.insert(all.end(), more.begin(), more.end());
+  RunSetup setup = simulated("viwo_skid_steer", all);
+  setup.filter.reset();
+  return setup;
+}
+
+/// By poses, without an IMU.
+inline Inspection by_poses_alone(RunSetup setup, const std::function<void(EncoderSample&)>& fault) {
+  return inspected(std::move(setup), {.imu = [](ImuSample&) { return false; },
+                                      .wheels =
+                                          [&fault](EncoderSample& s) {
+                                            fault(s);
+                                            return true;
+                                          }});
+}
+
 }  // namespace viwo::inspect

@@ -103,6 +103,24 @@ TEST_F(FixedConfiguration, GivesScalesToTheChannelsOfTheLog) {
   EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
 }
 
+TEST_F(FixedConfiguration, PutsAnOrderBehindTheOneThatIsThere) {
+  RunSetup faulty = changed(swerve(), {.wheels = [](EncoderSample& s) {
+                              std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[1]);
+                              return true;
+                            }});
+  write_log(faulty, folder_);
+  // WHEN a third is exchanged in the configuration, where nothing was to be exchanged but two
+  config::Node run = on_log(folder_);
+  config::set_path(run, "sensors.wheels0.drive_channel", config::parse("[1, 3, 2, 4]", "test"));
+  RunSetup setup = read_run(run, testing::registry());
+  const Inspection found = inspect(setup);
+  EXPECT_EQ(remedy_of(finding_of(found, "wheels0", "order"), "sensors.wheels0.drive_channel"),
+            "[2, 1, 3, 4]");
+  setup = read_run(setup.resolved, testing::registry());
+  setup = fixed(setup, found);
+  EXPECT_THAT(faults_of(inspect(setup)), IsEmpty());
+}
+
 TEST_F(FixedConfiguration, TurnsTheShiftWithTheSign) {
   // GIVEN a steering encoder that is reversed, and a shift that is right for it: z = s y + o
   RunSetup faulty = changed(swerve(), {.wheels = [](EncoderSample& s) {

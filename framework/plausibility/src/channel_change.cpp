@@ -1,7 +1,9 @@
 #include "viwo/plausibility/channel_change.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "viwo/math/significant.hpp"
@@ -12,35 +14,88 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.;
 
+using Order = ChannelChange::Order;
+
+Order in_order() {
+  Order order;
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  return order;
+}
+
+/// Channels that are not where they are read.
+std::vector<std::size_t> moved(const Order& order) {
+  std::vector<std::size_t> channels;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (order[i] != i) channels.push_back(i);
+  }
+  return channels;
+}
+
+template <class Values>
+void reorder(const Order& order, Values& values) {
+  const Values read = values;
+  for (std::size_t i = 0; i < order.size(); ++i) values[i] = read[order[i]];
+}
+
+/// "with drive_1 and drive_2 exchanged: their order", `name` being "drive_".
+std::string text_of(const Order& order, const std::string& name, const std::string& exchanged) {
+  const std::vector<std::size_t> channels = moved(order);
+  if (channels.size() == 2) {
+    return " with " + exchanged + std::to_string(channels[0] + 1) + " and " + name +
+           std::to_string(channels[1] + 1) + " exchanged: their order";
+  }
+  std::string text;
+  for (const std::size_t i : channels) {
+    text += (text.empty() ? " if " : ", ") + name + std::to_string(i + 1) +
+            (text.empty() ? " is what is read as " : " ") + name + std::to_string(order[i] + 1);
+  }
+  return text + ": their order";
+}
+
 }  // namespace
 
 std::vector<ChannelChange> channel_changes(const ModelDescription& description) {
   std::vector<ChannelChange> changes = {{}};
-  const auto add_pairs = [&changes](std::size_t n, ChannelChange::Kind exchanged) {
+  const auto add_pairs = [&changes](std::size_t n, ChannelChange::Kind kind) {
     for (std::size_t a = 0; a < n; ++a) {
-      for (std::size_t b = a + 1; b < n; ++b) changes.push_back({exchanged, a, b});
+      for (std::size_t b = a + 1; b < n; ++b) {
+        ChannelChange& change = changes.emplace_back(ChannelChange{kind});
+        change.order = in_order();
+        std::swap(change.order[a], change.order[b]);
+      }
     }
   };
   const auto n_drive = static_cast<std::size_t>(description.n_drive);
   const auto n_steer = static_cast<std::size_t>(description.n_steer);
-  for (std::size_t a = 0; a < n_drive; ++a) {
-    changes.push_back({ChannelChange::kDriveScale, a, a});
-  }
-  add_pairs(n_drive, ChannelChange::kDrivesExchanged);
-  for (std::size_t a = 0; a < n_steer; ++a) changes.push_back({ChannelChange::kSteerSign, a, a});
-  add_pairs(n_steer, ChannelChange::kSteersExchanged);
+  for (std::size_t a = 0; a < n_drive; ++a) changes.push_back({ChannelChange::kDriveScale, a});
+  add_pairs(n_drive, ChannelChange::kDriveOrder);
+  for (std::size_t a = 0; a < n_steer; ++a) changes.push_back({ChannelChange::kSteerSign, a});
+  add_pairs(n_steer, ChannelChange::kSteerOrder);
   if (n_steer > 1) changes.push_back({ChannelChange::kSteerSigns});
   if (n_steer > 0) changes.push_back({ChannelChange::kSteersInDegrees});
-  if (n_steer == n_drive) add_pairs(n_drive, ChannelChange::kWheelsExchanged);
+  if (n_steer == n_drive) add_pairs(n_drive, ChannelChange::kWheelOrder);
+  for (std::size_t a = 0; a < n_drive; ++a) {
+    for (const double scale : {2., 0.5}) {
+      changes.push_back({ChannelChange::kDriveScale, a, 0, scale});
+    }
+  }
   return changes;
 }
 
-std::vector<ChannelChange> gear_changes(const ModelDescription& description) {
+std::vector<ChannelChange> order_changes(const ModelDescription& description) {
+  constexpr int kMost = 5;
   std::vector<ChannelChange> changes;
-  for (std::size_t a = 0; a < static_cast<std::size_t>(description.n_drive); ++a) {
-    for (const double scale : {2., 0.5}) {
-      changes.push_back({ChannelChange::kDriveScale, a, a, 0, scale});
+  const auto add_orders = [&changes](int n, ChannelChange::Kind kind) {
+    if (n > kMost) return;
+    Order order = in_order();
+    while (std::next_permutation(order.begin(), order.begin() + n)) {
+      if (moved(order).size() > 2) changes.push_back({kind, 0, 0, -1., order});
     }
+  };
+  add_orders(description.n_drive, ChannelChange::kDriveOrder);
+  add_orders(description.n_steer, ChannelChange::kSteerOrder);
+  if (description.n_steer == description.n_drive) {
+    add_orders(description.n_drive, ChannelChange::kWheelOrder);
   }
   return changes;
 }
@@ -65,7 +120,7 @@ std::vector<ChannelChange> side_changes(const std::shared_ptr<const WheelModel>&
   std::vector<ChannelChange> changes;
   for (const double scale : {-1., 2., 0.5}) {
     for (const std::uint32_t side : {left, right}) {
-      changes.push_back({ChannelChange::kSideScale, 0, 0, side, scale});
+      changes.push_back({ChannelChange::kSideScale, 0, side, scale});
     }
   }
   return changes;
@@ -76,23 +131,23 @@ void ChannelChange::undo(EncoderSample& sample) const {
     case kNone:
       break;
     case kDriveScale:
-      sample.drive_rad_per_s[a] *= scale;
+      sample.drive_rad_per_s[channel] *= scale;
       break;
-    case kDrivesExchanged:
-      std::swap(sample.drive_rad_per_s[a], sample.drive_rad_per_s[b]);
+    case kDriveOrder:
+      reorder(order, sample.drive_rad_per_s);
       break;
     case kSteerSign:
-      sample.steer_rad[a] *= -1.;
+      sample.steer_rad[channel] *= -1.;
       break;
-    case kSteersExchanged:
-      std::swap(sample.steer_rad[a], sample.steer_rad[b]);
+    case kSteerOrder:
+      reorder(order, sample.steer_rad);
       break;
     case kSteerSigns:
       for (double& angle : sample.steer_rad) angle *= -1.;
       break;
-    case kWheelsExchanged:
-      std::swap(sample.drive_rad_per_s[a], sample.drive_rad_per_s[b]);
-      std::swap(sample.steer_rad[a], sample.steer_rad[b]);
+    case kWheelOrder:
+      reorder(order, sample.drive_rad_per_s);
+      reorder(order, sample.steer_rad);
       break;
     case kSteersInDegrees:
       for (double& angle : sample.steer_rad) angle *= kDegree;
@@ -109,31 +164,30 @@ void ChannelChange::undo(EncoderSample& sample) const {
 }
 
 std::string ChannelChange::text() const {
-  const std::string first = std::to_string(a + 1), second = std::to_string(b + 1);
+  const std::string number = std::to_string(channel + 1);
   switch (kind) {
     case kNone:
     case kNoSteering:
       break;
     case kDriveScale:
       if (scale < 0.) {
-        return "drive_" + first + " turns opposite to what the other wheels say: its sign";
+        return "drive_" + number + " turns opposite to what the other wheels say: its sign";
       }
-      return "drive_" + first + " turns " + significant(1. / scale, 2) +
+      return "drive_" + number + " turns " + significant(1. / scale, 2) +
              " times as fast as the other wheels say: its gear ratio, or counts per turn";
-    case kDrivesExchanged:
-      return "drives contradict each other, and do not with drive_" + first + " and drive_" +
-             second + " exchanged: their order";
+    case kDriveOrder:
+      return "drives contradict each other, and do not" + text_of(order, "drive_", "drive_");
     case kSteerSign:
-      return "steer_" + first + " turns opposite to what the other wheels say: its sign";
-    case kSteersExchanged:
-      return "wheels contradict each other, and do not with steer_" + first + " and steer_" +
-             second + " exchanged: their order";
+      return "steer_" + number + " turns opposite to what the other wheels say: its sign";
+    case kSteerOrder:
+      return "wheels contradict each other, and do not" + text_of(order, "steer_", "steer_");
     case kSteerSigns:
       return "wheels contradict each other, and do not with all steering angles reversed: their "
              "sign, or left and right of the wheels are exchanged";
-    case kWheelsExchanged:
-      return "wheels contradict each other, and do not with drive and steering of wheels " + first +
-             " and " + second + " exchanged: their order";
+    case kWheelOrder:
+      return "wheels contradict each other, and do not" +
+             text_of(order, moved(order).size() == 2 ? "" : "wheel ",
+                     "drive and steering of wheels ");
     case kSteersInDegrees:
       return "wheels contradict each other, and do not if the steering angles are in degrees";
     case kSideScale: {
@@ -150,20 +204,34 @@ std::string ChannelChange::text() const {
   return "";
 }
 
+bool ChannelChange::moves_many() const {
+  const bool is_order = kind == kDriveOrder || kind == kSteerOrder || kind == kWheelOrder;
+  return is_order && moved(order).size() > 2;
+}
+
+std::string text_of(const std::vector<ChannelChange>& changes) {
+  std::string text;
+  for (const ChannelChange& change : changes) {
+    text += (text.empty() ? "" : " - or, which explains it as well, ") + change.text();
+  }
+  return text;
+}
+
 std::vector<Remedy> ChannelChange::remedies(const std::string& sensor,
                                             const ModelDescription& description) const {
   const auto n_drive = static_cast<std::size_t>(description.n_drive);
   const auto n_steer = static_cast<std::size_t>(description.n_steer);
   const std::string section = "sensors." + sensor + ".";
   const auto factor = [&](std::size_t i) {
-    const bool is_changed = kind == kSideScale ? (side >> i & 1u) != 0 : i == a;
+    const bool is_changed = kind == kSideScale ? (side >> i & 1u) != 0 : i == channel;
     return is_changed || kind == kSteerSigns ? significant(scale, 2) : "1";
   };
-  const auto order = [&](std::size_t i) {
-    return std::to_string((i == a ? b : i == b ? a : i) + 1);
+  // Of which channel that is which is read as channel i.
+  const auto place = [&](std::size_t i) {
+    return std::to_string(std::find(order.begin(), order.end(), i) - order.begin() + 1);
   };
-  const Remedy drives{section + "drive_channel", yaml_list(n_drive, order)};
-  const Remedy steers{section + "steer_channel", yaml_list(n_steer, order)};
+  const Remedy drives{section + "drive_channel", yaml_list(n_drive, place)};
+  const Remedy steers{section + "steer_channel", yaml_list(n_steer, place)};
   switch (kind) {
     case kNone:
     case kNoSteering:
@@ -171,14 +239,14 @@ std::vector<Remedy> ChannelChange::remedies(const std::string& sensor,
     case kDriveScale:
     case kSideScale:
       return {{section + "drive_scale", yaml_list(n_drive, factor)}};
-    case kDrivesExchanged:
+    case kDriveOrder:
       return {drives};
     case kSteerSign:
     case kSteerSigns:
       return {{section + "steer_scale", yaml_list(n_steer, factor)}};
-    case kSteersExchanged:
+    case kSteerOrder:
       return {steers};
-    case kWheelsExchanged:
+    case kWheelOrder:
       return {drives, steers};
     case kSteersInDegrees:
       return {{section + "steer_scale",

@@ -16,15 +16,9 @@ EncoderCheck::EncoderCheck(const SensorName& wheels, std::shared_ptr<const Wheel
       sensor_(wheels.sensor),
       solver_(model, {}),
       sigma_WI_(prior.sigma_intrinsics),
-      n_steer_(model->description().n_steer) {
+      n_steer_(model->description().n_steer),
+      trial_(model, prior.wheels.x_WI, channel_changes(model->description())) {
   solver_.set_intrinsics(prior.wheels.x_WI);
-  for (const ChannelChange& change : channel_changes(model->description())) {
-    changes_.push_back({change});
-  }
-  for (const ChannelChange& change : gear_changes(model->description())) {
-    changes_.push_back({change});
-  }
-  if (n_steer_ > 0) changes_.push_back({{ChannelChange::kNoSteering}});
   drives_.resize(static_cast<std::size_t>(model->description().n_drive));
 }
 
@@ -40,7 +34,7 @@ std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
   last_ = sample;
   // They cost as many solutions as there are changes.
   constexpr std::int64_t kEvery = 5;
-  if (samples_++ % kEvery == 0) try_changes(sample);
+  if (samples_++ % kEvery == 0) trial_.add(sample);
   if (solver_.solve(sample, solution_) != Status::kOk || solution_.rank_deficient) return {};
   return solution_.xi;
 }
@@ -59,18 +53,6 @@ void EncoderCheck::watch_steering(const EncoderSample& sample) {
   }
   if (is_beyond) ++beyond_turn_;
   if (is_too_fast) ++too_fast_;
-}
-
-void EncoderCheck::try_changes(const EncoderSample& sample) {
-  if (solver_.model().n_rows() <= 3) return;  // nothing can contradict anything
-  for (Tried& tried : changes_) {
-    EncoderSample changed = sample;
-    tried.change.undo(changed);
-    if (solver_.solve(changed, solution_) != Status::kOk || solution_.rank_deficient) return;
-    tried.residual += solution_.e.squaredNorm();
-    tried.signal += solution_.xi.head<2>().squaredNorm();
-  }
-  ++tried_;
 }
 
 void EncoderCheck::findings(std::int64_t zero_ns, Findings& out) const {
@@ -110,34 +92,15 @@ void EncoderCheck::find_degrees(Findings& out) const {
                      sensor_, solver_.model().description())});
 }
 
-/// One change makes the contradictions of the wheels vanish: to a tenth of what they are. Others
-/// that leave less than three times as much explain it as well: then all of them are named. Where
-/// no steering at all does, the angles' unit cannot be told: degrees are next to nothing.
+/// Where several changes explain the contradictions, all of them are named.
 void EncoderCheck::find_change(Findings& out) const {
-  if (tried_ < 50) return;
-  const auto end = std::find_if(changes_.begin(), changes_.end(), [](const Tried& tried) {
-    return tried.change.kind == ChannelChange::kNoSteering;  // the last, if it is there
-  });
-  const auto best = std::min_element(changes_.begin(), end, [](const Tried& a, const Tried& b) {
-    return a.residual < b.residual;
-  });
-  if (best == changes_.begin()) return;
-  const double n_rows = solver_.model().n_rows();
-  const double least = 1e-4 * n_rows * static_cast<double>(tried_);  // 1 cm/s each
-  const Tried& none = changes_.front();
-  if (none.residual < least || none.residual < 0.01 * none.signal) return;
-  const double most = 0.1 * none.residual;
-  const bool is_degrees = best->change.kind == ChannelChange::kSteersInDegrees;
-  if (is_degrees && end != changes_.end() && end->residual < 3. * best->residual) return;
-  std::string texts;
-  std::vector<Remedy> remedies = best->change.remedies(sensor_, solver_.model().description());
-  for (auto other = changes_.begin(); other != end; ++other) {
-    if (other->residual >= 3. * best->residual && other != best) continue;
-    if (other->residual >= most) return;
-    if (!texts.empty()) remedies.clear();
-    texts += (texts.empty() ? "" : " - or, which explains it as well, ") + other->change.text();
+  const std::vector<ChannelChange> changes = trial_.explaining();
+  if (changes.empty()) return;
+  Finding finding{name_ + " order", name_ + ": " + text_of(changes)};
+  if (changes.size() == 1) {
+    finding.remedies = changes[0].remedies(sensor_, solver_.model().description());
   }
-  out.push_back({name_ + " order", name_ + ": " + texts, false, std::move(remedies)});
+  out.push_back(std::move(finding));
 }
 
 }  // namespace viwo

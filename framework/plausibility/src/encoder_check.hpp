@@ -11,7 +11,7 @@
 #include "sensor_name.hpp"
 #include "stuck_channel.hpp"
 #include "viwo/api/rig.hpp"
-#include "viwo/plausibility/channel_change.hpp"
+#include "viwo/plausibility/change_trial.hpp"
 #include "viwo/plausibility/finding.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
@@ -32,14 +32,7 @@ class EncoderCheck {
   void findings(std::int64_t zero_ns, Findings& out) const;
 
  private:
-  struct Tried {
-    ChannelChange change;
-    double residual = 0.;  ///< sum of the squares of the parity residuals
-    double signal = 0.;    ///< of what the rows say, (m/s)^2
-  };
-
   void watch_steering(const EncoderSample& sample);
-  void try_changes(const EncoderSample& sample);
   void find_stuck(std::int64_t zero_ns, Findings& out) const;
   void find_degrees(Findings& out) const;
   void find_change(Findings& out) const;
@@ -49,10 +42,9 @@ class EncoderCheck {
   TwistSolution solution_;
   Intrinsics sigma_WI_;  ///< of the prior
   int n_steer_;
-  std::vector<Tried> changes_;  ///< the first is none
+  ChangeTrial trial_;
   std::vector<StuckChannel> drives_;
   std::int64_t samples_ = 0;
-  std::int64_t tried_ = 0;
   std::optional<EncoderSample> last_;
   std::int64_t beyond_turn_ = 0, too_fast_ = 0;  ///< samples with such steering angles
   double largest_steer_ = 0.;

@@ -34,11 +34,7 @@ double YawDifference::part() const {
 std::vector<ChannelChange> changes_by_gyro(const std::shared_ptr<const WheelModel>& model,
                                            const Intrinsics& x_WI) {
   std::vector<ChannelChange> changes = {{}};
-  if (model->n_rows() <= 3) {
-    changes = channel_changes(model->description());
-    const auto gears = gear_changes(model->description());
-    changes.insert(changes.end(), gears.begin(), gears.end());
-  }
+  if (model->n_rows() <= 3) changes = channel_changes(model->description());
   const auto sides = side_changes(model, x_WI);
   changes.insert(changes.end(), sides.begin(), sides.end());
   return changes;

@@ -1,7 +1,8 @@
 // What may have been done to the channels of encoders on their way to a log: one sign or scale, or
-// two that are exchanged.
+// another order.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -18,21 +19,28 @@ struct ChannelChange {
   enum Kind : std::uint8_t {
     kNone,
     kDriveScale,  ///< of one drive: its sign, or twice or half the counts of a turn
-    kDrivesExchanged,
+    kDriveOrder,
     kSteerSign,
-    kSteersExchanged,
+    kSteerOrder,
     kSteerSigns,
-    kWheelsExchanged,
+    kWheelOrder,
     kSteersInDegrees,
     kSideScale,   ///< of all drives of a side: as kDriveScale
     kNoSteering,  ///< never done: what angles in degrees have to be told from
   };
+  /// Channel i is what is read as channel order[i].
+  using Order = std::array<std::size_t, kMaxDrives>;
+  static_assert(kMaxDrives == kMaxSteers);
+
   Kind kind = kNone;
-  std::size_t a = 0, b = 0;  ///< channels
-  std::uint32_t side = 0;    ///< drives of kSideScale, one bit each
-  double scale = -1.;        ///< that undoes kDriveScale, kSideScale
+  std::size_t channel = 0;  ///< of kDriveScale, kSteerSign
+  std::uint32_t side = 0;   ///< drives of kSideScale, one bit each
+  double scale = -1.;       ///< that undoes kDriveScale, kSideScale
+  Order order{};            ///< that undoes kDriveOrder, kSteerOrder, kWheelOrder
 
   void undo(EncoderSample& sample) const;
+  /// Whether it is another order of more than two.
+  bool moves_many() const;
   /// "drive_2 turns opposite to what the other wheels say: its sign"
   std::string text() const;
   /// What undoes it in the section of a sensor: signs as lists with -1 for what is reversed, an
@@ -41,11 +49,15 @@ struct ChannelChange {
                                const ModelDescription& description) const;
 };
 
-/// Signs, orders and units, one change at a time; the first is none.
+/// All of them, as what explains something equally well.
+std::string text_of(const std::vector<ChannelChange>& changes);
+
+/// Signs, units, two that are exchanged, one drive that tells half or twice of what its wheel
+/// turns: one change at a time; the first is none.
 std::vector<ChannelChange> channel_changes(const ModelDescription& description);
 
-/// One drive that tells half or twice of what its wheel turns.
-std::vector<ChannelChange> gear_changes(const ModelDescription& description);
+/// All other orders of drives, of steerings and of whole wheels, of not more than five of a kind.
+std::vector<ChannelChange> order_changes(const ModelDescription& description);
 
 /// All drives of one side reversed, or telling half or twice: of those that turn the base to the
 /// left when they turn alone, and of the others. Nothing where a side has one drive, which is among
