@@ -31,24 +31,30 @@ void ChangeTrial::add(const EncoderSample& sample) {
   ++tried_;
 }
 
+/// Where no steering at all explains it as well, the unit of angles that are next to nothing cannot
+/// be told.
+bool ChangeTrial::is_next_to_none(const Tried& tried) const {
+  return tried.change.kind == ChannelChange::kSteerUnit && tried.change.scale < 1. &&
+         no_steering_.residual < kAsWell * tried.residual;
+}
+
 std::vector<ChannelChange> ChangeTrial::explaining() const {
   constexpr std::int64_t kFewest = 50;
-  constexpr double kLeast_m_per_s = 0.01, kLeastPart = 0.01, kMostLeft = 0.1, kAsWell = 3.;
-  const auto best = std::ranges::min_element(changes_, {}, &Tried::residual);
-  if (tried_ < kFewest || best == changes_.begin()) return {};
+  constexpr double kLeast_m_per_s = 0.01, kLeastPart = 0.01, kMostLeft = 0.1;
   const double rows = solver_.model().n_rows() * static_cast<double>(tried_);
   const double none = changes_.front().residual;
-  if (none < rows * kLeast_m_per_s * kLeast_m_per_s || none < kLeastPart * signal_) return {};
-  // Degrees are next to nothing: where no steering at all explains it, the unit cannot be told.
-  const double as_well = kAsWell * best->residual;
-  const bool is_degrees = best->change.kind == ChannelChange::kSteersInDegrees;
-  if (is_degrees && no_steering_.residual < as_well) return {};
-  std::vector<ChannelChange> found = {best->change};
-  for (const Tried& other : changes_) {
-    const bool is_best = &other == &*best;
-    if (other.residual >= as_well && !is_best) continue;
-    if (other.residual >= kMostLeft * none) return {};
-    if (!is_best) found.push_back(other.change);
+  if (tried_ < kFewest || none < rows * kLeast_m_per_s * kLeast_m_per_s ||
+      none < kLeastPart * signal_) {
+    return {};
+  }
+  std::vector<Tried> told = changes_;
+  std::erase_if(told, [this](const Tried& tried) { return is_next_to_none(tried); });
+  std::ranges::stable_sort(told, {}, &Tried::residual);
+  std::vector<ChannelChange> found;
+  for (const Tried& tried : told) {
+    if (!found.empty() && tried.residual >= kAsWell * told.front().residual) break;
+    if (tried.residual >= kMostLeft * none) return {};
+    found.push_back(tried.change);
   }
   return found;
 }

@@ -12,7 +12,21 @@
 namespace viwo {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.;
+constexpr double kDegree = std::numbers::pi / 180., kTurn = 2. * std::numbers::pi;
+
+/// What angles are in, and what they have been taken for.
+struct SteerUnit {
+  double scale;
+  const char* text;
+};
+constexpr std::array<SteerUnit, 6> kSteerUnits = {{
+    {kDegree, "in degrees"},
+    {kTurn, "in turns"},
+    {1. / kDegree, "in radians, and are taken for degrees"},
+    {1. / kTurn, "in radians, and are taken for turns"},
+    {kDegree / kTurn, "in degrees, and are taken for turns"},
+    {kTurn / kDegree, "in turns, and are taken for degrees"},
+}};
 
 using Order = ChannelChange::Order;
 
@@ -72,7 +86,9 @@ std::vector<ChannelChange> channel_changes(const ModelDescription& description) 
   for (std::size_t a = 0; a < n_steer; ++a) changes.push_back({ChannelChange::kSteerSign, a});
   add_pairs(n_steer, ChannelChange::kSteerOrder);
   if (n_steer > 1) changes.push_back({ChannelChange::kSteerSigns});
-  if (n_steer > 0) changes.push_back({ChannelChange::kSteersInDegrees});
+  for (const SteerUnit& unit : kSteerUnits) {
+    if (n_steer > 0) changes.push_back({ChannelChange::kSteerUnit, 0, 0, unit.scale});
+  }
   if (n_steer == n_drive) add_pairs(n_drive, ChannelChange::kWheelOrder);
   for (std::size_t a = 0; a < n_drive; ++a) {
     for (const double scale : {2., 0.5}) {
@@ -149,8 +165,8 @@ void ChannelChange::undo(EncoderSample& sample) const {
       reorder(order, sample.drive_rad_per_s);
       reorder(order, sample.steer_rad);
       break;
-    case kSteersInDegrees:
-      for (double& angle : sample.steer_rad) angle *= kDegree;
+    case kSteerUnit:
+      for (double& angle : sample.steer_rad) angle *= scale;
       break;
     case kSideScale:
       for (std::size_t i = 0; i < kMaxDrives; ++i) {
@@ -188,8 +204,9 @@ std::string ChannelChange::text() const {
       return "wheels contradict each other, and do not" +
              text_of(order, moved(order).size() == 2 ? "" : "wheel ",
                      "drive and steering of wheels ");
-    case kSteersInDegrees:
-      return "wheels contradict each other, and do not if the steering angles are in degrees";
+    case kSteerUnit:
+      return "wheels contradict each other, and do not if the steering angles are " +
+             std::string(std::ranges::find(kSteerUnits, scale, &SteerUnit::scale)->text);
     case kSideScale: {
       std::string drives;
       for (std::size_t i = 0; i < kMaxDrives; ++i) {
@@ -248,9 +265,9 @@ std::vector<Remedy> ChannelChange::remedies(const std::string& sensor,
       return {steers};
     case kWheelOrder:
       return {drives, steers};
-    case kSteersInDegrees:
+    case kSteerUnit:
       return {{section + "steer_scale",
-               yaml_list(n_steer, [](std::size_t) { return significant(kDegree, 15); })}};
+               yaml_list(n_steer, [this](std::size_t) { return significant(scale, 15); })}};
   }
   return {};
 }

@@ -58,8 +58,8 @@ void EncoderCheck::watch_steering(const EncoderSample& sample) {
 void EncoderCheck::findings(std::int64_t zero_ns, Findings& out) const {
   find_stuck(zero_ns, out);
   const std::size_t before = out.size();
-  find_degrees(out);
-  if (out.size() == before) find_change(out);
+  find_change(out);
+  if (out.size() == before) find_degrees(out);
 }
 
 void EncoderCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {
@@ -88,7 +88,7 @@ void EncoderCheck::find_degrees(Findings& out) const {
                  name_ + ": steering angles up to " + significant(largest_steer_, 3) +
                      " rad: they are in degrees",
                  false,
-                 ChannelChange{ChannelChange::kSteersInDegrees}.remedies(
+                 ChannelChange{ChannelChange::kSteerUnit, 0, 0, std::numbers::pi / 180.}.remedies(
                      sensor_, solver_.model().description())});
 }
 
@@ -96,7 +96,8 @@ void EncoderCheck::find_degrees(Findings& out) const {
 void EncoderCheck::find_change(Findings& out) const {
   const std::vector<ChannelChange> changes = trial_.explaining();
   if (changes.empty()) return;
-  Finding finding{name_ + " order", name_ + ": " + text_of(changes)};
+  const bool is_unit = changes[0].kind == ChannelChange::kSteerUnit;
+  Finding finding{name_ + (is_unit ? " steering" : " order"), name_ + ": " + text_of(changes)};
   if (changes.size() == 1) {
     finding.remedies = changes[0].remedies(sensor_, solver_.model().description());
   }

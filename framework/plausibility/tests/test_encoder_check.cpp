@@ -14,6 +14,7 @@ namespace viwo {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -70,6 +71,29 @@ TEST(EncoderCheck, DoesNotTakeAnglesForDegreesWhereNoneFitAsWell) {
                        s.steer_rad[2] = std::sin(0.37 * ++k);  // whatever it is
                      }),
               IsEmpty());
+}
+
+TEST(EncoderCheck, TellsTheUnitOfTheSteeringFromWhatItHasBeenTakenFor) {
+  const Intrinsics x_WI = read_run(testing::simulated("circle"), testing::registry()).x_WI;
+  constexpr double kDegree = std::numbers::pi / 180., kTurn = 2. * std::numbers::pi;
+  const auto found = [&x_WI](double scale) {
+    return driven(0., [&x_WI, scale, k = 0](EncoderSample& s) mutable {
+      const double omega = 0.6 * std::sin(0.01 * ++k);
+      for (Eigen::Index i = 0; i < 4; ++i) {  // r_1 .., x_1 .., y_1 ..
+        const Eigen::Vector2d v(0.5 - omega * x_WI[8 + i], omega * x_WI[4 + i]);
+        const auto wheel = static_cast<std::size_t>(i);
+        s.drive_rad_per_s[wheel] = v.norm() / x_WI[i];
+        s.steer_rad[wheel] = scale * std::atan2(v.y(), v.x());
+      }
+    });
+  };
+  EXPECT_THAT(found(1.), IsEmpty());
+  const Findings degrees = found(kTurn);
+  ASSERT_THAT(texts(degrees), ElementsAre(HasSubstr("in radians, and are taken for turns")));
+  EXPECT_THAT(degrees[0].remedies.at(0).value, HasSubstr("[0.15915494"));
+  EXPECT_THAT(texts(found(1. / kTurn)), ElementsAre(EndsWith("in turns")));
+  EXPECT_THAT(texts(found(360.)), ElementsAre(HasSubstr("in degrees, and are taken for turns")));
+  EXPECT_THAT(texts(found(1. / kDegree)), ElementsAre(EndsWith("in degrees")));
 }
 
 TEST(EncoderCheck, NamesADriveWithAnotherGear) {

@@ -248,7 +248,7 @@ TEST(Run, OfWheelsThatContradictThemselvesIsDoubtful) {
   EXPECT_THAT(doubts("drive_scale=[1, 1, 2, 1]"),
               Contains(HasSubstr("drive_3 turns 2 times as fast as the other wheels say")));
   EXPECT_THAT(doubts("steer_scale=[57.3, 57.3, 57.3, 57.3]"),
-              Contains(HasSubstr("they are in degrees")));
+              Contains(HasSubstr("the steering angles are in degrees")));
 }
 
 /// Of two wheels neither can contradict the other: the gyro of the log does.

@@ -30,7 +30,10 @@ class ChangeTrial {
     double residual = 0.;  ///< sum of the squares of the parity residuals
   };
 
+  static constexpr double kAsWell = 3.;
+
   bool add_to(Tried& tried, const EncoderSample& sample);
+  bool is_next_to_none(const Tried& tried) const;
 
   TwistSolver solver_;
   TwistSolution solution_;

@@ -24,7 +24,7 @@ struct ChannelChange {
     kSteerOrder,
     kSteerSigns,
     kWheelOrder,
-    kSteersInDegrees,
+    kSteerUnit,   ///< of all steerings
     kSideScale,   ///< of all drives of a side: as kDriveScale
     kNoSteering,  ///< never done: what angles in degrees have to be told from
   };
@@ -35,7 +35,7 @@ struct ChannelChange {
   Kind kind = kNone;
   std::size_t channel = 0;  ///< of kDriveScale, kSteerSign
   std::uint32_t side = 0;   ///< drives of kSideScale, one bit each
-  double scale = -1.;       ///< that undoes kDriveScale, kSideScale
+  double scale = -1.;       ///< that undoes kDriveScale, kSideScale, kSteerUnit
   Order order{};            ///< that undoes kDriveOrder, kSteerOrder, kWheelOrder
 
   void undo(EncoderSample& sample) const;
