@@ -38,6 +38,9 @@ EncoderSample cut(std::span<const EncoderSample> samples, std::size_t k, std::in
   const EncoderSample& sample = samples[k];
   share = 0.;
   if (k == 0 || samples[k - 1].end_ns != sample.begin_ns) return sample;
+  // What is not believed of the one before is not to be in this one.
+  const EncoderSample& before = samples[k - 1];
+  if (before.bad_drives != 0 || before.bad_steers != 0 || before.fault() != nullptr) return sample;
   // Twice the middles.
   const std::int64_t cell = sample.begin_ns + sample.end_ns;
   const std::int64_t cell_before = samples[k - 1].begin_ns + samples[k - 1].end_ns;
@@ -140,10 +143,10 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   // A hole between cells: the mean of its neighbours, a piece of its own.
   const auto bridge_hole = [&](std::size_t next, std::int64_t until_ns) {
     const double dt = seconds_between(reached_ns, until_ns);
+    const double bridged_s = out.bridged_s;
     // Its parity says nothing that those do not.
-    add_piece(blend(samples[next - 1], samples[next], 0.5), dt, {.parity = 0.}, out);
-    out.bridged_s += dt;
-    --out.samples;
+    add_piece(blend(samples[next - 1], samples[next], 0.5), dt, {.parity = 0., .samples = 0}, out);
+    out.bridged_s = bridged_s + dt;
     previous_own = 0.;
     reached_ns = until_ns;
   };
@@ -170,10 +173,10 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
       const double variance = own * own + share * share;
       // It counts in each of its intervals by its part of the cell.
       const double cell = seconds_between(sample.begin_ns, sample.end_ns);
-      add_piece(piece, dt, {variance, -share * previous_own, dt / cell}, out);
+      // It counts as a sample where its stamp is.
+      const int counts = sample.t_ns >= from_ns && sample.t_ns < to_ns ? 1 : 0;
+      add_piece(piece, dt, {variance, -share * previous_own, dt / cell, counts}, out);
       previous_own = own;
-      // A sample that is cut counts where its stamp is.
-      if (sample.t_ns < from_ns || sample.t_ns >= to_ns) --out.samples;
     }
     reached_ns = to_ns;
   }
@@ -205,10 +208,10 @@ void Preintegrator::find_motion(std::span<const EncoderSample> samples, std::int
 
 void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise noise,
                               PreintegratedPose& out) {
-  ++out.samples;
+  out.samples += noise.samples;
   TwistSolution& solution = solutions_[1 - believed_];
   if (solver_.solve(y, solution) != Status::kOk) {
-    ++out.rejected;
+    out.rejected += noise.samples;
     bridge(dt, nullptr, out);
     return;
   }
@@ -221,8 +224,8 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
         parity_gate_dof_ = dof;
         parity_gate_ = chi2_quantile(1. - options_.parity_gate_probability, dof);
       }
-      if (!(parity.chi2() <= parity_gate_)) {
-        ++out.gated;
+      if (!(parity.chi2() <= noise.variance * parity_gate_)) {
+        out.gated += noise.samples;
         bridge(dt, &solution, out);
         return;
       }
@@ -233,7 +236,7 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
       out.parity.dof += noise.parity * (noise.variance - 1.) * dof;
     }
   }
-  if (solution.rank_deficient) ++out.rank_deficient;
+  if (solution.rank_deficient) out.rank_deficient += noise.samples;
   step(solution, dt, noise, out);
   believed_ = 1 - believed_;  // solution becomes the one believed last
   has_believed_ = true;

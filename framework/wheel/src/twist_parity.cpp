@@ -5,13 +5,6 @@
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo {
-namespace {
-
-/// For the parity residual only directions that A cannot tell at all are left out.
-constexpr double kParityRankTolerance = 1e-6;
-
-}  // namespace
-
 TwistSolver::Parity TwistSolver::parity() {
   Parity parity;
   if (options_.noise_weighted && weighted_.rank == 3) {
@@ -19,7 +12,7 @@ TwistSolver::Parity TwistSolver::parity() {
     parity.chi2_ = weighted_chi2_;
   } else {
     parity.fit_.resize(model_->n_rows());
-    parity.chi2_ = fit_weighted(kParityRankTolerance, parity.fit_);
+    parity.chi2_ = fit_weighted(kWeightedRankTolerance, parity.fit_);
   }
   parity.dof_ = model_->n_rows() - n_left_out_ - parity.fit_.rank;
   return parity;

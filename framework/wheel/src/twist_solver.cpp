@@ -118,6 +118,7 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   const KinematicModel& model = model_->model();
   y_ = &y;
   find_left_out(y);
+  if (is_undriven_) return Status::kRejected;
   if (model.rows(y, x_WI_, A_is_current_, rows_) != Status::kOk) return Status::kRejected;
   clear_left_out(rows_.A);
   clear_left_out(rows_.b);
@@ -130,10 +131,14 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
     weight_A_is_current_ = model_->description().constant_A && n_left_out_ == 0;
     model.noise_derivatives(y, weights_at_, weight_rows_, weight_rows_.b, weight_twist(), plain_.e,
                             by_n_);
-    weighted_chi2_ = fit_weighted(options_.rank_tolerance, weighted_);
+    clear_left_out(by_n_.J);
+    // Rows that tell the twist tell it however noisy some of them are.
+    weighted_chi2_ = fit_weighted(
+        plain_.rank == 3 ? kWeightedRankTolerance : options_.rank_tolerance, weighted_);
     set_gain(weighted_);
   } else {
     model.noise_derivatives(y, x_WI_, rows_, rows_.b, plain_.xi, plain_.e, by_n_);
+    clear_left_out(by_n_.J);
   }
   const Fit& fit = options_.noise_weighted ? weighted_ : plain_;
   if (!fit.xi.allFinite()) return Status::kRejected;
@@ -184,11 +189,18 @@ void TwistSolver::find_left_out(const EncoderSample& y) {
   const std::vector<NoiseSpec>& noises = model_->description().noises;
   for (std::size_t k = 0; k < noises.size(); ++k) {
     if (!is_bad(noises[k], y)) continue;
-    for (int i = 0; i < noise_rows_[k].count; ++i) {
-      left_out_[static_cast<std::size_t>(noise_rows_[k].first + i)] = true;
+    for (int i = 0; i < noises[k].rows.count; ++i) {
+      left_out_[static_cast<std::size_t>(noises[k].rows.first + i)] = true;
     }
   }
   n_left_out_ = static_cast<int>(std::count(left_out_.begin(), left_out_.end(), true));
+  // What is left then says how it does not move.
+  is_undriven_ = std::all_of(noises.begin(), noises.end(), [&](const NoiseSpec& noise) {
+    const auto first = left_out_.begin() + noise.rows.first;
+    return noise.kind != NoiseKind::kDrive ||
+           std::all_of(first, first + noise.rows.count,
+                       [](bool is_left_out) { return is_left_out; });
+  });
 }
 
 template <class Rows>
@@ -253,6 +265,10 @@ Eigen::Matrix3d TwistSolver::weigh_rows(RowLanes& WA) {
       for (int i = 0; i < size; ++i) {
         for (int l = 0; l < size; ++l) R(l, i) += variance_[k] * J[i] * J[l];
       }
+    }
+    for (int i = 0; i < size && n_left_out_ > 0; ++i) {
+      // Whatever such a row weighs, it is zero.
+      if (left_out_[static_cast<std::size_t>(i0 + i)]) R(i, i) = 1.;
     }
     const BlockMatrix<kSize> W = invert_block<kSize>(R);
     W_.block<kSize, kSize>(0, i0, size, size) = W;

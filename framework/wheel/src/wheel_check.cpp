@@ -41,6 +41,8 @@ EncoderSample within_measure(EncoderSample y) {
   return y;
 }
 
+bool are_same(RowRange a, RowRange b) { return a.first == b.first && a.count == b.count; }
+
 void mark(NoiseKind kind, int channel, EncoderSample& y) {
   (kind == NoiseKind::kDrive ? y.bad_drives : y.bad_steers) |= 1u << static_cast<unsigned>(channel);
 }
@@ -52,11 +54,10 @@ WheelCheck::WheelCheck(std::shared_ptr<const WheelModel> model, double probabili
       noise_(kBelievedSamples, kRememberedSamples, kMostNoise) {
   const WheelModel& wheels = solver_.model();
   const std::vector<NoiseSpec>& noises = wheels.description().noises;
-  const int size = wheels.description().noise_block;
   for (int k = 0; k < wheels.n_noises(); ++k) {
     const NoiseSpec& noise = noises[static_cast<std::size_t>(k)];
     if (noise.kind == NoiseKind::kSlip) continue;
-    suspects_.push_back({noise.kind, noise.channel, noise.rows.first / size});
+    suspects_.push_back({noise.kind, noise.channel, noise.rows});
   }
   // Fewer rows cannot tell who lies.
   const int most_dof = wheels.n_rows() - 3;
@@ -130,7 +131,7 @@ WheelCheck::Suspect* WheelCheck::of_same_wheel(const EncoderSample& rest, Suspec
   Suspect* drive = nullptr;
   Suspect* steering = nullptr;
   for (Suspect& other : suspects_) {
-    if (other.block != suspect.block) continue;
+    if (!are_same(other.rows, suspect.rows)) continue;
     (other.kind == NoiseKind::kDrive ? drive : steering) = &other;
   }
   if (drive == nullptr || steering == nullptr) return &suspect;

@@ -98,6 +98,52 @@ TEST(Preintegration, DoesNotBelieveASlippingWheel) {
   EXPECT_GT(with_gate.P_g.trace(), 2. * without.P_g.trace());
 }
 
+// A cut sample is noisier than one that is whole: the gate has to know.
+TEST(Preintegration, GatesCutSamplesAsOftenAsItIsAskedTo) {
+  const auto model = load_model(swerve("four_wis_wid"));
+  constexpr double kSeconds = 400., kRate_hz = 25., kProbability = 0.01;
+  const auto even = [](double) { return Twist(0.4, 0.1, 0.3); };  // pieces of it fit as samples do
+  std::mt19937_64 rng(5);
+  std::vector<EncoderSample> noisy;
+  for (const EncoderSample& clean : sample_motion(*model, even, kSeconds, kRate_hz)) {
+    noisy.push_back(testing::with_noise(*model, even(0.), clean, 1., rng));
+  }
+  Preintegrator gated(model, {.twist = {}, .parity_gate_probability = kProbability});
+  const auto gated_of = [&](std::int64_t period_ns, std::int64_t offset_ns) {
+    std::int64_t n = 0;
+    PreintegratedPose part;
+    for (std::int64_t t = kSecond + offset_ns; t < 399 * kSecond; t += period_ns) {
+      gated.integrate(noisy, t, t + period_ns, part);
+      n += part.gated;
+    }
+    return static_cast<double>(n);
+  };
+  // Of a thousand times ten, and three sigma of their number.
+  const double n = 398. * kRate_hz, sigma = std::sqrt(n * kProbability);
+  EXPECT_NEAR(gated_of(kSecond, 0), n * kProbability, 3. * sigma);
+  EXPECT_NEAR(gated_of(kSecond / 30, 7'000'000), n * kProbability, 3. * sigma);
+}
+
+TEST(Preintegration, CountsWhatItLeavesOutBySamplesNotByPieces) {
+  const auto model = load_model(swerve("four_wis_wid"));
+  auto samples = sample_motion(*model, wavy, 1., 100.);
+  samples[50].drive_rad_per_s[0] = std::nan("");
+  samples.erase(samples.begin() + 48, samples.begin() + 50);  // a hole before it
+  Preintegrator preintegrator(model, {});
+  PreintegratedPose pose;
+  ASSERT_TRUE(preintegrator.integrate(samples, 0, kSecond, pose));
+  EXPECT_EQ(pose.rejected, 1);
+  EXPECT_NEAR(pose.bridged_s, 0.03, 1e-12);
+  // One that is cut by the ends of intervals is one all the same.
+  std::int64_t rejected = 0;
+  PreintegratedPose part;
+  for (std::int64_t k = 0; k < 200; ++k) {
+    preintegrator.integrate(samples, k * kSecond / 200, (k + 1) * kSecond / 200, part);
+    rejected += part.rejected;
+  }
+  EXPECT_EQ(rejected, 1);
+}
+
 TEST(Preintegration, CountsSamplesThatAreNotFinite) {
   const auto model = load_model(swerve("four_wis_wid"));
   auto samples = sample_motion(*model, wavy, 1., 100.);

@@ -357,6 +357,45 @@ TEST(TwistSolver, CountsParallelRollingRowsAsRankDeficientAndStaysFinite) {
   }
 }
 
+// Where the rows tell the whole twist they do so however noisy one of them is.
+TEST(TwistSolver, TakesANoisyRowForANoisyOne) {
+  constexpr double kSigmas[] = {0.001, 0.0099, 0.02, 0.5};
+  for (const double sigma : kSigmas) {
+    const auto model = load_model(
+        "{type: differential, radius_left_m: 0.1, radius_right_m: 0.1, baseline_m: 0.5, "
+        "sigma_drive_rad_per_s: 0.001, "
+        "sigma_lateral_m_per_s: " +
+        std::to_string(sigma) + "}");
+    TwistSolver solver(model, {.noise_weighted = true});
+    EncoderSample y;
+    follow(*model, {0.5, 0., 0.2}, y);
+    TwistSolution solution;
+    ASSERT_EQ(solver.solve(y, solution), Status::kOk);
+    EXPECT_FALSE(solution.rank_deficient);
+    EXPECT_NEAR(std::sqrt(solution.P_xi(1, 1)), sigma, 1e-6 * sigma);
+  }
+}
+
+// A row that says that nothing goes sideways is no measurement of a base that goes nowhere.
+TEST(TwistSolver, RefusesASampleOfWhichNoDriveIsLeft) {
+  for (const std::string& base :
+       {swerve("four_wis_wid"),
+        std::string("{type: differential, radius_left_m: 0.1, radius_right_m: 0.1, "
+                    "baseline_m: 0.5}"),
+        std::string("{type: ackermann, wheel_base_m: 0.5, track_m: 0.4, radius_m: [0.1], "
+                    "wheel_speeds: all, steering: both}")}) {
+    const auto model = load_model(base);
+    TwistSolver solver(model, {.noise_weighted = true});
+    EncoderSample y;
+    follow(*model, {0.3, 0., 0.1}, y);
+    TwistSolution solution;
+    y.bad_drives = (1u << model->description().n_drive) - 1u;
+    EXPECT_EQ(solver.solve(y, solution), Status::kRejected) << base;
+    y.bad_drives = 0;
+    EXPECT_EQ(solver.solve(y, solution), Status::kOk) << base;
+  }
+}
+
 TEST(TwistSolver, RefusesASampleThatIsNotFinite) {
   const auto model = load_model(swerve("four_wis_wid"));
   TwistSolver solver(model, {});

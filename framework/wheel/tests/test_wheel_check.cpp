@@ -25,12 +25,13 @@ Twist curvy(double t) {
 }
 
 /// Half a minute with the noise of the model, times `scale`.
-std::vector<EncoderSample> drive(const WheelModel& model, unsigned seed, double scale = 1.) {
+std::vector<EncoderSample> drive(const WheelModel& model, unsigned seed, double scale,
+                                 const std::function<Twist(double)>& motion) {
   std::mt19937_64 rng(seed);
   std::vector<EncoderSample> noisy;
-  for (const EncoderSample& clean : sample_motion(model, curvy, 30., 50.)) {
+  for (const EncoderSample& clean : sample_motion(model, motion, 30., 50.)) {
     noisy.push_back(
-        with_noise(model, curvy(1e-9 * static_cast<double>(clean.t_ns)), clean, scale, rng));
+        with_noise(model, motion(1e-9 * static_cast<double>(clean.t_ns)), clean, scale, rng));
   }
   return noisy;
 }
@@ -40,7 +41,8 @@ using Fault = std::function<void(EncoderSample&)>;
 /// Runs the check over a drive in which `fault` befalls the samples from 10 s to 20 s.
 struct Checked {
   Checked(const std::string& yaml, const Fault& fault, double scale = 1.,
-          const Intrinsics& off = Intrinsics(), double prior = 0.)
+          const Intrinsics& off = Intrinsics(), double prior = 0.,
+          const std::function<Twist(double)>& motion = curvy)
       : model(load_model(yaml)), check(model, kProbability) {
     const int n = model->n_intrinsics();
     Intrinsics x = model->nominal();
@@ -48,7 +50,7 @@ struct Checked {
     IntrinsicMatrix P = IntrinsicMatrix::Zero(n, n);
     P.diagonal() = prior * model->prior_sigma().cwiseAbs2();
     check.set_calibration(x, P);
-    for (EncoderSample y : drive(*model, 3, scale)) {
+    for (EncoderSample y : drive(*model, 3, scale, motion)) {
       const bool is_faulty = y.t_ns >= 10'000'000'000 && y.t_ns < 20'000'000'000;
       if (is_faulty && fault) fault(y);
       check.check(y);
@@ -94,6 +96,21 @@ TEST(WheelCheck, LeavesOutTheWheelThatLiesForAsLongAsItDoes) {
               "unit, or the order of the joints)");
     EXPECT_EQ(checked.rejections[0].first, "t = 10.010 s .. t = 19.990 s");
     EXPECT_NEAR(checked.check.noise().found(), 1., 0.05);
+  }
+}
+
+// Rows of several wheels share the noise of a steering encoder, not what they lie.
+TEST(WheelCheck, LeavesOutADriveOfACarAlone) {
+  for (const char* steering : {"centre", "both"}) {
+    SCOPED_TRACE(steering);
+    const auto fault = [](EncoderSample& y) { y.drive_rad_per_s[1] *= 2.; };
+    const Checked checked(
+        std::string("{type: ackermann, wheel_base_m: 0.5, track_m: 0.4, radius_m: [0.1], "
+                    "wheel_speeds: all, steering: ") +
+            steering + "}",
+        fault, 1., {}, 0., [](double t) { return Twist(0.8, 0., 0.3 * std::sin(0.8 * t)); });
+    EXPECT_GT(Checked::count(checked.during, 2, 0), 480);
+    EXPECT_EQ(Checked::count(checked.outside, 0, 0), 1000);
   }
 }
 

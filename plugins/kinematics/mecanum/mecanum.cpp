@@ -1,5 +1,6 @@
 // Base with N >= 3 mecanum wheels: one row per wheel, along the direction in which its rollers
 // cannot roll. Equations: model.md beside this file.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -95,6 +96,24 @@ class Mecanum final : public KinematicModel {
     for (int j = 0; j < n_; ++j) {  // (MC-2)
       const auto i = static_cast<std::size_t>(j);
       nominal_.push_back(x[i] * std::tan(angle(j)) - y[i]);
+    }
+    require_lever(x, y);
+  }
+
+  /// Rollers that all point at O on the ground hold against no turn.
+  void require_lever(std::span<const double> x, std::span<const double> y) const {
+    constexpr double kLeast = 0.05;
+    double lever = 0., far = 0.;
+    for (int j = 0; j < n_; ++j) {
+      const auto i = static_cast<std::size_t>(j);
+      lever = std::max(lever, std::abs(nominal_[static_cast<std::size_t>(2 * n_) + i]));
+      far = std::max(far, std::hypot(x[i], y[i]));
+    }
+    if (lever < kLeast * far) {
+      throw ParamError("roller_angle_rad",
+                       "the axes of all rollers go through the middle, so that no wheel tells a "
+                       "turn: are these the rollers as seen on top of the wheels? On the ground "
+                       "they have the other sign");
     }
   }
 

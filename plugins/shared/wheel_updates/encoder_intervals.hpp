@@ -108,7 +108,8 @@ class SampleTallies {
   }
 
  private:
-  Tally rejected_{"encoder sample refused by the kinematic model (bridged)"};
+  Tally rejected_{
+      "encoder sample refused by the kinematic model, or with no wheel to be believed (bridged)"};
   Tally gated_{"encoder sample whose wheels contradict each other (bridged)"};
   Tally rank_deficient_{"encoder sample that does not tell the whole twist (used)"};
 };

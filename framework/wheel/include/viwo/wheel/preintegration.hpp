@@ -67,12 +67,13 @@ class Preintegrator {
                  PreintegratedPose& out);
 
  private:
-  /// Noise of a piece relative to one sample: variance, and covariance with the piece before; and
-  /// how much its parity counts.
+  /// Noise of a piece relative to one sample: variance, and covariance with the piece before; how
+  /// much its parity counts, and as how many samples it does.
   struct PieceNoise {
     double variance = 1.;
     double with_previous = 0.;
     double parity = 1.;
+    int samples = 1;
   };
   void find_motion(std::span<const EncoderSample> samples, std::int64_t end_ns);
   void add_piece(const EncoderSample& y, double dt, PieceNoise noise, PreintegratedPose& out);

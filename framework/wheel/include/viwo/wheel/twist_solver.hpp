@@ -83,9 +83,10 @@ class TwistSolver {
   /// not show it.
   void set_moving(bool moves) { moves_ = moves; }
 
-  /// Twist, residual, sensitivity and covariance. kRejected: the model refuses the sample or the
-  /// result is not finite. Channels that `y` calls bad are left out, with all rows of their noise
-  /// blocks. Keeps a reference to `y` for the calls about the sample last solved.
+  /// Twist, residual, sensitivity and covariance. kRejected: the model refuses the sample, no
+  /// drive is left of it, or the result is not finite. Channels that `y` calls bad are left out, with
+  /// all rows that their noise enters. Keeps a reference to `y` for the calls about the sample last
+  /// solved.
   Status solve(const EncoderSample& y, TwistSolution& out);
 
   class Parity;
@@ -112,6 +113,9 @@ class TwistSolver {
 
     void resize(int n_rows);
   };
+
+  /// With noise weights, of directions that A cannot tell at all.
+  static constexpr double kWeightedRankTolerance = 1e-6;
 
   void differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P, const RowVector& e);
   void find_left_out(const EncoderSample& y);
@@ -168,6 +172,7 @@ class TwistSolver {
   bool moves_ = false;
   std::array<bool, kMaxRows> left_out_{};  // rows of the sample at hand
   int n_left_out_ = 0;
+  bool is_undriven_ = false;  ///< no drive of it is believed
 
   const EncoderSample* y_ = nullptr;
   RowSystem rows_, weight_rows_;

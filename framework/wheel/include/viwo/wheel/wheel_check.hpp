@@ -36,7 +36,7 @@ class WheelCheck {
   struct Suspect {
     NoiseKind kind = NoiseKind::kDrive;
     int channel = 0;
-    int block = 0;  ///< first noise block that it enters
+    RowRange rows{};  ///< that it enters
     std::int64_t left_out = 0;
     std::int64_t first_ns = 0, last_ns = 0;
   };
