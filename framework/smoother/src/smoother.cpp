@@ -7,7 +7,6 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
-#include <tbb/parallel_for.h>
 
 #include "block_values.hpp"
 #include "factor_collector.hpp"
@@ -15,6 +14,7 @@
 #include "viwo/api/status.hpp"
 #include "viwo/config/overrides.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/run/parallel_for.hpp"
 #include "viwo/setup/calibration_file.hpp"
 
 namespace viwo::smoother {
@@ -46,7 +46,8 @@ struct Recording {
 /// What is the same in all recordings: columns of blocks of cameras and wheels that are estimated.
 struct Shared {
   std::vector<Eigen::Index> columns;  ///< of BlockPrior::P, of the first recording
-  MatrixXd Lambda;                    ///< of the prior
+  std::vector<std::string> names;
+  MatrixXd Lambda;  ///< of the prior
 
   int size() const { return static_cast<int>(columns.size()); }
 };
@@ -104,11 +105,11 @@ bool moves(const BlockSpec& spec) {
 
 /// Which unknown each column of blocks is. Blocks that are not of cameras and wheels (where the
 /// Earth is) are the recording's own.
-void number_columns(Recording& recording, Shared* shared) {
+std::vector<std::string> number_columns(Recording& recording, Shared* shared) {
+  std::vector<std::string> names;
   const BlockPrior& prior = recording.filter->prior();
   BlockColumns& columns = recording.columns;
   columns.unknown.assign(static_cast<std::size_t>(prior.P.rows()), kInRoom);
-  int next_shared = 0;
   for (std::size_t b = 0; b < prior.specs.size(); ++b) {
     const BlockSpec& spec = prior.specs[b];
     if (prior.first[b] < 0) continue;
@@ -123,27 +124,40 @@ void number_columns(Recording& recording, Shared* shared) {
         columns.moving.push_back({static_cast<int>(column), spec.entries[i].process_sigma,
                                   settles ? spec.time_constant_s : 0.});
       } else if (is_of_the_rig(spec.name)) {
-        columns.unknown[column] = smoother::shared(next_shared++);
+        columns.unknown[column] = smoother::shared(static_cast<int>(names.size()));
+        names.push_back(spec.entries[i].name);
         if (shared != nullptr) shared->columns.push_back(at);
       } else {
         columns.unknown[column] = columns.own++;
       }
     }
   }
+  return names;
 }
 
 Shared number_columns(std::vector<Recording>& recordings) {
   Shared shared;
   for (Recording& recording : recordings) {
     const bool is_first = &recording == &recordings.front();
-    number_columns(recording, is_first ? &shared : nullptr);
-    const auto n = std::count_if(recording.columns.unknown.begin(), recording.columns.unknown.end(),
-                                 [](int unknown) { return unknown < 0 && unknown > kInRoom; });
-    if (n != shared.size()) fail(recording, "it estimates other parameters than the first one");
+    const std::vector<std::string> names = number_columns(recording, is_first ? &shared : nullptr);
+    if (is_first) shared.names = names;
+    if (names != shared.names) fail(recording, "it estimates other parameters than the first one");
   }
   const MatrixXd P = recordings.front().filter->prior().P(shared.columns, shared.columns);
   shared.Lambda = P.llt().solve(MatrixXd::Identity(P.rows(), P.cols()));
   return shared;
+}
+
+/// Cameras and wheels begin where the filter of the first recording has them.
+void take_shared_blocks(const Recording& first, Recording& recording) {
+  const std::vector<BlockSpec>& of_first = first.filter->prior().specs;
+  const std::vector<BlockSpec>& specs = recording.filter->prior().specs;
+  for (std::size_t b = 0; b < specs.size(); ++b) {
+    if (!is_of_the_rig(specs[b].name)) continue;
+    const auto same = std::ranges::find(of_first, specs[b].name, &BlockSpec::name);
+    if (same == of_first.end()) fail(recording, "the first one has no '" + specs[b].name + "'");
+    recording.blocks[b] = first.blocks[static_cast<std::size_t>(same - of_first.begin())];
+  }
 }
 
 /// By how much the blocks are off their prior, by columns.
@@ -286,13 +300,12 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
     recordings[i].run = inputs[i].run;
   }
   const auto for_each = [&](auto&& work) {
-    tbb::parallel_for(std::size_t{0}, recordings.size(),
-                      [&](std::size_t i) { work(recordings[i]); });
+    parallel_for(recordings.size(), [&](std::size_t i) { work(recordings[i]); });
   };
   for_each([&](Recording& recording) { run_filter_of(recording, plugins); });
   progress.note("smoother: the filter has gone before");
   const Shared shared = number_columns(recordings);
-  for (Recording& recording : recordings) recording.blocks = recordings.front().blocks;
+  for (Recording& recording : recordings) take_shared_blocks(recordings.front(), recording);
   Smoothed out;
   MatrixXd covariance;
   while (!out.converged && out.iterations < kMostPasses) {

@@ -86,6 +86,14 @@ TEST(Smoother, SaysWhatItCannotSmooth) {
       },
       ThrowsMessage<InputError>(
           "recording '2': smoother: it estimates other parameters than the first one"));
+  // As many, but others.
+  EXPECT_THAT(
+      [] {
+        testing::smoothed({swerve_run(1, "circle", {"wheels.sigma_p_IinO_m=[0.01, 0, 0.01]"}),
+                           swerve_run(1, "circle", {"wheels.sigma_t_OtoI_s=0"})});
+      },
+      ThrowsMessage<InputError>(
+          "recording '2': smoother: it estimates other parameters than the first one"));
 }
 
 }  // namespace
