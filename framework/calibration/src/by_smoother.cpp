@@ -23,6 +23,7 @@ CalibrationEstimate estimate_of(const smoother::Smoothed& smoothed, const Calibr
   CalibrationEstimate out;
   const auto n = static_cast<Eigen::Index>(specs.size());
   out.x_WI = out.sigma = Intrinsics::Zero(n);
+  out.prior_sigma = setup.recordings.front().setup.model->prior_sigma();
   out.correlations = Eigen::MatrixXd::Zero(n, n);
   out.extrinsics = setup.options.extrinsics_x_m_y_m_yaw_rad;
   std::vector<int> free;
@@ -52,7 +53,8 @@ CalibrationEstimate estimate_of(const smoother::Smoothed& smoothed, const Calibr
         out.sigma[free[i]] / specs[static_cast<std::size_t>(free[i])].prior_sigma;
   }
   out.undetermined =
-      undetermined_of(ratio.asDiagonal() * correlations * ratio.asDiagonal(), free, specs);
+      undetermined_of(ratio.asDiagonal() * correlations * ratio.asDiagonal(),
+                      Eigen::MatrixXd::Identity(ratio.size(), ratio.size()), free, specs);
   out.residuals = static_cast<int>(smoothed.residuals);
   // What each factor tells is in the covariance: nothing is counted.
   out.unknowns = out.parity_directions = static_cast<int>(free.size());

@@ -5,8 +5,6 @@
 #include <numeric>
 #include <set>
 
-#include <tbb/parallel_for.h>
-
 #include "by_smoother.hpp"
 #include "joint_search.hpp"
 #include "judgement.hpp"
@@ -19,6 +17,7 @@
 #include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/run/parallel_for.hpp"
 #include "wheel_wander.hpp"
 
 namespace viwo::calibration {
@@ -303,7 +302,7 @@ CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress) {
       is_smoothed ? setup.options : choose_segments(setup, start, result, progress);
   progress.begin("fits", static_cast<int>(fits.size()));
   std::vector<CalibrationEstimate> estimates(fits.size());
-  tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t f) {
+  parallel_for(fits.size(), [&](std::size_t f) {
     std::vector<std::size_t> used;
     for (std::size_t i = 0; i < setup.recordings.size(); ++i) {
       if (!fits[f].leaves_out(setup.recordings[i])) used.push_back(i);

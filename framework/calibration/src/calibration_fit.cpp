@@ -119,9 +119,9 @@ class Fit {
     for (std::size_t k = 0; k < problems_.size(); ++k) {
       problem.AddResidualBlock(new RecordingCost(*problems_[k], prior_), nullptr, shared_.data(),
                                own_[k].data());
-      problem.AddResidualBlock(new PriorCost(2), nullptr, own_[k].data());
+      problem.AddResidualBlock(new PriorCost(Eigen::Matrix2d::Identity()), nullptr, own_[k].data());
     }
-    problem.AddResidualBlock(new PriorCost(prior_.n_shared()), nullptr, shared_.data());
+    problem.AddResidualBlock(new PriorCost(prior_.root), nullptr, shared_.data());
     set_bounds(problem);
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
@@ -274,9 +274,11 @@ class Fit {
   }
 
   /// `white`: as if what is left did not persist.
-  static Eigen::MatrixXd covariance(const Linearisation& at, bool white = false) {
+  Eigen::MatrixXd covariance(const Linearisation& at, bool white = false) const {
     const auto size = at[0].information.rows();
+    const int n = prior_.n_shared();
     Eigen::MatrixXd information = Eigen::MatrixXd::Identity(size, size);
+    information.topLeftCorner(n, n) = prior_.information();
     for (const NoiseGroup& group : at) {
       information += group.information / (white ? 1. : std::max(1., persistence(group).ratio));
     }
@@ -290,6 +292,7 @@ class Fit {
     estimate_.extrinsics[2] = wrap_angle(estimate_.extrinsics[2]);
     const Eigen::MatrixXd P = covariance(at);
     const auto n = static_cast<int>(prior_.sigma.size());
+    estimate_.prior_sigma = prior_.sigma;
     estimate_.sigma = prior_.sigma.cwiseProduct(P.diagonal().head(n).cwiseSqrt());
     const Eigen::VectorXd inverse = P.diagonal().head(n).cwiseSqrt().cwiseInverse();
     estimate_.correlations = inverse.asDiagonal() * P.topLeftCorner(n, n) * inverse.asDiagonal();
@@ -351,7 +354,13 @@ class Fit {
     estimate_.turn_rms_rad = std::sqrt(estimate_.turn_rms_rad / std::max(1, segments));
     estimate_.way_rms_m = std::sqrt(estimate_.way_rms_m / std::max(1, segments));
     const auto& parity = at[static_cast<std::size_t>(ResidualKind::kParity)].information;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(parity, Eigen::EigenvaluesOnly);
+    // In units of the sigmas of the drawing.
+    const auto n = prior_.sigma.size();
+    const Intrinsics drawn =
+        (prior_.sigma.array() > 0.).select(prior_.drawn_sigma.cwiseQuotient(prior_.sigma), 0.);
+    const Eigen::MatrixXd told =
+        drawn.asDiagonal() * parity.topLeftCorner(n, n) * drawn.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(told, Eigen::EigenvaluesOnly);
     estimate_.parity_directions = static_cast<int>((eigen.eigenvalues().array() > 1.).count());
   }
 
@@ -368,11 +377,19 @@ class Fit {
     };
     estimate_.unknowns +=
         count(prior_.extrinsics_sigma) + static_cast<int>(own_.size()) * count(prior_.own_sigma);
-    const Eigen::MatrixXd P_free = P(free, free);
+    // In what is known before, which hangs together where the gauge holds entries.
+    const Eigen::MatrixXd root =
+        prior_.root.topLeftCorner(prior_.sigma.size(), prior_.sigma.size());
+    const auto whiten = [&](const Eigen::MatrixXd& M) -> Eigen::MatrixXd {
+      return root.triangularView<Eigen::Lower>().solve(M);
+    };
+    const Eigen::MatrixXd P_white =
+        whiten(whiten(P.topLeftCorner(root.rows(), root.cols())).transpose());
+    const Eigen::MatrixXd P_free = P_white(free, free);
     // Below zero: by how many powers of e the data have narrowed what was known.
     estimate_.log_volume = P_free.llt().matrixLLT().diagonal().array().log().sum();
     const auto& specs = setup_.recordings.front().setup.model->description().intrinsics;
-    estimate_.undetermined = undetermined_of(P_free, free, specs);
+    estimate_.undetermined = undetermined_of(P_free, root(free, free), free, specs);
   }
 
   const CalibrationSetup& setup_;

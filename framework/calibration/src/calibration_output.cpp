@@ -66,8 +66,7 @@ void describe_parameters(const CalibrationResult& result, std::ostream& out) {
     out << pad(specs[i].name, 12) << pad(specs[i].unit, 6)
         << pad(significant(specs[i].nominal, 6), 12) << pad(significant(estimate.x_WI[k], 6), 12)
         << pad(estimate.sigma[k] > 0. ? significant(estimate.sigma[k], 3) : "held", 12)
-        << pad(significant((estimate.x_WI[k] - specs[i].nominal) / specs[i].prior_sigma, 3), 14)
-        << "\n";
+        << pad(significant(estimate.change(k, specs[i].nominal), 3), 14) << "\n";
   }
   for (int i = 0; i < 3; ++i) {
     const char* names[] = {"x_OinB", "y_OinB", "yaw_OinB"};

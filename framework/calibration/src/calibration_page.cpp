@@ -38,7 +38,7 @@ report::Table parameter_table(const CalibrationResult& result) {
     const auto k = static_cast<Eigen::Index>(i);
     table.rows.push_back({specs[i].name, specs[i].unit, specs[i].nominal, result.all.x_WI[k],
                           result.all.sigma[k], result.sigma_of_fit[k],
-                          (result.all.x_WI[k] - specs[i].nominal) / specs[i].prior_sigma});
+                          result.all.change(k, specs[i].nominal)});
   }
   for (const CalibrationEntry& entry : beside_the_wheels(result)) {
     table.rows.push_back(

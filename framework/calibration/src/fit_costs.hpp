@@ -1,32 +1,30 @@
 // What the solver of a fit minimises: residuals of recordings, and a prior, of scaled unknowns.
 #pragma once
 
-#include <algorithm>
-
 #include <Eigen/Dense>
 #include <ceres/cost_function.h>
 
 #include "calibration_problem.hpp"
+#include "held_prior.hpp"
 #include "viwo/calibration/calibrate.hpp"
 
 namespace viwo::calibration {
 
 /// Unknowns in units of their prior sigmas: u = (value - start) / sigma. Entries with sigma 0 are
-/// held.
+/// held. Where the gauge holds some, what is known of the others hangs together (CAL-18).
 struct Prior {
   Intrinsics x_WI, sigma;
+  Intrinsics drawn_sigma;  ///< in the frame of the drawing, in which nothing is held
   PlanarExtrinsics extrinsics, extrinsics_sigma;
   Eigen::Vector2d own_sigma;  ///< of the clock offset and the gyro bias of each recording
+  Eigen::MatrixXd root;       ///< of the correlations of the shared unknowns, lower triangle
 
   Prior(const CalibrationRecording& first, const CalibrationOptions& options, const FitStart& start)
-      : x_WI(start.x_WI), sigma(start.sigma) {
+      : x_WI(start.x_WI), sigma(start.sigma), drawn_sigma(start.sigma) {
     const bool poses = first.motion.kind == ReferenceKind::kPoses;
-    const auto& specs = first.setup.model->description().intrinsics;
-    for (int i = 0; i < sigma.size(); ++i) {
-      // Where O is the reference body nothing is left to a gauge.
-      const bool held = specs[static_cast<std::size_t>(i)].gauge_fixed;
-      if (held && (!poses || options.estimate_extrinsics)) sigma[i] = 0.;
-    }
+    root.setIdentity(n_shared(), n_shared());
+    // Where O is the reference body nothing is left to a gauge.
+    if (!poses || options.estimate_extrinsics) hold_gauge(*first.setup.model);
     const bool estimates = poses && options.estimate_extrinsics;
     const double m = estimates ? options.prior_sigma_extrinsics_m : 0.;
     const double rad = estimates ? options.prior_sigma_extrinsics_rad : 0.;
@@ -51,11 +49,29 @@ struct Prior {
     return at;
   }
 
+  /// What is known of the shared unknowns before.
+  Eigen::MatrixXd information() const {
+    const auto n = root.rows();
+    const Eigen::MatrixXd whitened =
+        root.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(n, n));
+    return whitened.transpose() * whitened;
+  }
+
   /// Derivative by the scaled unknowns [shared, own].
   Eigen::VectorXd scale() const {
     Eigen::VectorXd all(n_shared() + 2);
     all << sigma, extrinsics_sigma, own_sigma;
     return all;
+  }
+
+ private:
+  void hold_gauge(const WheelModel& model) {
+    const Eigen::MatrixXd P = prior_in_held_frame(model, x_WI, sigma);
+    sigma = P.diagonal().cwiseSqrt();
+    const Eigen::VectorXd per = (sigma.array() > 0.).select(sigma.cwiseInverse(), 0.);
+    Eigen::MatrixXd C = per.asDiagonal() * P * per.asDiagonal();
+    for (int i = 0; i < C.rows(); ++i) C(i, i) = 1.;  // also of what is held
+    root.topLeftCorner(C.rows(), C.cols()) = C.llt().matrixL();
   }
 };
 
@@ -86,22 +102,30 @@ class RecordingCost final : public ceres::CostFunction {
   const Prior& prior_;
 };
 
-/// The prior of scaled unknowns: r = u.
+/// The prior of scaled unknowns, of which `root` is of the correlations: r = root^-1 u.
 class PriorCost final : public ceres::CostFunction {
  public:
-  explicit PriorCost(int size) {
+  explicit PriorCost(const Eigen::MatrixXd& root)
+      : whitened_(root.triangularView<Eigen::Lower>().solve(
+            Eigen::MatrixXd::Identity(root.rows(), root.cols()))) {
+    const auto size = static_cast<int>(root.rows());
     set_num_residuals(size);
     *mutable_parameter_block_sizes() = {size};
   }
   bool Evaluate(const double* const* parameters, double* residuals,
                 double** jacobians) const override {
     const int n = num_residuals();
-    std::copy_n(parameters[0], n, residuals);
+    Eigen::Map<Eigen::VectorXd>(residuals, n) =
+        whitened_ * Eigen::Map<const Eigen::VectorXd>(parameters[0], n);
     if (jacobians != nullptr && jacobians[0] != nullptr) {
-      Eigen::Map<Eigen::MatrixXd>(jacobians[0], n, n).setIdentity();
+      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+      Eigen::Map<RowMajor>(jacobians[0], n, n) = whitened_;
     }
     return true;
   }
+
+ private:
+  Eigen::MatrixXd whitened_;
 };
 
 }  // namespace viwo::calibration

@@ -6,10 +6,10 @@
 
 #include <Eigen/Dense>
 #include <ceres/tiny_solver.h>
-#include <tbb/parallel_for.h>
 
 #include "viwo/math/se2.hpp"
 #include "viwo/math/stamp.hpp"
+#include "viwo/run/parallel_for.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -185,8 +185,8 @@ std::vector<Solution> solve(const SearchCost& cost, const std::vector<int>& zero
       starts[i][zero] = std::ldexp(2. * M_PI * static_cast<double>(random() >> 11), -53);
     }
   }
-  tbb::parallel_for(std::size_t{0}, starts.size(),
-                    [&](std::size_t i) { solutions[i] = descend(cost, zeros, starts[i]); });
+  parallel_for(starts.size(),
+               [&](std::size_t i) { solutions[i] = descend(cost, zeros, starts[i]); });
   std::stable_sort(solutions.begin(), solutions.end(),
                    [](const Solution& a, const Solution& b) { return a.cost < b.cost; });
   return solutions;

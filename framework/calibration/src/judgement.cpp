@@ -232,7 +232,7 @@ void judge_change(CalibrationResult& result) {
           specs[i].name + " has gone to its bound " + significant(value, 3) +
           ": a base that is mirrored, or joints that are exchanged or reversed");
     }
-    const double change = (result.all.x_WI[k] - specs[i].nominal) / specs[i].prior_sigma;
+    const double change = result.all.change(k, specs[i].nominal);
     add_by_size(change,
                 specs[i].name + " is " + significant(std::abs(change), 2) +
                     " prior sigmas from its nominal value: a wrong nominal value, a prior that is "

@@ -8,10 +8,9 @@
 #include <string>
 #include <tuple>
 
-#include <tbb/parallel_for.h>
-
 #include "viwo/math/median.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/run/parallel_for.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -105,7 +104,7 @@ CalibrationOptions choose_segments(const CalibrationSetup& setup, const FitStart
   const bool predicts = setup.recordings.size() >= kFolds &&
                         setup.recordings.front().motion.kind == ReferenceKind::kPoses;
   progress.begin("segment lengths", static_cast<int>(all.size()));
-  tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+  parallel_for(all.size(), [&](std::size_t i) {
     estimates[i].segments = all[i].segments;
     estimates[i].segment_s = all[i].segment_s;
     const std::string text = "segments: " + segments_text(estimates[i]);

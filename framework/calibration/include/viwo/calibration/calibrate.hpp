@@ -130,6 +130,13 @@ struct TurnAgreement {
 struct CalibrationEstimate {
   Intrinsics x_WI;
   Intrinsics sigma;  ///< 0 where an entry was held
+  /// Before the data, in the frame of x_WI: where the gauge holds entries, what they may be off by
+  /// is in the others (CAL-18).
+  Intrinsics prior_sigma;
+  /// By how many of these x_WI is from `nominal`, its value before; 0 where it was held.
+  double change(Eigen::Index k, double nominal) const {
+    return prior_sigma[k] > 0. ? (x_WI[k] - nominal) / prior_sigma[k] : 0.;
+  }
   PlanarExtrinsics extrinsics = PlanarExtrinsics::Zero();
   PlanarExtrinsics extrinsics_sigma = PlanarExtrinsics::Zero();
   Eigen::MatrixXd correlations;  ///< of x_WI
