@@ -7,6 +7,7 @@
 
 #include "checks.hpp"
 #include "clock_finding.hpp"
+#include "pose_jumps.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/so3.hpp"
@@ -52,19 +53,36 @@ std::vector<Turn> yaw_turns_of(const Trajectory& poses) {
 
 /// Displacements over windows: of the wheels by their speed, of the poses by their positions.
 struct Speeds {
-  std::vector<double> ratio;   ///< of the wheels to the poses
-  std::vector<double> cosine;  ///< of the direction in the plane, body frames as they are
+  std::vector<double> ratio;  ///< of the wheels to the poses
+  /// Cosine and sine of the direction of the wheels from that of the poses, in the plane, body
+  /// frames as they are, times the way of the poses: errors of these are most of a short one.
+  std::vector<Eigen::Vector2d> direction;
   double path_m = 0.;
+
+  Eigen::Vector2d mean_direction() const {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    double way_m = 0.;
+    for (const Eigen::Vector2d& one : direction) {
+      sum += one;
+      way_m += one.norm();
+    }
+    return sum / way_m;
+  }
 };
 
-Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
+/// How long a window is at least, and how far the poses go in it.
+struct WindowSize {
+  double length_s = 1., way_m = 0.03;
+};
+
+Speeds speeds_of(const Wheels& wheels, const Trajectory& poses, const WindowSize& size = {}) {
   Speeds speeds;
   TwistSolver solver(wheels.model, {});
   solver.set_intrinsics(wheels.prior.wheels.x_WI);
   TwistSolution solution;
   // As long as it takes to get somewhere: where few windows of a slow robot were long enough,
   // errors of its poses would be taken for way.
-  constexpr double kWindow_s = 1., kLongest_s = 30., kLeast_m = 0.03;
+  constexpr double kLongest_s = 30.;
   const auto clock_ns = to_ns(wheels.prior.wheels.t_OtoI_s);
   const double gap_s = std::max(0.5, 2.5 * period_of(turns_of(poses)));
   double path = 0., time_s = 0., turned_rad = 0.;
@@ -79,11 +97,11 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
     time_s += dt_s;
     turned_rad += fastest_of(sample) * dt_s;
     const double window_s = seconds_between(begin_ns, sample.end_ns);
-    if (window_s < kWindow_s) continue;
+    if (window_s < size.length_s) continue;
     const auto from = interpolate(poses, begin_ns + clock_ns, gap_s);
     const auto to = interpolate(poses, sample.end_ns + clock_ns, gap_s);
     const Vector3d moved = from && to ? Vector3d(to->p_BinW - from->p_BinW) : Vector3d::Zero();
-    const bool goes = moved.norm() > kLeast_m;
+    const bool goes = moved.norm() > size.way_m;
     if (from && to && !goes && window_s < kLongest_s) continue;
     const bool is_whole = time_s > 0.9 * window_s;
     // Poses of a base that stands still can be corrected meanwhile.
@@ -96,8 +114,9 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses) {
         const Vector3d in_B = from->q_BtoW.conjugate() * moved;
         speeds.ratio.push_back(path / moved.norm());
         if (along.norm() > 0. && in_B.head<2>().norm() > 0.) {
-          speeds.cosine.push_back(
-              along.normalized().dot(Eigen::Vector2d(in_B.head<2>().normalized())));
+          const Eigen::Vector2d a = in_B.head<2>().normalized(), b = along.normalized();
+          speeds.direction.push_back(moved.norm() *
+                                     Eigen::Vector2d(a.dot(b), a.x() * b.y() - a.y() * b.x()));
         }
         speeds.path_m += moved.norm();
       }
@@ -115,23 +134,33 @@ struct Unit {
 
 void check_heading(const Speeds& speeds, const std::string& label, const std::string& other,
                    Findings& out) {
-  const double cosine = eval::median(speeds.cosine);
+  const Eigen::Vector2d mean = speeds.mean_direction();
+  const double angle = std::atan2(mean.y(), mean.x());
   Finding heading{label,
                   Severity::kFits,
                   "heading",
                   "goes where " + other + " goes",
-                  {{"cosine of the angle", cosine, ""}}};
-  constexpr double kReversed = -0.9;
-  if (cosine < kReversed) {
+                  {{"angle", angle, "rad"}, {"in common", mean.norm(), ""}}};
+  constexpr double kReversed_rad = 2.7, kTurned_rad = 0.1, kLeastInCommon = 0.7;
+  if (mean.norm() < kLeastInCommon) {
+    heading.severity = Severity::kFault;
+    heading.what =
+        "goes now to this and now to that side of where " + other +
+        " goes: its positions and orientations do not belong together - x and y "
+        "exchanged or mirrored, the unit, sign or column of the yaw - or zeros and signs "
+        "of the wheels";
+  } else if (std::abs(angle) > kReversed_rad) {
     heading.severity = Severity::kFault;
     heading.what =
         "goes backwards where " + other +
         " goes forwards: sign of all drives, or the frame of the poses is turned by half "
         "a turn";
-  } else if (cosine < 0.5) {
+  } else if (std::abs(angle) > kTurned_rad) {
     heading.severity = Severity::kNote;
-    heading.what = "goes elsewhere than " + other + " (cosine " + significant(cosine, 2) +
-                   "): the body of the poses is turned on the base";
+    heading.what = "goes " + significant(angle, 3) + " rad beside where " + other +
+                   " goes: the body of the poses is turned on the base (estimate_extrinsics: true "
+                   "of viwo calibrate, evaluation.extrinsics_x_m_y_m_yaw_rad of a run), or zeros "
+                   "of the steering";
   }
   out.push_back(heading);
 }
@@ -152,9 +181,9 @@ bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& la
     for (EncoderSample& sample : changed.samples) change.undo(sample);
     if (contradiction_of(changed, x_WI) > 1.1 * as_it_is + kNoContradiction_m_per_s) continue;
     const Speeds speeds = speeds_of(changed, poses.poses);
-    if (speeds.ratio.size() < kFewestWindows || speeds.cosine.empty()) continue;
+    if (speeds.ratio.size() < kFewestWindows || speeds.direction.empty()) continue;
     const double ratio = eval::median(speeds.ratio);
-    if (std::abs(ratio - 1.) > kMostFactor || eval::median(speeds.cosine) < 0.) continue;
+    if (std::abs(ratio - 1.) > kMostFactor || speeds.mean_direction().x() < 0.) continue;
     if (found) return false;  // whichever it is, if it is one of them
     found = {label,
              Severity::kFault,
@@ -172,40 +201,17 @@ bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& la
   return true;
 }
 
-/// Positions between which nothing can go: of a source that loses its place, or has none and says
-/// zero.
-bool has_jumps(const Poses& poses, const std::string& label, Findings& out) {
-  constexpr double kMost_m_per_s = 100., kLeast_m = 0.5;
-  double jumps = 0., zeros = 0.;
-  for (std::size_t i = 1; i < poses.poses.size(); ++i) {
-    const double moved_m = (poses.poses[i].p_BinW - poses.poses[i - 1].p_BinW).norm();
-    const double dt_s = seconds_between(poses.poses[i - 1].t_ns, poses.poses[i].t_ns);
-    if (moved_m < std::max(kLeast_m, kMost_m_per_s * dt_s)) continue;
-    jumps += 1.;
-    if (poses.poses[i].p_BinW.norm() == 0.) zeros += 1.;
-  }
-  const double share = jumps / static_cast<double>(poses.poses.size());
-  constexpr double kRare = 1e-3, kOften = 0.3;
-  if (jumps < 2. || share < kRare) return false;
-  const bool may_be_unit = share > kOften && zeros < 0.1 * jumps;
-  out.push_back({label,
-                 Severity::kFault,
-                 "jumps",
-                 "its positions jump " + significant(jumps, 6) + " times faster than " +
-                     significant(kMost_m_per_s, 3) + " m/s, " + significant(zeros, 6) +
-                     " times to exactly zero: " +
-                     (may_be_unit ? "their unit (mm for m?), poses of two bodies, or outliers"
-                                  : "outliers, or records without a pose"),
-                 {{"jumps", jumps, ""}, {"to zero", zeros, ""}, {"share", share, ""}}});
-  return true;
-}
-
 /// How far the wheels say that the base went, by how far the poses say.
 void check_speed(const Recording& recording, const Wheels& wheels, const Poses& poses,
                  const std::string& other, Findings& out) {
   const std::string label = recording.label<EncoderSample>(wheels.sensor);
   const Speeds speeds = speeds_of(wheels, poses.poses);
-  if (speeds.ratio.size() < kFewestWindows) return;
+  if (speeds.ratio.size() < kFewestWindows) {
+    // Of a base that turns all the time the direction shows in short ones.
+    const Speeds brief = speeds_of(wheels, poses.poses, {.length_s = 0.25, .way_m = 0.15});
+    if (brief.direction.size() >= 4 * kFewestWindows) check_heading(brief, label, other, out);
+    return;
+  }
   const double ratio = eval::median(speeds.ratio);
   Finding finding{label,
                   Severity::kFits,
@@ -254,7 +260,7 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
     }
   }
   out.push_back(finding);
-  if (speeds.cosine.size() >= kFewestWindows) check_heading(speeds, label, other, out);
+  if (speeds.direction.size() >= kFewestWindows) check_heading(speeds, label, other, out);
 }
 
 /// Whether the body of reference states is the IMU, as they are taken.
@@ -352,7 +358,7 @@ void check_poses(const Recording& recording, Findings& out) {
   for (const Poses& poses : recording.poses) {
     if (poses.poses.size() < 10) continue;
     const std::string label = recording.label(poses);
-    if (has_jumps(poses, label, out)) continue;
+    if (has_jumps(poses, label, out) || has_flips(poses, label, out)) continue;
     if (!recording.imu.empty() && poses.of_imu) {
       if (!has_axes_of_imu(recording, poses, label, out)) continue;
       check_clock(recording, turns_of(poses.poses), label, turns_of(recording.imu),

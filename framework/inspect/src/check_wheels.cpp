@@ -113,7 +113,7 @@ void check_channels(const Recording& recording, const Wheels& wheels, const std:
 /// What the others contradict (W-12), channel by channel: now and then it is slip, for long it is a
 /// fault. Gives the wheels without the samples in which one is contradicted.
 Wheels check_liars(const Recording& recording, const Wheels& wheels, const Calibration& calibration,
-                 const std::string& label, Findings& out) {
+                   const std::string& label, Findings& out) {
   constexpr double kProbability = 1e-4;
   WheelCheck check(wheels.model, kProbability);
   if (!check.is_on()) return wheels;

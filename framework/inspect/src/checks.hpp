@@ -28,6 +28,8 @@ void check_turns(const series::Recording& recording, Findings& out);
 /// Signs, gears and order of the channels: by what the wheels contradict each other, and by the
 /// gyro's rate.
 void check_order(const series::Recording& recording, Findings& out);
+/// Times in which the wheels turn otherwise than the gyro, and else as it does.
+void check_slip(const series::Recording& recording, Findings& out);
 /// Constant offsets of steering angles that stop the wheels from contradicting each other.
 void check_steer_offsets(const series::Recording& recording, Findings& out);
 /// Clock, sign and scale of the wheels' yaw rate against the gyro's.

@@ -181,6 +181,7 @@ Inspection inspect(RunSetup& setup) {
   check_wheels(recording, findings);
   check_turns(recording, findings);
   check_order(recording, findings);
+  check_slip(recording, findings);
   check_steer_offsets(recording, findings);
   check_wheel_clocks(recording, findings);
   check_camera_clocks(recording, findings);

@@ -67,57 +67,6 @@ TEST(InspectWheels, WritesNoNoiseThatIsNone) {
   EXPECT_THAT(faults_of(faster), Contains(AnyOf("wheels0 parity", "wheels0 contradicted")));
 }
 
-TEST(InspectPoses, TellThatTheWheelsTurnLessThanTheyDo) {
-  EXPECT_EQ(
-      finding_of(by_poses_alone(two_drives(), [](EncoderSample&) {}), "wheels0", "turns").what, "");
-  const Inspection narrow =
-      by_poses_alone(two_drives({"kinematics.y_icr_left_m=0.15", "kinematics.y_icr_right_m=-0.15"}),
-                     [](EncoderSample&) {});
-  EXPECT_THAT(faults_of(narrow), ElementsAre("wheels0 turns"));
-  const Finding turns = finding_of(narrow, "wheels0", "turns");
-  EXPECT_NEAR(turns.figures.at(0).value, 2., 0.05);
-  EXPECT_THAT(turns.what, HasSubstr("width of the base (baseline, track, centres of rotation)"));
-  // Skid-steered bases are often said to be wider by some part.
-  const Inspection wide =
-      by_poses_alone(two_drives({"kinematics.y_icr_left_m=0.4", "kinematics.y_icr_right_m=-0.4"}),
-                     [](EncoderSample&) {});
-  EXPECT_THAT(faults_of(wide), IsEmpty());
-  EXPECT_EQ(finding_of(wide, "wheels0", "turns").severity, Severity::kNote);
-}
-
-TEST(InspectPoses, TellTheirUnitAndThatOfSpeeds) {
-  const auto what = [](double of_poses, double of_drives, const char* sensor, const char* check) {
-    const RunSetup planar = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
-    const Inspection found = inspected(planar, {.wheels =
-                                                    [=](EncoderSample& s) {
-                                                      for (double& r : s.drive_rad_per_s) {
-                                                        r *= of_drives;
-                                                      }
-                                                      return true;
-                                                    },
-                                                .poses =
-                                                    [=](PoseSample& s) {
-                                                      scale(s.p_BinW_m, of_poses);
-                                                      return true;
-                                                    }});
-    return finding_of(found, sensor, check).what;
-  };
-  EXPECT_THAT(what(100., 1., "wheels0", "speed"), HasSubstr("positions of poses0 are in cm"));
-  EXPECT_THAT(what(1000., 1., "poses0", "jumps"), HasSubstr("their unit (mm for m?)"));
-  EXPECT_THAT(what(1., 3.6, "wheels0", "speed"), HasSubstr("drives are in km/h"));
-}
-
-TEST(InspectPoses, ThatAreCorrectedWhileTheBaseStandsTellNoSpeed) {
-  const RunSetup planar = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
-  const Inspection stands = inspected(planar, {.wheels = [](EncoderSample& s) {
-                                        if (s.t_ns < 5'000'000'000) return true;
-                                        s.drive_rad_per_s.fill(0.);
-                                        return true;
-                                      }});
-  EXPECT_EQ(finding_of(stands, "wheels0", "speed").severity, Severity::kFits)
-      << finding_of(stands, "wheels0", "speed").what;
-}
-
 TEST(InspectWheels, TellsZerosThatStandForReadingsThatWereLost) {
   const auto of = [](double from_s, double to_s) {
     const Inspection found = with_wheels(swerve(), [=](EncoderSample& s) {
@@ -142,19 +91,6 @@ TEST(InspectWheels, TellsACounterThatWasSet) {
   EXPECT_EQ(jump.severity, Severity::kFault);
   EXPECT_THAT(jump.what,
               HasSubstr("drive_3 jumps by up to 200 rad from one sample to the next (1"));
-}
-
-TEST(InspectPoses, TellsThoseThatJump) {
-  std::int64_t n = 0;
-  const Inspection jumps = inspected(setup_of(testing::configuration("runs/simulated_swerve.yaml")),
-                                     {.poses = [&n](PoseSample& s) {
-                                       if (++n % 10 == 0) s.p_BinW_m = {0., 0., 0.};
-                                       if (n % 10 == 5) s.p_BinW_m[0] += 50.;
-                                       return true;
-                                     }});
-  EXPECT_THAT(faults_of(jumps), ElementsAre("poses0 jumps"));
-  EXPECT_GT(figure_of(finding_of(jumps, "poses0", "jumps"), "to zero"), 0.);
-  EXPECT_EQ(finding_of(jumps, "wheels0", "heading").what, "");
 }
 
 TEST(InspectWheels, FindsTheZeroOfASteeringAndWritesTheOffset) {
@@ -206,28 +142,6 @@ TEST(InspectWheels, FindsDrivesInOtherUnitsByTheGyroAndByPoses) {
   EXPECT_THAT(remedy_of(speed, "sensors.wheels0.drive_scale"), HasSubstr("[0.104719"));
 }
 
-TEST(InspectPoses, DoNotTellTheSpeedOfASlowRobotByTheirErrors) {
-  constexpr double kSlow = 0.01;
-  std::int64_t n = 0;
-  const Inspection slow =
-      inspected(setup_of(testing::configuration("runs/simulated_swerve.yaml"),
-                         {"sensors.simulator0.duration_s=600", "placeholders.motion=straight"}),
-                {.wheels =
-                     [](EncoderSample& s) {
-                       for (double& rate : s.drive_rad_per_s) rate *= kSlow;
-                       return true;
-                     },
-                 .poses =
-                     [&n](PoseSample& s) {
-                       for (double& at : s.p_BinW_m) at *= kSlow;
-                       if (++n % 600 == 0) s.p_BinW_m[0] += 0.04;
-                       return true;
-                     }});
-  EXPECT_EQ(finding_of(slow, "wheels0", "speed").severity, Severity::kFits)
-      << finding_of(slow, "wheels0", "speed").what;
-  EXPECT_NEAR(figure_of(finding_of(slow, "wheels0", "speed"), "wheels by poses"), 1., 0.1);
-}
-
 TEST(InspectWheels, FindsThatAllDrivesAreReversedByPoses) {
   const Inspection reversed = with_wheels(
       setup_of(testing::configuration("runs/simulated_swerve.yaml")), [](EncoderSample& s) {
@@ -275,6 +189,27 @@ TEST(InspectWheels, NamesWhatIsUpsideDownOrReversed) {
                   [](EncoderSample& s) { std::swap(s.drive_rad_per_s[0], s.drive_rad_per_s[1]); });
   EXPECT_THAT(finding_of(sides, "wheels0", "rate").what,
               HasSubstr("drives on the left and on the right are exchanged"));
+}
+
+// A gyro tells of wheels that cannot contradict each other when they turned otherwise, and which
+// encoder stood still.
+TEST(InspectWheels, TellsWhenABaseOfTwoDrivesSlippedOrAnEncoderStoodStill) {
+  const auto during = [](const EncoderSample& s) {
+    return s.t_ns > 10'000'000'000 && s.t_ns < 13'000'000'000;
+  };
+  const Inspection slips = with_wheels(two_drives(), [&](EncoderSample& s) {
+    if (during(s)) s.drive_rad_per_s[0] *= 1.6;
+  });
+  EXPECT_THAT(faults_of(slips), ElementsAre("wheels0 contradicted"));
+  const Finding slip = finding_of(slips, "wheels0", "contradicted");
+  EXPECT_THAT(slip.what, HasSubstr("turns otherwise than imu0"));
+  EXPECT_NEAR(figure_of(slip, "longest"), 3., 0.6);
+  const Inspection stands = with_wheels(two_drives(), [&](EncoderSample& s) {
+    if (during(s)) s.drive_rad_per_s[1] = 0.;
+  });
+  EXPECT_THAT(finding_of(stands, "wheels0", "contradicted").what,
+              HasSubstr("(drive_2 reads 0 rad/s all that time)"));
+  EXPECT_THAT(faults_of(with_wheels(two_drives(), [](EncoderSample&) {})), IsEmpty());
 }
 
 }  // namespace

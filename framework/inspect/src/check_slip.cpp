@@ -1,0 +1,177 @@
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "checks.hpp"
+#include "viwo/eval/statistics.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/math/stamp.hpp"
+#include "viwo/math/time_text.hpp"
+#include "viwo/series/lag.hpp"
+#include "viwo/series/rate_grid.hpp"
+#include "wheel_calibration.hpp"
+
+namespace viwo::inspect {
+
+using series::RateGrid;
+using series::Recording;
+using series::Span;
+using series::turns_of;
+using series::Wheels;
+using series::YawRates;
+
+namespace {
+
+constexpr std::size_t kWindow = 50;  ///< cells: half a second
+constexpr double kWindow_s = static_cast<double>(kWindow) * RateGrid::kCell_s;
+
+/// Mean rates of a window, rad/s.
+struct Window {
+  std::int64_t begin_ns;
+  double gyro, wheels;
+};
+
+std::vector<Window> windows_of(const RateGrid& gyro, const RateGrid& wheels, std::int64_t lag) {
+  std::vector<Window> windows;
+  for (std::size_t i = 0; i + kWindow <= gyro.size(); i += kWindow) {
+    Window window{gyro.begin_ns() + static_cast<std::int64_t>(i) * RateGrid::kCellNs, 0., 0.};
+    std::size_t n = 0;
+    for (std::size_t k = i; k < i + kWindow; ++k) {
+      const std::int64_t j = static_cast<std::int64_t>(k) + lag;
+      if (j < 0 || j >= static_cast<std::int64_t>(wheels.size())) continue;
+      const auto of_wheels = static_cast<std::size_t>(j);
+      if (!gyro.has(k) || !wheels.has(of_wheels)) continue;
+      window.gyro += gyro[k].z();
+      window.wheels += wheels[of_wheels].z();
+      ++n;
+    }
+    if (5 * n < 4 * kWindow) continue;
+    window.gyro /= static_cast<double>(n);
+    window.wheels /= static_cast<double>(n);
+    windows.push_back(window);
+  }
+  return windows;
+}
+
+/// By how much the gyro turns otherwise than wheels that may be wrong by a factor, and it by a
+/// bias.
+std::vector<double> differences(const std::vector<Window>& windows) {
+  constexpr double kTurns_rad_per_s = 0.1, kMostOff = 1.5;
+  std::vector<double> factors, left;
+  for (const Window& w : windows) {
+    if (std::abs(w.wheels) > kTurns_rad_per_s) factors.push_back(w.gyro / w.wheels);
+  }
+  const double factor =
+      factors.empty() ? 1. : std::clamp(eval::median(factors), 1. / kMostOff, kMostOff);
+  for (const Window& w : windows) left.push_back(w.gyro - factor * w.wheels);
+  const double bias = eval::median(left);
+  for (double& one : left) one -= bias;
+  return left;
+}
+
+/// Windows that follow each other, in all of which the wheels turn too much, or too little.
+struct Stretch {
+  std::size_t first = 0, count = 0;
+  double turn_rad = 0.;
+};
+
+/// Drives that give one number all the time while another turns: " (drive_1 reads 0 rad/s then)".
+std::string constant_drives(const Wheels& wheels, std::int64_t from_ns, std::int64_t to_ns) {
+  const auto n = static_cast<std::size_t>(wheels.model->description().n_drive);
+  const EncoderSample* first = nullptr;
+  std::vector<bool> is_constant(n, true);
+  bool any_moves = false;
+  for (const EncoderSample& sample : wheels.samples) {
+    if (sample.t_ns < from_ns || sample.t_ns > to_ns) continue;
+    if (first == nullptr) first = &sample;
+    any_moves = any_moves || moves(sample);
+    for (std::size_t i = 0; i < n; ++i) {
+      is_constant[i] = is_constant[i] && sample.drive_rad_per_s[i] == first->drive_rad_per_s[i];
+    }
+  }
+  std::string text;
+  for (std::size_t i = 0; i < n && any_moves; ++i) {
+    if (!is_constant[i]) continue;
+    text += (text.empty() ? " (" : ", ") + ("drive_" + std::to_string(i + 1)) + " reads " +
+            significant(first->drive_rad_per_s[i], 3) + " rad/s all that time";
+  }
+  return text.empty() ? "" : text + ")";
+}
+
+/// Wheels that agree with a gyro but for a while.
+bool check_against(const Recording& recording, const Wheels& wheels, const YawRates& rates,
+                   Findings& out) {
+  const Span span = span_of(recording);
+  const RateGrid gyro(span.begin_ns, span.end_ns, rates.turns);
+  const RateGrid of_wheels(span.begin_ns, span.end_ns, turns_of(wheels));
+  constexpr double kAlike = 0.6, kMostLag_s = 0.3;
+  const auto lag = find_lag(gyro, of_wheels);
+  const bool is_lag = lag && lag->correlation > kAlike && std::abs(lag->lag_s) < kMostLag_s;
+  const std::int64_t cells = is_lag ? std::llround(lag->lag_s / RateGrid::kCell_s) : 0;
+  const std::vector<Window> windows = windows_of(gyro, of_wheels, cells);
+  constexpr std::size_t kFewest = 40;
+  if (windows.size() < kFewest) return false;
+  const std::vector<double> left = differences(windows);
+  std::vector<double> sizes;
+  for (const double one : left) sizes.push_back(std::abs(one));
+  constexpr double kNormal = 1.4826, kSigmas = 8., kLeast_rad_per_s = 0.08;
+  const double limit = std::max(kSigmas * kNormal * eval::median(sizes), kLeast_rad_per_s);
+  Stretch longest, now;
+  double beyond = 0.;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const bool is_beyond = sizes[i] > limit;
+    const bool goes_on = now.count > 0 && now.turn_rad * left[i] > 0.;
+    if (is_beyond) beyond += 1.;
+    if (!is_beyond) now = {};
+    if (is_beyond && !goes_on) now = {i, 0, 0.};
+    if (is_beyond) {
+      ++now.count;
+      now.turn_rad += kWindow_s * left[i];
+    }
+    if (std::abs(now.turn_rad) > std::abs(longest.turn_rad)) longest = now;
+  }
+  // What is wrong more often is another fault; what is less is how wheels are.
+  constexpr double kMostPart = 0.35, kLeast_rad = 0.2;
+  constexpr std::size_t kLeastWindows = 2;
+  if (longest.count < kLeastWindows || std::abs(longest.turn_rad) < kLeast_rad ||
+      beyond > kMostPart * static_cast<double>(left.size())) {
+    return false;
+  }
+  const std::int64_t from_ns = windows[longest.first].begin_ns;
+  const double length_s = kWindow_s * static_cast<double>(longest.count);
+  const std::string label = recording.label<EncoderSample>(wheels.sensor);
+  // A base that skids does so by some degrees where the ground changes.
+  constexpr double kFault_rad = 0.5;
+  out.push_back({label,
+                 std::abs(longest.turn_rad) < kFault_rad ? Severity::kNote : Severity::kFault,
+                 "contradicted",
+                 "turns otherwise than " + rates.label + " for " + significant(length_s, 2) +
+                     " s from " + time_text(from_ns - recording.begin_ns()) + " on, by " +
+                     significant(std::abs(longest.turn_rad), 2) +
+                     " rad in all, and as it does otherwise" +
+                     constant_drives(wheels, from_ns + to_ns(0.5 * kWindow_s),
+                                     from_ns + to_ns(length_s - 0.5 * kWindow_s)) +
+                     ": a wheel slipped, was blocked or lifted, or its encoder stood still",
+                 {{"turn", longest.turn_rad, "rad"}, {"longest", length_s, "s"}}});
+  return true;
+}
+
+}  // namespace
+
+void check_slip(const Recording& recording, Findings& out) {
+  for (const Wheels& wheels : recording.wheels) {
+    if (wheels.samples.empty() || !wheels.unusable.empty()) continue;
+    const std::string label = recording.label<EncoderSample>(wheels.sensor);
+    const bool is_told = std::any_of(out.begin(), out.end(), [&](const Finding& f) {
+      return f.sensor == label && f.check == "contradicted" && f.severity == Severity::kFault;
+    });
+    if (is_told) continue;
+    for (const YawRates& rates : yaw_rates_of(recording, wheels.prior)) {
+      if (check_against(recording, wheels, rates, out)) break;
+    }
+  }
+}
+
+}  // namespace viwo::inspect
