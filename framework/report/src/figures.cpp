@@ -4,6 +4,7 @@
 #include <fstream>
 #include <stdexcept>
 #include <system_error>
+#include <vector>
 
 #include "gnuplot.hpp"
 
@@ -45,11 +46,26 @@ void write(const std::filesystem::path& path, const std::string& text) {
   }
 }
 
+/// Those of a document before, by their scripts.
+void clear_figures(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> scripts;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    if (entry.path().extension() == ".gp") scripts.push_back(entry.path());
+  }
+  for (std::filesystem::path file : scripts) {
+    for (const char* extension : {".svg", ".pdf", ".dat", ".gp"}) {
+      clear(file.replace_extension(extension));
+    }
+  }
+}
+
 }  // namespace
 
 void write_figures(const std::filesystem::path& folder, const Document& document,
                    FigureFormat format) {
   require_gnuplot();
+  clear_figures(folder);
   Colours colours;
   int n = 0;
   for (const Section& section : document.sections) {
@@ -65,7 +81,6 @@ void write_figures(const std::filesystem::path& folder, const Document& document
       if (figure.script.empty()) continue;
       write(folder / (name + ".dat"), figure.data);
       write(folder / (name + ".gp"), figure.script);
-      clear(folder / (name + (format == FigureFormat::kSvg ? ".svg" : ".pdf")));
       run_gnuplot(folder, name + ".gp");
     }
   }

@@ -21,6 +21,7 @@ struct Curve {
   std::string colour;
   bool in_legend = false;
   std::size_t index = 0;  ///< of its block in the data file
+  std::vector<double> x;  ///< those of the series, or the places of its categories
   double bar_offset = 0.;
   double bar_width = 0.;
 
@@ -30,8 +31,28 @@ struct Curve {
   bool has_error_bars() const { return has_band() && (is_bars() || is_markers()); }
 };
 
-double x_of(const Series& series, std::size_t i) {
-  return series.categories.empty() ? series.x[i] : static_cast<double>(i);
+/// Of all series, each in its place.
+std::vector<std::string> categories_of(const std::vector<Curve>& curves) {
+  std::vector<std::string> all;
+  for (const Curve& curve : curves) {
+    for (const std::string& category : curve.series->categories) {
+      if (std::find(all.begin(), all.end(), category) == all.end()) all.push_back(category);
+    }
+  }
+  return all;
+}
+
+void place_points(std::vector<Curve>& curves) {
+  const std::vector<std::string> all = categories_of(curves);
+  for (Curve& curve : curves) {
+    curve.x = curve.series->x;
+    if (curve.series->categories.empty()) continue;
+    curve.x.clear();
+    for (const std::string& category : curve.series->categories) {
+      const auto place = std::find(all.begin(), all.end(), category) - all.begin();
+      curve.x.push_back(static_cast<double>(place));
+    }
+  }
 }
 
 /// Least distance of neighbouring bars; 1 for a single one.
@@ -40,7 +61,7 @@ double bar_spacing(const std::vector<Curve>& curves) {
   for (const Curve& curve : curves) {
     if (!curve.is_bars()) continue;
     for (std::size_t i = 1; i < curve.series->y.size(); ++i) {
-      const double step = std::abs(x_of(*curve.series, i) - x_of(*curve.series, i - 1));
+      const double step = std::abs(curve.x[i] - curve.x[i - 1]);
       if (step > 0.) least = std::min(least, step);
     }
   }
@@ -82,6 +103,7 @@ std::vector<Curve> curves_of(const Plot& plot, Colours& colours) {
   if (listed.size() < 2) {  // one name says nothing that the caption does not
     for (Curve& curve : curves) curve.in_legend = false;
   }
+  place_points(curves);
   place_bars(curves);
   return curves;
 }
@@ -95,7 +117,7 @@ std::string data_of(const std::vector<Curve>& curves) {
             (curve.has_band() ? ", low, high\n" : "\n");
     bool any = false, interrupted = false;
     for (std::size_t i = 0; i < series.y.size(); ++i) {
-      const double x = x_of(series, i);
+      const double x = curve.x[i];
       if (!std::isfinite(x) || !std::isfinite(series.y[i])) {
         interrupted = any;  // no empty line at the beginning; two of them would end the block
         continue;
@@ -308,13 +330,10 @@ std::string script_of(const Plot& plot, const std::string& name, FigureFormat fo
   const int legend = legend_lines(curves);
   double height_cm = body_height_cm(plot, curves) + kLineCm * legend;
   std::string axes;
-  const auto named = std::find_if(curves.begin(), curves.end(), [](const Curve& curve) {
-    return !curve.series->categories.empty();
-  });
-  if (named != curves.end()) {
-    height_cm += place_names(named->series->categories, axes);
-    axes +=
-        "set xrange [-0.6:" + number(static_cast<double>(named->series->y.size()) - 0.4) + "]\n";
+  const std::vector<std::string> categories = categories_of(curves);
+  if (!categories.empty()) {
+    height_cm += place_names(categories, axes);
+    axes += "set xrange [-0.6:" + number(static_cast<double>(categories.size()) - 0.4) + "]\n";
   } else if (lines_only) {
     axes += "set autoscale xfix\n";
   }

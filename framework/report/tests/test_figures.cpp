@@ -208,6 +208,37 @@ TEST(Figures, LeaveTheirDataBehind) {
             "\n\n# second: x, y, low, high\n1 2 1.5 2.5\n");
 }
 
+TEST(Figures, PutBarsAboveTheirNamesThoughASeriesHasNotAllOfThem) {
+  SKIP_WITHOUT_GNUPLOT();
+  const TemporaryFolder folder;
+  Plot plot{.title = "Bars", .x_label = "", .y_label = ""};
+  plot.series = {
+      {.name = "short", .x = {}, .y = {1., 3.}, .draw = Draw::kBars, .categories = {"a", "c"}},
+      {.name = "long",
+       .x = {},
+       .y = {4., 5., 6.},
+       .draw = Draw::kBars,
+       .categories = {"a", "b", "c"}}};
+  write_figures(folder.path(), with_plot(plot), FigureFormat::kSvg);
+  // Names in the order in which they come: a, c, b.
+  EXPECT_EQ(text_of(folder.path() / "01_bars.dat"),
+            "# short: x, y\n0 1\n1 3\n\n\n# long: x, y\n0 4\n2 5\n1 6\n");
+  EXPECT_THAT(text_of(folder.path() / "01_bars.gp"), HasSubstr("set xrange [-0.6:2.6]"));
+}
+
+TEST(Figures, OfADocumentBeforeDoNotStandBesideThem) {
+  SKIP_WITHOUT_GNUPLOT();
+  const TemporaryFolder folder;
+  Plot plot{.title = "Old", .x_label = "", .y_label = ""};
+  plot.series = {{.name = "s", .x = {1., 2.}, .y = {1., 2.}}};
+  write_figures(folder.path(), with_plot(plot), FigureFormat::kSvg);
+  std::ofstream(folder.path() / "mine.svg") << "mine";
+  plot.title = "New";
+  write_figures(folder.path(), with_plot(plot), FigureFormat::kSvg);
+  EXPECT_THAT(file_names(folder.path()),
+              ElementsAre("01_new.dat", "01_new.gp", "01_new.svg", "mine.svg"));
+}
+
 /// The compressed streams of a PDF, unpacked; without those that are something else.
 std::string streams_of(const std::string& pdf) {
   std::string all;
