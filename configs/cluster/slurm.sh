@@ -1,6 +1,7 @@
 #!/bin/sh
 # A campaign as an array of jobs, eight shards of one core each, then the tables:
-#   EXPERIMENT=configs/experiments/paper_accuracy.yaml OUT=$HOME/results/paper sbatch configs/cluster/slurm.sh
+#   export EXPERIMENT=configs/experiments/paper_accuracy.yaml OUT=$HOME/results/paper
+#   sbatch configs/cluster/slurm.sh
 #   viwo experiment $EXPERIMENT --out $OUT --collect        # when all are done; names what is missing
 # A task that is killed and requeued goes on where it was.
 #SBATCH --job-name=viwo

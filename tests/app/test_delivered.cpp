@@ -237,7 +237,7 @@ TEST_F(DeliveredTest, TheJobFilesOfClustersRunShards) {
   expect_done({"experiment", experiment, "--out", out, "--collect"});
   // What the other one starts, word by word.
   const std::string job = testing::text_of(kConfigFolder + "cluster/kubernetes.yaml");
-  EXPECT_NE(job.find("[viwo, experiment, configs/experiments/paper_accuracy.yaml, --out,"),
+  EXPECT_NE(job.find("[viwo, experiment, /usr/share/viwo/configs/experiments/paper_accuracy.yaml,"),
             std::string::npos);
   EXPECT_NE(job.find("--shard, JOB_COMPLETION_INDEX/8]"), std::string::npos);
 }

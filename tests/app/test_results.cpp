@@ -66,6 +66,11 @@ TEST_F(ResultsTest, GoToAFolderNamedAfterTheConfigurationByDefault) {
   write("run.yaml", kRun);
   expect_done({"run", "run.yaml"});
   EXPECT_TRUE(fs::exists(at("results/run/report.html")));
+  // What another command makes of the same configuration does not replace it.
+  const std::string before = read("results/run/report.html");
+  viwo({"inspect", "run.yaml"});
+  EXPECT_TRUE(fs::exists(at("results/run_inspect/report.html")));
+  EXPECT_EQ(read("results/run/report.html"), before);
 }
 
 TEST_F(ResultsTest, AreTheSameForTheSameSeedAndOthersForAnother) {
@@ -111,6 +116,17 @@ TEST_F(ResultsTest, OfEachRunAreKeptOnRequest) {
     EXPECT_TRUE(fs::exists(at("out/runs") / run / "trajectory.tum")) << run;
   }
   EXPECT_EQ(read("out/runs/a_1/trajectory.tum"), read("out/runs/b_1/trajectory.tum"));
+}
+
+TEST_F(ResultsTest, OfEachRunHaveAFolderOfTheirOwn) {
+  write("run.yaml", kRun);
+  write("e.yaml",
+        "experiment: e\nbase: run.yaml\nvariants:\n  a_b:\n  a:\n"
+        "recordings:\n  - {name: c}\n  - {name: b_c}\n");
+  const Outcome outcome = viwo({"experiment", "e.yaml", "--out", "out", "--keep-runs"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.err.find("two runs would be kept in out/runs/a_b_c"), std::string::npos)
+      << outcome.err;
 }
 
 TEST_F(ResultsTest, ThatCannotBeWrittenAreAFailure) {
@@ -162,6 +178,19 @@ TEST_F(ResultsTest, AreWrittenForARunThatDiverges) {
   EXPECT_EQ(outcome.out.find("status diverged: "), 0U) << outcome.out;
   EXPECT_EQ(summary().at("status"), "diverged");
   EXPECT_TRUE(fs::exists(at("out/report.html")));
+}
+
+// What cannot be compared is no reason to lose what was estimated.
+TEST_F(ResultsTest, AreWrittenWhereNothingOfTheReferenceCanBeCompared) {
+  write("run.yaml", kRun);
+  const Outcome outcome =
+      viwo({"run", "run.yaml", "--out", "out", "--set", "odometry.reference_time_offset_s=10"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("warning: no accuracy: no pose of the estimate lies in the time of"),
+            std::string::npos)
+      << outcome.out;
+  EXPECT_TRUE(summary().at("accuracy").is_null());
+  EXPECT_TRUE(fs::exists(at("out/trajectory.tum")));
 }
 
 TEST_F(ResultsTest, AreDoubtfulWhereTheReferenceContradictsThem) {

@@ -369,7 +369,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    viwo::convert(words[0], words[1]);
+    const std::filesystem::path bag = words[1];
+    viwo::convert(words[0], bag.has_filename() ? bag : bag.parent_path());  // "folder/"
     return 0;
   } catch (const viwo::InputError& error) {
     std::cerr << error.what() << "\n";

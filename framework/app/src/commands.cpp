@@ -39,22 +39,24 @@ using namespace experiment;
 using log::make_folder;
 using log::write_text;
 
-/// The folder asked for, or results/<name of the configuration file>.
-std::filesystem::path out_folder(const Arguments& arguments) {
+/// The folder asked for, or results/<name of the configuration file>; what makes no run of it has
+/// its own, with the name of the `command` behind.
+std::filesystem::path out_folder(const Arguments& arguments, const std::string& command = "") {
   if (arguments.out) return *arguments.out;
-  return std::filesystem::path("results") / std::filesystem::path(arguments.positional[0]).stem();
+  std::filesystem::path name = std::filesystem::path(arguments.positional[0]).stem();
+  if (!command.empty()) name += "_" + command;
+  return "results" / name;
 }
 
 /// It is made, and belongs to this command: whether results can be written shows before the work.
 class OutFolder {
  public:
-  explicit OutFolder(const Arguments& arguments)
-      : folder_(made(arguments)), lock_(folder_, false) {}
+  explicit OutFolder(std::filesystem::path folder)
+      : folder_(made(std::move(folder))), lock_(folder_, false) {}
   const std::filesystem::path& path() const { return folder_; }
 
  private:
-  static std::filesystem::path made(const Arguments& arguments) {
-    std::filesystem::path folder = out_folder(arguments);
+  static std::filesystem::path made(std::filesystem::path folder) {
     make_folder(folder);
     return folder;
   }
@@ -91,7 +93,7 @@ class Figures {
 class LiveOutput {
  public:
   LiveOutput(const RunSetup& setup, const std::filesystem::path& folder, RunHooks& hooks)
-      : stream_(folder) {
+      : stream_(begun(setup, folder)) {
     hooks.on_epoch = [this, then = hooks.on_epoch](const RunResult& result) {
       stream_.epoch(result);
       if (then) then(result);
@@ -108,6 +110,14 @@ class LiveOutput {
   }
 
  private:
+  /// What is there of an earlier run goes before the first epoch, for this one may be killed.
+  static const std::filesystem::path& begun(const RunSetup& setup,
+                                            const std::filesystem::path& folder) {
+    log::remove_results(folder, kResultsOfRun);
+    write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
+    return folder;
+  }
+
   RunStream stream_;
 };
 
@@ -150,10 +160,7 @@ RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
 /// The calibration that a run starts from, and what it is compared with, must not be lost.
 void refuse_to_replace_inputs(const std::filesystem::path& folder, const config::Node& resolved) {
   const std::vector<std::filesystem::path> inputs = input_files(resolved);
-  for (const char* const name : {"calibration.yaml", "calibration.csv", "trajectory.tum",
-                                 "reference.tum", "summary.json", "report.html"}) {
-    refuse_to_replace(folder / name, inputs);
-  }
+  for (const char* const name : kResultsOfRun) refuse_to_replace(folder / name, inputs);
 }
 
 /// The results of a shard wait for those of the others.
@@ -184,12 +191,11 @@ int run_command(const Arguments& arguments) {
   view::PictureSinks sinks = view::open_sinks(setup, arguments.show, arguments.video);
   const RunData data = collect(setup, LiveSensors::kAllowed);
   view::RunPictures pictures(setup, data, std::move(sinks));
-  const OutFolder out(arguments);
+  const OutFolder out(out_folder(arguments));
   const std::filesystem::path& folder = out.path();
   const Figures figures(arguments, folder);
   std::optional<EstimateOutput> mcap;  // behind what else may be refused: it empties its file
   if (!arguments.mcap.empty()) mcap.emplace(arguments.mcap, setup);
-  write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
   // Until all is written. What has no filter is done in no time.
   std::optional<InterruptSignal> interrupt;
   if (setup.filter) interrupt.emplace();
@@ -258,7 +264,7 @@ int observability_command(const Arguments& arguments) {
   ExperimentOptions options;
   options.assignments = arguments.assignments;
   const ExperimentSetup setup = observability::read_observability(arguments.positional[0], options);
-  const OutFolder out(arguments);
+  const OutFolder out(out_folder(arguments, "observability"));
   const std::filesystem::path& folder = out.path();
   const Figures figures(arguments, folder);
   const observability::ObservabilityReport report = [&] {
@@ -278,9 +284,9 @@ int calibrate_command(const Arguments& arguments) {
   calibration::CalibrationSetup setup =
       calibration::read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
   for (const calibration::CalibrationRecording& recording : setup.recordings) {
-    refuse_to_replace_inputs(out_folder(arguments), recording.setup.resolved);
+    refuse_to_replace_inputs(out_folder(arguments, "calibrate"), recording.setup.resolved);
   }
-  const OutFolder out(arguments);
+  const OutFolder out(out_folder(arguments, "calibrate"));
   const std::filesystem::path& folder = out.path();
   const calibration::CalibrationResult result = [&] {
     Progress progress;
@@ -314,7 +320,7 @@ int plan_command(const Arguments& arguments) {
   const plan::PlanSetup setup =
       plan::read_plan_setup(arguments.positional[0], arguments.assignments, plugins);
   const plan::Plan found = plan::make_plan(setup);
-  const OutFolder out(arguments);
+  const OutFolder out(out_folder(arguments, "plan"));
   const std::filesystem::path& folder = out.path();
   write_plan(folder, setup, found);
   std::cout << describe(setup, found) << "motion: " << (folder / "plan.csv").string()
@@ -332,7 +338,7 @@ int inspect_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
   if (!arguments.fix.empty()) refuse_to_replace(arguments.fix, input_files(setup.resolved));
-  const OutFolder out(arguments);
+  const OutFolder out(out_folder(arguments, "inspect"));
   const std::filesystem::path& folder = out.path();
   const inspect::Inspection inspection = inspect::inspect(setup);
   write_inspection(folder, inspection);
@@ -351,7 +357,7 @@ int simulate_command(const Arguments& arguments) {
   if (std::filesystem::is_regular_file(*arguments.out)) {
     throw InputError(arguments.out->string() + "  is a file, not a folder");
   }
-  const OutFolder out(arguments);
+  const OutFolder out(*arguments.out);
   const SimulateResult result = write_log(setup, *arguments.out);
   std::cout << describe(result) << " in " << arguments.out->string() << "\n";
   return 0;

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <string>
@@ -158,6 +159,19 @@ Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate, const
   result.end_deg = angle_error_deg(from_start.back());
   result.end_yaw_deg = result.series.yaw_error_deg.back();
   return result;
+}
+
+Trajectory aligned(const Trajectory& reference, Trajectory estimate, Alignment alignment) {
+  if (alignment == Alignment::kNone) return estimate;
+  std::vector<PosePair> pairs;
+  for (const StampedPose& pose : estimate) {
+    constexpr double kAnyGap = std::numeric_limits<double>::infinity();
+    if (const auto at = interpolate(reference, pose.t_ns, kAnyGap)) pairs.push_back({*at, pose});
+  }
+  if (pairs.empty()) return estimate;
+  const RigidTransform T_EtoR = align(pairs, alignment);
+  for (StampedPose& pose : estimate) pose = T_EtoR * pose;
+  return estimate;
 }
 
 std::string length_text(double length_m) {

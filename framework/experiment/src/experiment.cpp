@@ -10,7 +10,6 @@
 #include <set>
 
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include "run_identity.hpp"
@@ -23,7 +22,9 @@
 #include "viwo/log/files.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/results/run_output.hpp"
+#include "viwo/run/parallel_for.hpp"
 #include "viwo/run/thin.hpp"
+#include "viwo/setup/input_files.hpp"
 
 namespace viwo::experiment {
 namespace {
@@ -145,6 +146,8 @@ class Runner {
         const Node run = configuration(v, r);
         const RunSetup check = of_recording(setup_.recordings[r], [&] {
           RunSetup read = read_run(run, plugins_);
+          const std::vector<std::filesystem::path> inputs = input_files(read.resolved);
+          for (const char* const name : kResults) refuse_to_replace(folder_ / name, inputs);
           if (!options_.collect && (v == 0 || r == 0)) collect(read);
           return read;
         });
@@ -157,6 +160,7 @@ class Runner {
         if (stopped()) throw Interrupted("interrupted before the first run");
       }
     }
+    if (options_.keep_runs) require_own_folders();
   }
 
   /// Takes over what the journal has, or throws it away.
@@ -260,6 +264,15 @@ class Runner {
   struct Unwritable {
     std::string text;
   };
+
+  void require_own_folders() const {
+    std::set<std::filesystem::path> folders;
+    for (const ExperimentRun& run : result_.runs) {
+      if (folders.insert(run_folder(run)).second) continue;
+      throw InputError("--keep-runs: two runs would be kept in " + run_folder(run).string() +
+                       ", made of the names of variant and recording - rename one of them");
+    }
+  }
 
   /// Whether a warning is the first of its kind, whatever its numbers, of a variant.
   bool is_new(const ExperimentRun& run, const std::string& text) {
@@ -375,7 +388,9 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
   progress.begin(setup.name, runner.cells());
   runner.open_journal(progress);
   if (options.collect) runner.require_all();
-  tbb::parallel_for(std::size_t{0}, result.runs.size(), [&](std::size_t i) {
+  // Those of another experiment are not to be taken for those of this one when it is interrupted.
+  if (!options.collect && !options.shard) log::remove_results(folder, kResults);
+  parallel_for(result.runs.size(), [&](std::size_t i) {
     ExperimentRun& run = result.runs[i];
     if (run.taken_over || !runner.is_mine(i)) return;
     if (runner.run(run, progress)) progress.done(line_of(setup, run));

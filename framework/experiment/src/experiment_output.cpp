@@ -159,7 +159,7 @@ std::string runs_csv(const ExperimentResult& result) {
 
 void write_experiment(const std::filesystem::path& folder, const ExperimentResult& result) {
   log::make_folder(folder);
-  log::remove_results(folder, {"summary.json", "report.html"});
+  log::remove_results(folder, kResults);
   log::write_text(folder / "runs.csv", runs_csv(result));
   log::write_text(folder / "summary.json", json_text(summary_of(result)));
   log::write_text(folder / "report.html", report::to_html(report_of(result)));

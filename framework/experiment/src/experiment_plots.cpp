@@ -274,7 +274,10 @@ std::vector<Section> recording_sections(const ExperimentResult& result) {
       if (top.series.empty() && !run->result.reference.empty()) {
         top.series.push_back(truth_series(run->result.reference));
       }
-      top.series.push_back(path_series(variant, run->result.estimate));
+      const eval::Alignment alignment =
+          run->result.accuracy ? run->result.accuracy->alignment : eval::Alignment::kNone;
+      top.series.push_back(path_series(
+          variant, eval::aligned(run->result.reference, run->result.estimate, alignment)));
       add_errors(run->result, variant, position, yaw);
     }
     Section section{heading_of(result.setup, result.setup.recordings[r]), {}};

@@ -35,10 +35,16 @@ std::string checksum_of(const fs::path& file) {
 /// Of all files below it but those of the results, in the order of their names.
 std::string checksums_of(const fs::path& folder, const fs::path& results) {
   std::vector<fs::path> files;
-  for (fs::recursive_directory_iterator at(folder), end; at != end; ++at) {
+  // Parts of a log may be links to folders. One that leads to where it is is an error that is told.
+  constexpr auto kFollow = fs::directory_options::follow_directory_symlink;
+  constexpr int kDeepest = 32;
+  for (fs::recursive_directory_iterator at(folder, kFollow), end; at != end; ++at) {
     if (at->is_regular_file()) files.push_back(at->path());
     if (at->is_directory() && fs::weakly_canonical(at->path()) == results) {
       at.disable_recursion_pending();
+    }
+    if (at.depth() > kDeepest) {
+      throw std::runtime_error(at->path().string() + "  lies too deep: a link to where it is?");
     }
   }
   std::sort(files.begin(), files.end());
@@ -63,6 +69,7 @@ std::string RunIdentity::of(const RunSetup& run) {
   for (const SensorEntry& entry : run.sensors) add(entry.sensor.info);
   if (run.filter) {
     for (const auto& entry : run.filter->updates) add(entry.update.info);
+    for (const WheelSet& set : run.filter->wheels) add(set.info);
   }
   config::Node configuration = run.resolved;
   replace_paths(configuration);

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kExtension = ".cbor";
-constexpr std::string_view kUnfinished = ".cbor.tmp";
+constexpr std::string_view kUnfinished = ".tmp";
 constexpr std::size_t kChecksumBytes = 4;
 
 std::string checksum(std::string_view bytes) {
@@ -123,7 +123,10 @@ void RunJournal::write(const RunKey& key, const RunResult& run) const {
   std::string bytes;
   nlohmann::json::to_cbor(entry, bytes);
   bytes += checksum(bytes);
-  log::write_bytes(file_of(key), bytes);
+  // The same shard may run twice.
+  log::FileWriter out(file_of(key), log::Appears::kWholeBesideOthers);
+  out.write(bytes);
+  out.commit();
 }
 
 void RunJournal::remove() const {

@@ -171,6 +171,19 @@ TEST(RunIdentity, IsOfContentsWhereverTheyLie) {
   fs::rename(folder / "there" / "images" / "cam0" / "1.png",
              folder / "there" / "images" / "cam0" / "2.png");
   EXPECT_NE(first, identity("there"));
+  // Parts of a log may be links: what they lead to counts.
+  for (const char* place : {"one", "other"}) {
+    fs::create_directories(folder / place);
+    std::ofstream(folder / place / "1.png") << place;
+  }
+  fs::create_directory_symlink(folder / "one", folder / "there" / "images" / "cam1");
+  const std::string with_one = identity("there");
+  fs::remove(folder / "there" / "images" / "cam1");
+  fs::create_directory_symlink(folder / "other", folder / "there" / "images" / "cam1");
+  EXPECT_NE(with_one, identity("there"));
+  fs::create_directory_symlink(folder / "there" / "images", folder / "there" / "images" / "round");
+  EXPECT_THAT(testing::error_of<std::runtime_error>([&] { identity("there"); }),
+              HasSubstr("lies too deep: a link to where it is?"));
 }
 
 }  // namespace

@@ -167,6 +167,18 @@ TEST_F(Journal, GivesARunBackOnlyUnderItsOwnKey) {
   EXPECT_EQ(files_in(folder_ / "journal"), 1);
 }
 
+// The same shard may run twice: what one has not finished is not the other's.
+TEST_F(Journal, HasUnfinishedFilesOfEachProcessAndRemovesThem) {
+  const fs::path folder = folder_ / "journal";
+  fs::create_directories(folder);
+  std::ofstream(folder / "a,b,1.cbor.4711@elsewhere.tmp") << "of another process";
+  const RunJournal journal(folder_);
+  journal.write({"a", "b", 1, "configuration"}, odd_result());
+  EXPECT_EQ(files_in(folder), 2);
+  journal.remove();
+  EXPECT_FALSE(fs::exists(folder));
+}
+
 TEST_F(Journal, TakesNothingFromAFileThatIsCutOrChangedAnywhere) {
   const RunJournal journal(folder_);
   RunResult run;

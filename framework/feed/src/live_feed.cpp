@@ -6,6 +6,7 @@
 // full waits. A sensor that works on images then gets too many of them, of which the oldest go, and
 // there is less to do; a sensor that still gets too much drops by itself, and counts.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -138,7 +139,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     const auto has_ended = [&](const std::string& name) {
       return std::find(left.begin(), left.end(), name) == left.end();
     };
-    report.reference = reference_.points();
+    report.reference = reference();
     gate_.append_to(report.rejections);
     if (!has_imu_) report.cause = kNothingCame;
     for (const Worker& worker : workers_) {
@@ -178,6 +179,21 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   }
 
  private:
+  void add_to_reference(const StampedPose& pose) {
+    if (newest_of_reference_) reference_.add({*newest_of_reference_, pose});
+    newest_of_reference_ = pose;
+  }
+
+  Trajectory reference() const {
+    Trajectory poses;
+    for (const auto& pair : reference_.points()) {
+      for (const StampedPose& pose : pair) {
+        if (poses.empty() || pose.t_ns > poses.back().t_ns) poses.push_back(pose);
+      }
+    }
+    return poses;
+  }
+
   struct Arrival {
     const std::string* sensor = nullptr;
     Measurement measurement;
@@ -326,7 +342,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
           break;
         case Consumer::kReferencePoses:
           if (gate_.accept(sensor, sample)) {
-            reference_.add(stamped_pose(*sample.get_if<PoseSample>()));
+            add_to_reference(stamped_pose(*sample.get_if<PoseSample>()));
           }
           break;
         default:
@@ -342,7 +358,9 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   std::vector<Worker> workers_;
   bool has_imu_ = false;
   std::set<std::string> checked_;  ///< sensors whose encoder channels have been looked at
-  BoundedSeries<StampedPose> reference_{kMostReference};
+  std::optional<StampedPose> newest_of_reference_;
+  /// Each with the one before: between two there is a pose to compare with, however few are kept.
+  BoundedSeries<std::array<StampedPose, 2>> reference_{kMostReference};
   SampleGate gate_;  ///< of the reference
   ImageArrivals arrivals_of_images_;
   TimeStatistics latency_ms_;

@@ -1,5 +1,6 @@
 #include "viwo/log/files.hpp"
 
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <stdexcept>
@@ -26,6 +27,13 @@ bool sync_folder(const std::filesystem::path& folder) {
   ::close(fd);
   errno = error;
   return well;
+}
+
+/// ".PROCESS@HOST", of processes on all machines that share a file system.
+std::string this_process() {
+  std::array<char, 256> host{};
+  if (::gethostname(host.data(), host.size() - 1) != 0) host[0] = '\0';
+  return "." + std::to_string(::getpid()) + "@" + host.data();
 }
 
 }  // namespace
@@ -71,7 +79,8 @@ FileWriter::FileWriter(std::filesystem::path file, Appears appears)
     if (fd_ < 0 || ::fcntl(fd_, F_SETFL, 0) != 0) fail();
     return;
   }
-  if (appears == Appears::kWhole) unfinished_ += ".tmp";
+  if (appears == Appears::kWholeBesideOthers) unfinished_ += this_process();
+  if (appears != Appears::kAtOnce) unfinished_ += ".tmp";
   // What is there is not written into: it may be a link to a file that is none of the results.
   ::unlink(unfinished_.c_str());
   fd_ = ::open(unfinished_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);

@@ -134,9 +134,13 @@ void add_trajectory_section(const RunResult& result, Document& document) {
   Plot top{"Seen from above", "x [m]", "y [m]"};
   top.equal_axes = true;
   top.height_px = kTopViewHeight;
-  top.series.push_back(
-      report::trajectory_series("estimate", result.estimate, report::kMaxCurvePoints));
+  const eval::Alignment alignment =
+      result.accuracy ? result.accuracy->alignment : eval::Alignment::kNone;
+  top.series.push_back(report::trajectory_series(
+      "estimate", eval::aligned(result.reference, result.estimate, alignment),
+      report::kMaxCurvePoints));
   top.series.back().colour = kEstimateColour;
+  if (alignment != eval::Alignment::kNone) top.caption = "The estimate is aligned with the truth.";
   if (!result.reference.empty()) {
     top.series.push_back(
         report::trajectory_series("truth", result.reference, report::kMaxCurvePoints));

@@ -117,8 +117,7 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
     result.warnings.push_back(std::move(line));
   }
   if (result.status == RunStatus::kOk && !result.reference.empty()) {
-    result.accuracy = eval::evaluate(result.reference, result.estimate, setup.evaluation);
-    warn_of_gaps(result);
+    compare(result.reference, setup, result);
   }
   doubt(result);
 }

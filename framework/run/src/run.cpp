@@ -193,9 +193,8 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
     result.cause = "none of the encoder samples could be used";
   }
   if (result.status == RunStatus::kOk && !data.reference.empty()) {
-    result.accuracy = eval::evaluate(data.reference, result.estimate, setup.evaluation);
+    compare(data.reference, setup, result);
     result.nees_planar = nees.mean();
-    warn_of_gaps(result);
   }
   look_at_samples(setup, data, result);
   doubt(result);

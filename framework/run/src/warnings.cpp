@@ -177,14 +177,37 @@ std::vector<std::string> too_sure(const RunResult& result) {
 
 namespace {
 
-/// Root mean square distance of the reference from its middle.
-double extent_m(const Trajectory& reference) {
+/// Root mean square distance of a trajectory from its middle.
+double extent_m(const Trajectory& poses) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  const auto n = static_cast<double>(reference.size());
-  for (const StampedPose& pose : reference) mean += pose.p_BinW / n;
+  const auto n = static_cast<double>(poses.size());
+  for (const StampedPose& pose : poses) mean += pose.p_BinW / n;
   double squares = 0.;
-  for (const StampedPose& pose : reference) squares += (pose.p_BinW - mean).squaredNorm() / n;
+  for (const StampedPose& pose : poses) squares += (pose.p_BinW - mean).squaredNorm() / n;
   return std::sqrt(squares);
+}
+
+/// The poses of `reference` while there are those of `estimate`.
+Trajectory during(const Trajectory& estimate, const Trajectory& reference) {
+  Trajectory poses;
+  for (const StampedPose& pose : reference) {
+    const bool is_in = pose.t_ns >= estimate.front().t_ns && pose.t_ns <= estimate.back().t_ns;
+    if (is_in) poses.push_back(pose);
+  }
+  return poses;
+}
+
+/// One goes many times as far as the other, as in other units; "" if they do not.
+std::string size_contradiction(const RunResult& result) {
+  constexpr double kFar_m = 0.5, kMany = 5.;
+  if (result.estimate.empty()) return "";
+  const double reference_m = extent_m(during(result.estimate, result.reference));
+  const double estimate_m = extent_m(result.estimate);
+  const double larger = std::max(reference_m, estimate_m);
+  if (!(larger > kFar_m && larger > kMany * std::min(reference_m, estimate_m))) return "";
+  return "it goes " + significant(reference_m, 3) +
+         " m from its middle, root mean square, and the estimate " + significant(estimate_m, 3) +
+         " m";
 }
 
 /// The error on segments by their length: the least of all lengths, and the largest.
@@ -250,15 +273,22 @@ void doubt(RunResult& result) {
     text = "after " + eval::length_text(std::round(result.accuracy->path_length_m)) +
            " m it is off by " + eval::length_text(std::round(result.accuracy->end_m)) + " m";
   } else {
-    return;
+    text = size_contradiction(result);
   }
+  if (text.empty()) return;
   result.doubts.push_back("the reference contradicts the estimate: " + text +
                           " - units, signs, order or mount of a sensor are wrong, or of "
                           "the reference: viwo inspect tells which");
 }
 
-void warn_of_gaps(RunResult& result) {
-  if (!result.accuracy || result.accuracy->n_in_gap <= result.accuracy->n_poses) return;
+void compare(const Trajectory& reference, const RunSetup& setup, RunResult& result) {
+  try {
+    result.accuracy = eval::evaluate(reference, result.estimate, setup.evaluation);
+  } catch (const InputError& error) {
+    result.warnings.push_back(std::string("no accuracy: ") + error.what());
+    return;
+  }
+  if (result.accuracy->n_in_gap <= result.accuracy->n_poses) return;
   result.warnings.push_back("accuracy is of " + std::to_string(result.accuracy->n_poses) + " of " +
                             std::to_string(result.accuracy->n_poses + result.accuracy->n_in_gap) +
                             " poses alone: the others lie in gaps of the reference of more than "

@@ -266,6 +266,28 @@ TEST(Doubts, AreOfAnEstimateThatIsWorseThanNone) {
   EXPECT_THAT(doubts(1.2), ElementsAre());
 }
 
+// Segments that turn are off by less than their length, and both stay near their middles.
+TEST(Doubts, AreOfAReferenceInOtherUnits) {
+  const auto doubts = [](double scale, std::int64_t first) {
+    RunResult result;
+    result.status = RunStatus::kOk;
+    for (int i = 0; i < 100; ++i) {
+      const double angle = 0.1 * i, size = i < first ? 100. : scale;
+      result.reference.push_back({i, {size * std::cos(angle), size * std::sin(angle), 0.}});
+      if (i >= first) result.estimate.push_back({i, {std::cos(angle), std::sin(angle), 0.}});
+    }
+    result.accuracy.emplace();
+    result.accuracy->rpe = {{.length_m = 0.5, .count = 100, .mean_m = 0.2}};
+    result.accuracy->path_length_m = 10.;
+    doubt(result);
+    return result.doubts;
+  };
+  EXPECT_THAT(doubts(1000., 0), ElementsAre(HasSubstr("it goes 981 m from its middle")));
+  EXPECT_THAT(doubts(2., 0), ElementsAre());
+  // What it does before there is an estimate is not compared.
+  EXPECT_THAT(doubts(1., 20), ElementsAre());
+}
+
 TEST(Doubts, AreOfAFilterThatEndsFarOffAndIsNoBetterOnTheWay) {
   RunResult result;
   result.status = RunStatus::kOk;

@@ -101,9 +101,9 @@ void describe_rig(const RunSetup& setup, CalibrationFile& file) {
   for (const WheelSet& set : setup.filter->wheels) {
     if (file.intrinsics.empty()) break;  // no update has declared any wheels
     if (set.prior.name.empty()) {
-      file.model = set.model_name;
+      file.model = set.info.name;
     } else {
-      file.wheel_sets[set.prior.name] = set.model_name;
+      file.wheel_sets[set.prior.name] = set.info.name;
     }
   }
   const auto& cameras = setup.filter->cameras;

@@ -248,6 +248,7 @@ void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext&
   }
   Node resolved_sets = Node::empty_map(sets->mark());
   for (const auto& entry : sets->entries()) {
+    if (!is_name(entry, "wheel_sets", errors)) continue;
     const std::string path = "wheel_sets." + entry.key;
     const Node* kinematics = entry.value.is_map() ? entry.value.find("kinematics") : nullptr;
     if (kinematics == nullptr) {
@@ -273,9 +274,9 @@ void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext&
                         [&] { return std::make_shared<const WheelModel>(model.object); });
     set.prior.wheels.x_WI = set.model->nominal();
     set.prior.sigma_intrinsics = set.model->prior_sigma();
-    set.model_name = model.info.name;
-    if (context.start != nullptr && context.start->has_wheels(entry.key, set.model_name)) {
-      context.start->take_intrinsics(entry.key, *set.model, set.model_name, set.prior.wheels.x_WI,
+    set.info = model.info;
+    if (context.start != nullptr && context.start->has_wheels(entry.key, set.info.name)) {
+      context.start->take_intrinsics(entry.key, *set.model, set.info.name, set.prior.wheels.x_WI,
                                      set.prior.sigma_intrinsics, errors);
     }
     read_wheels(*params, std::move(set), error, context, setup, errors);

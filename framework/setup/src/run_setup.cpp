@@ -79,6 +79,7 @@ void read_sensors(const Node& run, const ReadContext& context, RunSetup& setup,
   std::uint64_t index = 0;
   std::vector<SensorEntry> unplaced;
   for (const auto& entry : sensors->entries()) {
+    if (!is_name(entry, "sensors", errors)) continue;
     // Sensors of one run have seeds of their own; the same sensor keeps its own in every variant.
     const std::uint64_t seed = setup.seed * 1000 + index++;
     auto loaded = context.plugins.make_sensor(entry.value, "sensors." + entry.key, seed, errors,
@@ -328,7 +329,7 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
     }
     measuring = filter.measuring;
     const bool has_base = setup.model != nullptr && !filter.wheels.empty();
-    if (has_base) filter.wheels.front().model_name = setup.kinematics.info.name;
+    if (has_base) filter.wheels.front().info = setup.kinematics.info;
     if (wants_filter(run)) setup.filter = std::move(filter);
   }
   require_wheels_for_place(run, setup, errors);

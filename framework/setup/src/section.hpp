@@ -1,6 +1,9 @@
-// Sections of a configuration that may be left out.
+// Sections of a configuration, and the names in them.
 #pragma once
 
+#include <string>
+
+#include "viwo/config/errors.hpp"
 #include "viwo/config/node.hpp"
 
 namespace viwo {
@@ -9,6 +12,14 @@ namespace viwo {
 inline config::Node section_or_empty(const config::Node& parent, const char* key) {
   const config::Node* section = parent.find(key);
   return section != nullptr ? *section : config::Node::empty_map(parent.mark());
+}
+
+/// Whether `entry` of `section` has a name that can be told in results and in --set.
+inline bool is_name(const config::Node::Entry& entry, const char* section, config::Errors& errors) {
+  if (entry.key.find('.') == std::string::npos) return true;
+  errors.add(entry.key_mark, std::string(section) + ": the name '" + entry.key +
+                                 "' has a dot, which separates the parts of a key");
+  return false;
 }
 
 }  // namespace viwo

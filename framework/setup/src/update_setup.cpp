@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "section.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/setup/start_streams.hpp"
 
@@ -108,6 +109,7 @@ class UpdateReader {
                     "updates." + entry.key + " must be a section of parameters ({} for none)");
         continue;
       }
+      if (!is_name(entry, "updates", errors_)) continue;
       // The name says which update it is unless it says so itself.
       if (section.find("type") == nullptr) {
         section.set("type", Node::scalar_of(entry.key, entry.key_mark));

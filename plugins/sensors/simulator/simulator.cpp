@@ -20,8 +20,13 @@
 namespace viwo {
 namespace {
 
-/// A base that cannot move sideways slides by what the spline deviates from its motion, m/s.
-constexpr double kSliding = 1e-4;
+/// A base that cannot move sideways slides by what the spline deviates from its motion, m/s: the
+/// more the harder it accelerates.
+double sliding_of(const sim::DriveParams& drive) {
+  constexpr double kSliding = 1e-4, kUsual_m_per_s2 = 5., kKnots_s = 0.05;
+  const double acceleration = drive.speed_m_per_s / std::max(drive.ramp_s, kKnots_s);
+  return kSliding * std::max(1., acceleration / kUsual_m_per_s2);
+}
 
 struct Params : sim::EncoderParams, log::JointParams, sim::DriveParams, PoseParams, sim::RigParams {
   NestedKinematics robot;
@@ -97,7 +102,7 @@ log::Recording<Measurement> simulate(const Params& params, const HostServices& s
       sim::encoder_simulation_from(params, description, params.duration_s, start_ns, params.noise);
   wheels.rate_hz = params.wheel_rate_hz;
   wheels.time_offset_s = params.t_OtoI_s;
-  wheels.sliding_m_per_s = kSliding;
+  wheels.sliding_m_per_s = sliding_of(params);
   if (services.exact) {
     wheels.make_exact();
   } else {

@@ -67,6 +67,10 @@ struct Accuracy {
 Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate,
                   const Options& options = {});
 
+/// The estimate in the world of the reference, as the ate has it; as it is where the two have no
+/// time in common.
+Trajectory aligned(const Trajectory& reference, Trajectory estimate, Alignment alignment);
+
 /// What results call a segment length: "10", "2.5", the shortest text that reads back to it.
 std::string length_text(double length_m);
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -104,7 +105,11 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
 /// report.html of an experiment, as a document.
 report::Document report_of(const ExperimentResult& result);
 
-/// Writes runs.csv, summary.json and report.html, then removes the journal.
+/// What an experiment leaves behind.
+inline constexpr std::initializer_list<const char*> kResults = {"runs.csv", "summary.json",
+                                                                "report.html"};
+
+/// Writes them, then removes the journal.
 void write_experiment(const std::filesystem::path& folder, const ExperimentResult& result);
 
 /// The tables of variants (and labels) for the terminal.

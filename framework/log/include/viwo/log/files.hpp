@@ -26,13 +26,14 @@ using config::require_regular_file;
 
 /// When what is written is under the name of the file.
 enum class Appears {
-  kWhole,   ///< all of it, once it is on the disk; what is no file (a device, a pipe) at once
-  kAtOnce,  ///< as it is written: what has been stays when the process is killed
+  kWhole,  ///< all of it, once it is on the disk; what is no file (a device, a pipe) at once
+  kWholeBesideOthers,  ///< the same, of a file that others write, too
+  kAtOnce,             ///< as it is written: what has been stays when the process is killed
 };
 
 /// A file that is written, in place of what was there; a link is replaced, not followed, unless it
-/// leads to a device or a pipe. One that appears whole is FILE.tmp until commit(), and goes if
-/// nobody commits.
+/// leads to a device or a pipe. One that appears whole is FILE.tmp until commit(), beside others
+/// FILE.PROCESS@HOST.tmp, and goes if nobody commits.
 class FileWriter {
  public:
   explicit FileWriter(std::filesystem::path file, Appears appears = Appears::kWhole);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -23,8 +24,12 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result);
 /// report.html of a run, as a document.
 report::Document report_of(const RunSetup& setup, const RunResult& result);
 
-/// Writes config.resolved.yaml, trajectory.tum, reference.tum, calibration.csv, calibration.yaml,
-/// timing.csv, summary.json and report.html.
+/// What a run leaves behind; of one in pieces there are their trajectories, too.
+inline constexpr std::initializer_list<const char*> kResultsOfRun = {
+    "config.resolved.yaml", "trajectory.tum", "reference.tum", "calibration.csv",
+    "calibration.yaml",     "timing.csv",     "summary.json",  "report.html"};
+
+/// Writes them.
 void write_run(const std::filesystem::path& folder, const RunSetup& setup, const RunResult& result);
 
 /// A few lines for the terminal.

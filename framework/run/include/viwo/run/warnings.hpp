@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "viwo/math/trajectory.hpp"
 #include "viwo/plausibility/finding.hpp"
 #include "viwo/run/run_result.hpp"
+#include "viwo/setup/run_setup.hpp"
 
 namespace viwo {
 
@@ -45,7 +47,8 @@ void add_far_from_prior(RunResult& result);
 /// Of a calibration that is much surer than it ought to be, one line.
 std::vector<std::string> too_sure(const RunResult& result);
 
-/// An accuracy that most of the estimate has no part in, because the reference has gaps there.
-void warn_of_gaps(RunResult& result);
+/// The accuracy, with a warning when most of the estimate has no part in it because the reference
+/// has gaps there, or when there is none to tell.
+void compare(const Trajectory& reference, const RunSetup& setup, RunResult& result);
 
 }  // namespace viwo

@@ -43,8 +43,8 @@ enum class Restart { kNever, kLive, kAlways };
 /// A wheel set of the run: its model and its prior.
 struct WheelSet {
   std::shared_ptr<const WheelModel> model;
-  WheelsPrior prior;  ///< name "" for the first: its parameters have no prefix
-  std::string model_name = {};
+  WheelsPrior prior;     ///< name "" for the first: its parameters have no prefix
+  PluginInfo info = {};  ///< of the model
 };
 
 struct FilterSetup {
