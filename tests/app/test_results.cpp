@@ -180,19 +180,6 @@ TEST_F(ResultsTest, AreWrittenForARunThatDiverges) {
   EXPECT_TRUE(fs::exists(at("out/report.html")));
 }
 
-// What cannot be compared is no reason to lose what was estimated.
-TEST_F(ResultsTest, AreWrittenWhereNothingOfTheReferenceCanBeCompared) {
-  write("run.yaml", kRun);
-  const Outcome outcome =
-      viwo({"run", "run.yaml", "--out", "out", "--set", "odometry.reference_time_offset_s=10"});
-  EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_NE(outcome.out.find("warning: no accuracy: no pose of the estimate lies in the time of"),
-            std::string::npos)
-      << outcome.out;
-  EXPECT_TRUE(summary().at("accuracy").is_null());
-  EXPECT_TRUE(fs::exists(at("out/trajectory.tum")));
-}
-
 TEST_F(ResultsTest, AreDoubtfulWhereTheReferenceContradictsThem) {
   write("run.yaml", kRun);
   const Outcome outcome = viwo({"run", "run.yaml", "--out", "out", "--set",

@@ -242,6 +242,23 @@ TEST(SimulateResult, IsDescribedByWhatThereIs) {
             "1 IMU sample; not written, as there is no table for them: 15 gnss fixes");
 }
 
+// What cannot be compared is no reason to lose what was estimated.
+TEST(Accuracy, ThatCannotBeToldIsAWarning) {
+  const RunSetup setup = read_run(testing::simulated("circle"), testing::registry());
+  RunResult result;
+  result.estimate = {{0, {0., 0., 0.}}, {1'000'000'000, {1., 0., 0.}}};
+  const Trajectory later = {{2'000'000'000, {0., 0., 0.}}, {3'000'000'000, {1., 0., 0.}}};
+  compare(later, setup, result);
+  EXPECT_FALSE(result.accuracy);
+  EXPECT_THAT(result.warnings,
+              ElementsAre(HasSubstr("no accuracy: no pose of the estimate lies in the time of the "
+                                    "reference")));
+  result.warnings.clear();
+  compare(result.estimate, setup, result);
+  EXPECT_TRUE(result.accuracy);
+  EXPECT_THAT(result.warnings, ElementsAre());
+}
+
 TEST(Doubts, AreOfAnEstimateThatIsWorseThanNone) {
   RunResult result;
   result.status = RunStatus::kOk;

@@ -84,9 +84,9 @@ class TwistSolver {
   void set_moving(bool moves) { moves_ = moves; }
 
   /// Twist, residual, sensitivity and covariance. kRejected: the model refuses the sample, no
-  /// drive is left of it, or the result is not finite. Channels that `y` calls bad are left out, with
-  /// all rows that their noise enters. Keeps a reference to `y` for the calls about the sample last
-  /// solved.
+  /// drive is left of it, or the result is not finite. Channels that `y` calls bad are left out,
+  /// with all rows that their noise enters. Keeps a reference to `y` for the calls about the sample
+  /// last solved.
   Status solve(const EncoderSample& y, TwistSolution& out);
 
   class Parity;
