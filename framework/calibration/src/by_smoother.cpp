@@ -22,8 +22,7 @@ CalibrationEstimate estimate_of(const smoother::Smoothed& smoothed, const Calibr
   const CalibrationFile& file = smoothed.calibration;
   CalibrationEstimate out;
   const auto n = static_cast<Eigen::Index>(specs.size());
-  out.x_WI = out.sigma = Intrinsics::Zero(n);
-  out.prior_sigma = setup.recordings.front().setup.model->prior_sigma();
+  out.x_WI = out.sigma = out.prior_sigma = Intrinsics::Zero(n);
   out.correlations = Eigen::MatrixXd::Zero(n, n);
   out.extrinsics = setup.options.extrinsics_x_m_y_m_yaw_rad;
   std::vector<int> free;
@@ -39,6 +38,7 @@ CalibrationEstimate estimate_of(const smoother::Smoothed& smoothed, const Calibr
     out.sigma[k] = entry->sigma;
     if (!(entry->sigma > 0.)) continue;
     free.push_back(static_cast<int>(i));
+    out.prior_sigma[k] = specs[i].prior_sigma;
     const auto& names = file.correlations.entries;
     known.push_back(std::find(names.begin(), names.end(), entry->name) - names.begin());
   }

@@ -6,6 +6,7 @@
 
 #include "calibration_problem.hpp"
 #include "held_prior.hpp"
+#include "viwo/api/status.hpp"
 #include "viwo/calibration/calibrate.hpp"
 
 namespace viwo::calibration {
@@ -71,7 +72,13 @@ struct Prior {
     const Eigen::VectorXd per = (sigma.array() > 0.).select(sigma.cwiseInverse(), 0.);
     Eigen::MatrixXd C = per.asDiagonal() * P * per.asDiagonal();
     for (int i = 0; i < C.rows(); ++i) C(i, i) = 1.;  // also of what is held
-    root.topLeftCorner(C.rows(), C.cols()) = C.llt().matrixL();
+    const Eigen::LLT<Eigen::MatrixXd> llt(C);
+    if (llt.info() != Eigen::Success) {
+      throw InputError(
+          "the prior sigmas of the intrinsics are too unlike: one that is zero, but "
+          "for rounding, holds nothing");
+    }
+    root.topLeftCorner(C.rows(), C.cols()) = llt.matrixL();
   }
 };
 

@@ -147,7 +147,9 @@ class Runner {
         const RunSetup check = of_recording(setup_.recordings[r], [&] {
           RunSetup read = read_run(run, plugins_);
           const std::vector<std::filesystem::path> inputs = input_files(read.resolved);
-          for (const char* const name : kResults) refuse_to_replace(folder_ / name, inputs);
+          for (const char* const name : kResults) {
+            if (!folder_.empty()) refuse_to_replace(folder_ / name, inputs);
+          }
           if (!options_.collect && (v == 0 || r == 0)) collect(read);
           return read;
         });
@@ -389,7 +391,9 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
   runner.open_journal(progress);
   if (options.collect) runner.require_all();
   // Those of another experiment are not to be taken for those of this one when it is interrupted.
-  if (!options.collect && !options.shard) log::remove_results(folder, kResults);
+  if (!folder.empty() && !options.collect && !options.shard) {
+    log::remove_results(folder, kResults);
+  }
   parallel_for(result.runs.size(), [&](std::size_t i) {
     ExperimentRun& run = result.runs[i];
     if (run.taken_over || !runner.is_mine(i)) return;

@@ -75,7 +75,21 @@ struct WindowSize {
   double length_s = 1., way_m = 0.03;
 };
 
-Speeds speeds_of(const Wheels& wheels, const Trajectory& poses, const WindowSize& size = {}) {
+/// Of a body that is upright, whose axes are those of O as far as that is known.
+Eigen::Matrix3d axes_of(const Wheels& wheels, const Poses& poses) {
+  return poses.of_imu ? wheels.prior.wheels.R_ItoO : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+}
+
+/// Whether there are any orientations: a prism has none.
+bool are_turned(const Trajectory& poses) {
+  return std::any_of(poses.begin(), poses.end(), [&](const StampedPose& pose) {
+    return pose.q_BtoW.angularDistance(poses.front().q_BtoW) > 1e-6;
+  });
+}
+
+Speeds speeds_of(const Wheels& wheels, const Poses& of, const WindowSize& size = {}) {
+  const Trajectory& poses = of.poses;
+  const Eigen::Matrix3d R_BtoO = axes_of(wheels, of);
   Speeds speeds;
   TwistSolver solver(wheels.model, {});
   solver.set_intrinsics(wheels.prior.wheels.x_WI);
@@ -111,9 +125,11 @@ Speeds speeds_of(const Wheels& wheels, const Trajectory& poses, const WindowSize
       // Nearly straight: the chord is the path, wherever the body is on the base.
       constexpr double kStraight = 0.1;
       if (angle < kStraight) {
-        const Vector3d in_B = from->q_BtoW.conjugate() * moved;
+        const Vector3d in_B = R_BtoO * (from->q_BtoW.conjugate() * moved);
+        constexpr double kUpright = 0.94;  // 20 deg
+        const Vector3d up = R_BtoO * (from->q_BtoW.conjugate() * Vector3d::UnitZ());
         speeds.ratio.push_back(path / moved.norm());
-        if (along.norm() > 0. && in_B.head<2>().norm() > 0.) {
+        if (up.z() > kUpright && along.norm() > 0. && in_B.head<2>().norm() > 0.) {
           const Eigen::Vector2d a = in_B.head<2>().normalized(), b = along.normalized();
           speeds.direction.push_back(moved.norm() *
                                      Eigen::Vector2d(a.dot(b), a.x() * b.y() - a.y() * b.x()));
@@ -180,7 +196,7 @@ bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& la
     Wheels changed = wheels;
     for (EncoderSample& sample : changed.samples) change.undo(sample);
     if (contradiction_of(changed, x_WI) > 1.1 * as_it_is + kNoContradiction_m_per_s) continue;
-    const Speeds speeds = speeds_of(changed, poses.poses);
+    const Speeds speeds = speeds_of(changed, poses);
     if (speeds.ratio.size() < kFewestWindows || speeds.direction.empty()) continue;
     const double ratio = eval::median(speeds.ratio);
     if (std::abs(ratio - 1.) > kMostFactor || speeds.mean_direction().x() < 0.) continue;
@@ -205,11 +221,13 @@ bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& la
 void check_speed(const Recording& recording, const Wheels& wheels, const Poses& poses,
                  const std::string& other, Findings& out) {
   const std::string label = recording.label<EncoderSample>(wheels.sensor);
-  const Speeds speeds = speeds_of(wheels, poses.poses);
+  const Speeds speeds = speeds_of(wheels, poses);
+  const bool has_heading = are_turned(poses.poses);
   if (speeds.ratio.size() < kFewestWindows) {
     // Of a base that turns all the time the direction shows in short ones.
-    const Speeds brief = speeds_of(wheels, poses.poses, {.length_s = 0.25, .way_m = 0.15});
-    if (brief.direction.size() >= 4 * kFewestWindows) check_heading(brief, label, other, out);
+    const Speeds brief = speeds_of(wheels, poses, {.length_s = 0.25, .way_m = 0.15});
+    if (has_heading && brief.direction.size() >= 4 * kFewestWindows)
+      check_heading(brief, label, other, out);
     return;
   }
   const double ratio = eval::median(speeds.ratio);
@@ -260,7 +278,8 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
     }
   }
   out.push_back(finding);
-  if (speeds.direction.size() >= kFewestWindows) check_heading(speeds, label, other, out);
+  if (has_heading && speeds.direction.size() >= kFewestWindows)
+    check_heading(speeds, label, other, out);
 }
 
 /// Whether the body of reference states is the IMU, as they are taken.

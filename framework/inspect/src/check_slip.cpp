@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "checks.hpp"
+#include "clock_finding.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
@@ -19,24 +19,27 @@ using series::RateGrid;
 using series::Recording;
 using series::Span;
 using series::turns_of;
+using series::twists_of;
 using series::Wheels;
 using series::YawRates;
 
 namespace {
 
-constexpr std::size_t kWindow = 50;  ///< cells: half a second
+constexpr std::size_t kWindow = 50;       ///< cells: half a second
+constexpr std::size_t kFewestOfAll = 40;  ///< windows
 constexpr double kWindow_s = static_cast<double>(kWindow) * RateGrid::kCell_s;
 
 /// Mean rates of a window, rad/s.
 struct Window {
   std::int64_t begin_ns;
   double gyro, wheels;
+  double speed_m_per_s;  ///< of the wheels
 };
 
 std::vector<Window> windows_of(const RateGrid& gyro, const RateGrid& wheels, std::int64_t lag) {
   std::vector<Window> windows;
   for (std::size_t i = 0; i + kWindow <= gyro.size(); i += kWindow) {
-    Window window{gyro.begin_ns() + static_cast<std::int64_t>(i) * RateGrid::kCellNs, 0., 0.};
+    Window window{gyro.begin_ns() + static_cast<std::int64_t>(i) * RateGrid::kCellNs, 0., 0., 0.};
     std::size_t n = 0;
     for (std::size_t k = i; k < i + kWindow; ++k) {
       const std::int64_t j = static_cast<std::int64_t>(k) + lag;
@@ -45,11 +48,13 @@ std::vector<Window> windows_of(const RateGrid& gyro, const RateGrid& wheels, std
       if (!gyro.has(k) || !wheels.has(of_wheels)) continue;
       window.gyro += gyro[k].z();
       window.wheels += wheels[of_wheels].z();
+      window.speed_m_per_s += wheels[of_wheels].head<2>().norm();
       ++n;
     }
     if (5 * n < 4 * kWindow) continue;
     window.gyro /= static_cast<double>(n);
     window.wheels /= static_cast<double>(n);
+    window.speed_m_per_s /= static_cast<double>(n);
     windows.push_back(window);
   }
   return windows;
@@ -69,6 +74,29 @@ std::vector<double> differences(const std::vector<Window>& windows) {
   const double bias = eval::median(left);
   for (double& one : left) one -= bias;
   return left;
+}
+
+std::vector<double> sizes_of(const std::vector<double>& values) {
+  std::vector<double> sizes;
+  for (const double value : values) sizes.push_back(std::abs(value));
+  return sizes;
+}
+
+/// Slip looks like a lag where turns are alike: with the one that there is most of the time fits.
+std::vector<Window> in_step(const RateGrid& gyro, const RateGrid& twists, double lag_s) {
+  std::vector<Window> as_it_is = windows_of(gyro, twists, 0);
+  std::vector<Window> shifted = windows_of(gyro, twists, std::llround(lag_s / RateGrid::kCell_s));
+  if (shifted.size() < kFewestOfAll || as_it_is.size() < kFewestOfAll) return as_it_is;
+  const auto median_of = [](const std::vector<Window>& windows) {
+    return eval::median(sizes_of(differences(windows)));
+  };
+  return median_of(shifted) < median_of(as_it_is) ? shifted : as_it_is;
+}
+
+/// What sizes that are wrong and skidding make of a turn and of a way, rad/s.
+double usual(const Window& window) {
+  constexpr double kPartOfTurn = 0.45, kOfWay_rad_per_m = 0.06;
+  return std::max(kPartOfTurn * std::abs(window.gyro), kOfWay_rad_per_m * window.speed_m_per_s);
 }
 
 /// Windows that follow each other, in all of which the wheels turn too much, or too little.
@@ -105,24 +133,21 @@ bool check_against(const Recording& recording, const Wheels& wheels, const YawRa
                    Findings& out) {
   const Span span = span_of(recording);
   const RateGrid gyro(span.begin_ns, span.end_ns, rates.turns);
-  const RateGrid of_wheels(span.begin_ns, span.end_ns, turns_of(wheels));
-  constexpr double kAlike = 0.6, kMostLag_s = 0.3;
-  const auto lag = find_lag(gyro, of_wheels);
-  const bool is_lag = lag && lag->correlation > kAlike && std::abs(lag->lag_s) < kMostLag_s;
-  const std::int64_t cells = is_lag ? std::llround(lag->lag_s / RateGrid::kCell_s) : 0;
-  const std::vector<Window> windows = windows_of(gyro, of_wheels, cells);
-  constexpr std::size_t kFewest = 40;
-  if (windows.size() < kFewest) return false;
+  const RateGrid twists(span.begin_ns, span.end_ns, twists_of(wheels));
+  const auto lag = find_lag(gyro, RateGrid(span.begin_ns, span.end_ns, turns_of(wheels)));
+  if (lag && drifts(*lag)) return false;
+  const std::vector<Window> windows = in_step(gyro, twists, lag ? lag->lag_s : 0.);
+  if (windows.size() < kFewestOfAll) return false;
   const std::vector<double> left = differences(windows);
-  std::vector<double> sizes;
-  for (const double one : left) sizes.push_back(std::abs(one));
+  const std::vector<double> sizes = sizes_of(left);
   constexpr double kNormal = 1.4826, kSigmas = 8., kLeast_rad_per_s = 0.08;
   const double limit = std::max(kSigmas * kNormal * eval::median(sizes), kLeast_rad_per_s);
   Stretch longest, now;
   double beyond = 0.;
   for (std::size_t i = 0; i < left.size(); ++i) {
-    const bool is_beyond = sizes[i] > limit;
-    const bool goes_on = now.count > 0 && now.turn_rad * left[i] > 0.;
+    const bool is_beyond = sizes[i] > std::max(limit, usual(windows[i]));
+    const bool follows = i > 0 && windows[i].begin_ns - windows[i - 1].begin_ns == to_ns(kWindow_s);
+    const bool goes_on = now.count > 0 && follows && now.turn_rad * left[i] > 0.;
     if (is_beyond) beyond += 1.;
     if (!is_beyond) now = {};
     if (is_beyond && !goes_on) now = {i, 0, 0.};
@@ -146,7 +171,7 @@ bool check_against(const Recording& recording, const Wheels& wheels, const YawRa
   constexpr double kFault_rad = 0.5;
   out.push_back({label,
                  std::abs(longest.turn_rad) < kFault_rad ? Severity::kNote : Severity::kFault,
-                 "contradicted",
+                 "slip",
                  "turns otherwise than " + rates.label + " for " + significant(length_s, 2) +
                      " s from " + time_text(from_ns - recording.begin_ns()) + " on, by " +
                      significant(std::abs(longest.turn_rad), 2) +

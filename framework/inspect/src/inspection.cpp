@@ -77,7 +77,8 @@ constexpr std::array<std::string_view, 6> kImuCauses = {"gravity", "rate",    "u
 constexpr std::array<std::string_view, 1> kColumns = {"columns"};
 constexpr std::array<std::string_view, 3> kOfColumns = {"rate", "up", "tilt"};
 /// Of Plausibility: by check_wheel_clocks(), check_order() and check_stamps().
-constexpr std::array<std::string_view, 4> kToldWithMore = {"lag", "yaw order", "order", "unit"};
+constexpr std::array<std::string_view, 3> kToldWithMore = {"lag", "yaw order", "unit"};
+constexpr std::array<std::string_view, 1> kOrderAlone = {"order"};
 bool is_one_of(const std::string& check, Checks checks) {
   return std::find(checks.begin(), checks.end(), check) != checks.end();
 }
@@ -188,7 +189,10 @@ Inspection inspect(RunSetup& setup) {
   check_poses(recording, findings);
   for (const viwo::Finding& found : recording.implausible) {
     Finding finding = of_plausibility(found);
-    if (!is_one_of(finding.check, kToldWithMore) && !is_of_unread(recording, found)) {
+    const bool is_told =
+        is_one_of(finding.check, kToldWithMore) ||
+        (finding.check == "order" && is_fault_of(findings, finding.sensor, kOrderAlone));
+    if (!is_told && !is_of_unread(recording, found)) {
       findings.push_back(std::move(finding));
     }
   }

@@ -49,8 +49,10 @@ bool has_flips(const Poses& poses, const std::string& label, Findings& out) {
     if (flips++ == 0.) first_ns = pose.t_ns;
   }
   if (flips < 2.) return false;
+  // There and back is one pose that is bad, or a few.
+  const bool is_once = flips < 3.;
   out.push_back({label,
-                 Severity::kFault,
+                 is_once ? Severity::kNote : Severity::kFault,
                  "jumps",
                  "its orientation flips " + significant(flips, 6) +
                      " times from one pose to the next, the first time at " +
@@ -58,7 +60,7 @@ bool has_flips(const Poses& poses, const std::string& label, Findings& out) {
                      " of it: markers that are taken for each other, a yaw in degrees, or poses of "
                      "two bodies",
                  {{"flips", flips, ""}}});
-  return true;
+  return !is_once;
 }
 
 }  // namespace viwo::inspect

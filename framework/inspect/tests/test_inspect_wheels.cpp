@@ -200,14 +200,14 @@ TEST(InspectWheels, TellsWhenABaseOfTwoDrivesSlippedOrAnEncoderStoodStill) {
   const Inspection slips = with_wheels(two_drives(), [&](EncoderSample& s) {
     if (during(s)) s.drive_rad_per_s[0] *= 1.6;
   });
-  EXPECT_THAT(faults_of(slips), ElementsAre("wheels0 contradicted"));
-  const Finding slip = finding_of(slips, "wheels0", "contradicted");
+  EXPECT_THAT(faults_of(slips), ElementsAre("wheels0 slip"));
+  const Finding slip = finding_of(slips, "wheels0", "slip");
   EXPECT_THAT(slip.what, HasSubstr("turns otherwise than imu0"));
   EXPECT_NEAR(figure_of(slip, "longest"), 3., 0.6);
   const Inspection stands = with_wheels(two_drives(), [&](EncoderSample& s) {
     if (during(s)) s.drive_rad_per_s[1] = 0.;
   });
-  EXPECT_THAT(finding_of(stands, "wheels0", "contradicted").what,
+  EXPECT_THAT(finding_of(stands, "wheels0", "slip").what,
               HasSubstr("(drive_2 reads 0 rad/s all that time)"));
   EXPECT_THAT(faults_of(with_wheels(two_drives(), [](EncoderSample&) {})), IsEmpty());
 }

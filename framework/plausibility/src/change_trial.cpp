@@ -13,21 +13,25 @@ ChangeTrial::ChangeTrial(const std::shared_ptr<const WheelModel>& model, const I
   no_steering_.change.kind = ChannelChange::kNoSteering;
 }
 
-bool ChangeTrial::add_to(Tried& tried, const EncoderSample& sample) {
+bool ChangeTrial::solves(Tried& tried, const EncoderSample& sample) {
   EncoderSample changed = sample;
   tried.change.undo(changed);
-  if (solver_.solve(changed, solution_) != Status::kOk || solution_.rank_deficient) return false;
-  tried.residual += solution_.e.squaredNorm();
+  if (solver_.solve(changed, solution_) != Status::kOk) return false;
+  tried.of_sample = solution_.e.squaredNorm();
   return true;
 }
 
 void ChangeTrial::add(const EncoderSample& sample) {
   if (solver_.model().n_rows() <= 3) return;
-  for (Tried& tried : changes_) {
-    if (!add_to(tried, sample)) return;
-    if (&tried == &changes_.front()) signal_ += solution_.xi.head<2>().squaredNorm();
-  }
-  if (solver_.model().description().n_steer > 0 && !add_to(no_steering_, sample)) return;
+  // Rows that a change makes tell less than the twist contradict each other all the same.
+  if (!solves(changes_.front(), sample) || solution_.rank_deficient) return;
+  const double signal = solution_.xi.head<2>().squaredNorm();
+  const bool all_well = std::all_of(changes_.begin() + 1, changes_.end(),
+                                    [&](Tried& tried) { return solves(tried, sample); });
+  if (!all_well || !solves(no_steering_, sample)) return;
+  signal_ += signal;
+  for (Tried& tried : changes_) tried.residual += tried.of_sample;
+  no_steering_.residual += no_steering_.of_sample;
   ++tried_;
 }
 

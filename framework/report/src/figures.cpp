@@ -51,7 +51,11 @@ void clear_figures(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> scripts;
   std::error_code ignored;
   for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
-    if (entry.path().extension() == ".gp") scripts.push_back(entry.path());
+    const std::string name = entry.path().filename().string();  // NN_TITLE.gp
+    const bool is_own = name.find('_') >= 2 &&
+                        name.find_first_not_of("0123456789") == name.find('_') &&
+                        name.ends_with(".gp");
+    if (is_own) scripts.push_back(entry.path());
   }
   for (std::filesystem::path file : scripts) {
     for (const char* extension : {".svg", ".pdf", ".dat", ".gp"}) {
@@ -65,7 +69,7 @@ void clear_figures(const std::filesystem::path& folder) {
 void write_figures(const std::filesystem::path& folder, const Document& document,
                    FigureFormat format) {
   require_gnuplot();
-  clear_figures(folder);
+  if (!document.sections.empty()) clear_figures(folder);
   Colours colours;
   int n = 0;
   for (const Section& section : document.sections) {

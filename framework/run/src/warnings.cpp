@@ -187,22 +187,18 @@ double extent_m(const Trajectory& poses) {
   return std::sqrt(squares);
 }
 
-/// The poses of `reference` while there are those of `estimate`.
-Trajectory during(const Trajectory& estimate, const Trajectory& reference) {
-  Trajectory poses;
-  for (const StampedPose& pose : reference) {
-    const bool is_in = pose.t_ns >= estimate.front().t_ns && pose.t_ns <= estimate.back().t_ns;
-    if (is_in) poses.push_back(pose);
-  }
-  return poses;
-}
-
-/// One goes many times as far as the other, as in other units; "" if they do not.
+/// One goes many times as far as the other, as in other units; "" if they do not. Of poses that
+/// both have.
 std::string size_contradiction(const RunResult& result) {
-  constexpr double kFar_m = 0.5, kMany = 5.;
-  if (result.estimate.empty()) return "";
-  const double reference_m = extent_m(during(result.estimate, result.reference));
-  const double estimate_m = extent_m(result.estimate);
+  constexpr double kFar_m = 0.5, kMany = 5., kMostGap_s = 0.5;
+  Trajectory reference, estimate;
+  for (const StampedPose& pose : result.estimate) {
+    const auto at = interpolate(result.reference, pose.t_ns, kMostGap_s);
+    if (!at) continue;
+    reference.push_back(*at);
+    estimate.push_back(pose);
+  }
+  const double reference_m = extent_m(reference), estimate_m = extent_m(estimate);
   const double larger = std::max(reference_m, estimate_m);
   if (!(larger > kFar_m && larger > kMany * std::min(reference_m, estimate_m))) return "";
   return "it goes " + significant(reference_m, 3) +
@@ -272,7 +268,7 @@ void doubt(RunResult& result) {
     // With a gyro, whatever the wheels are.
     text = "after " + eval::length_text(std::round(result.accuracy->path_length_m)) +
            " m it is off by " + eval::length_text(std::round(result.accuracy->end_m)) + " m";
-  } else {
+  } else if (!agrees) {
     text = size_contradiction(result);
   }
   if (text.empty()) return;

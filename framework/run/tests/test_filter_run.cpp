@@ -285,13 +285,18 @@ TEST(Doubts, AreOfAnEstimateThatIsWorseThanNone) {
 
 // Segments that turn are off by less than their length, and both stay near their middles.
 TEST(Doubts, AreOfAReferenceInOtherUnits) {
-  const auto doubts = [](double scale, std::int64_t first) {
+  const auto doubts = [](double scale, std::int64_t first, std::int64_t gap = 0) {
     RunResult result;
     result.status = RunStatus::kOk;
-    for (int i = 0; i < 100; ++i) {
-      const double angle = 0.1 * i, size = i < first ? 100. : scale;
-      result.reference.push_back({i, {size * std::cos(angle), size * std::sin(angle), 0.}});
-      if (i >= first) result.estimate.push_back({i, {std::cos(angle), std::sin(angle), 0.}});
+    for (std::int64_t i = 0; i < 100; ++i) {
+      const double angle = 0.1 * static_cast<double>(i), size = i < first ? 100. : scale;
+      const bool is_in_gap = i > 2 && i < gap;
+      if (!is_in_gap) {
+        result.reference.push_back(
+            {100'000'000 * i, {size * std::cos(angle), size * std::sin(angle), 0.}});
+      }
+      if (i < first) continue;
+      result.estimate.push_back({100'000'000 * i, {std::cos(angle), std::sin(angle), 0.}});
     }
     result.accuracy.emplace();
     result.accuracy->rpe = {{.length_m = 0.5, .count = 100, .mean_m = 0.2}};
@@ -303,6 +308,7 @@ TEST(Doubts, AreOfAReferenceInOtherUnits) {
   EXPECT_THAT(doubts(2., 0), ElementsAre());
   // What it does before there is an estimate is not compared.
   EXPECT_THAT(doubts(1., 20), ElementsAre());
+  EXPECT_THAT(doubts(1., 0, 97), ElementsAre());
 }
 
 TEST(Doubts, AreOfAFilterThatEndsFarOffAndIsNoBetterOnTheWay) {

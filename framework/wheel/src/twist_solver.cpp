@@ -195,12 +195,13 @@ void TwistSolver::find_left_out(const EncoderSample& y) {
   }
   n_left_out_ = static_cast<int>(std::count(left_out_.begin(), left_out_.end(), true));
   // What is left then says how it does not move.
-  is_undriven_ = std::all_of(noises.begin(), noises.end(), [&](const NoiseSpec& noise) {
-    const auto first = left_out_.begin() + noise.rows.first;
-    return noise.kind != NoiseKind::kDrive ||
-           std::all_of(first, first + noise.rows.count,
-                       [](bool is_left_out) { return is_left_out; });
-  });
+  is_undriven_ =
+      n_left_out_ > 0 && std::all_of(noises.begin(), noises.end(), [&](const NoiseSpec& noise) {
+        const auto first = left_out_.begin() + noise.rows.first;
+        return noise.kind != NoiseKind::kDrive ||
+               std::all_of(first, first + noise.rows.count,
+                           [](bool is_left_out) { return is_left_out; });
+      });
 }
 
 template <class Rows>

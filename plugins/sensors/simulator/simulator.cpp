@@ -24,7 +24,7 @@ namespace {
 /// more the harder it accelerates.
 double sliding_of(const sim::DriveParams& drive) {
   constexpr double kSliding = 1e-4, kUsual_m_per_s2 = 5., kKnots_s = 0.05;
-  const double acceleration = drive.speed_m_per_s / std::max(drive.ramp_s, kKnots_s);
+  const double acceleration = std::abs(drive.speed_m_per_s) / std::max(drive.ramp_s, kKnots_s);
   return kSliding * std::max(1., acceleration / kUsual_m_per_s2);
 }
 

@@ -27,12 +27,13 @@ class ChangeTrial {
  private:
   struct Tried {
     ChannelChange change;
-    double residual = 0.;  ///< sum of the squares of the parity residuals
+    double residual = 0.;   ///< sum of the squares of the parity residuals
+    double of_sample = 0.;  ///< of the one at hand
   };
 
   static constexpr double kAsWell = 3.;
 
-  bool add_to(Tried& tried, const EncoderSample& sample);
+  bool solves(Tried& tried, const EncoderSample& sample);
   bool is_next_to_none(const Tried& tried) const;
 
   TwistSolver solver_;
