@@ -6,7 +6,6 @@
 
 #include "calibration_problem.hpp"
 #include "held_prior.hpp"
-#include "viwo/api/status.hpp"
 #include "viwo/calibration/calibrate.hpp"
 
 namespace viwo::calibration {
