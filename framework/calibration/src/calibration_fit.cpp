@@ -121,7 +121,7 @@ class Fit {
                                own_[k].data());
       problem.AddResidualBlock(new PriorCost(Eigen::Matrix2d::Identity()), nullptr, own_[k].data());
     }
-    problem.AddResidualBlock(new PriorCost(prior_.root), nullptr, shared_.data());
+    problem.AddResidualBlock(new PriorCost(prior_.whitening), nullptr, shared_.data());
     set_bounds(problem);
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
@@ -378,18 +378,14 @@ class Fit {
     estimate_.unknowns +=
         count(prior_.extrinsics_sigma) + static_cast<int>(own_.size()) * count(prior_.own_sigma);
     // In what is known before, which hangs together where the gauge holds entries.
-    const Eigen::MatrixXd root =
-        prior_.root.topLeftCorner(prior_.sigma.size(), prior_.sigma.size());
-    const auto whiten = [&](const Eigen::MatrixXd& M) -> Eigen::MatrixXd {
-      return root.triangularView<Eigen::Lower>().solve(M);
-    };
-    const Eigen::MatrixXd P_white =
-        whiten(whiten(P.topLeftCorner(root.rows(), root.cols())).transpose());
+    const auto all = prior_.sigma.size();
+    const Eigen::MatrixXd W = prior_.whitening.topLeftCorner(all, all);
+    const Eigen::MatrixXd P_white = W * P.topLeftCorner(all, all) * W.transpose();
     const Eigen::MatrixXd P_free = P_white(free, free);
     // Below zero: by how many powers of e the data have narrowed what was known.
     estimate_.log_volume = P_free.llt().matrixLLT().diagonal().array().log().sum();
     const auto& specs = setup_.recordings.front().setup.model->description().intrinsics;
-    estimate_.undetermined = undetermined_of(P_free, root(free, free), free, specs);
+    estimate_.undetermined = undetermined_of(P_free, prior_.root(free, free), free, specs);
   }
 
   const CalibrationSetup& setup_;

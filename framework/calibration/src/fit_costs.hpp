@@ -18,6 +18,7 @@ struct Prior {
   PlanarExtrinsics extrinsics, extrinsics_sigma;
   Eigen::Vector2d own_sigma;  ///< of the clock offset and the gyro bias of each recording
   Eigen::MatrixXd root;       ///< of the correlations of the shared unknowns, lower triangle
+  Eigen::MatrixXd whitening;  ///< its inverse
 
   Prior(const CalibrationRecording& first, const CalibrationOptions& options, const FitStart& start)
       : x_WI(start.x_WI), sigma(start.sigma), drawn_sigma(start.sigma) {
@@ -25,6 +26,8 @@ struct Prior {
     root.setIdentity(n_shared(), n_shared());
     // Where O is the reference body nothing is left to a gauge.
     if (!poses || options.estimate_extrinsics) hold_gauge(*first.setup.model);
+    whitening = root.triangularView<Eigen::Lower>().solve(
+        Eigen::MatrixXd::Identity(root.rows(), root.cols()));
     const bool estimates = poses && options.estimate_extrinsics;
     const double m = estimates ? options.prior_sigma_extrinsics_m : 0.;
     const double rad = estimates ? options.prior_sigma_extrinsics_rad : 0.;
@@ -50,12 +53,7 @@ struct Prior {
   }
 
   /// What is known of the shared unknowns before.
-  Eigen::MatrixXd information() const {
-    const auto n = root.rows();
-    const Eigen::MatrixXd whitened =
-        root.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(n, n));
-    return whitened.transpose() * whitened;
-  }
+  Eigen::MatrixXd information() const { return whitening.transpose() * whitening; }
 
   /// Derivative by the scaled unknowns [shared, own].
   Eigen::VectorXd scale() const {
@@ -108,13 +106,11 @@ class RecordingCost final : public ceres::CostFunction {
   const Prior& prior_;
 };
 
-/// The prior of scaled unknowns, of which `root` is of the correlations: r = root^-1 u.
+/// The prior of scaled unknowns: r = whitening u.
 class PriorCost final : public ceres::CostFunction {
  public:
-  explicit PriorCost(const Eigen::MatrixXd& root)
-      : whitened_(root.triangularView<Eigen::Lower>().solve(
-            Eigen::MatrixXd::Identity(root.rows(), root.cols()))) {
-    const auto size = static_cast<int>(root.rows());
+  explicit PriorCost(const Eigen::MatrixXd& whitening) : whitening_(whitening) {
+    const auto size = static_cast<int>(whitening.rows());
     set_num_residuals(size);
     *mutable_parameter_block_sizes() = {size};
   }
@@ -122,16 +118,16 @@ class PriorCost final : public ceres::CostFunction {
                 double** jacobians) const override {
     const int n = num_residuals();
     Eigen::Map<Eigen::VectorXd>(residuals, n) =
-        whitened_ * Eigen::Map<const Eigen::VectorXd>(parameters[0], n);
+        whitening_ * Eigen::Map<const Eigen::VectorXd>(parameters[0], n);
     if (jacobians != nullptr && jacobians[0] != nullptr) {
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-      Eigen::Map<RowMajor>(jacobians[0], n, n) = whitened_;
+      Eigen::Map<RowMajor>(jacobians[0], n, n) = whitening_;
     }
     return true;
   }
 
  private:
-  Eigen::MatrixXd whitened_;
+  Eigen::MatrixXd whitening_;
 };
 
 }  // namespace viwo::calibration

@@ -210,10 +210,7 @@ bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& la
              change.remedies(wheels.sensor, wheels.model->description())};
   }
   if (!found) return false;
-  const bool is_known = std::any_of(out.begin(), out.end(), [&](const Finding& f) {
-    return f.sensor == label && f.check == "order" && f.severity == Severity::kFault;
-  });
-  if (!is_known) out.push_back(std::move(*found));
+  if (!is_fault(out, label, "order")) out.push_back(std::move(*found));
   return true;
 }
 

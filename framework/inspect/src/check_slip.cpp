@@ -11,7 +11,7 @@
 #include "viwo/math/time_text.hpp"
 #include "viwo/series/lag.hpp"
 #include "viwo/series/rate_grid.hpp"
-#include "wheel_calibration.hpp"
+#include "viwo/wheel/drive_ranges.hpp"
 
 namespace viwo::inspect {
 
@@ -105,25 +105,18 @@ struct Stretch {
   double turn_rad = 0.;
 };
 
-/// Drives that give one number all the time while another turns: " (drive_1 reads 0 rad/s then)".
+/// Drives that give one number all the time while another turns: " (drive_1 reads 0 rad/s ...)".
 std::string constant_drives(const Wheels& wheels, std::int64_t from_ns, std::int64_t to_ns) {
-  const auto n = static_cast<std::size_t>(wheels.model->description().n_drive);
-  const EncoderSample* first = nullptr;
-  std::vector<bool> is_constant(n, true);
-  bool any_moves = false;
+  constexpr double kMoves_rad_per_s = 0.1;
+  DriveRanges ranges(wheels.model->description().n_drive);
   for (const EncoderSample& sample : wheels.samples) {
-    if (sample.t_ns < from_ns || sample.t_ns > to_ns) continue;
-    if (first == nullptr) first = &sample;
-    any_moves = any_moves || moves(sample);
-    for (std::size_t i = 0; i < n; ++i) {
-      is_constant[i] = is_constant[i] && sample.drive_rad_per_s[i] == first->drive_rad_per_s[i];
-    }
+    if (sample.t_ns >= from_ns && sample.t_ns <= to_ns) ranges.add(sample);
   }
+  if (ranges.fastest() < kMoves_rad_per_s) return "";
   std::string text;
-  for (std::size_t i = 0; i < n && any_moves; ++i) {
-    if (!is_constant[i]) continue;
-    text += (text.empty() ? " (" : ", ") + ("drive_" + std::to_string(i + 1)) + " reads " +
-            significant(first->drive_rad_per_s[i], 3) + " rad/s all that time";
+  for (const auto& [drive, value] : ranges.stuck()) {
+    text += (text.empty() ? " (" : ", ") + ("drive_" + std::to_string(drive + 1)) + " reads " +
+            significant(value, 3) + " rad/s all that time";
   }
   return text.empty() ? "" : text + ")";
 }
@@ -189,10 +182,7 @@ void check_slip(const Recording& recording, Findings& out) {
   for (const Wheels& wheels : recording.wheels) {
     if (wheels.samples.empty() || !wheels.unusable.empty()) continue;
     const std::string label = recording.label<EncoderSample>(wheels.sensor);
-    const bool is_told = std::any_of(out.begin(), out.end(), [&](const Finding& f) {
-      return f.sensor == label && f.check == "contradicted" && f.severity == Severity::kFault;
-    });
-    if (is_told) continue;
+    if (is_fault(out, label, "contradicted")) continue;
     for (const YawRates& rates : yaw_rates_of(recording, wheels.prior)) {
       if (check_against(recording, wheels, rates, out)) break;
     }

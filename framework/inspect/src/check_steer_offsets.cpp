@@ -233,9 +233,7 @@ bool check_unit(const Recording& recording, const Wheels& wheels, Offsets& probl
   const bool is_known =
       std::any_of(recording.implausible.begin(), recording.implausible.end(),
                   [&](const viwo::Finding& found) { return found.key == label + " steering"; }) ||
-      std::any_of(out.begin(), out.end(), [&](const Finding& found) {
-        return found.sensor == label && found.check == "order";
-      });
+      is_fault(out, label, "order");
   if (is_known || !go_on(wheels)) return false;
   const double before = problem.cost(Vector::Zero(problem.n()));
   constexpr double kLeast_m_per_s = 0.01;

@@ -3,12 +3,16 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "viwo/inspect/inspection.hpp"
 #include "viwo/series/recording.hpp"
 
 namespace viwo::inspect {
+
+/// Whether `check` has found a fault of a sensor already.
+bool is_fault(const Findings& findings, std::string_view sensor, std::string_view check);
 
 /// Rate, jitter, gaps, what readers have rejected, sensors that broke off, what is in common.
 void check_stamps(const series::Recording& recording, Findings& out);

@@ -78,7 +78,6 @@ constexpr std::array<std::string_view, 1> kColumns = {"columns"};
 constexpr std::array<std::string_view, 3> kOfColumns = {"rate", "up", "tilt"};
 /// Of Plausibility: by check_wheel_clocks(), check_order() and check_stamps().
 constexpr std::array<std::string_view, 3> kToldWithMore = {"lag", "yaw order", "unit"};
-constexpr std::array<std::string_view, 1> kOrderAlone = {"order"};
 bool is_one_of(const std::string& check, Checks checks) {
   return std::find(checks.begin(), checks.end(), check) != checks.end();
 }
@@ -153,6 +152,10 @@ void demote_consequences(const Recording& recording, Findings& findings) {
 
 }  // namespace
 
+bool is_fault(const Findings& findings, std::string_view sensor, std::string_view check) {
+  return is_fault_of(findings, sensor, {&check, 1});
+}
+
 const char* name(Severity severity) {
   switch (severity) {
     case Severity::kFits:
@@ -189,9 +192,8 @@ Inspection inspect(RunSetup& setup) {
   check_poses(recording, findings);
   for (const viwo::Finding& found : recording.implausible) {
     Finding finding = of_plausibility(found);
-    const bool is_told =
-        is_one_of(finding.check, kToldWithMore) ||
-        (finding.check == "order" && is_fault_of(findings, finding.sensor, kOrderAlone));
+    const bool is_told = is_one_of(finding.check, kToldWithMore) ||
+                         (finding.check == "order" && is_fault(findings, finding.sensor, "order"));
     if (!is_told && !is_of_unread(recording, found)) {
       findings.push_back(std::move(finding));
     }
