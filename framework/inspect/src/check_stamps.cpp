@@ -20,6 +20,9 @@ namespace {
 /// A spacing that lacks at least one sample, and is more than jitter: the next of a shaken clock
 /// comes within two periods.
 constexpr double kGapPeriods = 2.5;
+/// Of stamps that are whole periods apart, within kEvenPeriods, any that lacks one.
+constexpr double kEvenGapPeriods = 1.5;
+constexpr double kEvenPeriods = 0.25;
 constexpr std::size_t kFewestStamps = 3;
 
 std::string ms(double seconds) { return significant(1e3 * seconds, 3) + " ms"; }
@@ -30,11 +33,21 @@ struct Gaps {
   std::int64_t longest_ns = 0;  ///< when it begins
 };
 
-Gaps gaps_of(const std::vector<std::int64_t>& t_ns, double period_s) {
+/// Stamps that are whole periods apart: what is missing between them is no jitter.
+bool are_even(const std::vector<double>& spacing_s, double period_s) {
+  std::vector<double> off_s;
+  off_s.reserve(spacing_s.size());
+  for (const double s : spacing_s) {
+    off_s.push_back(s - std::max(1., std::round(s / period_s)) * period_s);
+  }
+  return eval::quantile(off_s, 0.99) - eval::quantile(off_s, 0.01) <= kEvenPeriods * period_s;
+}
+
+Gaps gaps_of(const std::vector<std::int64_t>& t_ns, double period_s, double gap_s) {
   Gaps gaps;
   for (std::size_t i = 1; i < t_ns.size(); ++i) {
     const double spacing_s = seconds_between(t_ns[i - 1], t_ns[i]);
-    if (spacing_s <= kGapPeriods * period_s) continue;
+    if (spacing_s <= gap_s) continue;
     ++gaps.count;
     gaps.missing += std::llround(spacing_s / period_s) - 1;
     if (spacing_s <= gaps.longest_s) continue;
@@ -44,10 +57,10 @@ Gaps gaps_of(const std::vector<std::int64_t>& t_ns, double period_s) {
   return gaps;
 }
 
-double rate_between_gaps(const std::vector<double>& spacing_s, double period_s) {
+double rate_between_gaps(const std::vector<double>& spacing_s, double gap_s) {
   double sum_s = 0., n = 0.;
   for (const double s : spacing_s) {
-    if (s > kGapPeriods * period_s) continue;
+    if (s > gap_s) continue;
     sum_s += s;
     n += 1.;
   }
@@ -145,8 +158,10 @@ void check_stream(const Recording& recording, const Stamps& stamps, Findings& ou
   const double period_s = eval::median(spacing_s);
   const double p1_s = eval::quantile(spacing_s, 0.01), p99_s = eval::quantile(spacing_s, 0.99);
   const double longest_s = *std::max_element(spacing_s.begin(), spacing_s.end());
-  const Gaps gaps = gaps_of(t_ns, period_s);
-  const double rate_hz = rate_between_gaps(spacing_s, period_s);
+  const bool is_even = are_even(spacing_s, period_s);
+  const double gap_s = (is_even ? kEvenGapPeriods : kGapPeriods) * period_s;
+  const Gaps gaps = gaps_of(t_ns, period_s, gap_s);
+  const double rate_hz = rate_between_gaps(spacing_s, gap_s);
   Finding rate{label,
                Severity::kFits,
                "stamps",
@@ -181,7 +196,7 @@ void check_stream(const Recording& recording, const Stamps& stamps, Findings& ou
     }
   }
   out.push_back(rate);
-  check_jitter(label, spacing_s, out);
+  if (!is_even) check_jitter(label, spacing_s, out);
 }
 
 /// What no run or check takes anything of.

@@ -64,8 +64,8 @@ std::optional<ClockDrift> clock_drift(const std::vector<std::pair<double, double
   for (const double lag_s : at_zero) off.push_back(std::abs(lag_s - zero_s));
   const ClockDrift drift{slope, zero_s + slope * parts.front().first,
                          zero_s + slope * parts.back().first};
-  // By chance not even three quarters of all pairs go one way.
-  constexpr double kLeast_s = 0.04, kClearly = 3., kOneWay = 0.9;
+  // Of ten that have no trend so many pairs go one way once in fifty times (Kendall).
+  constexpr double kLeast_s = 0.04, kClearly = 3., kOneWay = 0.8;
   const bool goes_one_way = along > kOneWay * static_cast<double>(slopes.size());
   if (!goes_one_way ||
       std::abs(drift.last_s - drift.first_s) < std::max(kLeast_s, kClearly * eval::median(off)))

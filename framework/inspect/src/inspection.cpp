@@ -70,7 +70,8 @@ constexpr std::array<std::string_view, 9> kNotOfGyro = {
 constexpr std::array<std::string_view, 2> kOrder = {"order", "steering"};
 constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
 /// What no noise is the remedy of.
-constexpr std::array<std::string_view, 4> kNoNoise = {"contradicted", "parity", "speed", "heading"};
+constexpr std::array<std::string_view, 5> kNoNoise = {"contradicted", "parity", "speed", "heading",
+                                                      "slip"};
 constexpr std::array<std::string_view, 6> kImuCauses = {"gravity", "rate",    "up",
                                                         "tilt",    "channel", "columns"};
 /// What exchanged columns look like besides.

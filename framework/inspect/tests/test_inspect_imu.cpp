@@ -61,6 +61,21 @@ TEST(InspectStamps, TellsJitter) {
   EXPECT_NEAR(figure_of(jitter, "jitter"), 7e-3, 1e-3);  // of the triangle of two such
 }
 
+TEST(InspectStamps, TellsSamplesThatAreMissingFromJitter) {
+  int i = 0;
+  std::mt19937 random(1);
+  int dropped = 0;
+  const Inspection thinned = inspected(swerve(), {.imu = [&](ImuSample&) {
+                                         const bool is_kept = ++i < 10 || random() % 10 > 0;
+                                         if (!is_kept) ++dropped;
+                                         return is_kept;
+                                       }});
+  EXPECT_EQ(finding_of(thinned, "imu0", "jitter").what, "");
+  // But for those after the last.
+  EXPECT_NEAR(figure_of(finding_of(thinned, "imu0", "stamps"), "missing samples"), dropped, 3.);
+  EXPECT_NEAR(figure_of(finding_of(thinned, "imu0", "stamps"), "rate"), 200., 0.01);
+}
+
 TEST(InspectStamps, TellsSensorsThatHaveLittleTimeInCommon) {
   const auto later = [](StateSample& s) { return s.t_ns > 37 * kSecond; };
   const auto sooner = [](FeatureSample& s) { return s.t_ns < 38 * kSecond; };
