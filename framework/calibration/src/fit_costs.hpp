@@ -23,16 +23,16 @@ struct Prior {
   Prior(const CalibrationRecording& first, const CalibrationOptions& options, const FitStart& start)
       : x_WI(start.x_WI), sigma(start.sigma), drawn_sigma(start.sigma) {
     const bool poses = first.motion.kind == ReferenceKind::kPoses;
-    root.setIdentity(n_shared(), n_shared());
-    // Where O is the reference body nothing is left to a gauge.
-    if (!poses || options.estimate_extrinsics) hold_gauge(*first.setup.model);
-    whitening = root.triangularView<Eigen::Lower>().solve(
-        Eigen::MatrixXd::Identity(root.rows(), root.cols()));
     const bool estimates = poses && options.estimate_extrinsics;
     const double m = estimates ? options.prior_sigma_extrinsics_m : 0.;
     const double rad = estimates ? options.prior_sigma_extrinsics_rad : 0.;
     extrinsics = options.extrinsics_x_m_y_m_yaw_rad;
     extrinsics_sigma = {m, m, rad};
+    root.setIdentity(n_shared(), n_shared());
+    // Where O is the reference body nothing is left to a gauge.
+    if (!poses || estimates) hold_gauge(*first.setup.model);
+    whitening = root.triangularView<Eigen::Lower>().solve(
+        Eigen::MatrixXd::Identity(root.rows(), root.cols()));
     const bool gyro = first.motion.kind == ReferenceKind::kGyro;
     const bool clock = first.motion.kind != ReferenceKind::kNone;
     own_sigma = {clock ? options.prior_sigma_clock_offset_s : 0.,
@@ -64,9 +64,11 @@ struct Prior {
 
  private:
   void hold_gauge(const WheelModel& model) {
-    const Eigen::MatrixXd P = prior_in_held_frame(model, x_WI, sigma);
-    sigma = P.diagonal().cwiseSqrt();
-    const Eigen::VectorXd per = (sigma.array() > 0.).select(sigma.cwiseInverse(), 0.);
+    const Eigen::MatrixXd P = prior_in_held_frame(model, x_WI, sigma, extrinsics, extrinsics_sigma);
+    const Eigen::VectorXd in_held = P.diagonal().cwiseSqrt();
+    sigma = in_held.head(sigma.size());
+    extrinsics_sigma = in_held.tail<3>();
+    const Eigen::VectorXd per = (in_held.array() > 0.).select(in_held.cwiseInverse(), 0.);
     Eigen::MatrixXd C = per.asDiagonal() * P * per.asDiagonal();
     for (int i = 0; i < C.rows(); ++i) C(i, i) = 1.;  // also of what is held
     const Eigen::LLT<Eigen::MatrixXd> llt(C);
@@ -75,7 +77,7 @@ struct Prior {
           "the prior sigmas of the intrinsics are too unlike: one that is zero, but "
           "for rounding, holds nothing");
     }
-    root.topLeftCorner(C.rows(), C.cols()) = llt.matrixL();
+    root = llt.matrixL();
   }
 };
 

@@ -3,14 +3,18 @@
 
 #include <Eigen/Core>
 
+#include "viwo/setup/run_setup.hpp"
 #include "viwo/wheel/wheel_model.hpp"
 
 namespace viwo::calibration {
 
-/// Covariance of the intrinsics, whose sigmas about `x_WI` in the frame of the drawing are `sigma`,
-/// once O is moved to where the entries that the gauge holds are what they are there (CAL-18):
-/// these have zero variance, and what they are off by is in the others.
-Eigen::MatrixXd prior_in_held_frame(const WheelModel& model, const Intrinsics& x_WI,
-                                    const Intrinsics& sigma);
+/// Covariance of [x_WI, E], whose sigmas about `x_WI` and `extrinsics` in the frame of the drawing
+/// are `sigma` and `extrinsics_sigma`, once O is moved to where the entries that the gauge holds
+/// are what they are there (CAL-18): these have zero variance, and what they are off by is in the
+/// others, E among them unless its sigmas are all zero.
+Eigen::MatrixXd prior_in_held_frame(
+    const WheelModel& model, const Intrinsics& x_WI, const Intrinsics& sigma,
+    const PlanarExtrinsics& extrinsics = PlanarExtrinsics::Zero(),
+    const PlanarExtrinsics& extrinsics_sigma = PlanarExtrinsics::Zero());
 
 }  // namespace viwo::calibration

@@ -6,6 +6,7 @@
 
 #include "held_prior.hpp"
 #include "simulated_calibration.hpp"
+#include "viwo/math/se2.hpp"
 
 namespace viwo {
 namespace {
@@ -42,7 +43,8 @@ TEST(HeldPrior, HasInTheOthersWhatTheHeldMayBeOffBy) {
   Intrinsics sigma = Intrinsics::Zero(model.n_intrinsics());
   constexpr double kSigma = 1e-3;
   sigma[model.find("delta_o1")] = kSigma;
-  const Eigen::MatrixXd P = prior_in_held_frame(model, model.nominal(), sigma);
+  const auto n = static_cast<Eigen::Index>(model.n_intrinsics());
+  const Eigen::MatrixXd P = prior_in_held_frame(model, model.nominal(), sigma).topLeftCorner(n, n);
   const Intrinsics moved = in_held_frame(model, kSigma) - model.nominal();
   EXPECT_GT(moved.norm(), 0.1 * kSigma);
   // To the second order of the turn.
@@ -50,12 +52,43 @@ TEST(HeldPrior, HasInTheOthersWhatTheHeldMayBeOffBy) {
   EXPECT_EQ(P.row(model.find("delta_o1")).norm(), 0.);
 }
 
+// The body of the poses stays where it is when O turns about the first wheel.
+TEST(HeldPrior, MovesTheBodyOfThePosesWithO) {
+  const auto setup = setup_of({"figure_eight"}, 1);
+  const WheelModel& model = *setup.recordings[0].setup.model;
+  const Intrinsics nominal = model.nominal();
+  constexpr double kSigma = 1e-3, kKnown = 1e-9;
+  Intrinsics sigma = Intrinsics::Zero(model.n_intrinsics());
+  sigma[model.find("delta_o1")] = kSigma;
+  const PlanarExtrinsics E(0.2, -0.1, 0.7);
+  const Eigen::MatrixXd P = prior_in_held_frame(model, nominal, sigma, E, {kKnown, kKnown, kKnown});
+  const auto n = nominal.size();
+  // Where the first wheel is in B, at the ends of what the zero may be off by.
+  const Eigen::Vector2d wheel(nominal[model.find("x_1")], nominal[model.find("y_1")]);
+  const Eigen::Vector3d at = compose(as_se2(E), {0., wheel.x(), wheel.y()});
+  for (const double by : {1., -1.}) {
+    const Eigen::Vector3d step = by * P.topRightCorner(n, 3).row(model.find("x_2")).transpose() /
+                                 std::sqrt(P(model.find("x_2"), model.find("x_2")));
+    const Eigen::Vector3d there = compose(as_se2(E + step), {0., wheel.x(), wheel.y()});
+    EXPECT_LT((there - at).tail<2>().norm(), kSigma * kSigma);
+    EXPECT_NEAR(std::abs(there[0] - at[0]), kSigma, 1e-3 * kSigma);
+  }
+}
+
+TEST(HeldPrior, LeavesTheBodyWhereItIsHeld) {
+  const auto setup = setup_of({"figure_eight"}, 1);
+  const WheelModel& model = *setup.recordings[0].setup.model;
+  const Eigen::MatrixXd P =
+      prior_in_held_frame(model, model.nominal(), model.prior_sigma(), {0.2, -0.1, 0.7});
+  EXPECT_TRUE(P.bottomRows<3>().isZero(0.));
+}
+
 TEST(HeldPrior, OfWheelsThatAreWellKnownIsThatOfTheirSigmas) {
   const auto setup = setup_of({"figure_eight"}, 1);
   const WheelModel& model = *setup.recordings[0].setup.model;
   const Intrinsics sigma = model.prior_sigma();  // none of those that are held
   const Eigen::MatrixXd P = prior_in_held_frame(model, model.nominal(), sigma);
-  EXPECT_LT((P.diagonal().cwiseSqrt() - sigma).norm(), 1e-12);
+  EXPECT_LT((P.diagonal().cwiseSqrt().head(sigma.size()) - sigma).norm(), 1e-12);
 }
 
 // The zero of the first wheel is off by two of its sigmas, the places of the wheels are well known:
