@@ -77,8 +77,8 @@ constexpr std::array<std::string_view, 6> kImuCauses = {"gravity", "rate",    "u
 /// What exchanged columns look like besides.
 constexpr std::array<std::string_view, 1> kColumns = {"columns"};
 constexpr std::array<std::string_view, 3> kOfColumns = {"rate", "up", "tilt"};
-/// Of Plausibility: by check_wheel_clocks(), check_order() and check_stamps().
-constexpr std::array<std::string_view, 3> kToldWithMore = {"lag", "yaw order", "unit"};
+/// Of Plausibility: by check_wheel_clocks(), check_order(), check_stamps() and check_slip().
+constexpr std::array<std::string_view, 4> kToldWithMore = {"lag", "yaw order", "unit", "slip"};
 bool is_one_of(const std::string& check, Checks checks) {
   return std::find(checks.begin(), checks.end(), check) != checks.end();
 }

@@ -329,8 +329,8 @@ void Plausibility::look(bool at_end) {
     // Wheels that contradict themselves say nothing of the IMU.
     if (findings_.size() != before) continue;
     if (wheels.twist.finds_order(findings_) || wheels.heading.finds_order(findings_)) continue;
-    wheels.twist.findings(checks_->imu.up(), findings_);
-    wheels.heading.findings(Eigen::Vector3d::Zero(), findings_);
+    wheels.twist.findings(checks_->imu.up(), zero_ns_.value_or(0), findings_);
+    wheels.heading.findings(Eigen::Vector3d::Zero(), zero_ns_.value_or(0), findings_);
   }
   checks_->stereo.findings(findings_);
   if (!now_ns_ || checks_->streams.empty()) return;

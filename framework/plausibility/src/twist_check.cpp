@@ -70,6 +70,8 @@ void TwistCheck::begin_anew() {
   lag_cells_ = lag_count_ = 0;
   lags_.fill({});
   lag_products_.setZero();
+  turn_cells_ = 0;
+  turns_.clear();
 }
 
 /// As the rate of a gyro without an accelerometer.
@@ -115,12 +117,14 @@ void TwistCheck::advance() {
     } else {
       window_ = before_ = {};
       lag_cells_ = 0;
+      turn_cells_ = 0;
     }
   }
 }
 
 void TwistCheck::add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi) {
   add_to_lags(imu[2], xi);
+  add_to_turns(imu[2], xi);
   // Of the IMU's place.
   const Eigen::Vector2d v(xi[0] - xi[2] * p_IinO_.y(), xi[1] + xi[2] * p_IinO_.x());
   Entries entries = Entries::Zero();
@@ -144,6 +148,18 @@ void TwistCheck::end_window() {
     ++windows_;
   }
   before_ = std::exchange(window_, {});
+}
+
+void TwistCheck::add_to_turns(double gyro, const Twist& xi) {
+  constexpr auto kWindowCells =
+      static_cast<std::int64_t>(1e9 * kTurnWindow_s) / CellMeans<6>::kCellNs;
+  if (turn_cells_ == 0) turn_ = {next_ * CellMeans<6>::kCellNs};
+  turn_ += {0, gyro, xi[2], xi.head<2>().norm()};
+  if (++turn_cells_ < kWindowCells) return;
+  turn_ /= static_cast<double>(std::exchange(turn_cells_, 0));
+  turns_.reserve(kMostTurns);  // once
+  if (turns_.size() == kMostTurns) turns_.erase(turns_.begin(), turns_.begin() + kMostTurns / 2);
+  turns_.push_back(turn_);
 }
 
 /// Differences of the gyro's rates, half a second before to after it, and one of the wheels.

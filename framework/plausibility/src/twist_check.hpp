@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -14,6 +15,7 @@
 #include "viwo/api/kinematic_model.hpp"
 #include "viwo/api/rig.hpp"
 #include "viwo/plausibility/finding.hpp"
+#include "viwo/plausibility/slip.hpp"
 #include "yaw_order_check.hpp"
 
 namespace viwo {
@@ -64,13 +66,14 @@ class TwistCheck {
   /// Whether the gyro says that channels are reversed or exchanged, of wheels that cannot say it of
   /// each other.
   bool finds_order(Findings& out) const { return order_.findings(out); }
-  /// `up`: direction of the specific force in I (ImuCheck).
-  void findings(const Eigen::Vector3d& up, Findings& out) const;
+  /// `up`: direction of the specific force in I (ImuCheck). `zero_ns`: when texts have t = 0.
+  void findings(const Eigen::Vector3d& up, std::int64_t zero_ns, Findings& out) const;
 
  private:
   static constexpr int kMostLag = 25;  ///< cells
   static constexpr int kLags = 2 * kMostLag + 1;
-  static constexpr int kWindow = 10;  ///< cells
+  static constexpr int kWindow = 10;               ///< cells
+  static constexpr std::size_t kMostTurns = 7200;  ///< of an hour
 
   // What moves in a window, along the axes of O, m/s^2 but for the first two, rad/s: rates about z
   // of gyro and wheels, specific force, change of the wheels' velocity, and what it takes to turn
@@ -87,10 +90,12 @@ class TwistCheck {
 
   void advance();
   void begin_anew();
-  void find_factor(double slope, double r, const Eigen::MatrixXd& C, Findings& out) const;
+  bool find_factor(double slope, double r, const Eigen::MatrixXd& C, Findings& out) const;
+  bool finds_slip(std::int64_t zero_ns, Findings& out) const;
   std::string opposite() const;
   void add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi);
   void add_to_lags(double gyro, const Twist& xi);
+  void add_to_turns(double gyro, const Twist& xi);
   void end_window();
   double factor_tolerance() const;
   Remedy drives_times(double scale) const;
@@ -124,6 +129,9 @@ class TwistCheck {
 
   Window window_, before_;
   std::int64_t windows_ = 0;
+  TurnWindow turn_;
+  int turn_cells_ = 0;
+  std::vector<TurnWindow> turns_;  ///< the last ones
   Entries sum_ = Entries::Zero();
   Eigen::Matrix<double, kEntries, kEntries> products_ =
       Eigen::Matrix<double, kEntries, kEntries>::Zero();

@@ -57,7 +57,14 @@ Eigen::Matrix2d matrix(double a, double b, double c, double d) {
 
 }  // namespace
 
-void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
+bool TwistCheck::finds_slip(std::int64_t zero_ns, Findings& out) const {
+  const std::optional<Slip> slip = find_slip(turns_);
+  if (!slip || !slip->is_fault()) return false;
+  out.push_back({wheels_ + " slip", wheels_ + ": " + slip->text(imu_, zero_ns, "")});
+  return true;
+}
+
+void TwistCheck::findings(const Eigen::Vector3d& up, std::int64_t zero_ns, Findings& out) const {
   const double n = static_cast<double>(std::max<std::int64_t>(windows_, 1));
   const Entries mean = sum_ / n;
   const Eigen::MatrixXd C = products_ / n - mean * mean.transpose();  // covariance
@@ -71,7 +78,14 @@ void TwistCheck::findings(const Eigen::Vector3d& up, Findings& out) const {
                            : 0.;
   if (gyro_is_ == Gyro::kMounted && finds_gravity(up, slope, out)) return;
   if (windows_ < kFewestWindows) return;
-  if (slope != 0.) return find_factor(slope, r, C, out);
+  const bool slips = finds_slip(zero_ns, out);
+  if (slope != 0.) {
+    if (find_factor(slope, r, C, out)) return;
+    find_axes(C, out);
+    if (!slips) find_lag(C(kGyro, kGyro), out);  // which slip looks like
+    return;
+  }
+  if (slips) return;
   // A lag of tenths of a second, and they are not alike any more.
   if (turns && r > 0. && find_lag(C(kGyro, kGyro), out)) return;
   // It turns by next to nothing of what the wheels do.
@@ -127,7 +141,7 @@ void TwistCheck::find_turned(const Eigen::MatrixXd& C, Findings& out) const {
 }
 
 /// The rates are alike but for a factor.
-void TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
+bool TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
                              Findings& out) const {
   const std::string fast = significant(std::abs(slope), 3) + " times as fast as the wheels";
   const std::string slow = significant(1. / std::abs(slope), 3) + " times as fast as the gyro";
@@ -168,9 +182,9 @@ void TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
                    {},
                    gyro_is_ == Gyro::kLevel});
   } else {
-    find_axes(C, out);
-    find_lag(C(kGyro, kGyro), out);
+    return false;
   }
+  return true;
 }
 
 /// By what part the two rates may differ: by more where the intrinsics are to be found first, such

@@ -2,13 +2,17 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "faulty_samples.hpp"
+#include "viwo/math/stamp.hpp"
+#include "viwo/plausibility/slip.hpp"
 
 namespace viwo {
 namespace {
@@ -108,6 +112,44 @@ TEST(Plausibility, NamesADriveThatOnlyTheGyroKnowsIsReversed) {
   EXPECT_THAT(found_with(-1., 1.), ElementsAre(HasSubstr("drive_1 turns opposite")));
   // That may be the gyro's sign as well.
   EXPECT_THAT(found_with(-1., -1.), ElementsAre(HasSubstr("sign of all drives")));
+}
+
+// One of two drives, of which nothing else of the wheels knows.
+TEST(Plausibility, NamesAWheelThatSlippedForAWhile) {
+  const auto slips_for = [](double slip_s, double factor) {
+    return found(robot("viwo_skid_steer"), {.wheels = [=](EncoderSample& s) {
+                   const double t_s = 1e-9 * static_cast<double>(s.t_ns);
+                   if (t_s > 12. && t_s < 12. + slip_s) s.drive_rad_per_s[0] *= factor;
+                 }});
+  };
+  EXPECT_THAT(slips_for(3., 1.5),
+              ElementsAre(AllOf(HasSubstr("wheels0: turns otherwise than imu0 for "),
+                                HasSubstr(" rad in all"), HasSubstr("slipped"))));
+  EXPECT_THAT(slips_for(3., 1.), IsEmpty());
+  EXPECT_THAT(slips_for(20., 1.5), ::testing::Not(Contains(HasSubstr("slipped"))));
+}
+
+TEST(FindSlip, TellsWhenHowLongAndByHowMuch) {
+  std::vector<TurnWindow> windows;
+  for (int i = 0; i < 100; ++i) {
+    const double rate = std::sin(0.1 * i);
+    // Another width of the base, and a bias.
+    TurnWindow window{i * to_ns(kTurnWindow_s), 1.3 * rate + 0.02, rate, 0.5};
+    if (i >= 60 && i < 64) window.wheels += 0.8;
+    windows.push_back(window);
+  }
+  const auto slip = find_slip(windows);
+  ASSERT_TRUE(slip);
+  EXPECT_EQ(slip->from_ns, 60 * to_ns(kTurnWindow_s));
+  EXPECT_EQ(slip->length_s, 2.);
+  EXPECT_NEAR(slip->turn_rad, -1.3 * 0.8 * 2., 0.05);
+  EXPECT_TRUE(slip->is_fault());
+  // With a hole in the middle it is two that are shorter.
+  windows.erase(windows.begin() + 62);
+  const auto shorter = find_slip(windows);
+  ASSERT_TRUE(shorter);
+  EXPECT_EQ(shorter->length_s, 1.);
+  EXPECT_FALSE(find_slip(std::span(windows).first(39)));
 }
 
 TEST(Plausibility, NamesTheLagOfTheWheels) {
