@@ -5,8 +5,8 @@
 #include <ceres/cost_function.h>
 
 #include "calibration_problem.hpp"
-#include "held_prior.hpp"
 #include "viwo/calibration/calibrate.hpp"
+#include "viwo/wheel/held_prior.hpp"
 
 namespace viwo::calibration {
 

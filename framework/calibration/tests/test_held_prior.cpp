@@ -4,9 +4,9 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
-#include "held_prior.hpp"
 #include "simulated_calibration.hpp"
 #include "viwo/math/se2.hpp"
+#include "viwo/wheel/held_prior.hpp"
 
 namespace viwo {
 namespace {

@@ -204,22 +204,32 @@ MatrixXd tilt_of_the_mount(const WheelsView& wheels, Builder& build) {
 
 }  // namespace
 
-std::vector<NamedDirections> analytic_directions(const ObservabilityMatrix& state,
-                                                 double gravity_m_per_s2, const WheelsView& wheels,
-                                                 const WheelModel& model,
-                                                 const EncoderSample& sample) {
-  Builder build(state, wheels);
+std::vector<NamedDirections> directions_of_the_robot(const ObservabilityMatrix& state,
+                                                     double gravity_m_per_s2) {
+  const WheelsView none;
+  Builder build(state, none);
   std::vector<NamedDirections> all;
   const auto add = [&](const std::string& name, const std::string& when, MatrixXd basis) {
     if (basis.cols() > 0) all.push_back({name, std::move(basis), when});
   };
   add("global position and yaw", "always", global_position_and_yaw(state, build));
-  add("placement of O", "always", placement_of_O(wheels, build));
   add("tilt and accelerometer bias", "no rotation",
       tilt_and_accelerometer_bias(state, gravity_m_per_s2, build));
   build.feature(state.p_FinG() - state.start().p_IinG);
   build.next();
   add("distance of the feature", "no motion", build.take());
+  return all;
+}
+
+std::vector<NamedDirections> directions_of_wheels(const ObservabilityMatrix& state,
+                                                  const WheelsView& wheels, const WheelModel& model,
+                                                  const EncoderSample& sample) {
+  Builder build(state, wheels);
+  std::vector<NamedDirections> all;
+  const auto add = [&](const std::string& name, const std::string& when, MatrixXd basis) {
+    if (basis.cols() > 0) all.push_back({name, std::move(basis), when});
+  };
+  add("placement of O", "always", placement_of_O(wheels, build));
   for (int i = 0; i < 3; ++i) {
     build.mount_theta(Vector3d::Unit(i));
     build.next();

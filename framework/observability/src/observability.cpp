@@ -127,39 +127,46 @@ Watched watch(const Node& run, PluginRegistry& plugins, std::vector<std::string>
   return out;
 }
 
-/// How the directions that theory names lie to the null space, and how many of its dimensions they
-/// leave unexplained.
+/// How directions that theory names lie to the null space: those that are hidden become `known`.
+void explain(const std::vector<NamedDirections>& sets, const std::string& of,
+             const ObservabilityMatrix& state, const MatrixXd& null, MatrixXd& known,
+             Observability& out) {
+  for (const NamedDirections& set : sets) {
+    const MatrixXd basis = orthonormal(state.prior_sigma().cwiseInverse().asDiagonal() * set.basis);
+    const MatrixXd hidden = intersection(basis, null, kHiddenAngle);
+    ExplainedDirections explained;
+    explained.name = of + set.name;
+    explained.when = set.when;
+    explained.dimension = static_cast<int>(basis.cols());
+    explained.hidden = static_cast<int>(hidden.cols());
+    explained.max_angle_rad = largest_angle(basis, null);
+    // What is hidden only in part is named by something else.
+    if (explained.hidden == explained.dimension) {
+      MatrixXd both(state.size(), known.cols() + hidden.cols());
+      both << known, hidden;
+      const auto before = known.cols();
+      known = orthonormal(both, 1e-6);
+      explained.adds = static_cast<int>(known.cols() - before);
+    }
+    out.explained.push_back(explained);
+  }
+}
+
+/// What theory names, and how many dimensions of the null space it leaves unexplained.
 void explain(const Watched& run, const MatrixXd& null, Observability& out) {
   const ObservabilityMatrix& state = *run.state;
+  const FilterSetup& filter = *run.setup.filter;
   MatrixXd known(state.size(), 0);
-  out.unexplained = out.unobservable;
-  const auto samples = run.data.wheels();
-  if (samples.empty()) return;
-  const EncoderSample& sample = samples[samples.size() / 2];
+  explain(directions_of_the_robot(state, filter.options.filter.gravity_m_per_s2), "", state, null,
+          known, out);
   for (std::size_t k = 0; k < run.wheels.size(); ++k) {
-    const WheelSet& wheels = run.setup.filter->wheels[k];
-    for (const NamedDirections& set :
-         analytic_directions(state, run.setup.filter->options.filter.gravity_m_per_s2,
-                             run.wheels[k], *wheels.model, sample)) {
-      const MatrixXd basis =
-          orthonormal(state.prior_sigma().cwiseInverse().asDiagonal() * set.basis);
-      const MatrixXd hidden = intersection(basis, null, kHiddenAngle);
-      ExplainedDirections explained;
-      explained.name = (wheels.prior.name.empty() ? "" : wheels.prior.name + ": ") + set.name;
-      explained.when = set.when;
-      explained.dimension = static_cast<int>(basis.cols());
-      explained.hidden = static_cast<int>(hidden.cols());
-      explained.max_angle_rad = largest_angle(basis, null);
-      // What is hidden only in part is named by something else.
-      if (explained.hidden == explained.dimension) {
-        MatrixXd both(state.size(), known.cols() + hidden.cols());
-        both << known, hidden;
-        const auto before = known.cols();
-        known = orthonormal(both, 1e-6);
-        explained.adds = static_cast<int>(known.cols() - before);
-      }
-      out.explained.push_back(explained);
-    }
+    const WheelSet& wheels = filter.wheels[k];
+    const std::string& sensor = wheels.prior.sensor;
+    const auto samples =
+        run.data.recorded.of<EncoderSample>(sensor.empty() ? run.data.wheels_name : sensor);
+    if (samples.empty()) continue;
+    explain(directions_of_wheels(state, run.wheels[k], *wheels.model, samples[samples.size() / 2]),
+            wheels.prior.name.empty() ? "" : wheels.prior.name + ": ", state, null, known, out);
   }
   out.unexplained = static_cast<int>(null.cols() - known.cols());
 }

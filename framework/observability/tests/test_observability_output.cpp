@@ -20,6 +20,30 @@ const std::vector<std::string> kShort = {"sensors.simulator0.duration_s=5",
                                          "sensors.simulator0.features=20",
                                          "sensors.simulator0.ramp_s=0"};
 
+// Cameras and IMU alone hide where the world begins, and that has a name.
+TEST(Observability, ExplainsTheNullSpaceOfARobotWithoutWheels) {
+  const auto file = std::filesystem::path(::testing::TempDir()) / "viwo_no_wheels.yaml";
+  const std::string cameras = testing::configuration("cameras/t265_like.yaml").string();
+  std::ofstream(file) << "sensors:\n"
+                         "  simulator0:\n"
+                         "    type: simulator\n"
+                         "    robot: {type: differential, baseline_m: 0.4, radius_left_m: 0.05, "
+                         "radius_right_m: 0.05}\n"
+                         "    motion: figure_eight\n"
+                         "    duration_s: 5\n"
+                         "    features: 20\n"
+                         "    cameras: "
+                      << cameras << "\ncameras: {kalibr: " << cameras
+                      << ", calibrate: false}\nestimator: {start: reference}\n"
+                         "updates:\n  visual_features: {sigma_px: 1}\n";
+  const ObservabilityReport report =
+      observability::analyse(read_observability(file, {}), testing::registry());
+  const Observability& free = report.results.at(0).free;
+  EXPECT_EQ(free.unobservable, 4);
+  EXPECT_EQ(free.unexplained, 0);
+  EXPECT_EQ(testing::find(free, "global position and yaw").hidden, 4);
+}
+
 TEST(ObservabilityOutput, OfARunHasTheKeysThatScriptsRead) {
   const ObservabilityReport report = testing::analyse("runs/viwo_swerve.yaml", kShort);
   ASSERT_EQ(report.results.size(), 1u);

@@ -15,6 +15,12 @@ std::string small(double value, const std::string& unit) {
   return significant(1e3 * value, 3) + " m" + unit;
 }
 
+/// Nobody measures it for a filter.
+PlanSetup without_distance(PlanSetup setup) {
+  setup.params.distance = false;
+  return setup;
+}
+
 }  // namespace
 
 std::string text_of(const Forecast& forecast) {
@@ -30,7 +36,7 @@ std::string text_of(const Forecast& forecast) {
 }
 
 Forecaster::Forecaster(PlanSetup setup)
-    : setup_(std::move(setup)),
+    : setup_(without_distance(std::move(setup))),
       wheels_(setup_.model, setup_.params),
       pieces_(make_pieces(wheels_, setup_.params)) {}
 

@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 
 #include "viwo/api/status.hpp"
+#include "viwo/wheel/held_prior.hpp"
 
 namespace viwo::plan {
 namespace {
@@ -17,6 +18,15 @@ constexpr std::int64_t kSegment_ns = 1'000'000'000;
 constexpr std::int64_t kPathPiece_ns = 50'000'000;
 /// A base that spins or stands has no way to be longer or shorter.
 constexpr double kNoWay_m = 1e-6;
+
+Eigen::MatrixXd known_before(const WheelModel& model) {
+  Intrinsics drawn(model.n_intrinsics());
+  for (int i = 0; i < drawn.size(); ++i) {
+    drawn[i] = model.description().intrinsics[static_cast<std::size_t>(i)].prior_sigma;
+  }
+  return prior_in_held_frame(model, model.nominal(), drawn)
+      .topLeftCorner(drawn.size(), drawn.size());
+}
 
 PreintegrationOptions preintegration() {
   PreintegrationOptions options;
@@ -42,6 +52,10 @@ void KnowledgeParams::bind(ParamBinder& b) {
              "parity residual of an earlier calibration"});
 }
 
+Intrinsics sigma_before(const WheelModel& model) {
+  return known_before(model).diagonal().cwiseSqrt();
+}
+
 Information Information::zero(int n_intrinsics) {
   return {Eigen::MatrixXd::Zero(n_intrinsics + 1, n_intrinsics + 1),
           Eigen::VectorXd::Zero(n_intrinsics + 1)};
@@ -63,8 +77,7 @@ WheelInformation::WheelInformation(std::shared_ptr<const WheelModel> model,
                                    const KnowledgeParams& known)
     : model_(std::move(model)), known_(known), preintegrator_(model_, preintegration()) {
   preintegrator_.set_intrinsics(model_->nominal());
-  const int size = model_->n_intrinsics() + 1;
-  before_ = Eigen::MatrixXd::Identity(size, size);
+  set_known(known_before(*model_));
 }
 
 void WheelInformation::set_known(const Eigen::MatrixXd& P) {
@@ -78,7 +91,9 @@ void WheelInformation::set_known(const Eigen::MatrixXd& P) {
   const Eigen::LLT<Eigen::MatrixXd> llt(inverse * P(free, free) * inverse);
   if (llt.info() != Eigen::Success) throw InputError("a covariance that is not positive definite");
   const auto n = static_cast<Eigen::Index>(free.size());
-  before_.setIdentity();
+  constexpr double kHeld = 1e12;
+  before_.setIdentity(prior.size() + 1, prior.size() + 1);
+  before_.diagonal().head(prior.size()).setConstant(kHeld);
   const Eigen::MatrixXd information = llt.solve(Eigen::MatrixXd::Identity(n, n));
   before_(free, free) = information;
 }

@@ -40,7 +40,7 @@ std::string result_text(const PlanSetup& setup, const Plan& plan) {
                           significant(plan.duration_s(), 3) + " s";
   if (plan.reached) return "all goals are reached after " + way;
   const Intrinsics sigma =
-      plan.pieces.empty() ? setup.model->prior_sigma() : plan.pieces.back().sigma;
+      plan.pieces.empty() ? sigma_before(*setup.model) : plan.pieces.back().sigma;
   return "the goals are not reached: " + plan.why_not + "; after " + way +
          " the worst sigma is still " + worst_text(setup, sigma) + " x its goal";
 }
@@ -81,13 +81,13 @@ json summary_of(const PlanSetup& setup, const Plan& plan) {
                       {"worst", spec_of(setup, worst.intrinsic).name}});
   }
   json goals = json::object();
+  const Intrinsics before = sigma_before(*setup.model);
   for (const Goal& goal : setup.goals) {
     const IntrinsicSpec& spec = spec_of(setup, goal.intrinsic);
-    const double sigma =
-        plan.pieces.empty() ? spec.prior_sigma : plan.pieces.back().sigma[goal.intrinsic];
+    const double sigma = (plan.pieces.empty() ? before : plan.pieces.back().sigma)[goal.intrinsic];
     goals[spec.name] = {{"unit", spec.unit},
                         {"goal", goal.sigma},
-                        {"prior_sigma", spec.prior_sigma},
+                        {"prior_sigma", before[goal.intrinsic]},
                         {"sigma", sigma}};
   }
   return {{"status", plan.reached ? "ok" : "failed"},
@@ -125,9 +125,10 @@ report::Plot sigma_plot(const PlanSetup& setup, const Plan& plan) {
   report::Plot plot{"What is known when", "path of the fastest point [m]", "sigma / goal"};
   plot.log_y = plot.half_width = true;
   plot.lines.push_back({report::ReferenceLine::Direction::kHorizontal, 1., "goal"});
+  const Intrinsics before = sigma_before(*setup.model);
   for (const Goal& goal : setup.goals) {
     const IntrinsicSpec& spec = spec_of(setup, goal.intrinsic);
-    report::Series series{spec.name, {0.}, {spec.prior_sigma / goal.sigma}};
+    report::Series series{spec.name, {0.}, {before[goal.intrinsic] / goal.sigma}};
     series.draw = report::Draw::kLinesAndMarkers;
     for (const PlannedPiece& one : plan.pieces) {
       series.x.push_back(series.x.back() + one.piece.cost_m);

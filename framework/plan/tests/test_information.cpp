@@ -159,13 +159,46 @@ TEST(Information, AddsUpAndNeverRaisesASigma) {
   WheelInformation wheels(setup.model, setup.params);
   Information drive = Information::zero(setup.model->n_intrinsics());
   Intrinsics before = wheels.sigma(drive);
-  EXPECT_LT((before - setup.model->prior_sigma()).cwiseAbs().maxCoeff(), 1e-15);
+  EXPECT_LT((before - plan::sigma_before(*setup.model)).cwiseAbs().maxCoeff(), 1e-12);
   for (const char* motion : {"straight", "spin", "icr_sweep"}) {
     drive += information(setup, samples_of(setup, motion));
     const Intrinsics after = wheels.sigma(drive);
     for (int i = 0; i < after.size(); ++i) EXPECT_LE(after[i], before[i] * (1. + 1e-9)) << motion;
     before = after;
   }
+}
+
+/// Four places that are known to sigma each, one of which is where O is held, know the size of the
+/// base by sigma / sqrt(sum |p_i - mean|^2), whichever is held.
+TEST(Information, KnowsTheSizeOfTheBaseAsItsDrawingDoes) {
+  const PlanSetup setup = testing::swerve_plan({});
+  const WheelModel& model = *setup.model;
+  WheelInformation wheels(setup.model, setup.params);
+  const auto n = static_cast<Eigen::Index>(model.n_intrinsics());
+  const Intrinsics x = model.nominal(), scale = model.prior_sigma();
+  const Eigen::MatrixXd P =
+      scale.asDiagonal() *
+      wheels.covariance(Information::zero(static_cast<int>(n))).topLeftCorner(n, n) *
+      scale.asDiagonal();
+  // The size by least squares: in the plane, with the free places as they hang together.
+  std::vector<Eigen::Index> places;
+  const double sigma = scale[model.find("x_2")];
+  double squares = 0.;
+  for (const std::string wheel : {"1", "2", "3", "4"}) {
+    squares += std::pow(x[model.find("x_" + wheel)], 2) + std::pow(x[model.find("y_" + wheel)], 2);
+    if (wheel == "1") continue;
+    for (const char* axis : {"x_", "y_"}) places.push_back(model.find(axis + wheel));
+  }
+  Eigen::VectorXd by_size(static_cast<Eigen::Index>(places.size()));
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const bool is_x = k % 2 == 0;
+    by_size[static_cast<Eigen::Index>(k)] = x[places[k]] - x[model.find(is_x ? "x_1" : "y_1")];
+  }
+  // Without the turn of O about the first wheel, which its zero and theirs hold.
+  const double information = by_size.dot(P(places, places).llt().solve(by_size));
+  EXPECT_NEAR(1. / std::sqrt(information), sigma / std::sqrt(squares), 0.02 * sigma);
+  // Broken: with the first wheel exactly where it is drawn it is better known.
+  EXPECT_LT(sigma / by_size.norm(), 0.8 * sigma / std::sqrt(squares));
 }
 
 /// A straight drive of L metres tells the scale of all radii by sigma_distance / L, no more.

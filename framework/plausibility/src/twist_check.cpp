@@ -14,8 +14,8 @@ namespace viwo {
 template <int kSize>
 void CellMeans<kSize>::add(std::int64_t begin_ns, std::int64_t end_ns, const Vector& value) {
   if (end_ns <= begin_ns) return;
-  end_ = std::max(end_, end_ns / kCellNs);
   if (end_ns - begin_ns > kLongestNs) return;
+  end_ = std::max(end_, end_ns / kCellNs);
   for (std::int64_t i = begin_ns / kCellNs; i * kCellNs < end_ns; ++i) {
     Cell& cell = cells_[static_cast<std::size_t>(i % kCells)];
     if (cell.index > i) continue;  // long gone

@@ -133,7 +133,7 @@ Preintegrator::Preintegrator(std::shared_ptr<const WheelModel> model,
 bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64_t begin_ns,
                               std::int64_t end_ns, PreintegratedPose& out) {
   out.reset(solver_.model().n_intrinsics());
-  if (begin_ns != reached_ns_) has_believed_ = false;
+  begin_at(begin_ns);
   const auto after_begin = [&](const EncoderSample& sample) { return sample.end_ns <= begin_ns; };
   const auto first = std::partition_point(samples.begin(), samples.end(), after_begin);
   find_motion(samples.subspan(static_cast<std::size_t>(first - samples.begin())), end_ns);
@@ -183,6 +183,20 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
   if (reached_ns < end_ns && k > 0 && k < samples.size()) bridge_hole(k, end_ns);
   reached_ns_ = reached_ns;
   return covered && reached_ns >= end_ns;
+}
+
+/// What has been believed up to there.
+void Preintegrator::begin_at(std::int64_t begin_ns) {
+  owed_s_ = 0.;
+  if (begin_ns == begun_ns_) {
+    has_believed_ = has_believed_there_;
+    if (has_believed_) solutions_[believed_] = believed_there_;
+    return;
+  }
+  if (begin_ns != reached_ns_) has_believed_ = false;
+  begun_ns_ = begin_ns;
+  has_believed_there_ = has_believed_;
+  if (has_believed_) believed_there_ = solutions_[believed_];
 }
 
 /// (W-16): whether the mean of the samples before end_ns shows a motion.
@@ -237,6 +251,7 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
     }
   }
   if (solution.rank_deficient) out.rank_deficient += noise.samples;
+  if (owed_s_ > 0.) step(solution, std::exchange(owed_s_, 0.), {}, out);
   step(solution, dt, noise, out);
   believed_ = 1 - believed_;  // solution becomes the one believed last
   has_believed_ = true;
@@ -245,8 +260,9 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
 void Preintegrator::bridge(double dt, const TwistSolution* unbelieved, PreintegratedPose& out) {
   out.bridged_s += dt;
   if (!has_believed_) {
-    // Nothing to bridge from yet: take what there is rather than stand still.
-    if (unbelieved != nullptr) step(*unbelieved, dt, {}, out);
+    // Nothing to bridge from yet: take what there is rather than stand still, or what comes.
+    if (unbelieved == nullptr) owed_s_ += dt;
+    if (unbelieved != nullptr) step(*unbelieved, std::exchange(owed_s_, 0.) + dt, {}, out);
     return;
   }
   TwistSolution held = solutions_[believed_];

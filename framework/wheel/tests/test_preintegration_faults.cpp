@@ -98,6 +98,35 @@ TEST(Preintegration, DoesNotBelieveASlippingWheel) {
   EXPECT_GT(with_gate.P_g.trace(), 2. * without.P_g.trace());
 }
 
+// An update integrates its interval again at other intrinsics.
+TEST(Preintegration, IsTheSameAgainWhereItsFirstSampleIsNotBelieved) {
+  const auto model = load_model(swerve("four_wis_wid"));
+  const auto even = [](double) { return Twist(0.4, 0.1, 0.3); };
+  const auto whole = sample_motion(*model, even, 1., 100.);
+  auto samples = whole;
+  for (const std::size_t bad : {30, 31, 60}) samples[bad].drive_rad_per_s.fill(std::nan(""));
+  Preintegrator preintegrator(model, {});
+  PreintegratedPose clean, once, again;
+  Preintegrator(model, {}).integrate(whole, 3 * kSecond / 10, 6 * kSecond / 10, clean);
+  const auto expect_all_of_it = [&](const PreintegratedPose& pose, double bridged_s) {
+    EXPECT_NEAR(pose.bridged_s, bridged_s, 1e-12);
+    EXPECT_NEAR(pose.duration_s, 0.3, 1e-12);
+    EXPECT_LT((pose.g - clean.g).norm(), 1e-9);
+  };
+  // With nothing before it, and behind another one.
+  for (const bool is_behind : {false, true}) {
+    if (is_behind) preintegrator.integrate(samples, 0, 3 * kSecond / 10, once);
+    ASSERT_TRUE(preintegrator.integrate(samples, 3 * kSecond / 10, 6 * kSecond / 10, once));
+    ASSERT_TRUE(preintegrator.integrate(samples, 3 * kSecond / 10, 6 * kSecond / 10, again));
+    expect_all_of_it(once, 0.02);
+    EXPECT_EQ(again.g, once.g);
+    EXPECT_EQ(again.P_g, once.P_g);
+  }
+  // The next one goes on from there.
+  ASSERT_TRUE(preintegrator.integrate(samples, 6 * kSecond / 10, 9 * kSecond / 10, once));
+  expect_all_of_it(once, 0.01);
+}
+
 // A cut sample is noisier than one that is whole: the gate has to know.
 TEST(Preintegration, GatesCutSamplesAsOftenAsItIsAskedTo) {
   const auto model = load_model(swerve("four_wis_wid"));

@@ -127,7 +127,7 @@ TEST(ZeroVelocity, DoesNotTakeSlowMotionForAStandstillWithTheImuAlone) {
   EXPECT_EQ(given, 0) << "even motion contradicts nothing";
   // Wheels that stand while the filter moves do.
   EXPECT_EQ(believed(", detector: wheels", Robot(0.), false, sure, &given), 0);
-  EXPECT_EQ(given, 29);
+  EXPECT_EQ(given, 30);
 }
 
 TEST(ZeroVelocity, SeesAStandstillAndSlowMotionInImagesWhateverTheFilterKnows) {
@@ -146,8 +146,7 @@ TEST(ZeroVelocity, SeesThemInTheImagesOfOneOfTwoCamerasThatTakeTurns) {
 
 TEST(ZeroVelocity, SeesAStandstillAndSlowMotionInTheWheels) {
   const testing::SmallFilter unsure = standing_filter(1.);
-  // The first epoch has no beginning.
-  EXPECT_EQ(believed(", detector: wheels", Robot(0.), false, unsure), 29);
+  EXPECT_EQ(believed(", detector: wheels", Robot(0.), false, unsure), 30);
   EXPECT_EQ(believed(", detector: wheels", Robot(0.05), false, unsure), 0);
   Robot late(0.);  // the last tenth of each epoch
   late.first_reading = 9;

@@ -165,7 +165,6 @@ class ZeroVelocity final : public Update {
 
   /// No wheel has turned since the last epoch; there must be a sample that says so.
   bool wheels_stand(const FilterView& filter, const EpochData& data) const {
-    if (data.begin_ns == 0) return false;
     const std::int64_t offset_ns = std::llround(1e9 * filter.block(wheels_.clock).numbers()[0]);
     const std::int64_t from_ns = data.begin_ns - offset_ns;
     const std::int64_t to_ns = data.end_ns - offset_ns;

@@ -25,6 +25,10 @@ struct KnowledgeParams {
   void bind(ParamBinder& b);
 };
 
+/// Sigmas of the intrinsics before a drive; 0 where the gauge holds one, which puts what it may be
+/// off by into the others (CAL-18).
+Intrinsics sigma_before(const WheelModel& model);
+
 /// Information adds up over a drive. Unknowns are the intrinsics and the bias of the gyro, in units
 /// of their prior sigmas.
 struct Information {
@@ -46,8 +50,8 @@ class WheelInformation {
   Information of(std::span<const EncoderSample> samples, std::int64_t begin_ns,
                  std::int64_t end_ns);
 
-  /// What is known before a drive, instead of the prior of the model: covariance of the intrinsics.
-  /// InputError where that is none.
+  /// What is known before a drive, instead of the prior of the model: covariance of the intrinsics,
+  /// zero of those that are held. InputError where that is none.
   void set_known(const Eigen::MatrixXd& P);
   /// Covariance of the unknowns in prior units after a drive (PL-2).
   Eigen::MatrixXd covariance(const Information& drive) const;

@@ -57,7 +57,7 @@ std::vector<EncoderSample> exact_encoders(const WheelModel& model,
                                           const std::function<Twist(double t_s)>& twist,
                                           double duration_s, double rate_hz);
 
-/// The pieces that the base can drive and the floor has room for, with what they tell.
+/// The pieces that the base can drive, with what they tell.
 std::vector<Piece> make_pieces(WheelInformation& wheels, const LimitParams& limits);
 
 /// Whether a base that drives `piece` from `start` stays on the floor, whose middle is the origin.

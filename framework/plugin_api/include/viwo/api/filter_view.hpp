@@ -93,7 +93,7 @@ struct SampleSpan {
 
 /// Measurements of one epoch.
 struct EpochData {
-  std::int64_t begin_ns = 0;            ///< the epoch before this one, IMU clock; 0 for the first
+  std::int64_t begin_ns = 0;            ///< the epoch before this one, or the start, IMU clock
   std::int64_t end_ns = 0;              ///< now; time of the last clone
   std::span<const ImuSample> imu;       ///< from begin to end, both included (interpolated there)
   std::span<const SampleSpan> streams;  ///< by StreamId::index

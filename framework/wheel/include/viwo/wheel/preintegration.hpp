@@ -62,7 +62,8 @@ class Preintegrator {
   /// there so that their pieces add up (W-11); holes between cells are bridged with the mean of
   /// their neighbours. Returns false, with the part that is covered, when
   /// the samples do not reach over the whole interval. What is not believed at the start of an
-  /// interval that continues the one before is bridged from there.
+  /// interval that continues the one before is bridged from there, also when the same interval is
+  /// integrated again; else it moves as what is believed first.
   bool integrate(std::span<const EncoderSample> samples, std::int64_t begin_ns, std::int64_t end_ns,
                  PreintegratedPose& out);
 
@@ -75,6 +76,7 @@ class Preintegrator {
     double parity = 1.;
     int samples = 1;
   };
+  void begin_at(std::int64_t begin_ns);
   void find_motion(std::span<const EncoderSample> samples, std::int64_t end_ns);
   void add_piece(const EncoderSample& y, double dt, PieceNoise noise, PreintegratedPose& out);
   void bridge(double dt, const TwistSolution* unbelieved, PreintegratedPose& out);
@@ -87,7 +89,12 @@ class Preintegrator {
   std::array<TwistSolution, 2> solutions_;  // of this sample, and the last one that passed
   std::size_t believed_ = 0;                // index of the latter
   bool has_believed_ = false;
+  double owed_s_ = 0.;  // begins the interval and waits for a twist to be believed
   std::int64_t reached_ns_ = std::numeric_limits<std::int64_t>::min();  // end of the last interval
+  // The last interval's begin, and what was believed there.
+  std::int64_t begun_ns_ = std::numeric_limits<std::int64_t>::min();
+  TwistSolution believed_there_;
+  bool has_believed_there_ = false;
   Eigen::Matrix3d last_gain_;  // d g / d xi of the last piece, for correlated neighbours
 };
 

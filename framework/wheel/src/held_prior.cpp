@@ -1,11 +1,11 @@
-#include "held_prior.hpp"
+#include "viwo/wheel/held_prior.hpp"
 
 #include <vector>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-namespace viwo::calibration {
+namespace viwo {
 namespace {
 
 /// How [x_WI, E] change with the frame, by yaw, x and y of O' in O, of those that can be moved.
@@ -31,8 +31,8 @@ Eigen::MatrixXd by_frame(const WheelModel& model, const Intrinsics& x_WI, double
 }  // namespace
 
 Eigen::MatrixXd prior_in_held_frame(const WheelModel& model, const Intrinsics& x_WI,
-                                    const Intrinsics& sigma, const PlanarExtrinsics& extrinsics,
-                                    const PlanarExtrinsics& extrinsics_sigma) {
+                                    const Intrinsics& sigma, const Eigen::Vector3d& extrinsics,
+                                    const Eigen::Vector3d& extrinsics_sigma) {
   std::vector<int> held;
   for (int i = 0; i < model.n_intrinsics(); ++i) {
     if (model.description().intrinsics[static_cast<std::size_t>(i)].gauge_fixed) held.push_back(i);
@@ -56,4 +56,4 @@ Eigen::MatrixXd prior_in_held_frame(const WheelModel& model, const Intrinsics& x
   return P;
 }
 
-}  // namespace viwo::calibration
+}  // namespace viwo
