@@ -157,6 +157,20 @@ RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
   return read_run(configuration, plugins, arguments.seed);
 }
 
+/// As it stands: what a log is compared with does not depend on a seed.
+RunSetup read_without_drawn_start(const Arguments& arguments, PluginRegistry& plugins) {
+  constexpr std::string_view kScale = "estimator.calibration_error_scale";
+  config::Node configuration =
+      resolve_placeholders(load_run_configuration(arguments.positional[0], arguments.assignments));
+  config::Node* const scale = configuration.at_path(kScale);
+  if (scale == nullptr) return read_run(configuration, plugins, arguments.seed);
+  const config::Node drawn =
+      std::exchange(*scale, config::Node::scalar_of("0", config::Mark(scale->mark())));
+  RunSetup setup = read_run(configuration, plugins, arguments.seed);
+  *setup.resolved.at_path(kScale) = drawn;  // for --fix
+  return setup;
+}
+
 /// The calibration that a run starts from, and what it is compared with, must not be lost.
 void refuse_to_replace_inputs(const std::filesystem::path& folder, const config::Node& resolved) {
   const std::vector<std::filesystem::path> inputs = input_files(resolved);
@@ -336,7 +350,7 @@ int inspect_command(const Arguments& arguments) {
                      "lost: name another file");
   }
   PluginRegistry plugins = make_registry(arguments);
-  RunSetup setup = read_run_of(arguments, plugins);
+  RunSetup setup = read_without_drawn_start(arguments, plugins);
   if (!arguments.fix.empty()) refuse_to_replace(arguments.fix, input_files(setup.resolved));
   const OutFolder out(out_folder(arguments, "inspect"));
   const std::filesystem::path& folder = out.path();

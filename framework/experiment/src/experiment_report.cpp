@@ -245,6 +245,7 @@ void add_calibration_table(const ExperimentResult& result, const Group& all, Sec
     std::vector<Cell> row{parameter, 0.};
     const auto found = result.units.find(parameter);
     std::optional<report::DisplayUnit> unit;
+    double prior_sigma = 0.;  // of the first variant that estimates it
     for (const auto& column : columns) {
       const auto c = std::find_if(column.begin(), column.end(),
                                   [&](const auto& s) { return s.name == parameter; });
@@ -255,10 +256,13 @@ void add_calibration_table(const ExperimentResult& result, const Group& all, Sec
       if (!unit) {
         unit = report::display_unit(found != result.units.end() ? found->second : "", c->rmse);
         row[0] = unbroken(report::with_unit(parameter, unit->name));
-        row[1] = rounded(unit->scale * c->prior_sigma);
+        prior_sigma = c->prior_sigma;
+        row[1] = rounded(unit->scale * prior_sigma);
       }
-      row.emplace_back(unbroken(compact(unit->scale * c->rmse, 3) + " (" +
-                                nees_text(c->nees, c->widened_nees) + ")"));
+      const bool is_other = std::abs(c->prior_sigma - prior_sigma) > 1e-6 * prior_sigma;
+      row.emplace_back(unbroken(
+          compact(unit->scale * c->rmse, 3) + " (" + nees_text(c->nees, c->widened_nees) + ")" +
+          (is_other ? ", prior " + compact(unit->scale * c->prior_sigma, 3) : "")));
     }
     table.rows.push_back(std::move(row));
   }

@@ -206,10 +206,16 @@ PlanarExtrinsics planar_mount(const WheelsView& wheels) {
   return {p_OinI.x(), p_OinI.y(), std::atan2(R_OtoI(1, 0), R_OtoI(0, 0))};
 }
 
+/// Where the run says that O is in the body of the reference, or null.
+const Node* place_of_O(const Node& run) {
+  const Node* const place = run.at_path("evaluation.extrinsics_x_m_y_m_yaw_rad");
+  return place == nullptr || place->items().empty() ? nullptr : place;
+}
+
 /// Where O is in the body of the poses tells where the IMU is by way of the wheels' mount.
 void require_wheels_for_place(const Node& run, const RunSetup& setup, config::Errors& errors) {
-  const Node* const place = run.at_path("evaluation.extrinsics_x_m_y_m_yaw_rad");
-  if (!setup.filter || setup.O_in_I || place == nullptr || place->items().empty()) return;
+  const Node* const place = place_of_O(run);
+  if (!setup.filter || setup.O_in_I || place == nullptr) return;
   errors.add(place->mark(),
              "evaluation.extrinsics_x_m_y_m_yaw_rad: this filter has no wheels, whose O it is of: "
              "errors are of the IMU");
@@ -324,7 +330,8 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
         read_filter(run, setup.model, setup.x_WI, setup.sigma, context, setup.resolved, errors);
     if (!filter.wheels.empty()) {
       const WheelsView& wheels = filter.wheels.front().prior.wheels;
-      setup.O_in_I = planar_mount(wheels);
+      // Wheels alone have no other use for it than to say whose errors these are.
+      if (wants_filter(run) || place_of_O(run) == nullptr) setup.O_in_I = planar_mount(wheels);
       setup.t_OtoI_s = wheels.t_OtoI_s;
     }
     measuring = filter.measuring;
