@@ -9,11 +9,14 @@ set -euo pipefail
 
 missing=()
 
-# Readers of MCAP by others, for tests/mcap; without network those tests are skipped.
-if [ "${1:-}" = --tests ] && command -v npm > /dev/null; then
+# Readers of MCAP by others, for tests/mcap; without network those tests are skipped. At the end: npm
+# itself may be what is installed.
+tests=${1:-}
+install_readers() {
+  if [ "$tests" != --tests ] || ! command -v npm > /dev/null; then return 0; fi
   npm ci --silent --no-audit --no-fund --prefix "$(dirname "$0")/../tests/mcap" < /dev/null ||
     echo "npm packages of tests/mcap cannot be had: these tests are skipped."
-fi
+}
 
 # need_command PACKAGE COMMAND...: one of the commands must be there, wherever it comes from.
 need_command() {
@@ -108,6 +111,7 @@ missing=("${required[@]}")
 
 if [ ${#missing[@]} -eq 0 ] && [ ${#optional[@]} -eq 0 ]; then
   echo "All dependencies are installed."
+  install_readers
   exit 0
 fi
 
@@ -142,3 +146,4 @@ done
 if [ ${#missing[@]} -gt 0 ]; then
   "${apt[@]}" install --no-install-recommends "${missing[@]}" < /dev/null
 fi
+install_readers

@@ -46,6 +46,9 @@ constexpr const char* kGnssHeader =
 /// Velocity and biases of a pose: a reader of states must not take them for zero.
 constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 
+/// Says that the folder was written here.
+constexpr const char* kMark = "viwo_log.txt";
+
 [[noreturn]] void refuse(const fs::path& folder, const fs::path& stranger) {
   throw InputError(folder.string() + "  already holds " + stranger.string() +
                    ", which is no part of a log written here: choose an empty folder");
@@ -77,10 +80,14 @@ void check_images_are_ours(const fs::path& folder, const fs::path& data) {
   }
 }
 
-/// Everything in `folder` must come from an earlier log.
+/// Everything in `folder` must come from an earlier log, and that from here: a recording of
+/// somebody has the same names.
 void check_is_ours(const fs::path& folder) {
+  const bool is_marked = fs::exists(folder / kMark);
   for (const auto& entry : fs::directory_iterator(folder)) {
     const fs::path name = entry.path().filename();
+    if (name == kMark && entry.is_regular_file()) continue;
+    if (!is_marked) refuse(folder, name);
     const bool is_camera = is_camera_folder(name);
     const bool is_table = std::find(kFolders.begin(), kFolders.end(), name) != kFolders.end();
     if (!(is_camera || is_table) || !entry.is_directory()) refuse(folder, name);
@@ -273,6 +280,9 @@ AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>(
   }
   make_folder(folder);
   check_is_ours(folder);
+  TextWriter mark(folder / kMark);
+  mark << "A log of viwo. The next one that is written to this folder replaces it.\n";
+  mark.close();
   // A table that the new log does not have must not stay behind.
   for_each_folder([&](const fs::path& ours) { fs::remove_all(folder / ours); });
 }
@@ -283,6 +293,7 @@ AslWriter::~AslWriter() {
   tables_.reset();
   try {
     for_each_folder([&](const fs::path& ours) { fs::remove_all(folder / ours); });
+    fs::remove(folder / kMark);
   } catch (...) {
     // Why it is not closed is known; what stays has no table, or not all of them.
   }

@@ -226,7 +226,8 @@ TEST_F(AslTest, SaysThatAForeignKindOfSamplesHasNoTable) {
   AslWriter writer(folder_ / "log");
   EXPECT_FALSE(writer.write(RangeSample{7, 1.5}));
   writer.close();
-  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "log"));
+  const std::filesystem::directory_iterator all(folder_ / "log");
+  EXPECT_EQ(std::distance(begin(all), end(all)), 1);  // what says that it is one
 }
 
 TEST_F(AslTest, ReplacesAnEarlierLogCompletely) {
@@ -243,6 +244,11 @@ TEST_F(AslTest, ReplacesAnEarlierLogCompletely) {
 TEST_F(AslTest, RefusesAFolderThatHoldsSomethingElseAndLeavesItAlone) {
   const std::string log = (folder_ / "log").string();
   write("log/wheels0/data.csv", "mine");
+  EXPECT_EQ(error_of([&] { AslWriter{log}; }),
+            log +
+                "  already holds wheels0, which is no part of a log written here: choose an "
+                "empty folder");
+  write("log/viwo_log.txt", "");
   write("log/wheels0/notes.txt", "mine");
   EXPECT_EQ(error_of([&] { AslWriter{log}; }),
             log +

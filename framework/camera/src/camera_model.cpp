@@ -57,6 +57,24 @@ bool distort_radtan(const CameraView& camera, const Eigen::Vector3d& p_C, Distor
   return true;
 }
 
+/// How fast the distance from the centre grows with the angle, `t2` its square.
+double equidistant_slope(const Eigen::Vector4d& k, double t2) {
+  return 1. + t2 * (3. * k[0] + t2 * (5. * k[1] + t2 * (7. * k[2] + t2 * 9. * k[3])));
+}
+
+/// Whether it has grown all the way up to there: behind a fold it may grow again, and what is seen
+/// there is nothing.
+bool grows_up_to(const Eigen::Vector4d& k, double t2) {
+  if (!(equidistant_slope(k, t2) > 0.)) return false;
+  // Not even if all that makes it less were there at once.
+  if (equidistant_slope(k.cwiseMin(0.), t2) > 0.) return true;
+  constexpr int kSteps = 32;
+  for (int i = 1; i < kSteps; ++i) {
+    if (!(equidistant_slope(k, t2 * i / kSteps) > 0.)) return false;
+  }
+  return true;
+}
+
 bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out,
                          CoefficientsJacobian* J_coefficients) {
   const double k1 = camera.intrinsics[4], k2 = camera.intrinsics[5];
@@ -76,8 +94,9 @@ bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, D
   const double theta = std::atan2(r, z);
   const double t2 = theta * theta;
   const double polynomial = 1. + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)));
-  const double slope = 1. + t2 * (3. * k1 + t2 * (5. * k2 + t2 * (7. * k3 + t2 * 9. * k4)));
-  if (!(slope > 0.) || theta > 3.14) return false;  // folds back
+  const Eigen::Vector4d k = camera.intrinsics.tail<4>();
+  const double slope = equidistant_slope(k, t2);
+  if (theta > 3.14 || !grows_up_to(k, t2)) return false;  // folds back
   const double d = theta * polynomial;
   const Eigen::Vector2d direction = a / r;
   out.xy = d * direction;
@@ -148,18 +167,22 @@ std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::
   if (camera.distortion == CameraDistortion::kEquidistant) {
     const double d = target.norm();
     if (d < 1e-12) return Eigen::Vector3d(target.x(), target.y(), 1.).normalized();
-    double theta = d;
-    for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector4d k = camera.intrinsics.tail<4>();
+    double theta = d, step = -d;  // half a step where it would leave what is not folded
+    for (int i = 0; i < 60; ++i) {
       const double t2 = theta * theta;
-      const auto k = camera.intrinsics.tail<4>();
+      if (!(theta >= 0.) || theta > 3.14 || !grows_up_to(k, t2)) {
+        step *= 0.5;
+        theta += step;
+        continue;
+      }
       const double value = theta * (1. + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
-      const double slope =
-          1. + t2 * (3. * k[0] + t2 * (5. * k[1] + t2 * (7. * k[2] + t2 * 9. * k[3])));
-      if (!(slope > 0.) || !(theta >= 0.) || theta > 3.14) return std::nullopt;
-      const double step = (value - d) / slope;
+      step = (value - d) / equidistant_slope(k, t2);
       theta -= step;
       if (std::abs(step) < 1e-14) break;
-      if (i == 19 && std::abs(step) > 1e-9) return std::nullopt;
+    }
+    if (!(theta >= 0.) || theta > 3.14 || !grows_up_to(k, theta * theta) || std::abs(step) > 1e-9) {
+      return std::nullopt;
     }
     const double s = std::sin(theta) / d;
     return Eigen::Vector3d(s * target.x(), s * target.y(), std::cos(theta));

@@ -183,6 +183,33 @@ TEST(CameraModel, HasNoImageOfWhatIsBehindOrFoldedBack) {
   EXPECT_FALSE(project(fisheye, {std::sin(1.30), 0., std::cos(1.30)}, uv));
 }
 
+// Fisheyes of which the distance from the centre falls beyond some angle, and grows again.
+TEST(CameraModel, HasNoImageBehindTheFirstFoldOfAFisheye) {
+  Eigen::Vector4d grows_again, late;
+  grows_again << -0.00109, 0.0379, -0.0363, 0.00562;
+  late << 0.2, -0.07, 0., 0.;
+  for (const Eigen::Vector4d& k : {grows_again, late}) {
+    CameraView fisheye = fisheye_camera();
+    fisheye.intrinsics.tail<4>() = k;
+    bool was_seen = true;
+    double last = 0.;
+    for (double theta = 0.01; theta < 3.1; theta += 0.005) {
+      const Eigen::Vector3d ray(std::sin(theta), 0., std::cos(theta));
+      Eigen::Vector2d uv;
+      const bool is_seen = project(fisheye, ray, uv);
+      EXPECT_TRUE(was_seen || !is_seen) << theta;
+      was_seen = is_seen;
+      if (!is_seen) continue;
+      last = theta;
+      const auto direction = unproject(fisheye, uv);
+      ASSERT_TRUE(direction.has_value()) << theta;
+      EXPECT_LT((*direction - ray).norm(), 1e-6) << theta;
+    }
+    EXPECT_GT(last, 1.5);
+    EXPECT_LT(last, 2.);
+  }
+}
+
 TEST(CameraModel, RefusesWhatIsNotANumber) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();

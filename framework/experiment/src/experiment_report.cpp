@@ -260,9 +260,9 @@ void add_calibration_table(const ExperimentResult& result, const Group& all, Sec
         row[1] = rounded(unit->scale * prior_sigma);
       }
       const bool is_other = std::abs(c->prior_sigma - prior_sigma) > 1e-6 * prior_sigma;
-      row.emplace_back(unbroken(
-          compact(unit->scale * c->rmse, 3) + " (" + nees_text(c->nees, c->widened_nees) + ")" +
-          (is_other ? ", prior " + compact(unit->scale * c->prior_sigma, 3) : "")));
+      row.emplace_back(
+          unbroken(compact(unit->scale * c->rmse, 3) + " (" + nees_text(c->nees, c->widened_nees) +
+                   ")" + (is_other ? ", prior " + compact(unit->scale * c->prior_sigma, 3) : "")));
     }
     table.rows.push_back(std::move(row));
   }

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "channels.hpp"
+#include "has_next.hpp"
 #include "sample_gate.hpp"
 #include "viwo/feed/inputs.hpp"
 #include "viwo/feed/run_data.hpp"
@@ -158,9 +159,10 @@ RunData collect(RunSetup& setup, LiveSensors live) {
           {entry.name, sensor.info, sensor.object, entry.input, std::move(input)});
       continue;
     }
+    Status answer = Status::kOk;
     guarded(sensor.info, "next", [&] {
       Measurement measurement;
-      while (sensor.object->next(measurement) == Status::kOk) {
+      while ((answer = sensor.object->next(measurement)) == Status::kOk) {
         inputs.keep(entry, measurement);
         collector.add(entry.name, measurement);
       }
@@ -170,6 +172,7 @@ RunData collect(RunSetup& setup, LiveSensors live) {
         data.rejections.emplace_back(entry.name, rejection);
       }
     });
+    require_answer(sensor.info, answer);
   }
   collector.report();
   require_channels(setup, data.recorded);

@@ -24,6 +24,7 @@
 
 #include "begin_thread.hpp"
 #include "channels.hpp"
+#include "has_next.hpp"
 #include "image_arrivals.hpp"
 #include "live_input.hpp"
 #include "sample_gate.hpp"
@@ -286,8 +287,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   template <class Wanted>
   void read(const SensorStream& stream, Wanted&& wanted) {
     Measurement measurement;
-    while (guarded(stream.info, "next", [&] { return stream.sensor->next(measurement); }) ==
-           Status::kOk) {
+    while (has_next(stream.info, *stream.sensor, measurement)) {
       if (is_at_end()) break;
       if (!wanted(measurement)) continue;
       {

@@ -63,6 +63,7 @@ class LockstepFeed final : public Feed {
     gate_.append_to(report.rejections);
     if (!has_imu_) report.cause = kNothingCame;
     for (const auto& played : played_) {
+      if (!played->not_stopped().empty()) report.warnings.push_back(played->not_stopped());
       std::vector<RejectionCount> all;
       const SensorStream& stream = played->stream();
       guarded(stream.info, "rejections", [&] { stream.sensor->rejections(all); });

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <utility>
 
+#include "has_next.hpp"
+
 namespace viwo {
 namespace {
 
@@ -31,7 +33,11 @@ void PlayedSensor::stop() {
     stop_ = true;
   }
   changed_.notify_all();
-  guarded(played_.info, "stop", [&] { played_.sensor->stop(); });
+  try {
+    guarded(played_.info, "stop", [&] { played_.sensor->stop(); });
+  } catch (const std::exception& error) {
+    not_stopped_ = std::string("a sensor could not be stopped: ") + error.what();
+  }
   thread_.join();
 }
 
@@ -47,8 +53,7 @@ void PlayedSensor::read() {
   std::exception_ptr error;
   try {
     Measurement measurement;
-    while (guarded(played_.info, "next", [&] { return played_.sensor->next(measurement); }) ==
-           Status::kOk) {
+    while (has_next(played_.info, *played_.sensor, measurement)) {
       std::unique_lock lock(mutex_);
       if (!wait(lock, [this] { return has_room(); })) break;
       take(std::move(measurement));

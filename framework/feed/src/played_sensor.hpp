@@ -31,8 +31,9 @@ class PlayedSensor {
   /// threw.
   Measurement* head();
   void pop() { has_head_ = false; }
-  /// Ends the thread, and those who wait for images.
+  /// Ends the thread, and those who wait for images. Throws nothing.
   void stop();
+  const std::string& not_stopped() const { return not_stopped_; }  ///< why; "" if it was
 
  private:
   /// Its images, for who works on them.
@@ -69,6 +70,7 @@ class PlayedSensor {
   bool ended_ = false;  ///< nothing more is read
   bool stop_ = false;
   std::exception_ptr error_;
+  std::string not_stopped_;
   std::thread thread_;
 };
 

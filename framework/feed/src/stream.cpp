@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "begin_thread.hpp"
+#include "has_next.hpp"
 
 namespace viwo {
 namespace {
@@ -38,6 +39,7 @@ Status Prefetch::read_one(Measurement& out) {
   const auto begin = std::chrono::steady_clock::now();
   const Status status = guarded(info_, "next", [&] { return sensor_->next(out); });
   const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - begin;
+  require_answer(info_, status);
   if (status != Status::kOk) return status;
   // The images of one instant are one piece of work, whichever of them the sensor does it for.
   if (ms_per_stamp_.empty() || stamp_ns(out) != stamp_ns_) ms_per_stamp_.push_back(0.);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "has_next.hpp"
 #include "viwo/feed/recorded.hpp"
 #include "viwo/feed/run_data.hpp"
 
@@ -57,6 +58,24 @@ TEST(Recorded, ReplacesWhatASensorGaveOfAKind) {
   EXPECT_EQ(recorded.of<ImuSample>("sim").size(), 1U);
   recorded.set<EncoderSample>("sim", {});
   EXPECT_TRUE(recorded.of<EncoderSample>("sim").empty());
+}
+
+// kRejected is an answer of others: to take it for the end would lose all that follows.
+TEST(HasNext, RefusesAnAnswerThatIsNone) {
+  class Answers final : public Sensor {
+   public:
+    explicit Answers(Status status) : status_(status) {}
+    SampleTypes yields() const override { return {}; }
+    Status next(Measurement& /*out*/) override { return status_; }
+
+   private:
+    Status status_;
+  };
+  Measurement out;
+  Answers goes_on(Status::kOk), ends(Status::kEnd), rejects(Status::kRejected);
+  EXPECT_TRUE(has_next({}, goes_on, out));
+  EXPECT_FALSE(has_next({}, ends, out));
+  EXPECT_THROW(has_next({}, rejects, out), PluginFailure);
 }
 
 TEST(RunData, HasTheWheelsOfTheFirstWheelSet) {

@@ -207,7 +207,7 @@ void read_intrinsics(const Section& section, CameraView& camera) {
 }
 
 void read_resolution(const Section& section, CameraView& camera) {
-  constexpr double kLargest = 100'000.;
+  constexpr double kLargest = 32'768., kMostPixels = 33'554'432.;  // as of an image file
   const Node* const node = section.required("resolution");
   if (node == nullptr) return;
   const auto size = section.numbers(*node, "resolution", 2, "[width, height]");
@@ -215,9 +215,13 @@ void read_resolution(const Section& section, CameraView& camera) {
   for (const double pixels : *size) {
     if (pixels != std::floor(pixels) || pixels < 1. || pixels > kLargest) {
       section.error(*node, "resolution",
-                    number_text(pixels) + " is no number of pixels (1 to 100000)");
+                    number_text(pixels) + " is no number of pixels (1 to 32768)");
       return;
     }
+  }
+  if ((*size)[0] * (*size)[1] > kMostPixels) {
+    section.error(*node, "resolution", "an image of more than 2^25 pixels");
+    return;
   }
   camera.width_px = static_cast<int>((*size)[0]);
   camera.height_px = static_cast<int>((*size)[1]);

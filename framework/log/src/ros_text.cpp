@@ -34,7 +34,8 @@ class StampReader {
     }
     const std::int64_t seconds = table_.integer(seconds_);
     const std::int64_t nanoseconds = table_.integer(nanoseconds_);
-    if (std::abs(seconds) > 4'000'000'000) {
+    constexpr std::int64_t kMost_s = 4'000'000'000;
+    if (seconds < -kMost_s || seconds > kMost_s) {
       table_.fail(seconds_, quoted(table_.text(seconds_)) + " is no stamp in seconds");
     }
     if (nanoseconds < 0 || nanoseconds >= 1'000'000'000) {
@@ -220,16 +221,17 @@ EncoderRecording read_ros_encoders(const std::filesystem::path& file,
   EncoderReading reading;
   reading.n_drive = static_cast<int>(options.drive.size());
   reading.n_steer = static_cast<int>(options.steer.size());
-  while (table.next()) {
+  const auto read = [&] {
     if (!joints.find()) {
       collector.reject("row without one of the joints", table.reader());
-      continue;
+      return;
     }
     reading.t_ns = stamp.read();
     pick(table, drive, joints.count(), joints.drive, reading.drive);
     pick(table, position, joints.count(), joints.steer, reading.steer_rad);
     collector.add(reading, table.reader());
-  }
+  };
+  table.for_each_row(read, [&](const BadRow& bad) { collector.reject_row(bad, table.reader()); });
   joints.finish();
   return collector.finish(table.reader());
 }
@@ -245,13 +247,14 @@ PoseRecording read_ros_poses(const std::filesystem::path& file, const RosClock& 
       table.column(".pose.orientation.x"), table.column(".pose.orientation.y"),
       table.column(".pose.orientation.z"), table.column(".pose.orientation.w")};
   PoseCollector collector(limits);
-  while (table.next()) {
+  const auto read = [&] {
     PoseSample pose;
     pose.t_ns = stamp.read();
     for (std::size_t i = 0; i < p.size(); ++i) pose.p_BinW_m[i] = table.number(p[i]);
     for (std::size_t i = 0; i < q.size(); ++i) pose.q_BtoW_xyzw[i] = table.number(q[i]);
     collector.add(pose, table.reader());
-  }
+  };
+  table.for_each_row(read, [&](const BadRow& bad) { collector.reject_row(bad, table.reader()); });
   return collector.finish(table.reader());
 }
 

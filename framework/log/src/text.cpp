@@ -49,7 +49,7 @@ std::optional<Decimal> take_apart(std::string_view text) {
   std::int64_t exponent = 0;
   if (exponent_at != std::string_view::npos) {
     const auto parsed = parse_whole<std::int64_t>(text.substr(exponent_at + 1));
-    if (!parsed || std::abs(*parsed) > 1000) return std::nullopt;
+    if (!parsed || *parsed < -1000 || *parsed > 1000) return std::nullopt;
     exponent = *parsed;
   }
   const std::size_t dot = mantissa.find('.');

@@ -144,6 +144,20 @@ TEST(SamplesFrom, ReadingsThatAreWrittenOnChangeStandAsLongAsNothingIsWritten) {
   }
 }
 
+// Of a few readings close together and long rests between them nobody makes millions.
+TEST(SamplesFrom, RestsOfAShortTableStayWithinBounds) {
+  std::vector<EncoderReading> readings;
+  for (int burst = 0; burst < 300; ++burst) {
+    for (int k = 0; k < 3; ++k) {
+      EncoderReading reading;
+      reading.t_ns = burst * 9'000'000'000L + k * 400'000L;
+      reading.n_drive = 2;
+      readings.push_back(reading);
+    }
+  }
+  EXPECT_LT(samples_from(readings, false, 0.2, 1).size(), 300'000U);
+}
+
 TEST(SamplesFrom, AGapInWhichTheWheelsTurnIsAHole) {
   for (const bool angles : {false, true}) {
     auto readings = written_on_change(angles);

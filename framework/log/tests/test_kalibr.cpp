@@ -158,7 +158,7 @@ TEST_F(Kalibr, RefusesMissingAndWrongKeysAllAtOnce) {
             "F:9:22  cam0.distortion_coeffs: expected 4 numbers (radtan: k1, k2, p1, p2; "
             "equidistant: k1 .. k4), got 3\n"
             "F:10:15  cam0.intrinsics: the focal lengths fx and fy must be positive\n"
-            "F:11:15  cam0.resolution: 480.5 is no number of pixels (1 to 100000)");
+            "F:11:15  cam0.resolution: 480.5 is no number of pixels (1 to 32768)");
 }
 
 TEST_F(Kalibr, RefusesFilesWithoutCamerasOrWithGapsInTheirNumbers) {

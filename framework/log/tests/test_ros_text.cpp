@@ -7,6 +7,8 @@
 namespace viwo::log {
 namespace {
 
+using ::testing::HasSubstr;
+
 using ::testing::ElementsAre;
 
 class RosTextTest : public InFolder {
@@ -93,19 +95,19 @@ TEST_F(RosTextTest, NamesTheParameterOfAJointThatDoesNotExist) {
 
 TEST_F(RosTextTest, SaysLineAndColumnOfWhatIsWrong) {
   const std::string names = ";['L_Wheel', 'R_Position', 'R_Wheel'];";
-  EXPECT_EQ(message("t;1;0" + names + "(1.0, 2.0);(1.0, 2.0, 3.0)\n"),
-            ":2  column '.position': 2 values for 3 joints");
-  EXPECT_EQ(message("t;1;0" + names + "(1.0, 2.0, 3.0);(1.0, 2.0, x)\n"),
-            ":2  column '.velocity': 'x' is not a number");
-  EXPECT_EQ(message("t;1;0" + names + "(1.0, 2.0, 3.0);1.0\n"),
-            ":2  column '.velocity': '1.0' is not a list");
-  EXPECT_EQ(message("t;1;1000000000" + names + "(1.0, 2.0, 3.0);(1.0, 2.0, 3.0)\n"),
-            ":2  column '.header.stamp.nsecs': '1000000000' is not in [0, 1e9) ns");
-  EXPECT_EQ(message("t;5000000000;0" + names + "(1.0, 2.0, 3.0);(1.0, 2.0, 3.0)\n"),
-            ":2  column '.header.stamp.secs': '5000000000' is no stamp in seconds");
+  EXPECT_THAT(message("t;1;0" + names + "(1.0, 2.0);(1.0, 2.0, 3.0)\n"),
+              HasSubstr(":2  column '.position': 2 values for 3 joints"));
+  EXPECT_THAT(message("t;1;0" + names + "(1.0, 2.0, 3.0);(1.0, 2.0, x)\n"),
+              HasSubstr(":2  column '.velocity': 'x' is not a number"));
+  EXPECT_THAT(message("t;1;0" + names + "(1.0, 2.0, 3.0);1.0\n"),
+              HasSubstr(":2  column '.velocity': '1.0' is not a list"));
+  EXPECT_THAT(message("t;1;1000000000" + names + "(1.0, 2.0, 3.0);(1.0, 2.0, 3.0)\n"),
+              HasSubstr(":2  column '.header.stamp.nsecs': '1000000000' is not in [0, 1e9) ns"));
+  EXPECT_THAT(message("t;5000000000;0" + names + "(1.0, 2.0, 3.0);(1.0, 2.0, 3.0)\n"),
+              HasSubstr(":2  column '.header.stamp.secs': '5000000000' is no stamp in seconds"));
   options_.clock.reception = true;
-  EXPECT_EQ(message("yesterday;1;0" + names + "(1.0, 2.0, 3.0);(1.0, 2.0, 3.0)\n"),
-            ":2  column 'time': 'yesterday' is no time yyyy/MM/dd/HH:mm:ss.ffffff");
+  EXPECT_THAT(message("yesterday;1;0" + names + "(1.0, 2.0, 3.0);(1.0, 2.0, 3.0)\n"),
+              HasSubstr(":2  column 'time': 'yesterday' is no time yyyy/MM/dd/HH:mm:ss.ffffff"));
 }
 
 TEST_F(RosTextTest, ReadsPoses) {

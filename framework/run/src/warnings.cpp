@@ -70,13 +70,15 @@ std::string text_of(const RejectionCount& r, std::int64_t begin_ns) {
          since(begin_ns, r.first);
 }
 
+bool is_nearly_all(const RejectionCount& r) { return r.of > 0 && 10 * r.count >= 9 * r.of; }
+
 }  // namespace
 
 std::vector<std::string> refused_altogether(std::span<const RejectionCount> rejections,
                                             std::int64_t begin_ns) {
   std::vector<std::string> lines;
   for (const RejectionCount& r : rejections) {
-    if (r.count >= kFewestCounted && r.count == r.of) lines.push_back(text_of(r, begin_ns));
+    if (r.count >= kFewestCounted && is_nearly_all(r)) lines.push_back(text_of(r, begin_ns));
   }
   return lines;
 }
@@ -86,7 +88,7 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
   constexpr double kMostFactor = 3.;  // between a guess and what is found
   std::vector<std::string> lines;
   for (const RejectionCount& r : rejections) {
-    if (r.count < kFewestCounted || 5 * r.count < r.of || r.count >= r.of) continue;
+    if (r.count < kFewestCounted || 5 * r.count < r.of || r.of == 0 || is_nearly_all(r)) continue;
     lines.push_back(text_of(r, begin_ns));
   }
   for (const NoiseFound& noise : noises) {

@@ -181,6 +181,7 @@ log::PoseRecording read_poses(const Params& params) {
   auto q = table.columns("quaternion_columns", params.quaternion_columns);
   if (!params.yaw_column.empty()) q = {table.column("yaw_column", params.yaw_column)};
   table.require_unit("position_unit", p, Quantity::kLength, params.position_factor());
+  if (q.size() == 1) table.require_unit("yaw_unit", q, Quantity::kAngle, params.yaw_factor());
   auto all = p;
   all.insert(all.end(), q.begin(), q.end());
   log::PoseCollector collector(params.limits());
@@ -204,6 +205,7 @@ log::PoseRecording read_poses(const Params& params) {
 log::HeadingRecording read_headings(const Params& params) {
   Table table(params);
   const std::size_t yaw = table.column("yaw_column", params.yaw_column);
+  table.require_unit("yaw_unit", {yaw}, Quantity::kAngle, params.yaw_factor());
   log::HeadingCollector collector(params.limits());
   table.read({yaw}, collector, [&](std::int64_t t_ns) {
     collector.add({t_ns, params.yaw_factor() * table.number(yaw)}, table.at());

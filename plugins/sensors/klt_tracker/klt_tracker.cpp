@@ -41,7 +41,7 @@ std::vector<CameraView> read_cameras(const Params& params) {
                      "there are only " + std::to_string(cameras.size()) + " cameras in " + file);
   }
   cameras.resize(asked > 0 ? asked : std::min<std::size_t>(cameras.size(), kMaxCameras));
-  for (std::size_t i = 1; i < cameras.size(); ++i) {
+  for (std::size_t i = 1; params.stereo && i < cameras.size(); i += 2) {
     const std::string names = "cam" + std::to_string(i - 1) + " and cam" + std::to_string(i);
     const double shift_s = std::abs(cameras[i].t_CtoI_s - cameras[i - 1].t_CtoI_s);
     if (shift_s > params.max_camera_dt_s) {
@@ -49,7 +49,6 @@ std::vector<CameraView> read_cameras(const Params& params) {
                                               std::to_string(shift_s) + " s in " + file +
                                               ": images of a pair must be taken at the same time");
     }
-    if (!params.stereo || i % 2 == 0) continue;
     const CameraView &left = cameras[i - 1], &right = cameras[i];
     const Eigen::Vector3d p_LinR =
         right.p_IinC - right.R_ItoC * left.R_ItoC.transpose() * left.p_IinC;

@@ -154,7 +154,7 @@ std::vector<Instant> cycles_of(const std::vector<Track>& tracks, const ReadingOp
     for (const Track& track : tracks) track.append_instants(all);
   } else {
     for (const Datum& datum : options.cycle->data) {
-      if (has_stamp(datum)) all.push_back({datum.t_us, datum.offset});
+      if (!datum.is_end && has_stamp(datum)) all.push_back({datum.t_us, datum.offset});
     }
   }
   std::stable_sort(all.begin(), all.end(), is_earlier);

@@ -37,6 +37,8 @@ class EncoderIntervals {
                                       std::span<const EncoderSample> encoders,
                                       double at_least_s = 0.) {
     const CloneState& now = filter.clones.back();
+    ++epochs_;
+    ++waited_;
     const std::int64_t cut_ns = now.t_ns - to_ns(t_OtoI_s);  // (WO-1)
     if (!started_) {
       start_at(now, cut_ns);
@@ -44,7 +46,7 @@ class EncoderIntervals {
     }
     const std::optional<std::size_t> first = find_start(filter);
     if (!first.has_value()) {
-      clone_left_.add(1, now.t_ns);
+      clone_left_.add(waited_, now.t_ns);
       start_at(now, cut_ns);
       return std::nullopt;
     }
@@ -55,7 +57,7 @@ class EncoderIntervals {
     const bool last_chance = *first == 0 && filter.oldest_leaves;
     if (!last_chance && seconds_between(begin_ns_, cut_ns) < at_least_s) return std::nullopt;
     if (encoders.front().begin_ns > begin_ns_) {
-      no_samples_.add(1, now.t_ns);
+      no_samples_.add(waited_, now.t_ns);
       start_at(now, cut_ns);
       return std::nullopt;
     }
@@ -65,8 +67,8 @@ class EncoderIntervals {
   }
 
   void append_rejections(std::vector<RejectionCount>& out) const {
-    clone_left_.append_to(out);
-    no_samples_.append_to(out);
+    clone_left_.append_to(out, epochs_);
+    no_samples_.append_to(out, epochs_);
   }
 
  private:
@@ -75,6 +77,7 @@ class EncoderIntervals {
     start_t_ns_ = clone.t_ns;
     start_slot_ = clone.slot;
     begin_ns_ = cut_ns;
+    waited_ = 0;
   }
 
   std::optional<std::size_t> find_start(const FilterView& filter) const {
@@ -86,11 +89,13 @@ class EncoderIntervals {
   }
 
   bool started_ = false;
+  std::int64_t epochs_ = 0, waited_ = 0;  // in all; since the interval began
   std::int64_t start_t_ns_ = 0;
   int start_slot_ = 0;
   std::int64_t begin_ns_ = 0;  // wheel clock
-  Tally clone_left_{"interval lost: its first clone left before the encoder samples came"};
-  Tally no_samples_{"interval lost: the encoder samples begin after it"};
+  Tally clone_left_{
+      "epochs lost: the encoder samples came when the first clone had left (estimator.max_wait_s)"};
+  Tally no_samples_{"epochs lost: the encoder samples begin after them"};
 };
 
 /// What the preintegration of an interval left out.

@@ -23,9 +23,10 @@ struct Tally {
   }
 
   /// Appends itself to `out` if it happened at all.
-  void append_to(std::vector<RejectionCount>& out) const {
+  /// `of`: out of how many, for what is suspicious when it is most.
+  void append_to(std::vector<RejectionCount>& out, std::int64_t of = 0) const {
     if (count == 0) return;
-    out.push_back({reason, count, time_text(first_ns)});
+    out.push_back({reason, count, time_text(first_ns), of});
   }
 };
 

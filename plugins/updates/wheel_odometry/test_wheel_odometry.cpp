@@ -248,18 +248,19 @@ TEST(EncoderIntervals, UsesEachSampleOnceWhileTheClockOffsetChanges) {
   EXPECT_EQ(used, expected);
 }
 
+CloneState clone_at(int k) {
+  CloneState clone;
+  clone.t_ns = 100 * k * kMs;
+  clone.slot = k % 4;
+  return clone;
+}
+
 TEST(EncoderIntervals, WaitsForLateSamplesAndCountsLostIntervals) {
   const auto model = testing::load_model(kModel);
   const auto samples = testing::sample_motion(
       *model, [](double) { return Twist(0.4, 0.1, 0.3); }, 2., 100.);
   EncoderIntervals intervals;
   testing::SmallFilter filter;
-  const auto clone_at = [&](int k) {
-    CloneState clone;
-    clone.t_ns = 100 * k * kMs;
-    clone.slot = k % 4;
-    return clone;
-  };
   const std::span all(samples);
   filter.clones = {clone_at(1)};
   EXPECT_FALSE(intervals.next(filter.view(), 0., all.first(10)).has_value());
@@ -285,11 +286,29 @@ TEST(EncoderIntervals, WaitsForLateSamplesAndCountsLostIntervals) {
   intervals.append_rejections(counts);
   ASSERT_EQ(counts.size(), 2u);
   EXPECT_EQ(counts[0].reason,
-            "interval lost: its first clone left before the encoder samples came");
+            "epochs lost: the encoder samples came when the first clone had left "
+            "(estimator.max_wait_s)");
   EXPECT_EQ(counts[0].first, "t = 0.500 s");
-  EXPECT_EQ(counts[1].reason, "interval lost: the encoder samples begin after it");
+  EXPECT_EQ(counts[1].reason, "epochs lost: the encoder samples begin after them");
   EXPECT_EQ(counts[1].first, "t = 0.600 s");
   EXPECT_EQ(counts[1].count, 1);
+  EXPECT_GT(counts[0].of, counts[0].count);
+}
+
+// A filter of three clones, and samples that come when the first of them has long left.
+TEST(EncoderIntervals, CountTheEpochsThatGoWithout) {
+  testing::SmallFilter filter;
+  EncoderIntervals intervals;
+  constexpr int kEpochs = 30;
+  for (int k = 0; k < kEpochs; ++k) {
+    filter.clones = {clone_at(k), clone_at(k + 1), clone_at(k + 2)};
+    EXPECT_FALSE(intervals.next(filter.view(), 0., {}).has_value());
+  }
+  std::vector<RejectionCount> counts;
+  intervals.append_rejections(counts);
+  ASSERT_EQ(counts.size(), 1u);
+  EXPECT_EQ(counts[0].of, kEpochs);
+  EXPECT_NEAR(static_cast<double>(counts[0].count), kEpochs, 4.);  // but for those that wait
 }
 
 TEST_F(OneInterval, DoesNotAllocateInTheSteadyState) {
