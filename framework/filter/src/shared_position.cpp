@@ -10,7 +10,7 @@ namespace {
 
 /// Poses know each other to less than a millimetre: beside a variance of more than this that takes
 /// more digits than a double has.
-constexpr double kLargestVariance_m2 = 1.;
+constexpr double kLargestVariance_m2 = 100.;
 constexpr double kRounding = 1e-9;
 
 /// x, y or z of the position of a pose; -1: another column.

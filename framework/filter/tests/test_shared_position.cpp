@@ -114,7 +114,7 @@ TEST(SharedPosition, IsFoundByNormalEquationsOfAFix) {
 }
 
 TEST(SharedPosition, IsLeftWhereItIsWhereItIsSmall) {
-  const Filter filter = on_its_way(0.5);
+  const Filter filter = on_its_way(5.);
   EXPECT_EQ(filter.imu_covariance(),
             (filter.covariance().topLeftCorner<kImuSize, kImuSize>().eval()));
 }
