@@ -168,6 +168,9 @@ void check_gyro_columns(const Recording& recording, double vertically, Findings&
                  {{"correlation", most, ""}, {"correlation about the vertical", vertically, ""}}});
 }
 
+/// An epoch waits until the samples reach its end, and they come in cells.
+constexpr double kEpoch_s = 0.1, kMargin_s = 0.2;
+
 /// Of a wheel set against a gyro. Returns their correlation, regardless of sign, with an IMU.
 double check_wheel_clock(const Recording& recording, const Wheels& wheels, const YawRates& rates,
                          Findings& out) {
@@ -209,6 +212,12 @@ double check_wheel_clock(const Recording& recording, const Wheels& wheels, const
       label, {"clock", "clock", key, rates.label, wheels.prior.wheels.t_OtoI_s}, *lag,
       wheels.prior.sigma_time_offset_s, std::max(period_of(rates.turns), period_of(of_wheels)));
   clock.figures.push_back({"wheels by gyro", lag->slope, ""});
+  // Put right, they come later than the filter waits for them.
+  const double late_s = lag->lag_s - wheels.prior.wheels.t_OtoI_s;
+  if (!clock.remedies.empty() && recording.setup->filter &&
+      late_s > recording.setup->filter->options.schedule.max_wait_s - kEpoch_s) {
+    clock.remedies.push_back({"estimator.max_wait_s", significant(late_s + kMargin_s, 2)});
+  }
   if (lag->correlation < -0.8) {
     clock.severity = Severity::kFault;
     clock.remedies.clear();

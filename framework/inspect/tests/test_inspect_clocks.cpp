@@ -50,6 +50,12 @@ TEST(InspectClocks, FindsWheelsThatAreSecondsLate) {
     const Finding clock = finding_of(late, "wheels0", "clock");
     EXPECT_EQ(clock.severity, Severity::kFault) << clock.what;
     EXPECT_NEAR(figure_of(clock, "lag"), late_s, 0.06) << clock.what;
+    // Later than the filter waits for them.
+    const std::string wait = remedy_of(clock, "estimator.max_wait_s");
+    ASSERT_EQ(wait.empty(), late_s < 0.) << wait;
+    if (late_s > 0.) {
+      EXPECT_NEAR(std::stod(wait), late_s + 0.2, 0.06);
+    }
   }
 }
 
