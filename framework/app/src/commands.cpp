@@ -150,9 +150,13 @@ void play_in_step(config::Node& configuration, PluginRegistry& plugins) {
   if (!any) throw InputError("--lockstep: no sensor of this run can be played in step");
 }
 
+config::Node configuration_of(const Arguments& arguments) {
+  return resolve_placeholders(
+      load_run_configuration(arguments.positional[0], arguments.assignments));
+}
+
 RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
-  config::Node configuration =
-      resolve_placeholders(load_run_configuration(arguments.positional[0], arguments.assignments));
+  config::Node configuration = configuration_of(arguments);
   if (arguments.lockstep) play_in_step(configuration, plugins);
   return read_run(configuration, plugins, arguments.seed);
 }
@@ -160,12 +164,10 @@ RunSetup read_run_of(const Arguments& arguments, PluginRegistry& plugins) {
 /// As it stands: what a log is compared with does not depend on a seed.
 RunSetup read_without_drawn_start(const Arguments& arguments, PluginRegistry& plugins) {
   constexpr std::string_view kScale = "estimator.calibration_error_scale";
-  config::Node configuration =
-      resolve_placeholders(load_run_configuration(arguments.positional[0], arguments.assignments));
+  config::Node configuration = configuration_of(arguments);
   config::Node* const scale = configuration.at_path(kScale);
   if (scale == nullptr) return read_run(configuration, plugins, arguments.seed);
-  const config::Node drawn =
-      std::exchange(*scale, config::Node::scalar_of("0", config::Mark(scale->mark())));
+  const config::Node drawn = std::exchange(*scale, config::Node::scalar_of("0", scale->mark()));
   RunSetup setup = read_run(configuration, plugins, arguments.seed);
   *setup.resolved.at_path(kScale) = drawn;  // for --fix
   return setup;

@@ -280,9 +280,8 @@ AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>(
   }
   make_folder(folder);
   check_is_ours(folder);
-  TextWriter mark(folder / kMark);
-  mark << "A log of viwo. The next one that is written to this folder replaces it.\n";
-  mark.close();
+  write_text(folder / kMark,
+             "A log of viwo. The next one that is written to this folder replaces it.\n");
   // A table that the new log does not have must not stay behind.
   for_each_folder([&](const fs::path& ours) { fs::remove_all(folder / ours); });
 }

@@ -57,15 +57,21 @@ bool distort_radtan(const CameraView& camera, const Eigen::Vector3d& p_C, Distor
   return true;
 }
 
-/// How fast the distance from the centre grows with the angle, `t2` its square.
+/// The distance from the centre by the angle, `t2` its square.
+double equidistant_part(const Eigen::Vector4d& k, double t2) {
+  return 1. + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3])));
+}
+
+/// How fast that distance grows with the angle.
 double equidistant_slope(const Eigen::Vector4d& k, double t2) {
   return 1. + t2 * (3. * k[0] + t2 * (5. * k[1] + t2 * (7. * k[2] + t2 * 9. * k[3])));
 }
 
 /// Whether it has grown all the way up to there: behind a fold it may grow again, and what is seen
 /// there is nothing.
-bool grows_up_to(const Eigen::Vector4d& k, double t2) {
-  if (!(equidistant_slope(k, t2) > 0.)) return false;
+bool is_before_fold(const Eigen::Vector4d& k, double theta) {
+  const double t2 = theta * theta;
+  if (!(theta >= 0.) || theta > 3.14 || !(equidistant_slope(k, t2) > 0.)) return false;
   // Not even if all that makes it less were there at once.
   if (equidistant_slope(k.cwiseMin(0.), t2) > 0.) return true;
   constexpr int kSteps = 32;
@@ -77,8 +83,6 @@ bool grows_up_to(const Eigen::Vector4d& k, double t2) {
 
 bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out,
                          CoefficientsJacobian* J_coefficients) {
-  const double k1 = camera.intrinsics[4], k2 = camera.intrinsics[5];
-  const double k3 = camera.intrinsics[6], k4 = camera.intrinsics[7];
   const Eigen::Vector2d a = p_C.head<2>();
   const double z = p_C.z();
   const double a2 = a.squaredNorm();
@@ -93,11 +97,10 @@ bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, D
   const double r = std::sqrt(a2);
   const double theta = std::atan2(r, z);
   const double t2 = theta * theta;
-  const double polynomial = 1. + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)));
   const Eigen::Vector4d k = camera.intrinsics.tail<4>();
   const double slope = equidistant_slope(k, t2);
-  if (theta > 3.14 || !grows_up_to(k, t2)) return false;  // folds back
-  const double d = theta * polynomial;
+  if (!is_before_fold(k, theta)) return false;
+  const double d = theta * equidistant_part(k, t2);
   const Eigen::Vector2d direction = a / r;
   out.xy = d * direction;
   // xy = d(theta) a / r with d theta / d a = z a / (r n2), d theta / d z = -r / n2.
@@ -171,19 +174,16 @@ std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::
     double theta = d, step = -d;  // half a step where it would leave what is not folded
     for (int i = 0; i < 60; ++i) {
       const double t2 = theta * theta;
-      if (!(theta >= 0.) || theta > 3.14 || !grows_up_to(k, t2)) {
+      if (!is_before_fold(k, theta)) {
         step *= 0.5;
         theta += step;
         continue;
       }
-      const double value = theta * (1. + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
-      step = (value - d) / equidistant_slope(k, t2);
+      step = (theta * equidistant_part(k, t2) - d) / equidistant_slope(k, t2);
       theta -= step;
       if (std::abs(step) < 1e-14) break;
     }
-    if (!(theta >= 0.) || theta > 3.14 || !grows_up_to(k, theta * theta) || std::abs(step) > 1e-9) {
-      return std::nullopt;
-    }
+    if (!is_before_fold(k, theta) || std::abs(step) > 1e-9) return std::nullopt;
     const double s = std::sin(theta) / d;
     return Eigen::Vector3d(s * target.x(), s * target.y(), std::cos(theta));
   }

@@ -135,7 +135,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     try {
       if (stop_error_) std::rethrow_exception(stop_error_);
     } catch (const std::exception& error) {
-      report.warnings.push_back(std::string("a sensor could not be stopped: ") + error.what());
+      report.warnings.push_back(not_stopped_text(error));
     }
     const auto has_ended = [&](const std::string& name) {
       return std::find(left.begin(), left.end(), name) == left.end();

@@ -36,7 +36,7 @@ void PlayedSensor::stop() {
   try {
     guarded(played_.info, "stop", [&] { played_.sensor->stop(); });
   } catch (const std::exception& error) {
-    not_stopped_ = std::string("a sensor could not be stopped: ") + error.what();
+    not_stopped_ = not_stopped_text(error);
   }
   thread_.join();
 }

@@ -41,9 +41,10 @@ bool is_rest(const EncoderReading& a, const EncoderReading& b, bool drive_is_ang
 
 /// Readings between the two, at about `spacing_ns`, that say what stands.
 void hold(const EncoderReading& a, const EncoderReading& b, bool drive_is_angle,
-          std::int64_t spacing_ns, std::int64_t most, std::vector<EncoderReading>& out) {
+          std::int64_t spacing_ns, std::vector<EncoderReading>& out) {
+  constexpr std::int64_t kMost = 20'000;
   const std::int64_t gap_ns = b.t_ns - a.t_ns;
-  const std::int64_t n = std::clamp<std::int64_t>(gap_ns / spacing_ns, 1, most);
+  const std::int64_t n = std::clamp<std::int64_t>(gap_ns / spacing_ns, 1, kMost);
   for (std::int64_t k = 1; k < n; ++k) {
     EncoderReading between = a;
     const double part = static_cast<double>(k) / static_cast<double>(n);
@@ -63,14 +64,14 @@ std::vector<EncoderReading> with_rests(std::span<const EncoderReading> written, 
   std::vector<EncoderReading> out;
   out.reserve(written.size());
   out.push_back(written.front());
-  // Of one rest, and of all: a short table is not to need any memory. What is beyond is a gap.
-  constexpr std::int64_t kMost = 20'000, kMostOfAll = 200'000, kForEach = 20;
-  const std::size_t most_of_all = static_cast<std::size_t>(kMostOfAll) + kForEach * written.size();
+  // A short table is not to need any memory. A rest beyond is a gap.
+  constexpr std::size_t kMostOfAny = 200'000, kForEach = 20;
+  const std::size_t most = kMostOfAny + kForEach * written.size();
   for (std::size_t i = 1; i < written.size(); ++i) {
     const EncoderReading &a = written[i - 1], &b = written[i];
     if (seconds_between(a.t_ns, b.t_ns) > max_gap_s && is_rest(a, b, drive_is_angle) &&
-        out.size() < most_of_all) {
-      hold(a, b, drive_is_angle, spacing_ns, kMost, out);
+        out.size() < most) {
+      hold(a, b, drive_is_angle, spacing_ns, out);
     }
     out.push_back(b);
   }

@@ -202,6 +202,12 @@ MatrixXd tilt_of_the_mount(const WheelsView& wheels, Builder& build) {
   return build.take();
 }
 
+auto adding_to(std::vector<NamedDirections>& all) {
+  return [&all](const std::string& name, const std::string& when, MatrixXd basis) {
+    if (basis.cols() > 0) all.push_back({name, std::move(basis), when});
+  };
+}
+
 }  // namespace
 
 std::vector<NamedDirections> directions_of_the_robot(const ObservabilityMatrix& state,
@@ -209,9 +215,7 @@ std::vector<NamedDirections> directions_of_the_robot(const ObservabilityMatrix& 
   const WheelsView none;
   Builder build(state, none);
   std::vector<NamedDirections> all;
-  const auto add = [&](const std::string& name, const std::string& when, MatrixXd basis) {
-    if (basis.cols() > 0) all.push_back({name, std::move(basis), when});
-  };
+  const auto add = adding_to(all);
   add("global position and yaw", "always", global_position_and_yaw(state, build));
   add("tilt and accelerometer bias", "no rotation",
       tilt_and_accelerometer_bias(state, gravity_m_per_s2, build));
@@ -226,9 +230,7 @@ std::vector<NamedDirections> directions_of_wheels(const ObservabilityMatrix& sta
                                                   const EncoderSample& sample) {
   Builder build(state, wheels);
   std::vector<NamedDirections> all;
-  const auto add = [&](const std::string& name, const std::string& when, MatrixXd basis) {
-    if (basis.cols() > 0) all.push_back({name, std::move(basis), when});
-  };
+  const auto add = adding_to(all);
   add("placement of O", "always", placement_of_O(wheels, build));
   for (int i = 0; i < 3; ++i) {
     build.mount_theta(Vector3d::Unit(i));

@@ -317,7 +317,12 @@ void Plausibility::look_now_and_then() {
 }
 
 void Plausibility::finish() {
-  if (checks_) look(true);
+  if (!checks_) return;
+  for (auto& wheels : checks_->wheels) {
+    wheels.twist.finish();
+    wheels.heading.finish();
+  }
+  look(true);
 }
 
 void Plausibility::look(bool at_end) {

@@ -72,6 +72,7 @@ void TwistCheck::begin_anew() {
   lag_products_.setZero();
   turn_cells_ = 0;
   turns_.clear();
+  slip_.reset();
 }
 
 /// As the rate of a gyro without an accelerometer.
@@ -160,6 +161,8 @@ void TwistCheck::add_to_turns(double gyro, const Twist& xi) {
   turns_.reserve(kMostTurns);  // once
   if (turns_.size() == kMostTurns) turns_.erase(turns_.begin(), turns_.begin() + kMostTurns / 2);
   turns_.push_back(turn_);
+  constexpr std::size_t kLookedAfter = 20;
+  if (turns_.size() % kLookedAfter == 0) slip_ = find_slip(turns_);
 }
 
 /// Differences of the gyro's rates, half a second before to after it, and one of the wheels.

@@ -63,6 +63,8 @@ class TwistCheck {
   /// `xi`: twist of O over the time of the sample; `rate_by_prior`: by what a prior sigma of each
   /// intrinsic changes its yaw rate.
   void add_wheels(const EncoderSample& sample, const Twist& xi, const Intrinsics& rate_by_prior);
+  /// Nothing more is to come.
+  void finish() { slip_ = find_slip(turns_); }
   /// Whether the gyro says that channels are reversed or exchanged, of wheels that cannot say it of
   /// each other.
   bool finds_order(Findings& out) const { return order_.findings(out); }
@@ -132,6 +134,7 @@ class TwistCheck {
   TurnWindow turn_;
   int turn_cells_ = 0;
   std::vector<TurnWindow> turns_;  ///< the last ones
+  std::optional<Slip> slip_;       ///< of them, as of a multiple of ten seconds or the end
   Entries sum_ = Entries::Zero();
   Eigen::Matrix<double, kEntries, kEntries> products_ =
       Eigen::Matrix<double, kEntries, kEntries>::Zero();

@@ -58,9 +58,8 @@ Eigen::Matrix2d matrix(double a, double b, double c, double d) {
 }  // namespace
 
 bool TwistCheck::finds_slip(std::int64_t zero_ns, Findings& out) const {
-  const std::optional<Slip> slip = find_slip(turns_);
-  if (!slip || !slip->is_fault()) return false;
-  out.push_back({wheels_ + " slip", wheels_ + ": " + slip->text(imu_, zero_ns, "")});
+  if (!slip_ || !slip_->is_fault()) return false;
+  out.push_back({wheels_ + " slip", wheels_ + ": " + slip_->text(imu_, zero_ns, "")});
   return true;
 }
 

@@ -261,8 +261,11 @@ void Preintegrator::bridge(double dt, const TwistSolution* unbelieved, Preintegr
   out.bridged_s += dt;
   if (!has_believed_) {
     // Nothing to bridge from yet: take what there is rather than stand still, or what comes.
-    if (unbelieved == nullptr) owed_s_ += dt;
-    if (unbelieved != nullptr) step(*unbelieved, std::exchange(owed_s_, 0.) + dt, {}, out);
+    if (unbelieved != nullptr) {
+      step(*unbelieved, std::exchange(owed_s_, 0.) + dt, {}, out);
+    } else {
+      owed_s_ += dt;
+    }
     return;
   }
   TwistSolution held = solutions_[believed_];
