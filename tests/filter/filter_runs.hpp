@@ -21,14 +21,15 @@ inline RunSetup run_setup(const std::string& name, const std::vector<std::string
   return read_run(resolve_placeholders(run), registry(), seed);
 }
 
-/// One variant of configs/experiments/paper_accuracy.yaml over the seeds 1 .. `seeds`.
-inline std::vector<RunResult> paper_runs(const std::string& variant, int seeds,
-                                         std::vector<std::string> assignments) {
+/// One variant of an experiment of configs/experiments, over the seeds 1 .. `seeds`.
+inline std::vector<RunResult> variant_runs(const std::string& experiment,
+                                           const std::string& variant, int seeds,
+                                           std::vector<std::string> assignments) {
   experiment::ExperimentOptions options;
   options.seeds = seeds;
   options.assignments = std::move(assignments);
   auto setup =
-      experiment::read_experiment(configuration("experiments/paper_accuracy.yaml"), options);
+      experiment::read_experiment(configuration("experiments/" + experiment + ".yaml"), options);
   std::erase_if(setup.variants, [&](const auto& v) { return v.name != variant; });
   auto result = experiment::run_experiment(setup, options, registry(), {});
   std::vector<RunResult> runs;

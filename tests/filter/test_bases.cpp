@@ -39,17 +39,9 @@ std::vector<std::string> with_open_gates(std::vector<std::string> assignments) {
 void PrintTo(const Base& base, std::ostream* out) { *out << base.name; }
 
 std::vector<RunResult> runs_of(const Base& base, const std::vector<std::string>& more = {}) {
-  experiment::ExperimentOptions options;
-  options.seeds = kSeeds;
-  options.assignments = {"sensors.simulator0.duration_s=30"};
-  options.assignments.insert(options.assignments.end(), more.begin(), more.end());
-  auto setup = experiment::read_experiment(
-      testing::configuration(std::string("experiments/") + base.experiment + ".yaml"), options);
-  std::erase_if(setup.variants, [&](const auto& v) { return v.name != base.variant; });
-  auto result = experiment::run_experiment(setup, options, testing::registry(), {});
-  std::vector<RunResult> runs;
-  for (experiment::ExperimentRun& run : result.runs) runs.push_back(std::move(run.result));
-  return runs;
+  std::vector<std::string> assignments{"sensors.simulator0.duration_s=30"};
+  assignments.insert(assignments.end(), more.begin(), more.end());
+  return testing::variant_runs(base.experiment, base.variant, kSeeds, std::move(assignments));
 }
 
 bool is_intrinsic(const std::string& name) {

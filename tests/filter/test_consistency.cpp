@@ -29,11 +29,14 @@ std::vector<std::string> with(std::vector<std::string> more) {
 }
 
 TEST(FilterConsistency, PoseIsConsistentWhileAllOfTheCalibrationIsFound) {
-  EXPECT_EQ(inconsistency(testing::paper_runs("bad_init_calib_on", kSeeds, kTwentySeconds)), "");
+  EXPECT_EQ(inconsistency(testing::variant_runs("paper_accuracy", "bad_init_calib_on", kSeeds,
+                                                kTwentySeconds)),
+            "");
 }
 
 TEST(FilterConsistency, PoseIsNotTooSureWithTheTrueCalibrationHeld) {
-  EXPECT_EQ(inconsistency(testing::paper_runs("true_init_calib_off", kSeeds, kTwentySeconds),
+  EXPECT_EQ(inconsistency(testing::variant_runs("paper_accuracy", "true_init_calib_off", kSeeds,
+                                                kTwentySeconds),
                           MayBeModest::kYes),
             "");
 }
@@ -41,30 +44,32 @@ TEST(FilterConsistency, PoseIsNotTooSureWithTheTrueCalibrationHeld) {
 /// The floors of an interval are ten times the noise of these wheels: where nothing else is unknown
 /// of them, the mean NEES is 4.3 with them, and 6.0 with a tenth of them (60 and 40 seeds).
 TEST(FilterConsistency, PoseIsConsistentWithTheTrueCalibrationHeld) {
-  EXPECT_EQ(inconsistency(
-                testing::paper_runs("true_init_calib_off", kSeeds,
-                                    with({"updates.wheel_odometry.sigma_floor_yaw_rad=3e-6",
-                                          "updates.wheel_odometry.sigma_floor_position_m=3e-6"}))),
+  EXPECT_EQ(inconsistency(testing::variant_runs(
+                "paper_accuracy", "true_init_calib_off", kSeeds,
+                with({"updates.wheel_odometry.sigma_floor_yaw_rad=3e-6",
+                      "updates.wheel_odometry.sigma_floor_position_m=3e-6"}))),
             "");
 }
 
 TEST(FilterConsistency, CheckSeesPixelsThatAreTwiceAsNoisyAsTheFilterThinks) {
-  EXPECT_NE(inconsistency(testing::paper_runs("bad_init_calib_on", kSeeds,
-                                              with({"updates.visual_features.sigma_px=0.5",
-                                                    "updates.visual_features.find_noise=false"}))),
-            "");
+  EXPECT_NE(
+      inconsistency(testing::variant_runs("paper_accuracy", "bad_init_calib_on", kSeeds,
+                                          with({"updates.visual_features.sigma_px=0.5",
+                                                "updates.visual_features.find_noise=false"}))),
+      "");
 }
 
 TEST(FilterConsistency, CheckSeesAWrongSignOfTheExtrinsics) {
-  EXPECT_NE(inconsistency(testing::paper_runs("true_init_calib_off", kSeeds,
-                                              with({"wheels.p_IinO_m=[-0.05, -0.02, 0.15]"}))),
+  EXPECT_NE(inconsistency(testing::variant_runs("paper_accuracy", "true_init_calib_off", kSeeds,
+                                                with({"wheels.p_IinO_m=[-0.05, -0.02, 0.15]"}))),
             "");
 }
 
 TEST(FilterConsistency, SameSeedGivesTheSameBits) {
   const std::vector<std::string> three_seconds{"sensors.simulator0.duration_s=3"};
-  const auto first = testing::paper_runs("bad_init_calib_on", 2, three_seconds);
-  const auto second = testing::paper_runs("bad_init_calib_on", 2, three_seconds);
+  const auto first = testing::variant_runs("paper_accuracy", "bad_init_calib_on", 2, three_seconds);
+  const auto second =
+      testing::variant_runs("paper_accuracy", "bad_init_calib_on", 2, three_seconds);
   for (std::size_t i = 0; i < first.size(); ++i) {
     ASSERT_GT(first[i].epochs, 20);
     ASSERT_EQ(first[i].estimate.size(), second[i].estimate.size());

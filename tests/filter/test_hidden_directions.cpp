@@ -30,7 +30,7 @@ std::vector<RunResult> runs(const std::string& motion, const std::string& ground
                                "sensors.simulator0.motion=" + motion,
                                "sensors.simulator0.ground=" + ground};
   all.insert(all.end(), more.begin(), more.end());
-  return testing::paper_runs(variant, kSeeds, all);
+  return testing::variant_runs("paper_accuracy", variant, kSeeds, all);
 }
 
 /// Empty when all parameters are consistent and the hidden ones, called by how their names begin,

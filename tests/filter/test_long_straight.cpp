@@ -24,7 +24,7 @@ std::string faults(const std::vector<std::string>& more) {
                                "sensors.simulator0.motion=straight",
                                "sensors.simulator0.ground=uneven"};
   all.insert(all.end(), more.begin(), more.end());
-  const auto runs = testing::paper_runs("bad_init_calib_on", kSeeds, all);
+  const auto runs = testing::variant_runs("paper_accuracy", "bad_init_calib_on", kSeeds, all);
   const auto bounds = eval::mean_nees_bounds(1, kSeeds, 0.99);
   std::string out;
   for (std::size_t i = 0; i < runs.front().calibration.size(); ++i) {

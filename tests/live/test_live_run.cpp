@@ -198,7 +198,9 @@ TEST_F(LiveRun, HasItsResultsOnDiskAsTheyComeAlsoWhenItIsKilled) {
   for (const char* file : {"out/trajectory.tum", "out/calibration.csv", "out/timing.csv"}) {
     EXPECT_EQ(text_of(file).back(), '\n') << file << " ends within a line";
   }
-  EXPECT_EQ(lines_with("", "out/timing.csv").size(), static_cast<std::size_t>(n_poses()) + 1);
+  // It may have been killed between the two.
+  EXPECT_NEAR(static_cast<double>(lines_with("", "out/timing.csv").size()),
+              static_cast<double>(n_poses() + 1), 1.);
 }
 
 TEST_F(LiveRun, EndsSoonByAnySignalAlsoWhileNothingComes) {

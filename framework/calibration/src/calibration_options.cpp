@@ -46,7 +46,7 @@ void CalibrationOptions::bind(ParamBinder& b) {
     {.unit = "s",
      .min = 0.,
      .max = 1.,
-     .help = "prior of one clock offset per recording; 0: none is estimated"});
+     .help = "prior of one clock offset per recording; 0: it is exactly what is configured"});
   b(VIWO_PARAM(prior_sigma_gyro_bias_rad_per_s),
     {.unit = "rad/s", .above = 0., .help = "prior of the gyro's bias, one per recording"});
   b(VIWO_PARAM(sigma_distance_m),

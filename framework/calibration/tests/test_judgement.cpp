@@ -37,7 +37,7 @@ TEST(Judgement, TrustsWhatIsRight) {
 TEST(Judgement, DoubtsAFitOfFewResiduals) {
   CalibrationSetup setup = differential(kRight);
   setup.options.segments = Segments::kWhole;
-  EXPECT_THAT(calibrate(setup).doubts, Contains(HasSubstr("only 1 residuals for 4 unknowns")));
+  EXPECT_THAT(calibrate(setup).doubts, Contains(HasSubstr("only 1 residuals for 5 unknowns")));
 }
 
 TEST(Judgement, DoubtsAChangeThatThePriorExcludes) {
@@ -45,6 +45,17 @@ TEST(Judgement, DoubtsAChangeThatThePriorExcludes) {
   testing::scale_drives(setup, 1.1);
   const CalibrationResult result = calibrate(setup);
   EXPECT_THAT(result.doubts, Contains(HasSubstr("prior sigmas from its nominal value")));
+}
+
+TEST(Judgement, DoubtsAClockThatThePriorExcludes) {
+  CalibrationSetup setup = differential(kRight);
+  ASSERT_EQ(setup.options.prior_sigma_clock_offset_s, 0.01) << "it is estimated unless said";
+  testing::change_wheels(setup, [](EncoderSample& sample) {
+    for (std::int64_t* t_ns : {&sample.t_ns, &sample.begin_ns, &sample.end_ns}) {
+      *t_ns -= 100'000'000;
+    }
+  });
+  EXPECT_THAT(calibrate(setup).doubts, Contains(HasSubstr("ms later than the wheels")));
 }
 
 TEST(Judgement, DoubtsAMirroredBaseWhichBoundsExclude) {

@@ -209,6 +209,12 @@ void Filter::correct() {
       clone.p_IinG_fej = clone.p_IinG;
     }
   }
+  // What its own epoch tells of how the latest clone moves.
+  if (!clones_.empty() && clones_.back().t_ns == t_ns_) {
+    CloneState& now = clones_.back();
+    now.w_IinI -= dx_.segment<3>(kGyroBiasColumn);
+    now.v_IinG = now.R_GtoI_fej.transpose() * (imu_.R_GtoI * imu_.v_IinG);
+  }
   blocks_.correct(dx_, options_.first_estimates);
 }
 

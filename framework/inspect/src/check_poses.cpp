@@ -8,6 +8,7 @@
 #include "checks.hpp"
 #include "clock_finding.hpp"
 #include "pose_jumps.hpp"
+#include "pose_orientation.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/so3.hpp"
@@ -40,17 +41,6 @@ constexpr double kMostFactor = 0.15;
 /// is.
 double most_off(double factor) { return factor > 50. ? kMostFactor : 0.05; }
 
-/// Turns about the vertical of the world, of a pose source.
-std::vector<Turn> yaw_turns_of(const Trajectory& poses) {
-  std::vector<Turn> turns = turns_of(poses);
-  std::size_t k = 0;
-  for (Turn& turn : turns) {
-    while (k + 1 < poses.size() && poses[k].t_ns < turn.begin_ns) ++k;
-    turn.rate = Vector3d(0., 0., (poses[k].q_BtoW * turn.rate).z());
-  }
-  return turns;
-}
-
 /// Displacements over windows: of the wheels by their speed, of the poses by their positions.
 struct Speeds {
   std::vector<double> ratio;  ///< of the wheels to the poses
@@ -78,13 +68,6 @@ struct WindowSize {
 /// Of a body that is upright, whose axes are those of O as far as that is known.
 Eigen::Matrix3d axes_of(const Wheels& wheels, const Poses& poses) {
   return poses.of_imu ? wheels.prior.wheels.R_ItoO : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-}
-
-/// Whether there are any orientations: a prism has none.
-bool are_turned(const Trajectory& poses) {
-  return std::any_of(poses.begin(), poses.end(), [&](const StampedPose& pose) {
-    return pose.q_BtoW.angularDistance(poses.front().q_BtoW) > 1e-6;
-  });
 }
 
 Speeds speeds_of(const Wheels& wheels, const Poses& of, const WindowSize& size = {}) {
@@ -301,16 +284,20 @@ bool has_axes_of_imu(const Recording& recording, const Poses& poses, const std::
   return false;
 }
 
+/// By how much two may turn as fast as each other: beyond is a note, and a fault.
+struct MostRatio {
+  double note, fault;
+};
+
 /// Where `label` turns when `other` does, but `ratio` times as fast.
 void check_size_of_turns(const std::string& label, const std::string& other, double ratio,
-                         const std::string& causes, Findings& out) {
-  // Bases that slip are said to be wider than they are.
-  constexpr double kSlips = 1.25, kNoSlip = 1.6, kDegrees = 180. / std::numbers::pi;
+                         const MostRatio& most_ratio, const std::string& causes, Findings& out) {
+  constexpr double kDegrees = 180. / std::numbers::pi;
   const double most = std::max(ratio, 1. / ratio);
-  if (!(ratio > 0.) || most < kSlips) return;
+  if (!(ratio > 0.) || most < most_ratio.note) return;
   const bool are_degrees = std::abs(most / kDegrees - 1.) < 0.2;
   out.push_back({label,
-                 most < kNoSlip ? Severity::kNote : Severity::kFault,
+                 most < most_ratio.fault ? Severity::kNote : Severity::kFault,
                  "turns",
                  "turns " + significant(ratio, 3) + " times as fast as " + other + ": " +
                      (are_degrees ? "one of the two is in degrees" : causes),
@@ -333,12 +320,17 @@ void check_clock(const Recording& recording, std::vector<Turn> of_poses, const s
   }
   constexpr double kSameTurns = 0.9;
   if (lag->correlation > kSameTurns && recording.imu.empty()) {
-    check_size_of_turns(other, label, 1. / lag->slope,
+    // Bases that slip are said to be wider than they are.
+    check_size_of_turns(other, label, 1. / lag->slope, {.note = 1.25, .fault = 1.6},
                         "width of the base (baseline, track, centres of rotation), radii or gears "
                         "of the wheels, or units",
                         out);
   } else if (lag->correlation > kSameTurns) {
-    check_size_of_turns(label, other, lag->slope, "units of one of the two", out);
+    // Least squares of one by the other, and of the other by the one: the truth is between them.
+    const double least = lag->slope, most = least / (lag->correlation * lag->correlation);
+    const double ratio = least > 1. ? least : std::min(most, 1.);
+    check_size_of_turns(label, other, ratio, {.note = 1.03, .fault = 1.05},
+                        "the scale of the gyro, or units of one of the two", out);
   }
   const double period_s = period_of(of_poses);
   const bool is_key = !recording.setup->filter;
@@ -368,6 +360,27 @@ void check_clock(const Recording& recording, std::vector<Turn> of_poses, const s
   out.push_back(clock);
 }
 
+/// Of what poses are compared with: turns about the vertical, as z.
+struct YawTurns {
+  std::vector<Turn> turns;
+  std::string label;
+  double configured_s = 0.;  ///< the clock of the poses by it, as configured
+};
+YawTurns yaw_turns_beside(const Recording& recording) {
+  if (!recording.imu.empty()) {
+    Vector3d up = up_of(recording.imu);
+    if (up.norm() == 0. && !recording.wheels.empty()) {
+      up = recording.wheels.front().prior.wheels.R_ItoO.row(2);
+    }
+    if (up.norm() == 0.) return {};
+    return {about(turns_of(recording.imu), up), recording.label<ImuSample>(recording.imu_sensor)};
+  }
+  if (recording.wheels.empty() || recording.wheels.front().samples.empty()) return {};
+  const Wheels& wheels = recording.wheels.front();
+  return {turns_of(wheels), recording.label<EncoderSample>(wheels.sensor),
+          recording.setup->reference_time_offset_s};
+}
+
 }  // namespace
 
 void check_poses(const Recording& recording, Findings& out) {
@@ -379,21 +392,13 @@ void check_poses(const Recording& recording, Findings& out) {
       if (!has_axes_of_imu(recording, poses, label, out)) continue;
       check_clock(recording, turns_of(poses.poses), label, turns_of(recording.imu),
                   recording.label<ImuSample>(recording.imu_sensor), 0., out);
-    } else if (!recording.imu.empty()) {
-      Vector3d up = up_of(recording.imu);
-      if (up.norm() == 0. && !recording.wheels.empty()) {
-        up = recording.wheels.front().prior.wheels.R_ItoO.row(2);
+    } else if (const YawTurns yaw = yaw_turns_beside(recording); !yaw.turns.empty()) {
+      if (!has_other_orientation(poses.poses, label, yaw.turns, yaw.label, out)) {
+        check_clock(recording, turns_about(poses.poses), label, yaw.turns, yaw.label,
+                    yaw.configured_s, out);
       }
-      if (up.norm() > 0.) {
-        check_clock(recording, yaw_turns_of(poses.poses), label, about(turns_of(recording.imu), up),
-                    recording.label<ImuSample>(recording.imu_sensor), 0., out);
-      }
-    } else if (!recording.wheels.empty() && !recording.wheels.front().samples.empty()) {
-      const Wheels& wheels = recording.wheels.front();
-      check_clock(recording, yaw_turns_of(poses.poses), label, turns_of(wheels),
-                  recording.label<EncoderSample>(wheels.sensor),
-                  recording.setup->reference_time_offset_s, out);
     }
+    if (is_fault(out, label, "orientation")) continue;
     for (const Wheels& wheels : recording.wheels) {
       if (!wheels.samples.empty()) check_speed(recording, wheels, poses, label, out);
     }

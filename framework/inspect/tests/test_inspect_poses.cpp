@@ -53,6 +53,78 @@ TEST(InspectPoses, TellTheirUnitAndThatOfSpeeds) {
   EXPECT_THAT(what(1., 3.6, "wheels0", "speed"), HasSubstr("drives are in km/h"));
 }
 
+TEST(InspectPoses, TellTheScaleOfAGyro) {
+  const auto turns = [](double scale_of_gyro) {
+    return finding_of(inspected(swerve(), {.imu =
+                                               [=](ImuSample& s) {
+                                                 scale(s.gyro_rad_per_s, scale_of_gyro);
+                                                 return true;
+                                               }}),
+                      "states0", "turns");
+  };
+  EXPECT_EQ(turns(1.).what, "");
+  EXPECT_EQ(turns(1.02).what, "");
+  EXPECT_EQ(turns(1.1).severity, Severity::kFault);
+  EXPECT_THAT(turns(1.1).what, HasSubstr("the scale of the gyro"));
+  EXPECT_EQ(turns(0.9).severity, Severity::kFault);
+}
+
+TEST(InspectPoses, TellThatTheirQuaternionsAreReadInAnotherOrder) {
+  using Quaternion = std::array<double, 4>;  // x, y, z, w
+  const auto orientation = [](const std::function<Quaternion(const Quaternion&)>& read) {
+    return finding_of(inspected(setup_of(testing::configuration("runs/simulated_swerve.yaml")),
+                                {.poses =
+                                     [&](PoseSample& s) {
+                                       s.q_BtoW_xyzw = read(s.q_BtoW_xyzw);
+                                       return true;
+                                     }}),
+                      "poses0", "orientation");
+  };
+  EXPECT_EQ(orientation([](const Quaternion& q) { return q; }).what, "");
+  const auto w_first = orientation([](const Quaternion& q) {
+    return Quaternion{q[3], q[0], q[1], q[2]};
+  });
+  EXPECT_EQ(w_first.severity, Severity::kFault);
+  EXPECT_THAT(w_first.what, HasSubstr("read as w, x, y, z"));
+  const auto w_last = orientation([](const Quaternion& q) {
+    return Quaternion{q[1], q[2], q[3], q[0]};
+  });
+  EXPECT_EQ(w_last.severity, Severity::kFault);
+  EXPECT_THAT(w_last.what, HasSubstr("read as x, y, z, w"));
+  // The other way round is another fault.
+  EXPECT_EQ(orientation([](const Quaternion& q) {
+              return Quaternion{-q[0], -q[1], -q[2], q[3]};
+            }).what,
+            "");
+  const auto none = orientation([](const Quaternion&) { return Quaternion{0., 0., 0., 1.}; });
+  EXPECT_EQ(none.severity, Severity::kNote);
+  EXPECT_THAT(none.what, HasSubstr("never changes"));
+}
+
+TEST(InspectPoses, TellThatAnotherAxisOfTheirWorldPointsUp) {
+  const auto turned = [](const Eigen::Quaterniond& R) {
+    return finding_of(inspected(setup_of(testing::configuration("runs/simulated_swerve.yaml")),
+                                {.poses =
+                                     [&](PoseSample& s) {
+                                       const Eigen::Vector3d p = R * to_vector(s.p_BinW_m);
+                                       const auto& q = s.q_BtoW_xyzw;
+                                       const Eigen::Quaterniond there =
+                                           R * Eigen::Quaterniond(q[3], q[0], q[1], q[2]);
+                                       s.p_BinW_m = {p.x(), p.y(), p.z()};
+                                       s.q_BtoW_xyzw = {there.x(), there.y(), there.z(), there.w()};
+                                       return true;
+                                     }}),
+                      "poses0", "orientation");
+  };
+  const auto z_to = [](const Eigen::Vector3d& up) {
+    return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), up);
+  };
+  EXPECT_THAT(turned(z_to(Eigen::Vector3d::UnitY())).what,
+              HasSubstr("turn about y of their world"));
+  EXPECT_THAT(turned(z_to(-Eigen::Vector3d::UnitY())).what,
+              HasSubstr("turn about -y of their world"));
+}
+
 TEST(InspectPoses, ThatAreCorrectedWhileTheBaseStandsTellNoSpeed) {
   const RunSetup planar = setup_of(testing::configuration("runs/simulated_swerve.yaml"));
   const Inspection stands = inspected(planar, {.wheels = [](EncoderSample& s) {

@@ -122,13 +122,14 @@ void add_findings(const Findings& findings, RunResult& result) {
 }
 
 void add_far_from_prior(RunResult& result) {
-  constexpr double kFar = 5.;
-  std::vector<std::string>& lines = is_contradicted(result) ? result.doubts : result.warnings;
+  constexpr double kFar = 5., kHopeless = 10.;
+  const bool contradicted = is_contradicted(result);
   for (const CalibrationTrack& track : result.calibration) {
     if (track.estimate.empty() || !(track.sigma.front() > 0.)) continue;
     const double sigmas =
         std::abs(track.estimate.back() - track.estimate.front()) / track.sigma.front();
     if (!(sigmas > kFar)) continue;
+    auto& lines = contradicted || sigmas > kHopeless ? result.doubts : result.warnings;
     lines.push_back(track.name + ": " + significant(track.estimate.back(), 4) + " " + track.unit +
                     " was found, " + significant(sigmas, 2) + " prior sigmas from " +
                     significant(track.estimate.front(), 4) +

@@ -376,6 +376,15 @@ TEST(Warnings, OfCalibrationFarFromItsPriorAreDoubtsWhereANoiseIsFarOffToo) {
   EXPECT_THAT(result.doubts, ElementsAre(HasSubstr("r_1: 0.16 m was found")));
 }
 
+TEST(Warnings, OfCalibrationTenSigmasFromItsPriorAreDoubts) {
+  RunResult result;
+  result.calibration = {{"r_1", "m", {0.1, 0.199}, {0.01, 0.01}},
+                        {"r_2", "m", {0.1, 0.21}, {0.01, 0.01}}};
+  add_far_from_prior(result);
+  EXPECT_THAT(result.doubts, ElementsAre(HasSubstr("r_2: 0.21 m was found, 11 prior sigmas")));
+  EXPECT_THAT(result.warnings, ElementsAre(HasSubstr("r_1")));
+}
+
 TEST(Warnings, NameTheParametersThatScatterMost) {
   RunResult result;
   for (const auto& [name, scatter] :

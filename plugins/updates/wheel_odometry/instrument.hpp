@@ -1,7 +1,6 @@
 // The wheels as an instrument: what they measure over an interval for given intrinsics.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -10,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "interval.hpp"
+#include "viwo/math/se2.hpp"
 #include "viwo/wheel/preintegration.hpp"
 
 namespace viwo::wheel_odometry {
@@ -21,9 +21,6 @@ struct Readings {
   std::int64_t end_ns = 0;
 };
 
-/// For the derivative by time, ns: the rates of a few encoder samples are averaged.
-inline constexpr std::int64_t kShiftNs = 50'000'000;
-
 inline bool is_finite(const PreintegratedPose& pose) {
   return pose.g.allFinite() && pose.P_g.allFinite();
 }
@@ -31,14 +28,14 @@ inline bool is_finite(const PreintegratedPose& pose) {
 class Instrument {
  public:
   Instrument(std::shared_ptr<const WheelModel> model, const PreintegrationOptions& options)
-      : preintegrator_(model, options), shifted_(std::move(model), options) {}
+      : preintegrator_(model, options), part_(std::move(model), options) {}
 
   const WheelModel& model() const { return preintegrator_.model(); }
 
   /// The weights of the rows stay there whatever the intrinsics.
   void set_weights_at(const Intrinsics& x_WI) {
     preintegrator_.set_intrinsics(x_WI);
-    shifted_.set_intrinsics(x_WI);
+    part_.set_intrinsics(x_WI);
   }
 
   /// Nothing where samples do not cover the interval.
@@ -46,20 +43,33 @@ class Instrument {
     return integrate(preintegrator_, y, x_WI);
   }
 
-  /// Of the encoders themselves, whose rates are less noisy than those of the IMU (WO-13); `pose`
-  /// is that of the interval. From the clones where samples are missing.
-  Rate rate(const Readings& y, const Point& at, const PreintegratedPose& pose) {
-    const auto before =
-        integrate(shifted_, {y.samples, y.begin_ns - kShiftNs, y.end_ns - kShiftNs}, at.x_WI);
-    if (before && before->g.allFinite() && before->bridged_s == 0.) {
-      return {(pose.g - before->g) / (1e-9 * kShiftNs), true};
+  /// How `pose`, that of the interval, changes when both ends move on: by how much the last third
+  /// was faster than the first, whose noise is not in `pose` (WO-13). Nothing where samples are
+  /// missing.
+  std::optional<Eigen::Vector3d> rate(const Readings& y, const Intrinsics& x_WI,
+                                      const PreintegratedPose& pose) {
+    const std::int64_t third_ns = (y.end_ns - y.begin_ns) / 3;
+    const auto first = integrate(part_, {y.samples, y.begin_ns, y.begin_ns + third_ns}, x_WI);
+    const auto last = integrate(part_, {y.samples, y.end_ns - third_ns, y.end_ns}, x_WI);
+    for (const auto& part : {first, last}) {
+      if (!part || !is_finite(*part) || part->bridged_s > 0.) return std::nullopt;
     }
-    return {wheel_motion::relative_pose_jacobian(at.first, at.last, at.mount)
-                .col(wheel_motion::kTimeOffset),
-            false};
+    const Eigen::Vector3d u0 = log_se2(first->g) / first->duration_s;
+    const Eigen::Vector3d u1 = log_se2(last->g) / last->duration_s;
+    // They are those of the middles of the thirds.
+    return moved_on(pose.g, 1.25 * u0 - 0.25 * u1, 1.25 * u1 - 0.25 * u0);
   }
 
  private:
+  /// d/dt of the pose g of a frame that moves with the twists u0 at its beginning, u1 at its end.
+  static Eigen::Vector3d moved_on(const Eigen::Vector3d& g, const Eigen::Vector3d& u0,
+                                  const Eigen::Vector3d& u1) {
+    Eigen::Vector3d rate;
+    rate[0] = u1[0] - u0[0];
+    rate.tail<2>() = R2(g[0]) * u1.tail<2>() - u0.tail<2>() - u0[0] * (J2() * g.tail<2>());
+    return rate;
+  }
+
   static std::optional<PreintegratedPose> integrate(Preintegrator& preintegrator, const Readings& y,
                                                     const Intrinsics& x_WI) {
     preintegrator.move_intrinsics(x_WI);
@@ -68,7 +78,7 @@ class Instrument {
     return pose;
   }
 
-  Preintegrator preintegrator_, shifted_;
+  Preintegrator preintegrator_, part_;
 };
 
 }  // namespace viwo::wheel_odometry

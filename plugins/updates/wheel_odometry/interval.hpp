@@ -16,6 +16,8 @@ static_assert(kMaxColumns <= kMaxFactorColumns);
 using GeometryMatrix =
     Eigen::Matrix<double, wheel_motion::kGeometrySize, wheel_motion::kGeometrySize>;
 
+inline double square(double x) { return x * x; }
+
 /// Where a factor is linearised.
 struct Point {
   wheel_motion::MovingPose first, last;
@@ -23,10 +25,10 @@ struct Point {
   Intrinsics x_WI;
 };
 
-/// How the measured pose changes when both instants move on.
+/// How the measured pose changes when both instants move on (WO-13).
 struct Rate {
-  Eigen::Vector3d g = Eigen::Vector3d::Zero();  ///< rad/s, m/s
-  bool is_wheels = false;                       ///< else it is that of the IMU
+  Eigen::Vector3d g = Eigen::Vector3d::Zero();         ///< rad/s, m/s
+  Eigen::Vector3d variance = Eigen::Vector3d::Zero();  ///< of the noise of each entry
 };
 
 /// The states that a factor is about, and their prior.

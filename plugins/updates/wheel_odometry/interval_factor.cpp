@@ -1,6 +1,5 @@
 #include "interval_factor.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -15,8 +14,6 @@ namespace {
 /// Steps for the second derivatives, of the mount (rad, m) and the time offset (s). The Jacobian is
 /// nearly quadratic in them, so that they may be large.
 constexpr double kSecondDerivativeStep = 1e-4;
-
-double square(double x) { return x * x; }
 
 /// `at` with the mount or the time offset, entry k of the geometry, a step on.
 Point stepped(Point at, int k) {
@@ -37,6 +34,17 @@ Point stepped(Point at, int k) {
 
 }  // namespace
 
+Eigen::Matrix3d measurement_noise(const Params& params, const PreintegratedPose& pose) {
+  const double path = pose.path_length_m;
+  Eigen::Matrix3d R = square(params.noise_scale) * pose.P_g;
+  R(0, 0) += square(params.sigma_floor_yaw_rad) + path * square(params.sigma_yaw_rad_per_sqrt_m);
+  for (int i = 1; i < 3; ++i) {
+    R(i, i) +=
+        square(params.sigma_floor_position_m) + path * square(params.sigma_position_m_per_sqrt_m);
+  }
+  return R;
+}
+
 Linearised IntervalFactor::linearise(const Point& at, const PreintegratedPose& pose) const {
   Linearised out;
   out.residual = pose.g - relative_pose(at.first, at.last, at.mount, &out.tilt);
@@ -48,7 +56,7 @@ Linearised IntervalFactor::linearise(const Point& at, const PreintegratedPose& p
   first.after_s = at.first.after_s;
   last.after_s = at.last.after_s;
   PoseJacobian geometry = relative_pose_jacobian(first, last, at.mount);
-  out.R = noise(pose);
+  out.R = measurement_noise(params_, pose) + interval_.curvature_noise;
   // What the mount shows is proportional to the motion. Taken at the noisy first estimates it
   // would count their noise as motion, and so as information: it is taken at the motion that the
   // wheels measured, with a tilt that intervals before tell.
@@ -67,8 +75,9 @@ Linearised IntervalFactor::linearise(const Point& at, const PreintegratedPose& p
   // Free of the noise of this interval.
   const Eigen::Vector2d tilt =
       params_.motion_sigmas > 0. ? before_.tilt.expected(pose.duration_s) : out.tilt;
+  const Rate& rate = interval_.rate;
   const CalibrationJacobian moving =
-      calibration_jacobian(motion_of_O, tilt, moving_rate(pose.duration_s, out.R), p_IinO);
+      calibration_jacobian(motion_of_O, tilt, planar_part(rate.g, rate.variance), p_IinO);
   geometry.rightCols<kCalibrationSize>() = moving;
   out.H.resize(3, states.P.cols());
   for (int k = 0; k < states.n_geometry; ++k) out.H.col(k) = geometry.col(states.geometry_at(k));
@@ -80,18 +89,6 @@ Linearised IntervalFactor::linearise(const Point& at, const PreintegratedPose& p
            states.geometry_P.bottomRightCorner<kCalibrationSize, kCalibrationSize>() *
            D.transpose();
   return out;
-}
-
-/// (WO-9)
-Eigen::Matrix3d IntervalFactor::noise(const PreintegratedPose& pose) const {
-  const double path = pose.path_length_m;
-  Eigen::Matrix3d R = square(params_.noise_scale) * pose.P_g + interval_.curvature_noise;
-  R(0, 0) += square(params_.sigma_floor_yaw_rad) + path * square(params_.sigma_yaw_rad_per_sqrt_m);
-  for (int i = 1; i < 3; ++i) {
-    R(i, i) +=
-        square(params_.sigma_floor_position_m) + path * square(params_.sigma_position_m_per_sqrt_m);
-  }
-  return R;
 }
 
 /// (WO-15): zero where its noise alone explains all of it.
@@ -111,17 +108,6 @@ Eigen::Vector3d IntervalFactor::planar_part(const Eigen::Vector3d& g,
   part << moving_part(Turn(g.head<1>()), variance),
       moving_part(Eigen::Vector2d(g.tail<2>()), variance.tail<2>());
   return part;
-}
-
-/// Of the rates of the encoders: two intervals that share all but the shift at both ends. Those of
-/// the IMU are too noisy to teach anything.
-Eigen::Vector3d IntervalFactor::moving_rate(double duration_s, const Eigen::Matrix3d& R) const {
-  const Rate& rate = interval_.rate;
-  if (params_.motion_sigmas <= 0.) return rate.g;
-  if (!rate.is_wheels) return Eigen::Vector3d::Zero();
-  const double shift_s = 1e-9 * kShiftNs;
-  const double apart = std::min(shift_s / duration_s, 1.);
-  return planar_part(rate.g, Eigen::Vector3d(2. * apart / (shift_s * shift_s) * R.diagonal()));
 }
 
 Point IntervalFactor::moved(const Step& step) const {

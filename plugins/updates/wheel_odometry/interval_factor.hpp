@@ -34,6 +34,9 @@ struct Linearised {
   double size_of(const Eigen::Vector3d& r) const { return r.dot(R.llt().solve(r)); }
 };
 
+/// Of what the wheels measured over an interval (WO-9).
+Eigen::Matrix3d measurement_noise(const Params& params, const PreintegratedPose& pose);
+
 /// What it is made with must outlive it.
 class IntervalFactor {
  public:
@@ -55,11 +58,9 @@ class IntervalFactor {
   double tilt_variance(const Point& at) const;
 
  private:
-  Eigen::Matrix3d noise(const PreintegratedPose& pose) const;
   template <class Vector, class Variance>
   Vector moving_part(const Vector& measured, const Variance& variance) const;
   Eigen::Vector3d planar_part(const Eigen::Vector3d& g, const Eigen::Vector3d& variance) const;
-  Eigen::Vector3d moving_rate(double duration_s, const Eigen::Matrix3d& R) const;
 
   const Params& params_;
   const Memory& before_;

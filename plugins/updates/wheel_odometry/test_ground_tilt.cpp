@@ -36,6 +36,23 @@ TEST(GroundTilt, IsNoneOfNoiseAndOfAMountThatIsOff) {
 
 TEST(GroundTilt, IsSeenAtOnceWhereTheGroundTilts) { EXPECT_EQ(seen(5e-3, 5.), 1.); }
 
+// A turn that does not change is a bias of the gyro, as far as that may be so large.
+TEST(GroundTilt, IsNoneOfABiasOfTheGyro) {
+  const auto tilts = [](double rate, double sigma_of_bias) {
+    GroundTilt tilt(5.);
+    for (int i = 0; i < 4; ++i) {
+      tilt.add(kDurationS, 0.01 * i, kDurationS * Eigen::Vector2d(0., rate), kSigma * kSigma,
+               sigma_of_bias * sigma_of_bias);
+    }
+    return tilt.tilts();
+  };
+  const double rate = 5. * kSigma / kDurationS;
+  EXPECT_TRUE(tilts(rate, 0.));
+  EXPECT_TRUE(tilts(rate, 0.02 * rate));
+  EXPECT_FALSE(tilts(rate, 0.5 * rate));
+  EXPECT_TRUE(tilts(10. * rate, 0.5 * rate));
+}
+
 TEST(GroundTilt, IsUnknownBeforeThereIsAnInterval) {
   GroundTilt tilt(5.);
   EXPECT_FALSE(tilt.tilts());

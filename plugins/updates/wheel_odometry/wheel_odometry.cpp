@@ -6,6 +6,7 @@
 #include <span>
 
 #include "checked_encoders.hpp"
+#include "clock_rate.hpp"
 #include "encoder_intervals.hpp"
 #include "encoders.hpp"
 #include "interval_factor.hpp"
@@ -89,7 +90,9 @@ class WheelOdometry final : public Update {
     instrument_->set_weights_at(wheels.x_WI);
     const std::optional<PreintegratedPose> pose = instrument_->pose(readings, wheels.x_WI);
     if (!pose) return;
-    interval.rate = instrument_->rate(readings, interval.start, *pose);
+    const WheelRate wheel_rate{instrument_->rate(readings, wheels.x_WI, *pose), pose->duration_s,
+                               measurement_noise(params_, *pose).diagonal()};
+    interval.rate = clock_rate(wheel_rate, interval.start, filter, data.imu);
     tallies_.add(*pose, last.t_ns);
     if (!(pose->bridged_s <= params_.max_bridged_s) || !is_finite(*pose)) {
       bridged_.add(1, last.t_ns);
@@ -109,7 +112,10 @@ class WheelOdometry final : public Update {
     fill(found, factor);
     const double yaw = found.pose.g[0];
     const double duration_s = found.pose.duration_s;
-    memory_.tilt.add(duration_s, yaw, found.factor.tilt, model.tilt_variance(found.at));
+    const double bias_variance =
+        filter.P().diagonal().segment<3>(kGyroBiasColumn).mean();  // rad^2/s^2
+    memory_.tilt.add(duration_s, yaw, found.factor.tilt, model.tilt_variance(found.at),
+                     bias_variance);
     memory_.turn.add(duration_s, yaw, found.factor.R(0, 0), found.factor.lasting[0]);
   }
 

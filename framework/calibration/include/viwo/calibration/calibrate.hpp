@@ -46,7 +46,7 @@ struct CalibrationOptions {
   Eigen::Vector3d extrinsics_x_m_y_m_yaw_rad{0., 0., 0.};
   double prior_sigma_extrinsics_m = 0.01;
   double prior_sigma_extrinsics_rad = 0.02;
-  double prior_sigma_clock_offset_s = 0.;  ///< of one offset per recording; 0: not estimated
+  double prior_sigma_clock_offset_s = 0.01;  ///< of one offset per recording; 0: not estimated
   double prior_sigma_gyro_bias_rad_per_s = 0.02;
   double sigma_distance_m = 0.005;
   double sigma_turn_deg = 0.5;

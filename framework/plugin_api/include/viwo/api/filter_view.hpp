@@ -47,7 +47,7 @@ struct CloneState {
   Eigen::Vector3d p_IinG = Eigen::Vector3d::Zero();
   Eigen::Matrix3d R_GtoI_fej = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_IinG_fej = Eigen::Vector3d::Zero();
-  /// How it moved at that time, estimated when it was made: for time offsets.
+  /// How it moved at that time, estimated with what its own epoch measured: for time offsets.
   Eigen::Vector3d w_IinI = Eigen::Vector3d::Zero();  ///< rad/s
   Eigen::Vector3d v_IinG = Eigen::Vector3d::Zero();  ///< m/s
 };

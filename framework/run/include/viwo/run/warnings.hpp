@@ -41,8 +41,8 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
 /// above what is configured.
 void add_findings(const Findings& findings, RunResult& result);
 
-/// Calibration that has gone where its prior does not reach: doubts where a noise, too, is far
-/// above what is configured, else warnings.
+/// Calibration that has gone where its prior does not reach, beyond five sigmas: doubts beyond ten,
+/// and where a noise, too, is far above what is configured, else warnings.
 void add_far_from_prior(RunResult& result);
 /// Of a calibration that is much surer than it ought to be, one line.
 std::vector<std::string> too_sure(const RunResult& result);
