@@ -119,9 +119,9 @@ TEST(RecordingProblem, HasTheJacobianOfTurnAndDistanceOfCentralDifferences) {
 
 TEST(RecordingProblem, HasTheParityGradientOfItsInformation) {
   const auto simulated = recording({"sensors.simulator0.true_intrinsics_scale=1"});
-  CalibrationOptions options;
-  options.prior_sigma_clock_offset_s = 0.;  // its margin leaves out the ends
-  RecordingProblem problem(simulated, options);
+  CalibrationOptions without_clock;
+  without_clock.prior_sigma_clock_offset_s = 0.;  // its margin leaves out the ends
+  RecordingProblem problem(simulated, without_clock);
   CalibrationPoint at;
   at.x_WI = simulated.setup.model->nominal();
   RecordingResiduals residuals;

@@ -5,6 +5,7 @@
 
 #include "checks.hpp"
 #include "viwo/eval/statistics.hpp"
+#include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/wheel/drive_ranges.hpp"
@@ -61,7 +62,19 @@ double distance_of(const Trajectory& poses) {
   return distance_m > 3. * eval::median(steps_m) ? distance_m : 0.;
 }
 
-/// What stands still, while the poses go somewhere if there are any.
+/// What a tenth of the readings of the gyro are beyond, of those while the wheels were read, rad/s.
+double turn_of(const std::vector<ImuSample>& imu, const Wheels& wheels) {
+  std::vector<double> rates;
+  for (const ImuSample& sample : imu) {
+    const bool is_meanwhile = !wheels.samples.empty() &&
+                              sample.t_ns >= wheels.samples.front().begin_ns &&
+                              sample.t_ns <= wheels.samples.back().end_ns;
+    if (is_meanwhile) rates.push_back(to_vector(sample.gyro_rad_per_s).norm());
+  }
+  return rates.empty() ? 0. : eval::quantile(rates, 0.9);
+}
+
+/// What stands still, while poses go somewhere, or the gyro turns, if there are any.
 Finding standstill(const Recording& recording, const Wheels& wheels, const std::string& label,
                    double fastest) {
   constexpr double kGoes_m = 0.3;
@@ -87,6 +100,15 @@ Finding standstill(const Recording& recording, const Wheels& wheels, const std::
                    " m: their unit, or not connected";
     finding.figures.push_back({"distance", distance_m, "m"});
   }
+  constexpr double kTurns_rad_per_s = 0.3;
+  const double turn = turn_of(recording.imu, wheels);
+  if (finding.severity == Severity::kFault || turn < kTurns_rad_per_s) return finding;
+  finding.severity = Severity::kFault;
+  finding.what = "the wheels turn with no more than " + significant(fastest, 2) + " rad/s, while " +
+                 recording.label<ImuSample>(recording.imu_sensor) + " turns with " +
+                 significant(turn, 2) +
+                 " rad/s: their unit, not connected, or the robot is carried";
+  finding.figures.push_back({"turn", turn, "rad/s"});
   return finding;
 }
 

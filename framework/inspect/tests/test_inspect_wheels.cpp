@@ -15,7 +15,28 @@ using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+
+TEST(InspectWheels, ThatNeverTurnWhileTheGyroDoesAreNotConnected) {
+  const auto motion = [](double gyro) {
+    return finding_of(inspected(swerve(), {.imu =
+                                               [=](ImuSample& s) {
+                                                 scale(s.gyro_rad_per_s, gyro);
+                                                 return true;
+                                               },
+                                           .wheels =
+                                               [](EncoderSample& s) {
+                                                 s.drive_rad_per_s.fill(0.);
+                                                 return true;
+                                               },
+                                           .states = [](StateSample&) { return false; }}),
+                      "wheels0", "motion");
+  };
+  EXPECT_EQ(motion(1.).severity, Severity::kFault);
+  EXPECT_THAT(motion(1.).what, HasSubstr("while imu0 turns with"));
+  EXPECT_EQ(motion(0.01).severity, Severity::kNote);
+}
 
 TEST(InspectWheels, TellsADriveThatNeverChanges) {
   const Inspection dead = with_wheels(simulated("viwo_skid_steer"),
