@@ -71,8 +71,9 @@ void judge_what_was_given(CalibrationResult& result) {
     const double offset_s = result.all.clock_offset_s[i];
     add_by_size(offset_s / of_clock_s,
                 name_of(result.setup->recordings[i].label) + ": its reference would be " +
-                    significant(1e3 * offset_s, 2) +
-                    " ms later than the wheels: a clock that viwo inspect writes, or "
+                    significant(1e3 * std::abs(offset_s), 2) + " ms " +
+                    (offset_s > 0. ? "later" : "earlier") +
+                    " than the wheels: a clock that viwo inspect writes, or "
                     "prior_sigma_clock_offset_s is too narrow",
                 result);
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include "viwo/math/significant.hpp"
@@ -71,12 +72,18 @@ bool has_other_orientation(const Trajectory& poses, const std::string& label,
     const auto lag = find_lag(expected, RateGrid(poses.front().t_ns, poses.back().t_ns, of_poses));
     return lag ? lag->correlation : 0.;
   };
+  constexpr double kTurns_rad_per_s = 0.1;
+  const bool turns_there = std::any_of(turns.begin(), turns.end(), [](const Turn& turn) {
+    return std::abs(turn.rate.z()) > kTurns_rad_per_s;
+  });
   if (!are_turned(poses)) {
+    if (!turns_there) return false;
     out.push_back({label,
                    Severity::kNote,
                    "orientation",
-                   "its orientation never changes: it gives positions alone, and errors of the "
-                   "orientation against it mean nothing",
+                   "its orientation never changes while " + other +
+                       " turns: it gives positions alone, and errors of the orientation against "
+                       "it mean nothing",
                    {}});
     return true;
   }

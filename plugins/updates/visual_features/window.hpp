@@ -30,7 +30,7 @@ struct WindowClone {
   bool at_first_estimate = true;  ///< first estimate and estimate are the same
   Eigen::Matrix3d R_GtoI, R_GtoI_fej;
   Eigen::Vector3d p_IinG, p_IinG_fej;
-  Eigen::Vector3d w_IinI, v_IinG;  ///< when it was made
+  Eigen::Vector3d w_IinI, v_IinG;  ///< then, with what its epoch measured
 };
 
 /// A camera at the time of its image that belongs to a clone.

@@ -26,47 +26,53 @@ Eigen::Vector2d variance_by_state(const Point& at, double duration_s, const Filt
   return square(duration_s) * (J * P_state * J.transpose()).diagonal().head<2>();
 }
 
-/// How the turn of I changes, rad/s^2: the line through the readings of the gyro, whose slope has
-/// no noise of their mean.
-struct Slope {
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+/// Turn of I over some readings of a gyro, the line through them: the noise of its slope has
+/// nothing in common with that of its mean.
+struct Line {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();   ///< rad/s
+  Eigen::Vector3d slope = Eigen::Vector3d::Zero();  ///< rad/s^2
   double spread_s2 = 0.;  ///< sum of squares of the times of the readings, from their mean
 };
-Slope slope_of(std::span<const ImuSample> imu) {
-  Slope slope;
+Line line_through(std::span<const ImuSample> imu) {
+  Line line;
   double mean_s = 0.;
+  const double share = 1. / static_cast<double>(imu.size());
   for (const ImuSample& sample : imu) {
-    mean_s += seconds_between(imu.front().t_ns, sample.t_ns) / static_cast<double>(imu.size());
+    mean_s += share * seconds_between(imu.front().t_ns, sample.t_ns);
+    line.mean += share * to_vector(sample.gyro_rad_per_s);
   }
   for (const ImuSample& sample : imu) {
     const double t_s = seconds_between(imu.front().t_ns, sample.t_ns) - mean_s;
-    slope.rate += t_s * to_vector(sample.gyro_rad_per_s);
-    slope.spread_s2 += t_s * t_s;
+    line.slope += t_s * to_vector(sample.gyro_rad_per_s);
+    line.spread_s2 += t_s * t_s;
   }
-  if (slope.spread_s2 > 0.) slope.rate /= slope.spread_s2;
-  return slope;
+  if (line.spread_s2 > 0.) line.slope /= line.spread_s2;
+  return line;
 }
 
-/// By the slope of the gyro, and by what the accelerometer measured between the clones.
+/// By the line through the readings of the gyro, and by what the accelerometer measured between the
+/// clones. As good as unknown where the readings are not those of the interval, which is of more
+/// than one epoch where encoders were late.
 Rate rate_of_imu(const Point& at, double duration_s, const FilterView& filter,
                  std::span<const ImuSample> imu) {
-  wheel_motion::MovingPose first = at.first, last = at.last;
-  const Slope slope = slope_of(imu);
+  constexpr double kUnknown = 1e6, kNearlyAll = 0.9;
+  const double epoch_s = imu.empty() ? 0. : seconds_between(imu.front().t_ns, imu.back().t_ns);
   Rate rate;
-  if (slope.spread_s2 > 0.) {
-    const Eigen::Vector3d mean = 0.5 * (first.w_IinI + last.w_IinI);
-    first.w_IinI = mean - 0.5 * duration_s * slope.rate;
-    last.w_IinI = mean + 0.5 * duration_s * slope.rate;
-    const double per_s =
-        static_cast<double>(imu.size() - 1) / seconds_between(imu.front().t_ns, imu.back().t_ns);
-    const double turn =
-        square(filter.imu_noise.gyro_rad_per_s_sqrt_hz * duration_s) * per_s / slope.spread_s2;
-    const double velocity = duration_s * square(filter.imu_noise.accel_m_per_s2_sqrt_hz);
-    rate.variance << turn, variance_by_state(at, duration_s, filter);
-    rate.variance.tail<2>().array() += velocity + at.mount.p_IinO.squaredNorm() * turn;
-  }
+  rate.variance.setConstant(kUnknown);
+  if (imu.size() < 2 || !(epoch_s > kNearlyAll * duration_s)) return rate;
+  const Line line = line_through(imu);
+  wheel_motion::MovingPose first = at.first, last = at.last;
+  const Eigen::Vector3d mean = line.mean - filter.imu.gyro_bias;
+  first.w_IinI = mean - 0.5 * duration_s * line.slope;
+  last.w_IinI = mean + 0.5 * duration_s * line.slope;
   rate.g =
       wheel_motion::relative_pose_jacobian(first, last, at.mount).col(wheel_motion::kTimeOffset);
+  const double per_s = static_cast<double>(imu.size() - 1) / epoch_s;
+  const double turn =
+      square(filter.imu_noise.gyro_rad_per_s_sqrt_hz * duration_s) * per_s / line.spread_s2;
+  const double velocity = duration_s * square(filter.imu_noise.accel_m_per_s2_sqrt_hz);
+  rate.variance << turn, variance_by_state(at, duration_s, filter);
+  rate.variance.tail<2>().array() += velocity + at.mount.p_IinO.squaredNorm() * turn;
   return rate;
 }
 

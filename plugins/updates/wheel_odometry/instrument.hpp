@@ -45,15 +45,16 @@ class Instrument {
 
   /// How `pose`, that of the interval, changes when both ends move on: by how much the last third
   /// was faster than the first, whose noise is not in `pose` (WO-13). Nothing where samples are
-  /// missing.
+  /// missing, or so few that a third is not made of its own.
   std::optional<Eigen::Vector3d> rate(const Readings& y, const Intrinsics& x_WI,
                                       const PreintegratedPose& pose) {
     const std::int64_t third_ns = (y.end_ns - y.begin_ns) / 3;
     const auto first = integrate(part_, {y.samples, y.begin_ns, y.begin_ns + third_ns}, x_WI);
     const auto last = integrate(part_, {y.samples, y.end_ns - third_ns, y.end_ns}, x_WI);
-    for (const auto& part : {first, last}) {
-      if (!part || !is_finite(*part) || part->bridged_s > 0.) return std::nullopt;
-    }
+    const auto is_whole = [](const std::optional<PreintegratedPose>& part) {
+      return part && is_finite(*part) && part->bridged_s == 0. && part->duration_s > 0.;
+    };
+    if (pose.samples < kFewestSamples || !is_whole(first) || !is_whole(last)) return std::nullopt;
     const Eigen::Vector3d u0 = log_se2(first->g) / first->duration_s;
     const Eigen::Vector3d u1 = log_se2(last->g) / last->duration_s;
     // They are those of the middles of the thirds.
@@ -61,6 +62,8 @@ class Instrument {
   }
 
  private:
+  static constexpr std::int64_t kFewestSamples = 6;
+
   /// d/dt of the pose g of a frame that moves with the twists u0 at its beginning, u1 at its end.
   static Eigen::Vector3d moved_on(const Eigen::Vector3d& g, const Eigen::Vector3d& u0,
                                   const Eigen::Vector3d& u1) {

@@ -7,6 +7,7 @@
 #include "calibration_runs.hpp"
 #include "clock_rate.hpp"
 #include "instrument.hpp"
+#include "viwo/math/so3.hpp"
 
 namespace viwo::wheel_odometry {
 namespace {
@@ -24,11 +25,13 @@ class Sweep : public ::testing::Test {
     instrument_.set_weights_at(model_->nominal());
   }
 
-  std::vector<EncoderSample> drive(bool noise, std::uint64_t seed = 1) const {
+  std::vector<EncoderSample> drive(bool noise, std::uint64_t seed = 1,
+                                   double rate_hz = 100.) const {
     const sim::PlanarMotion motion("icr_sweep", {.ramp_s = 1.});
     sim::EncoderSimulation simulation;
     simulation.duration_s = 1.5;
     simulation.noise = noise;
+    simulation.rate_hz = rate_hz;
     return sim::simulate_encoders(model_->model(), model_->nominal(), motion, simulation, seed);
   }
 
@@ -59,15 +62,16 @@ TEST_F(Sweep, RateIsTheDerivativeByTime) {
 
 TEST_F(Sweep, RateHasNoNoiseOfThePose) {
   constexpr int kDraws = 4000;
-  const Eigen::Vector3d g = pose(drive(false)).g, true_rate = *rate(drive(false));
+  const auto clean = drive(false);
+  const Eigen::Vector3d g = pose(clean).g, true_rate = *rate(clean);
+  const Eigen::Vector3d sooner = pose(clean, -50 * kMs).g;
   Eigen::Array3d pp = Eigen::Array3d::Zero(), rr = pp, pr = pp, ss = pp, ps = pp;
   for (int k = 0; k < kDraws; ++k) {
     const auto samples = drive(true, static_cast<std::uint64_t>(k));
     const Eigen::Array3d p = pose(samples).g - g;
     const Eigen::Array3d r = *rate(samples) - true_rate;
     // What it was: the interval, and the same one 50 ms sooner.
-    const Eigen::Array3d s =
-        p - (pose(samples, -50 * kMs).g - pose(drive(false), -50 * kMs).g).array();
+    const Eigen::Array3d s = p - (pose(samples, -50 * kMs).g - sooner).array();
     pp += p * p;
     rr += r * r;
     pr += p * r;
@@ -81,15 +85,23 @@ TEST_F(Sweep, RateHasNoNoiseOfThePose) {
     EXPECT_GT(one_sided[i], by_chance) << i;
   }
   // (WO-13)
-  const Eigen::Array3d variance = 13.5 / 0.01 * pose(drive(false)).P_g.diagonal().array();
+  const Eigen::Array3d variance = 13.5 / 0.01 * pose(clean).P_g.diagonal().array();
   const Eigen::Array3d ratio = rr / kDraws / variance;
   EXPECT_TRUE((ratio > 0.8).all() && (ratio < 1.2).all()) << ratio.transpose();
 }
 
-TEST_F(Sweep, RateNeedsAllSamples) {
+TEST_F(Sweep, RateNeedsAllSamplesAndAFew) {
   auto samples = drive(false);
+  const PreintegratedPose whole = pose(samples);
+  const auto rate_of = [&] {
+    return instrument_.rate({samples, kBeginNs, kEndNs}, model_->nominal(), whole);
+  };
+  EXPECT_TRUE(rate_of().has_value());
   samples.resize(103);
-  EXPECT_FALSE(instrument_.rate({samples, kBeginNs, kEndNs}, model_->nominal(), {}).has_value());
+  EXPECT_FALSE(rate_of().has_value());
+  // Of one sample for all of the interval both thirds are alike, whatever the base does.
+  const auto slow = drive(false, 1, 20.);
+  EXPECT_FALSE(rate(slow).has_value());
 }
 
 /// Two clones a tenth of a second apart, of an IMU that speeds up along x and turns faster.
@@ -107,7 +119,7 @@ std::vector<ImuSample> imu_of_an_epoch() {
   std::vector<ImuSample> samples(21);
   for (std::size_t k = 0; k < samples.size(); ++k) {
     samples[k].t_ns = static_cast<std::int64_t>(5 * k) * kMs;
-    samples[k].gyro_rad_per_s = {0., 0., 0.3 + 1e-3 * static_cast<double>(k)};
+    samples[k].gyro_rad_per_s = {0., 0., 1e-3 * static_cast<double>(k)};
   }
   return samples;
 }
@@ -172,6 +184,37 @@ TEST_F(ClockRateAtTheStart, KnowsOfTheBiasAndTheTilt) {
   EXPECT_NEAR(alone.variance[1], expected, 1e-9);
   EXPECT_NEAR(alone.variance[2], expected, 1e-9);
   EXPECT_EQ(alone.variance[0], 0.);
+}
+
+// After a rest the two are known together: what a tilt feigns the bias takes back.
+TEST_F(ClockRateAtTheStart, KnowsWhatTheyHaveInCommon) {
+  filter_.imu_noise = {0., 0., 0., 0.};
+  Point at = speeding_up();
+  at.mount.R_ItoO = exp_so3(Eigen::Vector3d(0.1, -0.2, 0.7));
+  filter_.imu.R_GtoI = exp_so3(Eigen::Vector3d(-0.1, 0.3, 1.2));
+  const double sigma = 0.005;
+  P_.setZero();
+  P_.block<3, 3>(kThetaColumn, kThetaColumn) = sigma * sigma * Eigen::Matrix3d::Identity();
+  // The accelerometer read R g - b all the time.
+  const Eigen::Matrix3d b_by_theta =
+      skew(filter_.imu.R_GtoI * Eigen::Vector3d(0., 0., -filter_.gravity_m_per_s2));
+  P_.block<3, 3>(kAccelBiasColumn, kAccelBiasColumn) =
+      sigma * sigma * b_by_theta * b_by_theta.transpose();
+  const auto variance = [&](double sign) {
+    P_.block<3, 3>(kAccelBiasColumn, kThetaColumn) = sign * sigma * sigma * b_by_theta;
+    P_.block<3, 3>(kThetaColumn, kAccelBiasColumn) = sign * sigma * sigma * b_by_theta.transpose();
+    return clock_rate({std::nullopt, 0.1, {}}, at, filter_, imu_).variance;
+  };
+  EXPECT_LT(variance(1.).tail<2>().norm(), 1e-12);
+  EXPECT_GT(variance(-1.).tail<2>().norm(), 1e-5);
+}
+
+TEST_F(ClockRate, OfReadingsThatAreNotOfTheIntervalIsUnknown) {
+  const WheelRate longer{std::nullopt, 0.3, Eigen::Vector3d::Ones()};
+  EXPECT_GT(clock_rate(longer, speeding_up(), filter_, imu_).variance.minCoeff(), 1.);
+  const Rate rate =
+      clock_rate({of_wheels_, 0.1, Eigen::Vector3d::Constant(1e-8)}, speeding_up(), filter_, {});
+  EXPECT_TRUE(rate.g.isApprox(of_wheels_, 1e-6));
 }
 
 }  // namespace

@@ -91,7 +91,7 @@ class WheelOdometry final : public Update {
     const std::optional<PreintegratedPose> pose = instrument_->pose(readings, wheels.x_WI);
     if (!pose) return;
     const WheelRate wheel_rate{instrument_->rate(readings, wheels.x_WI, *pose), pose->duration_s,
-                               measurement_noise(params_, *pose).diagonal()};
+                               noise_.variance() * measurement_noise(params_, *pose).diagonal()};
     interval.rate = clock_rate(wheel_rate, interval.start, filter, data.imu);
     tallies_.add(*pose, last.t_ns);
     if (!(pose->bridged_s <= params_.max_bridged_s) || !is_finite(*pose)) {
