@@ -67,15 +67,15 @@ void judge_what_was_given(CalibrationResult& result) {
                 result);
   }
   const double of_clock_s = result.setup->options.prior_sigma_clock_offset_s;
-  for (std::size_t i = 0; of_clock_s > 0. && i < result.all.clock_offset_s.size(); ++i) {
+  for (std::size_t i = 0; i < result.all.clock_offset_s.size(); ++i) {
+    // It is estimated all the same, if not as far as it goes: no reason to doubt the rest.
     const double offset_s = result.all.clock_offset_s[i];
-    add_by_size(offset_s / of_clock_s,
-                name_of(result.setup->recordings[i].label) + ": its reference would be " +
-                    significant(1e3 * std::abs(offset_s), 2) + " ms " +
-                    (offset_s > 0. ? "later" : "earlier") +
-                    " than the wheels: a clock that viwo inspect writes, or "
-                    "prior_sigma_clock_offset_s is too narrow",
-                result);
+    if (!(of_clock_s > 0.) || std::abs(offset_s) < kStrange * of_clock_s) continue;
+    result.warnings.push_back(
+        name_of(result.setup->recordings[i].label) + ": its reference would be " +
+        significant(1e3 * std::abs(offset_s), 2) + " ms " + (offset_s > 0. ? "later" : "earlier") +
+        " than the wheels: a clock that viwo inspect writes, or prior_sigma_clock_offset_s is too "
+        "narrow");
   }
   const double prior = result.setup->options.prior_sigma_gyro_bias_rad_per_s;
   for (std::size_t i = 0; i < result.all.gyro_bias_rad_per_s.size(); ++i) {

@@ -15,7 +15,6 @@ using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 TEST(InspectWheels, ThatNeverTurnWhileTheGyroDoesAreNotConnected) {

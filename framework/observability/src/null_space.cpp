@@ -22,6 +22,28 @@ Eigen::MatrixXd outside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a - b * (b.transpose() * a);
 }
 
+double gap_at(const Eigen::VectorXd& values, Eigen::Index rank) {
+  if (rank == 0 || rank == values.size() || values[rank] == 0.) {
+    return std::numeric_limits<double>::infinity();
+  }
+  return values[rank - 1] / values[rank];
+}
+
+/// How many values are above `threshold`; or, of cuts that are near it, one that is much clearer.
+int rank_of(const Eigen::VectorXd& values, double threshold) {
+  constexpr double kNear = 100., kMuch = 100.;
+  const Eigen::Index n = values.size();
+  Eigen::Index rank = 0;
+  while (rank < n && values[rank] > threshold) ++rank;
+  if (rank == 0) return 0;
+  Eigen::Index best = rank;
+  for (Eigen::Index k = 1; k < n; ++k) {
+    const bool is_near = values[k - 1] * kNear > threshold && values[k] < kNear * threshold;
+    if (is_near && gap_at(values, k) > kMuch * gap_at(values, best)) best = k;
+  }
+  return static_cast<int>(best);
+}
+
 }  // namespace
 
 NullSpace null_space(const Eigen::MatrixXd& M, double tolerance) {
@@ -40,10 +62,8 @@ NullSpace null_space(const Eigen::MatrixXd& M, double tolerance) {
   out.singular_values = Eigen::VectorXd::Zero(n);
   out.singular_values.head(svd.singularValues().size()) = svd.singularValues();
   const double threshold = tolerance * out.singular_values[0];
-  while (out.rank < n && out.singular_values[out.rank] > threshold) ++out.rank;
-  const double dropped = out.rank < n ? out.singular_values[out.rank] : 0.;
-  out.gap = out.rank > 0 && dropped > 0. ? out.singular_values[out.rank - 1] / dropped
-                                         : std::numeric_limits<double>::infinity();
+  out.rank = rank_of(out.singular_values, threshold);
+  out.gap = gap_at(out.singular_values, out.rank);
   // Back to the columns as they were. Zero columns are in the null space by themselves.
   Eigen::MatrixXd basis = svd.matrixV().rightCols(n - out.rank);
   for (Eigen::Index i = 0; i < n; ++i) {

@@ -70,6 +70,20 @@ TEST(NullSpace, TellsHowClearTheCutIs) {
   EXPECT_EQ(null_space(M, 1e-8).rank, 8);
 }
 
+// What is seen little, beside the tolerance, is seen, where what is not seen is rounding.
+TEST(NullSpace, IsCutAtTheGapBesideTheTolerance) {
+  const auto rank = [](const VectorXd& values) {
+    const MatrixXd U = random_basis(12, static_cast<int>(values.size()), 7);
+    const MatrixXd V =
+        random_basis(static_cast<int>(values.size()), static_cast<int>(values.size()), 8);
+    MatrixXd M = U * values.asDiagonal() * V.transpose();
+    return null_space(M, 5e-5).rank;
+  };
+  EXPECT_EQ(rank(VectorXd{{1., 0.5, 5e-3, 3e-5, 1e-13}}), 4);
+  EXPECT_EQ(rank(VectorXd{{1., 0.5, 5e-1, 1e-3, 1e-5}}), 4) << "no clearer cut: the tolerance";
+  EXPECT_EQ(rank(VectorXd{{1., 0.5, 5e-3, 1e-8, 1e-13}}), 3) << "too far from it";
+}
+
 TEST(NullSpace, RefusesWhatIsNoMatrix) {
   EXPECT_THROW(null_space(MatrixXd(3, 0), 1e-8), std::invalid_argument);
   MatrixXd M = random_matrix(3, 3, 6);

@@ -16,9 +16,10 @@ struct NullSpace {
   double gap = 0.;
 };
 
-/// Singular values at most `tolerance` times the largest one count as zero, and so do columns
-/// shorter than 1e-10 times the longest one: give them in comparable units. std::invalid_argument
-/// for a matrix that is not finite or without columns.
+/// Singular values at most `tolerance` times the largest one count as zero; where the cut within a
+/// factor of 100 of that is 100 times clearer, those beyond it do. So do columns shorter than 1e-10
+/// times the longest one: give them in comparable units. std::invalid_argument for a matrix that is
+/// not finite or without columns.
 NullSpace null_space(const Eigen::MatrixXd& M, double tolerance);
 
 /// Largest principal angle between span(a) and span(b), rad: 0 when all of `a` is in `b`; `a` and
