@@ -62,14 +62,18 @@ double distance_of(const Trajectory& poses) {
   return distance_m > 3. * eval::median(steps_m) ? distance_m : 0.;
 }
 
+/// Whether the wheels were read then.
+bool is_meanwhile(const Wheels& wheels, std::int64_t t_ns) {
+  return !wheels.samples.empty() && t_ns >= wheels.samples.front().begin_ns &&
+         t_ns <= wheels.samples.back().end_ns;
+}
+
 /// What a tenth of the readings of the gyro are beyond, of those while the wheels were read, rad/s.
 double turn_of(const std::vector<ImuSample>& imu, const Wheels& wheels) {
   std::vector<double> rates;
   for (const ImuSample& sample : imu) {
-    const bool is_meanwhile = !wheels.samples.empty() &&
-                              sample.t_ns >= wheels.samples.front().begin_ns &&
-                              sample.t_ns <= wheels.samples.back().end_ns;
-    if (is_meanwhile) rates.push_back(to_vector(sample.gyro_rad_per_s).norm());
+    if (!is_meanwhile(wheels, sample.t_ns)) continue;
+    rates.push_back(to_vector(sample.gyro_rad_per_s).norm());
   }
   return rates.empty() ? 0. : eval::quantile(rates, 0.9);
 }
@@ -86,10 +90,7 @@ Finding standstill(const Recording& recording, const Wheels& wheels, const std::
   for (const Poses& poses : recording.poses) {
     Trajectory meanwhile;
     for (const StampedPose& pose : poses.poses) {
-      const bool is_meanwhile = !wheels.samples.empty() &&
-                                pose.t_ns >= wheels.samples.front().begin_ns &&
-                                pose.t_ns <= wheels.samples.back().end_ns;
-      if (is_meanwhile) meanwhile.push_back(pose);
+      if (is_meanwhile(wheels, pose.t_ns)) meanwhile.push_back(pose);
     }
     const double distance_m = distance_of(meanwhile);
     if (distance_m < kGoes_m) continue;

@@ -67,16 +67,11 @@ bool has_other_orientation(const Trajectory& poses, const std::string& label,
                            const std::vector<Turn>& turns, const std::string& other,
                            Findings& out) {
   if (poses.empty() || turns.empty()) return false;
-  const RateGrid expected(poses.front().t_ns, poses.back().t_ns, turns);
-  const auto likeness = [&](const std::vector<Turn>& of_poses) {
-    const auto lag = find_lag(expected, RateGrid(poses.front().t_ns, poses.back().t_ns, of_poses));
-    return lag ? lag->correlation : 0.;
-  };
-  constexpr double kTurns_rad_per_s = 0.1;
-  const bool turns_there = std::any_of(turns.begin(), turns.end(), [](const Turn& turn) {
-    return std::abs(turn.rate.z()) > kTurns_rad_per_s;
-  });
   if (!are_turned(poses)) {
+    constexpr double kTurns_rad_per_s = 0.1;
+    const bool turns_there = std::any_of(turns.begin(), turns.end(), [](const Turn& turn) {
+      return std::abs(turn.rate.z()) > kTurns_rad_per_s;
+    });
     if (!turns_there) return false;
     out.push_back({label,
                    Severity::kNote,
@@ -87,6 +82,11 @@ bool has_other_orientation(const Trajectory& poses, const std::string& label,
                    {}});
     return true;
   }
+  const RateGrid expected(poses.front().t_ns, poses.back().t_ns, turns);
+  const auto likeness = [&](const std::vector<Turn>& of_poses) {
+    const auto lag = find_lag(expected, RateGrid(poses.front().t_ns, poses.back().t_ns, of_poses));
+    return lag ? lag->correlation : 0.;
+  };
   // Even those that are turned the other way are read in the right order.
   constexpr double kUnlike = 0.5, kAlike = 0.9;
   if (std::abs(likeness(turns_about(poses))) > kUnlike) return false;
