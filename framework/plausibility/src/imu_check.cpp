@@ -16,7 +16,8 @@ constexpr double kStandardGravity = 9.80665;
 constexpr std::int64_t kFewest = 500;  ///< readings before a verdict
 constexpr double kShortest_s = 3.;     ///< likewise
 constexpr int kManyEqual = 100;
-constexpr double kLongPull_s = 10.;  ///< of no braking, and no curve
+constexpr double kFewestSteps = 127.;  ///< from zero to where the range ends
+constexpr double kLongPull_s = 10.;    ///< of no braking, and no curve
 
 const char* unit_of(std::size_t axis) { return axis < 3 ? " rad/s" : " m/s^2"; }
 
@@ -168,13 +169,14 @@ void ImuCheck::find_stuck_channels(std::int64_t zero_ns, Findings& out) const {
 }
 
 /// A value that is cut off where its range ends comes again and again, to the last bit; noise
-/// reaches its largest value once, unless it has next to no steps.
+/// reaches its largest value once. A converter has eight bits at least: what reaches fewer of its
+/// steps is coarse, and not cut off.
 void ImuCheck::find_saturated(Findings& out) const {
   if (!watch_.is_noise()) return;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const Axis& axis = axes_[i];
     const double share = static_cast<double>(axis.at_largest) / static_cast<double>(count_);
-    if (share < 0.02 || axis.most - axis.least <= 20. * axis.finest) continue;
+    if (share < 0.02 || axis.largest < kFewestSteps * axis.finest) continue;
     out.push_back({name_ + " saturated " + kImuAxes[i],
                    name_ + ": the " + kImuAxes[i] + " is at +-" + significant(axis.largest, 3) +
                        unit_of(i) + " in " + percent(share) +

@@ -317,16 +317,22 @@ void TwistCheck::find_axes(const Eigen::MatrixXd& C, Findings& out) const {
     if (i != best) second = std::min(second, left[i]);
   }
   const double least = kLeastForce * kLeastForce;
-  if (best == 0 || M(2, 2) < least || M(3, 3) < least || left[best] > 0.7 * all || left[0] < all ||
-      second - left[best] < 0.1 * all) {
-    return;
+  if (best == 0 || M(2, 2) < least || M(3, 3) < least || left[best] > 0.7 * all) return;
+  const auto followed = [&](int axis) { return kMountings[best].P(axis, 0) != 0. ? 0 : 1; };
+  const auto correlation = [&](int axis) {
+    const int other = 2 + followed(axis);
+    return M(axis, other) / std::sqrt(M(axis, axis) * M(other, other));
+  };
+  // Each axis by itself: one that is reversed may be the one along which it hardly accelerates.
+  constexpr double kFollows = 0.5;
+  for (const int axis : {0, 1}) {
+    if (correlation(axis) * kMountings[best].P(axis, followed(axis)) < kFollows) return;
   }
+  if (second - left[best] < std::min(M(0, 0), M(1, 1))) return;
   const auto follows = [&](int axis) {
-    const int other = kMountings[best].P(axis, 0) != 0. ? 0 : 1;
-    const double r = M(axis, 2 + other) / std::sqrt(M(axis, axis) * M(2 + other, 2 + other));
     return std::string(1, "xy"[axis]) +
-           (axis == 0 ? " of the accelerometer follows " : " follows ") + "xy"[other] +
-           " of the wheels (correlation " + significant(r, 2) + ")";
+           (axis == 0 ? " of the accelerometer follows " : " follows ") + "xy"[followed(axis)] +
+           " of the wheels (correlation " + significant(correlation(axis), 2) + ")";
   };
   out.push_back({imu_ + " axes",
                  imu_ + ": in the base's frame " + follows(0) + ", " + follows(1) + ": " +

@@ -1,6 +1,7 @@
 // Faults of sensors, told from their samples alone: nothing where there is none, the IMU, cameras,
 // channels that are stuck, and what is said while a run goes on.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,6 +21,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 using testing::Fault;
 using testing::found;
 using ::testing::HasSubstr;
@@ -124,6 +126,17 @@ TEST(Plausibility, NamesExchangedAxesOfTheImu) {
                   "0\\.[0-9]+\\): axes exchanged; determinant -1: not a rotation")));
 }
 
+/// Along x it accelerates less than it does along y: both signs count alike.
+TEST(Plausibility, NamesAnAxisOfTheAccelerometerThatIsReversed) {
+  const std::array<std::string, 2> names = {"x", "y, or of the base's"};
+  for (const std::size_t axis : {0u, 1u}) {
+    EXPECT_THAT(found({.imu = [&](ImuSample& s) { s.accel_m_per_s2[axis] *= -1.; }}),
+                ElementsAre(AllOf(HasSubstr("x of the accelerometer follows x of the wheels"),
+                                  HasSubstr("y follows y of the wheels"),
+                                  EndsWith("sign of the accelerometer's " + names[axis]))));
+  }
+}
+
 TEST(Plausibility, NamesTheYawOfTheMounting) {
   // The IMU's x points to the left, as the base's y does.
   EXPECT_THAT(found({.imu =
@@ -164,6 +177,15 @@ TEST(Plausibility, NamesAGyroThatIsSaturated) {
               ::testing::Contains(::testing::MatchesRegex(
                   "imu0: the gyro's z is at \\+-0\\.3 rad/s in [0-9]+ % of the readings: saturated "
                   "- choose a larger full scale range")));
+}
+
+TEST(Plausibility, TakesNoCoarseGyroForOneThatIsSaturated) {
+  EXPECT_THAT(found({.imu =
+                         [](ImuSample& s) {
+                           double& rate = s.gyro_rad_per_s[2];
+                           rate = 0.02 * std::round(rate / 0.02);
+                         }}),
+              ElementsAre());
 }
 
 TEST(Plausibility, NamesReadingsThatJump) {

@@ -26,6 +26,7 @@ constexpr double kMostUncertain = 0.3;
 /// A channel is worse than its kind if its variance is so by this factor and so many sigmas more.
 constexpr double kWorse = 1.3;
 constexpr double kSureSigmas = 4.;
+constexpr double kMoves = 4.;  ///< sigmas of a drive that turns
 
 }  // namespace
 
@@ -36,11 +37,12 @@ WheelNoise::WheelNoise(std::shared_ptr<const WheelModel> model)
   for (int dof = 1; dof <= m; ++dof) {
     gates_.push_back(chi2_quantile(1. - kOutlierProbability, dof));
   }
-  variance_.resize(q());
+  configured_.resize(q());
   for (int k = 0; k < q(); ++k) {
     const double sigma = model_->description().noises[static_cast<std::size_t>(k)].sigma;
-    variance_[k] = sigma * sigma;
+    configured_[k] = sigma * sigma;
   }
+  variance_ = configured_;
   rows_.A.setZero(m, 3);
   rows_.b.setZero(m);
   by_x_.J.setZero(m, n);
@@ -51,8 +53,11 @@ WheelNoise::WheelNoise(std::shared_ptr<const WheelModel> model)
 }
 
 void WheelNoise::forget() {
-  N_ = kBelieved * Square::Identity(q(), q());
-  h_ = NoiseVector::Constant(q(), kBelieved);
+  // A source that got a small weight may be as large as was configured: of two that look alike the
+  // other one is not known for that.
+  const NoiseVector believed = variance_.cwiseQuotient(configured_).cwiseMin(1.);
+  N_ = kBelieved * Square(believed.cwiseAbs2().asDiagonal());
+  h_ = kBelieved * believed;
   count_ = 0;
 }
 
@@ -66,9 +71,22 @@ bool WheelNoise::is_outlier(double chi2, int dof) {
   return true;
 }
 
+/// Whether no drive turns by more than its noise. Wheels that stand do not slip, and encoders that
+/// stand have no noise: neither is that of driving.
+bool WheelNoise::stands(const EncoderSample& y) const {
+  bool has_drives = false;
+  for (const NoiseSpec& noise : model_->description().noises) {
+    if (noise.kind != NoiseKind::kDrive) continue;
+    has_drives = true;
+    const double rate = y.drive_rad_per_s[static_cast<std::size_t>(noise.channel)];
+    if (std::abs(rate) > kMoves * noise.sigma) return false;
+  }
+  return has_drives;
+}
+
 void WheelNoise::add(const EncoderSample& y, const Intrinsics& x_WI, const IntrinsicMatrix& P) {
   const int m = model_->n_rows();
-  if (m <= 3 || y.bad_drives != 0 || y.bad_steers != 0) return;
+  if (m <= 3 || y.bad_drives != 0 || y.bad_steers != 0 || stands(y)) return;
   const KinematicModel& model = model_->model();
   if (model.rows(y, x_WI, false, rows_) != Status::kOk) return;
   const Twist rough = rows_.A.colPivHouseholderQr().solve(rows_.b);
@@ -124,7 +142,7 @@ WheelNoise::Kinds WheelNoise::by_parameter() const {
     std::size_t g = 0;
     while (g < kinds.size && noises[kinds.first[g]].parameter != noise.parameter) ++g;
     if (g == kinds.size) kinds.first[kinds.size++] = static_cast<std::size_t>(k);
-    kinds.members(k, static_cast<int>(g)) = noise.sigma * noise.sigma / variance_[k];
+    kinds.members(k, static_cast<int>(g)) = configured_[k] / variance_[k];
   }
   kinds.members.conservativeResize(q(), static_cast<int>(kinds.size));
   return kinds;

@@ -73,6 +73,9 @@ Twist ahead(double t) {
   return {xi[0], 0., xi[2]};
 }
 
+/// As nearly every recording begins.
+Twist wavering_after_a_rest(double t) { return t < 8. ? Twist::Zero() : wavering(t); }
+
 /// A minute, at the true calibration but `off`, of which the prior knows `sigma`.
 WheelNoise noise_after(const std::shared_ptr<const WheelModel>& shared, const TrueNoise& truth,
                        unsigned seed, double off = 0., double sigma = 0.,
@@ -86,7 +89,7 @@ WheelNoise noise_after(const std::shared_ptr<const WheelModel>& shared, const Tr
   std::mt19937_64 rng(seed);
   for (const EncoderSample& clean : sample_motion(model, motion, 60., 50.)) {
     const Twist xi = motion(1e-9 * static_cast<double>(clean.t_ns));
-    noise.add(with_true_noise(model, xi, clean, truth, rng), x, P);
+    noise.add(xi.isZero() ? clean : with_true_noise(model, xi, clean, truth, rng), x, P);
   }
   return noise;
 }
@@ -172,6 +175,33 @@ TEST(WheelNoise, TellsNothingWhileTheCalibrationIsRough) {
   const auto model = load_model(kNoisySwerve);
   EXPECT_TRUE(noise_after(model, {}, 1, 1e-3, 0.05).parts().empty());
   EXPECT_FALSE(noise_after(model, {}, 1, 0., 1e-5).parts().empty());
+}
+
+/// A base that stands has readings without noise and wheels without slip: more of them than the
+/// weights are renewed after.
+TEST(WheelNoise, IsThatOfDriving) {
+  const auto model = load_model(kNoisySwerve);
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const auto parts = noise_after(model, {}, seed, 0., 0., wavering_after_a_rest).parts();
+    EXPECT_EQ(parts.size(), 3u);
+    for (const WheelNoise::Part& part : parts) {
+      EXPECT_NEAR(part.variance, 1., 4. * part.sigma) << part.noise->parameter;
+    }
+  }
+}
+
+/// Slip along the rollers and three times less noise of the drives are one sum in each row. The sum
+/// is as configured: neither may be told to be what both are together.
+TEST(WheelNoise, TakesNoSourceForTwoThatLookAlike) {
+  const auto model = load_model(
+      "{type: mecanum, x_m: [0.2, -0.2, -0.2, 0.2], y_m: [0.18, 0.18, -0.18, -0.18], "
+      "roller_angle_rad: [-0.7854, 0.7854, -0.7854, 0.7854], radius_m: 0.05, "
+      "sigma_drive_rad_per_s: 0.02, sigma_slip_m_per_s: 0.003}");
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    for (const WheelNoise::Part& part : noise_after(model, {}, seed).parts()) {
+      EXPECT_NEAR(part.variance, 1., 4. * part.sigma) << part.noise->parameter;
+    }
+  }
 }
 
 /// Drive and slip of a side enter its row as one sum; a differential drive has no parity at all.

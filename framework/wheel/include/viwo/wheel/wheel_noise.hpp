@@ -19,7 +19,8 @@ class WheelNoise {
   explicit WheelNoise(std::shared_ptr<const WheelModel> model);
 
   /// A sample that no wheel lies in, at the calibration x_WI of covariance P. Samples about which
-  /// the calibration leaves more open than the noise are passed over, and so are outliers.
+  /// the calibration leaves more open than the noise are passed over, and so are outliers and a
+  /// base that stands.
   void add(const EncoderSample& y, const Intrinsics& x_WI, const IntrinsicMatrix& P);
 
   struct Part {
@@ -48,6 +49,7 @@ class WheelNoise {
   };
 
   void forget();
+  bool stands(const EncoderSample& y) const;
   bool is_outlier(double chi2, int dof);
   Kinds by_parameter() const;
   Estimate estimate(const Square& members) const;
@@ -56,7 +58,8 @@ class WheelNoise {
   std::shared_ptr<const WheelModel> model_;
   std::vector<double> gates_;  ///< by degrees of freedom
   NoiseScale common_;          ///< of all noises together, by which outliers are known
-  NoiseVector variance_;       ///< of each source, with which the rows are weighed
+  NoiseVector configured_;     ///< variance of each source
+  NoiseVector variance_;       ///< likewise, with which the rows are weighed
   Square N_;                   ///< q x q, of the normal equations (W-15)
   NoiseVector h_;
   std::int64_t count_ = 0;      ///< samples in them
