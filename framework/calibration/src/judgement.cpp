@@ -8,6 +8,7 @@
 #include "recording_name.hpp"
 #include "segment_choice.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/wheel/contradicted_channels.hpp"
 #include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
@@ -121,6 +122,27 @@ void judge_channels(CalibrationResult& result) {
     result.doubts.push_back("drive_" + std::to_string(drive + 1) + " reads " +
                             significant(value, 3) +
                             " rad/s all the time, while another turns: not connected, or not read");
+  }
+}
+
+/// Covariance of the intrinsics at the estimate.
+IntrinsicMatrix covariance_of(const CalibrationEstimate& estimate) {
+  const auto sigma = estimate.sigma.asDiagonal();
+  return sigma * estimate.correlations * sigma;
+}
+
+/// A channel that the others contradict is in the fit all the same.
+void judge_contradicted(CalibrationResult& result) {
+  constexpr double kMost = 0.02;
+  const IntrinsicMatrix P = covariance_of(result.all);
+  for (const CalibrationRecording& recording : result.setup->recordings) {
+    const auto& wheels = recording.data.wheels();
+    for (const ContradictedChannel& channel :
+         contradicted_channels(wheels, recording.setup.model, result.all.x_WI, P)) {
+      auto& lines = channel.share > kMost ? result.doubts : result.warnings;
+      lines.push_back(name_of(recording.label) + ": " +
+                      text_of(channel, wheels.front().begin_ns));
+    }
   }
 }
 
@@ -345,6 +367,7 @@ void judge(CalibrationResult& result) {
   judge_left_over(result);
   judge_turns(result);
   judge_channels(result);
+  judge_contradicted(result);
   judge_wheels(result);
   judge_change(result);
   judge_ends(result);

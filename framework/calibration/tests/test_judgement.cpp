@@ -102,6 +102,20 @@ TEST(Judgement, DoubtsADriveThatIsStuck) {
               Contains(HasSubstr("drive_2 reads 0 rad/s all the time, while another turns")));
 }
 
+/// Half-way the zero of a steering changes: the fit lies between the two, off by more than sigmas.
+TEST(Judgement, DoubtsASteeringThatJumps) {
+  const auto jumps_by = [](double jump_rad) {
+    const std::string right = testing::kPlaces + "radius_m: 0.0255";
+    CalibrationSetup setup = testing::gyro_setup(right, right, 1);
+    testing::change_wheels(setup, [&](EncoderSample& sample) {
+      if (sample.t_ns > 30'000'000'000) sample.steer_rad[0] += jump_rad;
+    });
+    return calibrate(setup).doubts;
+  };
+  EXPECT_THAT(jumps_by(0.2), Contains(HasSubstr("steer_1 is contradicted by all others in")));
+  EXPECT_THAT(jumps_by(0.), IsEmpty());
+}
+
 TEST(Judgement, DoubtsADistanceThatTheWheelsContradict) {
   CalibrationSetup setup =
       differential(kRight + ", prior_sigma_radius_m: 1e-4, prior_sigma_baseline_m: 1e-4");

@@ -8,9 +8,9 @@
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/wheel/contradicted_channels.hpp"
 #include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
-#include "viwo/wheel/wheel_check.hpp"
 #include "viwo/wheel/wheel_noise.hpp"
 #include "wheel_calibration.hpp"
 
@@ -133,61 +133,18 @@ void check_channels(const Recording& recording, const Wheels& wheels, const std:
   }
 }
 
-/// What the others contradict (W-12), channel by channel: now and then it is slip, for long it is a
-/// fault. Gives the wheels without the samples in which one is contradicted.
+/// Channels that the others contradict. Gives the wheels without the samples in which one is.
 Wheels check_liars(const Recording& recording, const Wheels& wheels, const Calibration& calibration,
                    const std::string& label, Findings& out) {
-  constexpr double kProbability = 1e-4;
-  WheelCheck check(wheels.model, kProbability);
-  if (!check.is_on()) return wheels;
   Wheels left = wheels;
-  left.samples.clear();
-  check.set_calibration(calibration.x_WI, calibration.P);
-  struct Run {
-    std::int64_t samples = 0;                         ///< left out in all
-    std::int64_t from_ns = 0, to_ns = 0, now_ns = 0;  ///< the longest without a break, and this one
-    bool lasts = false;
-  };
-  const ModelDescription& description = wheels.model->description();
-  const auto n_drive = static_cast<std::size_t>(description.n_drive);
-  const auto n = n_drive + static_cast<std::size_t>(description.n_steer);
-  std::vector<Run> runs(n);
-  for (const EncoderSample& sample : wheels.samples) {
-    EncoderSample checked = sample;
-    check.check(checked);
-    if (checked.bad_drives == 0 && checked.bad_steers == 0) left.samples.push_back(sample);
-    for (std::size_t i = 0; i < n; ++i) {
-      Run& run = runs[i];
-      const bool is_bad = i < n_drive ? (checked.bad_drives >> i & 1u) != 0
-                                      : (checked.bad_steers >> (i - n_drive) & 1u) != 0;
-      if (is_bad && !run.lasts) run.now_ns = sample.t_ns;
-      run.lasts = is_bad;
-      if (!is_bad) continue;
-      ++run.samples;
-      if (sample.t_ns - run.now_ns > run.to_ns - run.from_ns) {
-        run.from_ns = run.now_ns;
-        run.to_ns = sample.t_ns;
-      }
-    }
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    const Run& run = runs[i];
-    const double longest_s = seconds_between(run.from_ns, run.to_ns);
-    const double share =
-        static_cast<double>(run.samples) / static_cast<double>(wheels.samples.size());
-    // Slip of a wheel is over after half a second.
-    constexpr double kLong_s = 0.5, kShare = 0.2;
-    if (longest_s < kLong_s && share < kShare) continue;
-    const std::string channel =
-        i < n_drive ? "drive_" + std::to_string(i + 1) : "steer_" + std::to_string(i - n_drive + 1);
+  const std::vector<ContradictedChannel> channels = contradicted_channels(
+      wheels.samples, wheels.model, calibration.x_WI, calibration.P, &left.samples);
+  for (const ContradictedChannel& channel : channels) {
     out.push_back({label,
                    Severity::kFault,
                    "contradicted",
-                   channel + " is contradicted by all others in " + significant(100. * share, 2) +
-                       " % of the samples, for " + significant(longest_s, 2) + " s from " +
-                       time_text(run.from_ns - recording.begin_ns()) +
-                       " on: it was dead, blocked, slipped, or its encoder jumped",
-                   {{"share", share, ""}, {"longest", longest_s, "s"}}});
+                   text_of(channel, recording.begin_ns()),
+                   {{"share", channel.share, ""}, {"longest", channel.longest_s, "s"}}});
   }
   return left;
 }
