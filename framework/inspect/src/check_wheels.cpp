@@ -4,19 +4,14 @@
 #include <string>
 
 #include "checks.hpp"
-#include "viwo/eval/statistics.hpp"
-#include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
-#include "viwo/math/time_text.hpp"
 #include "viwo/wheel/contradicted_channels.hpp"
-#include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 #include "viwo/wheel/wheel_noise.hpp"
 #include "wheel_calibration.hpp"
 
 namespace viwo::inspect {
 
-using series::Poses;
 using series::Recording;
 using series::Wheels;
 
@@ -41,96 +36,6 @@ void check_intrinsics(const Wheels& wheels, const Calibration& calibration,
                      significant(nominal, 4) +
                      ": it, or unit, gear, sign or zero of a channel of that wheel",
                  {{spec.name, one.value, spec.unit}, {"part", one.part, ""}}});
-}
-
-/// How far from their middle poses go for a tenth of the time; 0 where they jump nearly as far from
-/// one to the next, as those of a body at rest that are noisy.
-double distance_of(const Trajectory& poses) {
-  if (poses.size() < 2) return 0.;
-  Eigen::Vector3d middle;
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    std::vector<double> along;
-    for (const StampedPose& pose : poses) along.push_back(pose.p_BinW[i]);
-    middle[i] = eval::median(along);
-  }
-  std::vector<double> distances_m, steps_m;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    distances_m.push_back((poses[i].p_BinW - middle).norm());
-    if (i > 0) steps_m.push_back((poses[i].p_BinW - poses[i - 1].p_BinW).norm());
-  }
-  const double distance_m = eval::quantile(distances_m, 0.9);
-  return distance_m > 3. * eval::median(steps_m) ? distance_m : 0.;
-}
-
-/// Whether the wheels were read then.
-bool is_meanwhile(const Wheels& wheels, std::int64_t t_ns) {
-  return !wheels.samples.empty() && t_ns >= wheels.samples.front().begin_ns &&
-         t_ns <= wheels.samples.back().end_ns;
-}
-
-/// What a tenth of the readings of the gyro are beyond, of those while the wheels were read, rad/s.
-double turn_of(const std::vector<ImuSample>& imu, const Wheels& wheels) {
-  std::vector<double> rates;
-  for (const ImuSample& sample : imu) {
-    if (!is_meanwhile(wheels, sample.t_ns)) continue;
-    rates.push_back(to_vector(sample.gyro_rad_per_s).norm());
-  }
-  return rates.empty() ? 0. : eval::quantile(rates, 0.9);
-}
-
-/// What stands still, while poses go somewhere, or the gyro turns, if there are any.
-Finding standstill(const Recording& recording, const Wheels& wheels, const std::string& label,
-                   double fastest) {
-  constexpr double kGoes_m = 0.3;
-  Finding finding{label,
-                  Severity::kNote,
-                  "motion",
-                  "the wheels do not turn in this recording",
-                  {{"fastest drive", fastest, "rad/s"}}};
-  for (const Poses& poses : recording.poses) {
-    Trajectory meanwhile;
-    for (const StampedPose& pose : poses.poses) {
-      if (is_meanwhile(wheels, pose.t_ns)) meanwhile.push_back(pose);
-    }
-    const double distance_m = distance_of(meanwhile);
-    if (distance_m < kGoes_m) continue;
-    const std::string other = recording.label(poses);
-    finding.severity = Severity::kFault;
-    finding.what = "the wheels turn with no more than " + significant(fastest, 2) +
-                   " rad/s, while " + other + " goes " + significant(distance_m, 2) +
-                   " m: their unit, or not connected";
-    finding.figures.push_back({"distance", distance_m, "m"});
-  }
-  constexpr double kTurns_rad_per_s = 0.3;
-  const double turn = turn_of(recording.imu, wheels);
-  if (finding.severity == Severity::kFault || turn < kTurns_rad_per_s) return finding;
-  finding.severity = Severity::kFault;
-  finding.what = "the wheels turn with no more than " + significant(fastest, 2) + " rad/s, while " +
-                 recording.label<ImuSample>(recording.imu_sensor) + " turns with " +
-                 significant(turn, 2) +
-                 " rad/s: their unit, not connected, or the robot is carried";
-  finding.figures.push_back({"turn", turn, "rad/s"});
-  return finding;
-}
-
-/// A channel that gives one number all the time while another moves.
-void check_channels(const Recording& recording, const Wheels& wheels, const std::string& label,
-                    Findings& out) {
-  const auto& samples = wheels.samples;
-  constexpr double kMoves_rad_per_s = 0.1;
-  DriveRanges ranges(wheels.model->description().n_drive);
-  for (const EncoderSample& sample : samples) ranges.add(sample);
-  const double fastest = ranges.fastest();
-  if (fastest < kMoves_rad_per_s) {
-    return out.push_back(standstill(recording, wheels, label, fastest));
-  }
-  if (samples.size() < 100) return;
-  for (const auto& [drive, value] : ranges.stuck()) {
-    out.push_back({label, Severity::kFault, "channel",
-                   "drive_" + std::to_string(drive + 1) + " reads " + significant(value, 3) +
-                       " rad/s all the time, while another turns with up to " +
-                       significant(fastest, 3) + " rad/s: not connected, or not read"});
-  }
 }
 
 /// Channels that the others contradict. Gives the wheels without the samples in which one is.
@@ -315,9 +220,7 @@ void check_wheels(const Recording& recording, Findings& out) {
       out.push_back({label, Severity::kFault, "channels", wheels.unusable});
       continue;
     }
-    if (wheels.samples.empty()) continue;
-    check_channels(recording, wheels, label, out);
-    if (wheels.model->n_rows() <= 3) continue;
+    if (wheels.samples.empty() || wheels.model->n_rows() <= 3) continue;
     const std::optional<Calibration> calibration = calibrated(wheels);
     if (!calibration) {
       check_parity(parity_of(wheels, wheels.prior.wheels.x_WI), label, out);

@@ -25,7 +25,9 @@ void check_imu_noise(const series::Recording& recording, Findings& out);
 /// By how much the rows of the wheels contradict each other with these intrinsics, rms, m/s; NaN
 /// where none can be told.
 double contradiction_of(const series::Wheels& wheels, const Intrinsics& x_WI);
-/// Channels that never change, wheels that the others contradict, noises against the configuration.
+/// Drives and steerings that never change.
+void check_still_channels(const series::Recording& recording, Findings& out);
+/// Wheels that the others contradict, noises against the configuration.
 void check_wheels(const series::Recording& recording, Findings& out);
 /// Angles of drives that begin anew after a turn, rates that no wheel has, zeros in their place.
 void check_turns(const series::Recording& recording, Findings& out);

@@ -183,6 +183,7 @@ Inspection inspect(RunSetup& setup) {
   check_imu(recording, findings);
   check_tilt(recording, findings);
   check_imu_noise(recording, findings);
+  check_still_channels(recording, findings);
   check_wheels(recording, findings);
   check_turns(recording, findings);
   check_order(recording, findings);

@@ -44,6 +44,29 @@ TEST(InspectWheels, TellsADriveThatNeverChanges) {
   EXPECT_THAT(finding_of(dead, "wheels0", "channel").what, HasSubstr("drive_1 reads 0 rad/s"));
 }
 
+TEST(InspectWheels, TellsASteeringThatNeverChanges) {
+  // One of four, the others move; or the only one, and the base turns as the gyro says.
+  for (const char* robot : {"viwo_swerve", "viwo_ackermann"}) {
+    const Inspection stuck =
+        with_wheels(simulated(robot), [](EncoderSample& s) { s.steer_rad[0] = 0.03; });
+    EXPECT_THAT(faults_of(stuck), Contains("wheels0 channel")) << robot;
+    EXPECT_THAT(finding_of(stuck, "wheels0", "channel").what,
+                HasSubstr("steer_1 reads 0.03 rad all the time"))
+        << robot;
+  }
+}
+
+/// Driven along a circle, one angle is right.
+TEST(InspectWheels, LetsASteeringStandWhereTheBaseTurnsAsItSays) {
+  const RunSetup circle = simulated("viwo_ackermann", {"sensors.simulator0.motion=circle"});
+  double angle = NAN;
+  const Inspection held = with_wheels(circle, [&](EncoderSample& s) {
+    if (s.t_ns > 5'000'000'000 && std::isnan(angle)) angle = s.steer_rad[0];
+    if (!std::isnan(angle)) s.steer_rad[0] = angle;
+  });
+  EXPECT_THAT(faults_of(held), ::testing::Not(Contains("wheels0 channel")));
+}
+
 TEST(InspectWheels, TellsTheWheelThatAllOthersContradictAndSinceWhen) {
   const Inspection blocked = with_wheels(swerve(), [](EncoderSample& s) {
     if (s.t_ns > 15'000'000'000 && s.t_ns < 17'000'000'000) s.drive_rad_per_s[1] = 0.;
