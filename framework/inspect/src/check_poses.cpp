@@ -9,15 +9,13 @@
 #include "clock_finding.hpp"
 #include "pose_jumps.hpp"
 #include "pose_orientation.hpp"
+#include "pose_speeds.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/so3.hpp"
-#include "viwo/math/stamp.hpp"
 #include "viwo/plausibility/channel_change.hpp"
 #include "viwo/plausibility/yaw_order.hpp"
 #include "viwo/series/lag.hpp"
-#include "viwo/wheel/drive_ranges.hpp"
-#include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::inspect {
 
@@ -40,91 +38,6 @@ constexpr double kMostFactor = 0.15;
 /// Of units that gears may look like: with a radius that is wrong, too, it is not known which it
 /// is.
 double most_off(double factor) { return factor > 50. ? kMostFactor : 0.05; }
-
-/// Displacements over windows: of the wheels by their speed, of the poses by their positions.
-struct Speeds {
-  std::vector<double> ratio;  ///< of the wheels to the poses
-  /// Cosine and sine of the direction of the wheels from that of the poses, in the plane, body
-  /// frames as they are, times the way of the poses: errors of these are most of a short one.
-  std::vector<Eigen::Vector2d> direction;
-  double path_m = 0.;
-
-  Eigen::Vector2d mean_direction() const {
-    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-    double way_m = 0.;
-    for (const Eigen::Vector2d& one : direction) {
-      sum += one;
-      way_m += one.norm();
-    }
-    return sum / way_m;
-  }
-};
-
-/// How long a window is at least, and how far the poses go in it.
-struct WindowSize {
-  double length_s = 1., way_m = 0.03;
-};
-
-/// Of a body that is upright, whose axes are those of O as far as that is known.
-Eigen::Matrix3d axes_of(const Wheels& wheels, const Poses& poses) {
-  return poses.of_imu ? wheels.prior.wheels.R_ItoO : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-}
-
-Speeds speeds_of(const Wheels& wheels, const Poses& of, const WindowSize& size = {}) {
-  const Trajectory& poses = of.poses;
-  const Eigen::Matrix3d R_BtoO = axes_of(wheels, of);
-  Speeds speeds;
-  TwistSolver solver(wheels.model, {});
-  solver.set_intrinsics(wheels.prior.wheels.x_WI);
-  TwistSolution solution;
-  // As long as it takes to get somewhere: where few windows of a slow robot were long enough,
-  // errors of its poses would be taken for way.
-  constexpr double kLongest_s = 30.;
-  const auto clock_ns = to_ns(wheels.prior.wheels.t_OtoI_s);
-  const double gap_s = std::max(0.5, 2.5 * period_of(turns_of(poses)));
-  double path = 0., time_s = 0., turned_rad = 0.;
-  Eigen::Vector2d along = Eigen::Vector2d::Zero();
-  std::int64_t begin_ns = 0;
-  for (const EncoderSample& sample : wheels.samples) {
-    if (time_s == 0.) begin_ns = sample.begin_ns;
-    const double dt_s = seconds_between(sample.begin_ns, sample.end_ns);
-    if (solver.solve(sample, solution) != Status::kOk || solution.rank_deficient) continue;
-    path += solution.xi.head<2>().norm() * dt_s;
-    along += solution.xi.head<2>() * dt_s;
-    time_s += dt_s;
-    turned_rad += fastest_of(sample) * dt_s;
-    const double window_s = seconds_between(begin_ns, sample.end_ns);
-    if (window_s < size.length_s) continue;
-    const auto from = interpolate(poses, begin_ns + clock_ns, gap_s);
-    const auto to = interpolate(poses, sample.end_ns + clock_ns, gap_s);
-    const Vector3d moved = from && to ? Vector3d(to->p_BinW - from->p_BinW) : Vector3d::Zero();
-    const bool goes = moved.norm() > size.way_m;
-    if (from && to && !goes && window_s < kLongest_s) continue;
-    const bool is_whole = time_s > 0.9 * window_s;
-    // Poses of a base that stands still can be corrected meanwhile.
-    constexpr double kTurns_rad = 0.1;
-    if (goes && is_whole && turned_rad > kTurns_rad) {
-      const double angle = from->q_BtoW.angularDistance(to->q_BtoW);
-      // Nearly straight: the chord is the path, wherever the body is on the base.
-      constexpr double kStraight = 0.1;
-      if (angle < kStraight) {
-        const Vector3d in_B = R_BtoO * (from->q_BtoW.conjugate() * moved);
-        constexpr double kUpright = 0.94;  // 20 deg
-        const Vector3d up = R_BtoO * (from->q_BtoW.conjugate() * Vector3d::UnitZ());
-        speeds.ratio.push_back(path / moved.norm());
-        if (up.z() > kUpright && along.norm() > 0. && in_B.head<2>().norm() > 0.) {
-          const Eigen::Vector2d a = in_B.head<2>().normalized(), b = along.normalized();
-          speeds.direction.push_back(moved.norm() *
-                                     Eigen::Vector2d(a.dot(b), a.x() * b.y() - a.y() * b.x()));
-        }
-        speeds.path_m += moved.norm();
-      }
-    }
-    path = time_s = turned_rad = 0.;
-    along.setZero();
-  }
-  return speeds;
-}
 
 struct Unit {
   double factor;  ///< of rad/s

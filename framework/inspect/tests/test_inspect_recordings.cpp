@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "inspected.hpp"
+#include "khepera_log.hpp"
 
 namespace viwo::inspect {
 namespace {
@@ -47,6 +48,15 @@ TEST(Inspection, FindsNothingInRealRecordingsThatAreWell) {
                 IsEmpty())
         << recording;
   }
+}
+
+// It turns on the spot: all that looks like straight way are scans that were matched wrongly.
+TEST(Inspection, FindsNothingInARobotThatTurnsOnTheSpot) {
+  const auto tuples = shared_data() / "real/censi_khepera_tuples/l90.tuple";
+  if (!std::filesystem::exists(tuples)) GTEST_SKIP() << tuples << " is not there";
+  const auto folder = std::filesystem::path(::testing::TempDir()) / "viwo_inspect_khepera";
+  testing::write_khepera_log(tuples, folder);
+  EXPECT_THAT(faults_in(setup_of(folder / "run.yaml")), IsEmpty());
 }
 
 // The ICRs of its configuration are first guesses, and it skids more than they say: within what the
