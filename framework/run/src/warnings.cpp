@@ -9,6 +9,7 @@
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
+#include "viwo/wheel/held_prior.hpp"
 
 namespace viwo {
 namespace {
@@ -121,13 +122,38 @@ void add_findings(const Findings& findings, RunResult& result) {
   }
 }
 
-void add_far_from_prior(RunResult& result) {
+std::map<std::string, double> sigmas_in_held_frame(const FilterSetup& filter) {
+  std::map<std::string, double> sigmas;
+  for (const WheelSet& set : filter.wheels) {
+    const std::vector<IntrinsicSpec>& specs = set.model->description().intrinsics;
+    Intrinsics drawn(set.model->n_intrinsics());
+    bool is_held = true;
+    for (std::size_t i = 0; i < specs.size(); ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      drawn[k] = specs[i].prior_sigma;
+      is_held = is_held && !(specs[i].gauge_fixed && set.prior.sigma_intrinsics[k] > 0.);
+    }
+    if (!is_held) continue;
+    const Eigen::MatrixXd P = prior_in_held_frame(*set.model, set.prior.wheels.x_WI, drawn);
+    const std::string prefix = set.prior.name.empty() ? "" : set.prior.name + ".";
+    for (std::size_t i = 0; i < specs.size(); ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      // Others are those of a calibration file, which are in the frame that is held.
+      if (set.prior.sigma_intrinsics[k] != specs[i].prior_sigma) continue;
+      sigmas[prefix + specs[i].name] = std::sqrt(P(k, k));
+    }
+  }
+  return sigmas;
+}
+
+void add_far_from_prior(const std::map<std::string, double>& sigmas_of, RunResult& result) {
   constexpr double kFar = 5., kHopeless = 10.;
   const bool contradicted = is_contradicted(result);
   for (const CalibrationTrack& track : result.calibration) {
     if (track.estimate.empty() || !(track.sigma.front() > 0.)) continue;
-    const double sigmas =
-        std::abs(track.estimate.back() - track.estimate.front()) / track.sigma.front();
+    const auto held = sigmas_of.find(track.name);
+    const double sigma = held == sigmas_of.end() ? track.sigma.front() : held->second;
+    const double sigmas = std::abs(track.estimate.back() - track.estimate.front()) / sigma;
     if (!(sigmas > kFar)) continue;
     auto& lines = contradicted || sigmas > kHopeless ? result.doubts : result.warnings;
     lines.push_back(track.name + ": " + significant(track.estimate.back(), 4) + " " + track.unit +

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -41,9 +42,13 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
 /// above what is configured.
 void add_findings(const Findings& findings, RunResult& result);
 
+/// Prior sigmas of intrinsics by name, with what the entries that the gauge holds may be off by in
+/// them (CAL-18): a first wheel whose zero is off turns the frame, and all other wheels in it.
+std::map<std::string, double> sigmas_in_held_frame(const FilterSetup& filter);
 /// Calibration that has gone where its prior does not reach, beyond five sigmas: doubts beyond ten,
-/// and where a noise, too, is far above what is configured, else warnings.
-void add_far_from_prior(RunResult& result);
+/// and where a noise, too, is far above what is configured, else warnings. The sigmas are those of
+/// `sigmas_of` instead of the track's where it has any.
+void add_far_from_prior(const std::map<std::string, double>& sigmas_of, RunResult& result);
 /// Of a calibration that is much surer than it ought to be, one line.
 std::vector<std::string> too_sure(const RunResult& result);
 

@@ -1,0 +1,122 @@
+// What is suspicious of a run as a whole.
+#include <cmath>
+#include <map>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "simulated.hpp"
+#include "viwo/run/warnings.hpp"
+
+namespace viwo {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using testing::registry;
+
+TEST(Warnings, OfSamplesAreDoubtsWhereTheFilterHasFoundTheSame) {
+  const Findings findings{{"a", "imu0: a gap"}, {"b", "imu0: turned", false, {{"rpy", "0"}}}};
+  const auto doubts_with = [&](double found, std::int64_t count) {
+    RunResult result;
+    result.noises = {{"wheels.noise_scale", "", 1., found, count}};
+    add_findings(findings, result);
+    EXPECT_EQ(result.doubts.size() + result.warnings.size(), 2U);
+    return result.doubts;
+  };
+  EXPECT_THAT(doubts_with(5., 1000), IsEmpty());
+  EXPECT_THAT(doubts_with(50., 10), IsEmpty());
+  EXPECT_THAT(doubts_with(50., 1000), ElementsAre("imu0: turned"));
+}
+
+TEST(Warnings, OfCalibrationFarFromItsPriorAreDoubtsWhereANoiseIsFarOffToo) {
+  RunResult result;
+  result.calibration = {{"r_1", "m", {0.1, 0.16}, {0.01, 0.01}},
+                        {"r_2", "m", {0.1, 0.14}, {0.01, 0.01}}};
+  add_far_from_prior({}, result);
+  EXPECT_THAT(result.doubts, IsEmpty());
+  EXPECT_THAT(result.warnings, ElementsAre(HasSubstr("r_1: 0.16 m was found, 6 prior sigmas")));
+  result.noises = {{"wheels.noise_scale", "", 1., 50., 1000}};
+  add_far_from_prior({}, result);
+  EXPECT_THAT(result.doubts, ElementsAre(HasSubstr("r_1: 0.16 m was found")));
+}
+
+TEST(Warnings, OfCalibrationTenSigmasFromItsPriorAreDoubts) {
+  RunResult result;
+  result.calibration = {{"r_1", "m", {0.1, 0.199}, {0.01, 0.01}},
+                        {"r_2", "m", {0.1, 0.21}, {0.01, 0.01}}};
+  add_far_from_prior({}, result);
+  EXPECT_THAT(result.doubts, ElementsAre(HasSubstr("r_2: 0.21 m was found, 11 prior sigmas")));
+  EXPECT_THAT(result.warnings, ElementsAre(HasSubstr("r_1")));
+}
+
+TEST(Warnings, NameTheParametersThatScatterMost) {
+  RunResult result;
+  for (const auto& [name, scatter] :
+       {std::pair{"cam0.fx", 3.}, {"r_1", 1.}, {"x_2", 2.5}, {"y_2", 8.}, {"t_OtoI", 2.1}}) {
+    result.calibration.emplace_back().name = name;
+    result.calibration.back().scatter = scatter;
+  }
+  EXPECT_THAT(
+      too_sure(result),
+      ElementsAre(AllOf(HasSubstr("y_2 8 times, cam0.fx 3 times, x_2 2.5 times, and 1 more"),
+                        Not(HasSubstr("intrinsics_wander")))));
+  // Wheels may be said to give way, unless they are.
+  result.final_calibration.emplace().intrinsics = {{"x_2", 0.1, 0.01, 0.1, "m", {}, {}}};
+  EXPECT_THAT(too_sure(result), ElementsAre(HasSubstr("intrinsics_wander: 0.5")));
+  result.calibration.emplace_back().name = "wander_x_2";
+  EXPECT_THAT(too_sure(result), ElementsAre(Not(HasSubstr("intrinsics_wander"))));
+  for (CalibrationTrack& track : result.calibration) track.scatter = 1.;
+  EXPECT_THAT(too_sure(result), IsEmpty());
+}
+
+/// A swerve robot of 0.6 m by 0.5 m on a figure eight, the zero of whose first steering is off by
+/// three prior sigmas.
+RunSetup with_first_zero_off() {
+  const std::string base =
+      "type: four_wis_wid, x_m: [0.3, -0.3, -0.3, 0.3], y_m: [0.25, 0.25, -0.25, -0.25], "
+      "radius_m: 0.05, sigma_drive_rad_per_s: 0.02, sigma_steer_rad: 0.002, "
+      "sigma_lateral_m_per_s: 0.003";
+  return read_run(config::parse("sensors:\n  simulator0: {type: simulator, motion: figure_eight, "
+                                "duration_s: 60, features: 0, robot: {" +
+                                    base +
+                                    ", steer_offset_rad: [0.06, 0, 0, 0]}}\n"
+                                    "kinematics: {" +
+                                    base +
+                                    ", prior_sigma_radius_m: 0.001, prior_sigma_position_m: 0.003, "
+                                    "prior_sigma_steer_offset_rad: 0.02}\n"
+                                    "wheels: {sigma_R_ItoO_rad: [0.02, 0.02, 0.02]}\n"
+                                    "estimator: {start: reference}\n"
+                                    "updates: {wheel_odometry: {}, wheel_parity: {}, "
+                                    "planar_motion: {}}\n",
+                                "run.yaml"),
+                  registry(), 1);
+}
+
+// The frame is held at the first wheel: turned by what its zero is off by, about that wheel, and
+// shifted by what its place is off by.
+TEST(Warnings, OfPriorsKnowWhatTheFirstWheelMayBeOffBy) {
+  RunSetup setup = with_first_zero_off();
+  const std::map<std::string, double> sigmas = sigmas_in_held_frame(*setup.filter);
+  const double shifted_m = std::sqrt(2.) * 0.003;
+  EXPECT_NEAR(sigmas.at("x_3"), std::hypot(shifted_m, 0.5 * 0.02), 1e-9);
+  EXPECT_NEAR(sigmas.at("y_3"), std::hypot(shifted_m, 0.6 * 0.02), 1e-9);
+  EXPECT_NEAR(sigmas.at("x_2"), shifted_m, 1e-9);
+  EXPECT_NEAR(sigmas.at("delta_o2"), std::sqrt(2.) * 0.02, 1e-9);
+  EXPECT_NEAR(sigmas.at("r_1"), 0.001, 1e-12);
+  EXPECT_EQ(sigmas.count("x_1"), 0u);
+
+  const RunData data = collect(setup);
+  RunResult result = viwo::run(setup, data);
+  EXPECT_THAT(result.doubts, IsEmpty());
+  EXPECT_THAT(result.warnings, Not(Contains(HasSubstr("prior sigmas from"))));
+  add_far_from_prior({}, result);
+  EXPECT_THAT(result.doubts, Contains(HasSubstr("prior sigmas from")));
+}
+
+}  // namespace
+}  // namespace viwo
