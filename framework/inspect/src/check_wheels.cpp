@@ -165,6 +165,7 @@ bool is_no_noise(const NoiseFound& part, const Parity& parity) {
 /// angle that is counted cancel out in it, slip does not. The smaller one counts.
 void check_noises(const Wheels& wheels, const Calibration& calibration, const Parity& parity,
                   const std::string& label, Findings& out) {
+  constexpr double kMostFactor = 3.;  // as a run warns of it
   std::vector<NoiseFound> found = noises_of(wheels, calibration, wheels.samples);
   const std::vector<EncoderSample> longer = merged(wheels.samples);
   const double times = std::sqrt(static_cast<double>(wheels.samples.size()) /
@@ -173,11 +174,18 @@ void check_noises(const Wheels& wheels, const Calibration& calibration, const Pa
   const std::string section = wheels.prior.name.empty()
                                   ? "kinematics."
                                   : "wheel_sets." + wheels.prior.name + ".kinematics.";
+  std::vector<double> per_samples;
+  bool is_noise = true;
   for (NoiseFound& part : found) {
-    const double per_sample = part.found;
+    per_samples.push_back(part.found);
     for (const NoiseFound& other : over_epoch) {
       if (other.name == part.name) part.found = std::min(part.found, other.found * times);
     }
+    const bool is_large = part.found > kMostFactor * part.configured;
+    is_noise = is_noise && !(is_large && is_no_noise(part, parity));
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const NoiseFound& part = found[i];
     const double ratio = part.found / part.configured;
     Finding finding{label,
                     Severity::kFits,
@@ -185,16 +193,14 @@ void check_noises(const Wheels& wheels, const Calibration& calibration, const Pa
                     part.name + " " + significant(part.found, 2) + " " + part.unit + ", " +
                         significant(ratio, 2) + " times what is configured",
                     {{"found", part.found, part.unit},
-                     {"from sample to sample", per_sample, part.unit},
+                     {"from sample to sample", per_samples[i], part.unit},
                      {"configured", part.configured, part.unit},
                      {"found by configured", ratio, ""},
                      {"samples", static_cast<double>(part.count), ""}}};
-    // As a run warns of it.
-    constexpr double kMostFactor = 3.;
     if (ratio > kMostFactor) {
       finding.severity = Severity::kFault;
       finding.what += ": the wheels contradict each other by more than it explains";
-      if (is_no_noise(part, parity)) {
+      if (!is_noise) {
         finding.what +=
             ", and no noise is like that: something else is wrong (signs, order, units, zeros)";
       } else if (part.name.find(' ') == std::string::npos) {

@@ -38,6 +38,8 @@ void check_order(const series::Recording& recording, Findings& out);
 void check_slip(const series::Recording& recording, Findings& out);
 /// Constant offsets of steering angles that stop the wheels from contradicting each other.
 void check_steer_offsets(const series::Recording& recording, Findings& out);
+/// Steering angles that are of another time than the drives.
+void check_steer_lag(const series::Recording& recording, Findings& out);
 /// Clock, sign and scale of the wheels' yaw rate against the gyro's.
 void check_wheel_clocks(const series::Recording& recording, Findings& out);
 /// Clock and axes of each camera against the gyro.

@@ -68,10 +68,12 @@ constexpr std::array<std::string_view, 6> kWheelCauses = {"order",   "turn", "st
 constexpr std::array<std::string_view, 9> kNotOfGyro = {
     "order", "turn", "steering", "channel", "steer offsets", "parity", "speed", "heading", "zeros"};
 constexpr std::array<std::string_view, 2> kOrder = {"order", "steering"};
-constexpr std::array<std::string_view, 1> kContradicted = {"contradicted"};
+constexpr std::array<std::string_view, 2> kContradicted = {"contradicted", "steer lag"};
 /// What no noise is the remedy of.
-constexpr std::array<std::string_view, 5> kNoNoise = {"contradicted", "parity", "speed", "heading",
-                                                      "slip"};
+constexpr std::array<std::string_view, 6> kNoNoise = {"contradicted", "parity", "speed",
+                                                      "heading",      "slip",   "steer lag"};
+/// Likewise, of the gyro: another scale of the drives.
+constexpr std::array<std::string_view, 1> kRate = {"rate"};
 constexpr std::array<std::string_view, 6> kImuCauses = {"gravity", "rate",    "up",
                                                         "tilt",    "channel", "columns"};
 /// What exchanged columns look like besides.
@@ -93,6 +95,13 @@ void demote(Finding& finding, const std::string& cause) {
   finding.severity = Severity::kNote;
   finding.what += " (look again when what is wrong with " + cause + " is mended)";
   finding.remedies.clear();
+}
+
+/// Of plausibility: "stuck drive_2".
+bool has_stuck_channel(const Findings& findings, const std::string& sensor) {
+  return std::any_of(findings.begin(), findings.end(), [&](const Finding& f) {
+    return f.sensor == sensor && f.severity == Severity::kFault && f.check.starts_with("stuck ");
+  });
 }
 
 void demote_consequences(const Recording& recording, Findings& findings) {
@@ -138,6 +147,10 @@ void demote_consequences(const Recording& recording, Findings& findings) {
     } else if (sensor != imu && follows(kWheelCauses)) {
       if (!is_of_stamps(finding.check) || finding.check == "clock") demote(finding, sensor);
     } else if (finding.check.starts_with("sigma_") && is_fault_of(all, sensor, kNoNoise)) {
+      demote(finding, sensor);
+    } else if (finding.check.starts_with("sigma_") && is_fault_of(all, imu, kRate)) {
+      demote(finding, imu);
+    } else if (finding.check.starts_with("sigma_") && has_stuck_channel(all, sensor)) {
       demote(finding, sensor);
     } else if (follows(kContradicted) && (finding.check == "parity" || finding.check == "speed" ||
                                           finding.check == "clock")) {
@@ -189,6 +202,7 @@ Inspection inspect(RunSetup& setup) {
   check_order(recording, findings);
   check_slip(recording, findings);
   check_steer_offsets(recording, findings);
+  check_steer_lag(recording, findings);
   check_wheel_clocks(recording, findings);
   check_camera_clocks(recording, findings);
   check_poses(recording, findings);

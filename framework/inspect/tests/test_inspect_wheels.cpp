@@ -1,4 +1,5 @@
 // Faults of encoders, put into simulated recordings.
+#include <deque>
 #include <numbers>
 #include <random>
 #include <utility>
@@ -52,6 +53,23 @@ TEST(InspectWheels, TellsASteeringThatNeverChanges) {
     EXPECT_THAT(faults_of(stuck), Contains("wheels0 channel")) << robot;
     EXPECT_THAT(finding_of(stuck, "wheels0", "channel").what,
                 HasSubstr("steer_1 reads 0.03 rad all the time"))
+        << robot;
+  }
+}
+
+TEST(InspectWheels, TellsThatTheSteeringIsReadLate) {
+  constexpr std::size_t kLate = 10;
+  for (const char* robot : {"viwo_swerve", "viwo_ackermann"}) {
+    std::deque<EncoderSample> before;
+    const Inspection late = with_wheels(simulated(robot), [&](EncoderSample& s) {
+      before.push_back(s);
+      s.steer_rad = before.front().steer_rad;
+      if (before.size() > kLate) before.pop_front();
+    });
+    EXPECT_THAT(faults_of(late), ElementsAre("wheels0 steer lag")) << robot;
+    const double period_s = 1. / 100.;
+    EXPECT_NEAR(figure_of(finding_of(late, "wheels0", "steer lag"), "lag"), kLate * period_s,
+                0.5 * period_s)
         << robot;
   }
 }

@@ -1,0 +1,92 @@
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "checks.hpp"
+#include "viwo/eval/statistics.hpp"
+#include "viwo/math/significant.hpp"
+#include "wheel_calibration.hpp"
+
+namespace viwo::inspect {
+
+using series::Recording;
+using series::Wheels;
+
+namespace {
+
+constexpr double kLongest_s = 0.2;
+constexpr std::size_t kMostSamples = 20'000;  ///< that are looked at, of a long recording
+
+/// Every `stride`-th sample with the angles of `later` samples after it: shifted by whole samples,
+/// for an angle between two has less noise.
+Wheels with_angles_of(const Wheels& wheels, int later, std::size_t stride) {
+  Wheels shifted = wheels;
+  shifted.samples.clear();
+  const auto margin = static_cast<std::size_t>(std::abs(later));
+  for (std::size_t i = margin; i + margin < wheels.samples.size(); i += stride) {
+    const std::size_t of = later < 0 ? i - margin : i + margin;
+    shifted.samples.push_back(wheels.samples[i]);
+    shifted.samples.back().steer_rad = wheels.samples[of].steer_rad;
+  }
+  return shifted;
+}
+
+double period_s_of(const Wheels& wheels) {
+  std::vector<double> periods_s;
+  for (const EncoderSample& sample : wheels.samples) {
+    periods_s.push_back(seconds_between(sample.begin_ns, sample.end_ns));
+  }
+  return periods_s.empty() ? 0. : eval::median(periods_s);
+}
+
+/// Where the wheels contradict each other clearly less with the angles of earlier or later.
+void check_steer_lag(const Wheels& wheels, const std::string& label, Findings& out) {
+  constexpr double kPart = 0.7;  // of the squared residual, what is left of it at most
+  const double period_s = period_s_of(wheels);
+  if (wheels.model->description().n_steer == 0 || wheels.model->n_rows() <= 3) return;
+  if (!(period_s > 0.) || wheels.samples.size() < 1000) return;
+  const auto calibration = calibrated(wheels);
+  if (!calibration) return;
+  const int most = static_cast<int>(kLongest_s / period_s);
+  if (most < 2) return;
+  const std::size_t stride = 1 + wheels.samples.size() / kMostSamples;
+  std::vector<double> squares;
+  for (int later = -most; later <= most; ++later) {
+    const Wheels shifted = with_angles_of(wheels, later, stride);
+    squares.push_back(std::pow(contradiction_of(shifted, calibration->x_WI), 2));
+  }
+  const auto least = std::ranges::min_element(squares);
+  const auto at = static_cast<int>(least - squares.begin());
+  const double as_it_is = squares[static_cast<std::size_t>(most)];
+  if (!std::isfinite(as_it_is) || at == 0 || at == 2 * most || !(*least < kPart * as_it_is)) return;
+  const double bend = least[-1] - 2. * least[0] + least[1];
+  const double lag_s = period_s * (at - most + 0.5 * (least[-1] - least[1]) / bend);
+  if (std::abs(lag_s) < 1.5 * period_s) return;
+  out.push_back({label,
+                 Severity::kFault,
+                 "steer lag",
+                 std::string("the angles of the steering are ") +
+                     (lag_s > 0. ? "behind" : "ahead of") + " the drives by " +
+                     significant(1e3 * std::abs(lag_s), 3) +
+                     " ms: so the wheels contradict each other by " +
+                     significant(1e3 * std::sqrt(*least), 2) + " mm/s and not by " +
+                     significant(1e3 * std::sqrt(as_it_is), 2) +
+                     " - one of the two is read late, or filtered; stamps of both must be of when "
+                     "they were measured",
+                 {{"lag", lag_s, "s"},
+                  {"residual", std::sqrt(*least), "m/s"},
+                  {"residual as it is", std::sqrt(as_it_is), "m/s"}}});
+}
+
+}  // namespace
+
+void check_steer_lag(const Recording& recording, Findings& out) {
+  for (const Wheels& wheels : recording.wheels) {
+    const std::string label = recording.label<EncoderSample>(wheels.sensor);
+    if (!wheels.unusable.empty() || is_fault(out, label, "order")) continue;
+    check_steer_lag(wheels, label, out);
+  }
+}
+
+}  // namespace viwo::inspect
