@@ -3,8 +3,10 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include "checks.hpp"
+#include "viwo/eval/statistics.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
@@ -119,6 +121,28 @@ void check_rest(const Recording& recording, const Rest& rest, const std::string&
   out.push_back(gyro);
 }
 
+/// Of readings that are all the same: so they are in a simulation without noise that stands still,
+/// drives straight on or along a circle, but not where wheels turn the base now more and now less.
+void check_all_constant(const Recording& recording, const std::string& label, Findings& out) {
+  constexpr double kTurns_rad_per_s = 0.1;
+  for (const series::Wheels& wheels : recording.wheels) {
+    std::vector<double> rates;
+    for (const series::Turn& turn : turns_of(wheels)) rates.push_back(turn.rate.z());
+    if (rates.empty()) continue;
+    const double range = eval::quantile(rates, 0.9) - eval::quantile(rates, 0.1);
+    if (range < kTurns_rad_per_s) continue;
+    out.push_back({label,
+                   Severity::kFault,
+                   "channel",
+                   "all six numbers are the same in every reading, while " +
+                       recording.label<EncoderSample>(wheels.sensor) +
+                       " turns now more and now less, by " + significant(range, 2) +
+                       " rad/s: it is not read",
+                   {{"range", range, "rad/s"}}});
+    return;
+  }
+}
+
 /// A number that never changes, and two that are the same all the time.
 void check_channels(const Recording& recording, const std::string& label, Findings& out) {
   const auto& imu = recording.imu;
@@ -137,8 +161,9 @@ void check_channels(const Recording& recording, const std::string& label, Findin
       for (std::size_t j = 0; j < i; ++j) same[i][j] = same[i][j] && of(sample, i) == of(sample, j);
     }
   }
-  // All of them are constant in a simulation without noise that stands still.
-  if (std::all_of(constant.begin(), constant.end(), [](bool c) { return c; })) return;
+  if (std::all_of(constant.begin(), constant.end(), [](bool c) { return c; })) {
+    return check_all_constant(recording, label, out);
+  }
   for (std::size_t i = 0; i < 6; ++i) {
     const double value = i < 3 ? imu.front().gyro_rad_per_s[i] : imu.front().accel_m_per_s2[i - 3];
     if (constant[i]) {

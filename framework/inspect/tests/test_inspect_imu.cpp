@@ -190,6 +190,23 @@ TEST(InspectStamps, TellsWhatAReaderHasRejectedAndWhereItBrokeOff) {
   EXPECT_THAT(finding_of(inspection, "wheels0", "readable").what, HasSubstr("'12.x4'"));
 }
 
+TEST(InspectImu, ThatIsNotReadIsSaidSoWhereWheelsTurnTheBase) {
+  const auto held = [](RunSetup setup) {
+    const ImuSample first{.accel_m_per_s2 = {0.1, 0.2, 9.8}};
+    return inspected(std::move(setup), {.imu = [=](ImuSample& s) {
+                       s.gyro_rad_per_s = first.gyro_rad_per_s;
+                       s.accel_m_per_s2 = first.accel_m_per_s2;
+                       return true;
+                     }});
+  };
+  for (const char* robot : {"viwo_swerve", "viwo_ackermann", "viwo_skid_steer"}) {
+    const Inspection unread = held(simulated(robot, {"sensors.simulator0.duration_s=20"}));
+    EXPECT_THAT(finding_of(unread, "imu0", "channel").what, HasSubstr("it is not read")) << robot;
+  }
+  EXPECT_THAT(faults_of(held(simulated("viwo_ackermann", {"placeholders.motion=straight"}))),
+              ::testing::Not(Contains("imu0 channel")));
+}
+
 TEST(InspectImu, TellsGravityAtRest) {
   const Inspection clean = inspected(standing(10.), {});
   EXPECT_THAT(faults_of(clean), IsEmpty());
