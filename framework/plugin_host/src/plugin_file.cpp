@@ -50,6 +50,12 @@ void check_elf(const std::filesystem::path& file, const std::string& bytes) {
                  bytes.size())) {
     throw PluginRefused(file, truncated);
   }
+  // It is at the end of the file, behind all that is loaded and the debug information.
+  if (header.e_shoff != 0 &&
+      !elf::fits(header.e_shoff, std::uint64_t{header.e_shnum} * header.e_shentsize,
+                 bytes.size())) {
+    throw PluginRefused(file, truncated);
+  }
   std::uint64_t loaded = 0;
   for (const elf::Segment& segment : elf::segments(bytes)) {
     if (segment.p_type != PT_LOAD) continue;

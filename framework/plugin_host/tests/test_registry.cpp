@@ -215,7 +215,8 @@ TEST_F(Registry, RefusesATextFile) {
 TEST_F(Registry, RefusesATruncatedLibraryAtAnyLength) {
   const std::string bytes = text_of(bad("moody"));
   const std::string expected = "is truncated - copy or build it again";
-  for (const std::size_t size : {std::size_t{20}, std::size_t{70}, bytes.size() / 4}) {
+  for (const std::size_t size :
+       {std::size_t{20}, std::size_t{70}, bytes.size() / 4, bytes.size() - 1}) {
     EXPECT_EQ(reason(write("libviwo_kinematics_moody.so", bytes.substr(0, size))), expected)
         << size;
   }

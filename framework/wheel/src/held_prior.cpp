@@ -1,5 +1,6 @@
 #include "viwo/wheel/held_prior.hpp"
 
+#include <iterator>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -42,10 +43,9 @@ Eigen::MatrixXd prior_in_held_frame(const WheelModel& model, const Intrinsics& x
   Eigen::VectorXd drawn(N.rows());
   drawn << sigma, extrinsics_sigma;
   Eigen::MatrixXd to_held = Eigen::MatrixXd::Identity(N.rows(), N.rows());
-  const Eigen::MatrixXd N_held = N(held, Eigen::all);
-  const Eigen::FullPivLU<Eigen::MatrixXd> lu(N_held);
-  if (!held.empty() && N_held.rows() == N_held.cols() && lu.isInvertible()) {
-    to_held(Eigen::all, held) -= N * lu.inverse();
+  if (!held.empty() && N.cols() == std::ssize(held)) {
+    const Eigen::FullPivLU<Eigen::MatrixXd> lu(N(held, Eigen::all));
+    if (lu.isInvertible()) to_held(Eigen::all, held) -= N * lu.inverse();
   }
   const Eigen::MatrixXd moved = to_held * drawn.asDiagonal();
   Eigen::MatrixXd P = moved * moved.transpose();
