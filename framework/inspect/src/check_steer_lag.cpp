@@ -15,13 +15,12 @@ using series::Wheels;
 
 namespace {
 
-constexpr double kLongest_s = 0.2;
+constexpr double kLongest_s = 0.2, kStep_s = 0.01;
 constexpr std::size_t kMostSamples = 20'000;  ///< that are looked at, of a long recording
 
-/// Every `stride`-th sample with the angles of `later` samples after it: shifted by whole samples,
-/// for an angle between two has less noise.
-Wheels with_angles_of(const Wheels& wheels, int later, std::size_t stride) {
-  Wheels shifted = wheels;
+/// Into `shifted`: every `stride`-th sample with the angles of `later` samples after it. By whole
+/// samples, for an angle between two has less noise.
+void take_angles_of(const Wheels& wheels, int later, std::size_t stride, Wheels& shifted) {
   shifted.samples.clear();
   const auto margin = static_cast<std::size_t>(std::abs(later));
   for (std::size_t i = margin; i + margin < wheels.samples.size(); i += stride) {
@@ -29,7 +28,6 @@ Wheels with_angles_of(const Wheels& wheels, int later, std::size_t stride) {
     shifted.samples.push_back(wheels.samples[i]);
     shifted.samples.back().steer_rad = wheels.samples[of].steer_rad;
   }
-  return shifted;
 }
 
 double period_s_of(const Wheels& wheels) {
@@ -48,12 +46,15 @@ void check_steer_lag(const Wheels& wheels, const std::string& label, Findings& o
   if (!(period_s > 0.) || wheels.samples.size() < 1000) return;
   const auto calibration = calibrated(wheels);
   if (!calibration) return;
-  const int most = static_cast<int>(kLongest_s / period_s);
+  const int step = std::max(1, static_cast<int>(std::lround(kStep_s / period_s)));
+  const double step_s = step * period_s;
+  const int most = static_cast<int>(kLongest_s / step_s);
   if (most < 2) return;
   const std::size_t stride = 1 + wheels.samples.size() / kMostSamples;
   std::vector<double> squares;
+  Wheels shifted = wheels;
   for (int later = -most; later <= most; ++later) {
-    const Wheels shifted = with_angles_of(wheels, later, stride);
+    take_angles_of(wheels, later * step, stride, shifted);
     squares.push_back(std::pow(contradiction_of(shifted, calibration->x_WI), 2));
   }
   const auto least = std::ranges::min_element(squares);
@@ -61,8 +62,8 @@ void check_steer_lag(const Wheels& wheels, const std::string& label, Findings& o
   const double as_it_is = squares[static_cast<std::size_t>(most)];
   if (!std::isfinite(as_it_is) || at == 0 || at == 2 * most || !(*least < kPart * as_it_is)) return;
   const double bend = least[-1] - 2. * least[0] + least[1];
-  const double lag_s = period_s * (at - most + 0.5 * (least[-1] - least[1]) / bend);
-  if (std::abs(lag_s) < 1.5 * period_s) return;
+  const double lag_s = step_s * (at - most + 0.5 * (least[-1] - least[1]) / bend);
+  if (!(std::abs(lag_s) >= 1.5 * step_s)) return;
   out.push_back({label,
                  Severity::kFault,
                  "steer lag",

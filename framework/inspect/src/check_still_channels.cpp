@@ -5,12 +5,15 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include "checks.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/series/rate_grid.hpp"
+#include "viwo/wheel/contradicted_channels.hpp"
 #include "viwo/wheel/drive_ranges.hpp"
 
 namespace viwo::inspect {
@@ -114,66 +117,111 @@ void check_drives(const Recording& recording, const Wheels& wheels, const std::s
   }
 }
 
-/// By how much it turns otherwise than wheels that are never steered let it, rad/s: such a base
-/// turns as fast as it drives, by one factor.
-double turns_otherwise(const Wheels& wheels, const RateGrid& yaw) {
+/// Means over half a second, so that what shakes the gyro counts for little: its rate, and the one
+/// rate of drives that all turn in proportion.
+struct Together {
+  double yaw = 0., drive = 0.;
+};
+std::vector<Together> means_of(const Wheels& wheels, const RateGrid& yaw) {
+  constexpr std::int64_t kMean_ns = 500'000'000;
+  const auto n = static_cast<Eigen::Index>(wheels.model->description().n_drive);
+  const auto drives_of = [n](const EncoderSample& sample) {
+    return Eigen::Map<const Eigen::VectorXd>(sample.drive_rad_per_s.data(), n);
+  };
+  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(n, n);
+  for (const EncoderSample& sample : wheels.samples) {
+    squares += drives_of(sample) * drives_of(sample).transpose();
+  }
+  const Eigen::VectorXd one =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(squares).eigenvectors().col(n - 1);
+  std::vector<Together> means;
+  Together sum;
+  double count = 0.;
+  std::int64_t end_ns = 0;
+  const std::int64_t later_ns = to_ns(wheels.prior.wheels.t_OtoI_s);
+  for (const EncoderSample& sample : wheels.samples) {
+    if (sample.t_ns >= end_ns) {
+      constexpr double kFewest = 3.;
+      if (count >= kFewest) means.push_back({sum.yaw / count, sum.drive / count});
+      sum = {};
+      count = 0.;
+      end_ns = sample.t_ns + kMean_ns;
+    }
+    const std::int64_t since_ns = sample.t_ns + later_ns - yaw.begin_ns();
+    const auto cell = static_cast<std::size_t>(since_ns / RateGrid::kCellNs);
+    if (since_ns < 0 || cell >= yaw.size() || !yaw.has(cell)) continue;
+    sum.yaw += yaw[cell].z();
+    sum.drive += one.dot(drives_of(sample));
+    count += 1.;
+  }
+  return means;
+}
+
+/// By how much it turns otherwise than wheels that are never steered let it, rad/s: such a base has
+/// one motion alone, faster or slower, and turns in proportion to its drives.
+double turns_otherwise(const std::vector<Together>& means) {
+  constexpr double kFewestMeans = 20., kPart = 0.25;  // of the turning, what one factor leaves
   Eigen::Matrix2d N = Eigen::Matrix2d::Zero();
   Eigen::Vector2d h = Eigen::Vector2d::Zero();
   double squares = 0.;
-  for (const EncoderSample& sample : wheels.samples) {
-    const std::int64_t cell = (sample.t_ns - yaw.begin_ns()) / RateGrid::kCellNs;
-    if (sample.t_ns < yaw.begin_ns() || cell >= static_cast<std::int64_t>(yaw.size())) continue;
-    if (!yaw.has(static_cast<std::size_t>(cell))) continue;
-    const double rate = yaw[static_cast<std::size_t>(cell)].z();
-    double drive = 0.;
-    for (const double one : sample.drive_rad_per_s) drive += one;
-    const Eigen::Vector2d a(drive, 1.);  // and the bias of the gyro
+  for (const Together& mean : means) {
+    const Eigen::Vector2d a(mean.drive, 1.);  // and the bias of the gyro
     N += a * a.transpose();
-    h += rate * a;
-    squares += rate * rate;
+    h += mean.yaw * a;
+    squares += mean.yaw * mean.yaw;
   }
-  if (N(1, 1) < kFewestReadings) return 0.;
-  const double left = squares - h.dot(N.ldlt().solve(h));
-  const double mean = h[1] / N(1, 1);
-  const double turns = squares / N(1, 1) - mean * mean;
-  constexpr double kPart = 0.25;  // of the turning, what one factor leaves
-  return left > kPart * turns * N(1, 1) ? std::sqrt(left / N(1, 1)) : 0.;
+  const double n = N(1, 1);
+  if (n < kFewestMeans) return 0.;
+  const double left = (squares - h.dot(N.ldlt().solve(h))) / n;
+  const double variance = squares / n - h[1] * h[1] / (n * n);
+  return left > kPart * variance ? std::sqrt(left) : 0.;
 }
 
-/// Steerings that give one number all the time, while others move, or the base turns otherwise.
+/// Why none of the steerings can stand still; "" for no reason.
+std::string turning_without_steering(const Recording& recording, const Wheels& wheels) {
+  constexpr double kTurns_rad_per_s = 0.1;
+  const series::Span span = span_of(recording);
+  for (const YawRates& rates : yaw_rates_of(recording, wheels.prior)) {
+    const double turns =
+        turns_otherwise(means_of(wheels, {span.begin_ns, span.end_ns, rates.turns}));
+    if (turns < kTurns_rad_per_s) continue;
+    return rates.label + " turns by " + significant(turns, 2) +
+           " rad/s (standard deviation) otherwise than a base with such wheels can";
+  }
+  return "";
+}
+
+/// Steerings that give one number all the time, while others move and contradict them, or while
+/// none does and the base turns otherwise.
 void check_steerings(const Recording& recording, const Wheels& wheels, const std::string& label,
                      Findings& out) {
-  constexpr double kSteers_rad = 0.1, kTurns_rad_per_s = 0.1;
   const auto n = static_cast<std::size_t>(wheels.model->description().n_steer);
   if (n == 0 || std::ssize(wheels.samples) < kFewestReadings) return;
-  std::vector<double> ranges(n, 0.);
-  double largest = 0.;
+  std::vector<std::size_t> still;
   for (std::size_t i = 0; i < n; ++i) {
-    const auto angle = [i](const EncoderSample& sample) { return sample.steer_rad[i]; };
-    const auto [least, most] = std::ranges::minmax_element(wheels.samples, {}, angle);
-    ranges[i] = angle(*most) - angle(*least);
-    largest = std::max(largest, ranges[i]);
+    const double first = wheels.samples.front().steer_rad[i];
+    const bool is_still = std::ranges::all_of(
+        wheels.samples, [&](const EncoderSample& sample) { return sample.steer_rad[i] == first; });
+    if (is_still) still.push_back(i);
   }
-  std::string while_what;
-  if (largest > kSteers_rad) {
-    while_what = "another moves by " + significant(largest, 2) + " rad";
-  } else {
-    for (const YawRates& rates : yaw_rates_of(recording, wheels.prior)) {
-      const series::Span span = span_of(recording);
-      const double turns = turns_otherwise(wheels, {span.begin_ns, span.end_ns, rates.turns});
-      if (turns < kTurns_rad_per_s) continue;
-      while_what = rates.label + " turns by " + significant(turns, 2) +
-                   " rad/s (standard deviation) otherwise than a base with such wheels can";
-      break;
-    }
+  if (still.empty()) return;
+  const std::string turning = still.size() == n ? turning_without_steering(recording, wheels) : "";
+  std::vector<ContradictedChannel> contradicted;
+  if (still.size() < n) {
+    const Intrinsics& sigma = wheels.prior.sigma_intrinsics;
+    contradicted = contradicted_channels(wheels.samples, wheels.model, wheels.prior.wheels.x_WI,
+                                         IntrinsicMatrix(sigma.cwiseAbs2().asDiagonal()));
   }
-  if (while_what.empty()) return;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (ranges[i] > 0.) continue;
+  for (const std::size_t i : still) {
+    const std::string name = "steer_" + std::to_string(i + 1);
+    const bool is_contradicted =
+        std::ranges::any_of(contradicted, [&](const auto& one) { return one.name == name; });
+    if (turning.empty() && !is_contradicted) continue;
     out.push_back({label, Severity::kFault, "channel",
-                   "steer_" + std::to_string(i + 1) + " reads " +
-                       significant(wheels.samples.front().steer_rad[i], 3) +
-                       " rad all the time, while " + while_what + ": not connected, or not read"});
+                   name + " reads " + significant(wheels.samples.front().steer_rad[i], 3) +
+                       " rad all the time, while " +
+                       (turning.empty() ? "others move and contradict it" : turning) +
+                       ": not connected, or not read"});
   }
 }
 

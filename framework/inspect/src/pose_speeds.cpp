@@ -33,29 +33,30 @@ struct Window {
   Vector2d along_m = Vector2d::Zero();  ///< sum of their velocities, in O
   double yaw_rad = 0.;                  ///< by which they turn the base
   double angle_rad = 0.;                ///< by which the poses turn
+  double turned_rad = 0.;               ///< likewise, about the z axis
   Vector3d moved_m = Vector3d::Zero();  ///< of the poses, in B with the axes of O
   bool is_upright = false;
 };
 
-/// Whether wheels and poses turn alike on the whole. Windows in which they do not are then those of
-/// a pose that is wrong: matches of scans that failed are all the straight way that there is of a
-/// robot that turns on the spot.
-bool turn_alike(const std::vector<Window>& windows) {
-  constexpr double kMost_rad = 2., kLeastCorrelation = 0.9, kMostFactor = 0.2;
+/// Whether wheels and poses turn together on the whole. Windows in which they do not are then those
+/// of a pose that is wrong: matches of scans that failed are all the straight way that there is of
+/// a robot that turns on the spot.
+bool turn_together(const std::vector<Window>& windows) {
+  constexpr double kMost_rad = 2., kLeastCorrelation = 0.9;
   constexpr int kFewest = 20;
-  double both = 0., of_wheels = 0., of_poses = 0.;
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  Vector2d sum = Vector2d::Zero();
   int n = 0;
   for (const Window& window : windows) {
-    const double yaw = std::abs(window.yaw_rad);
-    if (std::max(yaw, window.angle_rad) > kMost_rad) continue;
-    both += yaw * window.angle_rad;
-    of_wheels += yaw * yaw;
-    of_poses += window.angle_rad * window.angle_rad;
+    const Vector2d turned(window.yaw_rad, window.turned_rad);
+    if (turned.cwiseAbs().maxCoeff() > kMost_rad) continue;
+    squares += turned * turned.transpose();
+    sum += turned;
     ++n;
   }
-  const double correlation = both / std::sqrt(of_wheels * of_poses);
-  return n >= kFewest && correlation > kLeastCorrelation &&
-         std::abs(std::sqrt(of_wheels / of_poses) - 1.) < kMostFactor;
+  if (n < kFewest) return false;
+  const Eigen::Matrix2d C = squares - sum * sum.transpose() / n;
+  return C(0, 1) > kLeastCorrelation * std::sqrt(C(0, 0) * C(1, 1));
 }
 
 /// Windows in which wheels turn and poses are known.
@@ -95,6 +96,9 @@ std::vector<Window> windows_of(const Wheels& wheels, const Poses& of, const Wind
     if (goes && is_whole && turned_rad > kTurns_rad) {
       const Eigen::Quaterniond q_WtoB = from->q_BtoW.conjugate();
       window.angle_rad = from->q_BtoW.angularDistance(to->q_BtoW);
+      const Vector3d axis = R_BtoO * (q_WtoB * to->q_BtoW).vec();
+      const double half = (q_WtoB * to->q_BtoW).w();
+      window.turned_rad = 2. * std::atan2(half < 0. ? -axis.z() : axis.z(), std::abs(half));
       window.moved_m = R_BtoO * (q_WtoB * (to->p_BinW - from->p_BinW));
       window.is_upright = Vector3d(R_BtoO * (q_WtoB * Vector3d::UnitZ())).z() > kUpright;
       windows.push_back(window);
@@ -119,7 +123,7 @@ Vector2d Speeds::mean_direction() const {
 
 Speeds speeds_of(const Wheels& wheels, const Poses& poses, const WindowSize& size) {
   const std::vector<Window> windows = windows_of(wheels, poses, size);
-  const bool both_turn = turn_alike(windows);
+  const bool both_turn = turn_together(windows);
   Speeds speeds;
   for (const Window& window : windows) {
     if (window.angle_rad >= kStraight_rad) continue;

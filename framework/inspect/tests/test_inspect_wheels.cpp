@@ -1,7 +1,11 @@
 // Faults of encoders, put into simulated recordings.
+#include <cmath>
+#include <cstdint>
 #include <deque>
 #include <numbers>
+#include <optional>
 #include <random>
+#include <string>
 #include <utility>
 
 #include <gmock/gmock.h>
@@ -17,6 +21,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 TEST(InspectWheels, ThatNeverTurnWhileTheGyroDoesAreNotConnected) {
   const auto motion = [](double gyro) {
@@ -74,15 +79,56 @@ TEST(InspectWheels, TellsThatTheSteeringIsReadLate) {
   }
 }
 
-/// Driven along a circle, one angle is right.
+/// Driven along a circle, one angle is right, and turning on the spot, now more and now less, with
+/// wheels that were steered before.
 TEST(InspectWheels, LetsASteeringStandWhereTheBaseTurnsAsItSays) {
-  const RunSetup circle = simulated("viwo_ackermann", {"sensors.simulator0.motion=circle"});
-  double angle = NAN;
-  const Inspection held = with_wheels(circle, [&](EncoderSample& s) {
-    if (s.t_ns > 5'000'000'000 && std::isnan(angle)) angle = s.steer_rad[0];
-    if (!std::isnan(angle)) s.steer_rad[0] = angle;
+  std::optional<EncoderSample> first;
+  const auto held = [&first](EncoderSample& s) {
+    if (!first && s.t_ns > 2'000'000'000) first = s;
+    if (first) s.steer_rad = first->steer_rad;
+    return first.has_value();
+  };
+  const Inspection circle =
+      inspected(simulated("viwo_ackermann", {"placeholders.motion=circle"}), {.wheels = held});
+  EXPECT_THAT(faults_of(circle), Not(Contains("wheels0 channel")));
+
+  first.reset();
+  const auto part = [](std::int64_t t_ns) { return std::sin(1e-9 * static_cast<double>(t_ns)); };
+  const Inspection spin = inspected(
+      simulated("viwo_swerve", {"placeholders.motion=spin", "sensors.simulator0.ground=flat"}),
+      {.imu =
+           [&](ImuSample& s) {
+             scale(s.gyro_rad_per_s, part(s.t_ns));
+             return true;
+           },
+       .wheels =
+           [&](EncoderSample& s) {
+             for (double& rate : s.drive_rad_per_s) rate *= part(s.t_ns);
+             return held(s);
+           }});
+  EXPECT_THAT(faults_of(spin), Not(Contains("wheels0 channel")));
+}
+
+/// The rear of a base that is steered in front alone.
+TEST(InspectWheels, LetsASteeringStandThatNothingContradicts) {
+  const std::string robot =
+      "type: four_wis_wid, x_m: [1, -1, -1, 1], y_m: [0.6, 0.6, -0.6, -0.6], radius_m: 0.3";
+  const RunSetup setup = read_run(
+      config::parse(
+          "sensors:\n  simulator0: {type: simulator, duration_s: 40, features: 0, robot: {" +
+              robot + "}, motion: figure_eight, speed_m_per_s: 1.5}\nkinematics: {" + robot +
+              "}\nwheels: {sigma_R_ItoO_rad: [0.01, 0.01, 0.01]}\n"
+              "updates: {wheel_odometry: {}}\n",
+          "run.yaml"),
+      testing::registry(), 1);
+  // With O on the rear axle no wheel there is steered: all twists are as if it were.
+  const WheelModel& model = *setup.filter->wheels.front().model;
+  const Inspection inspection = with_wheels(setup, [&](EncoderSample& s) {
+    const double t = 1e-9 * static_cast<double>(s.t_ns);
+    const double omega = 0.3 * std::sin(0.4 * t);
+    model.model().inverse(Twist(1., omega, omega), model.nominal(), RowVector::Zero(8), s);
   });
-  EXPECT_THAT(faults_of(held), ::testing::Not(Contains("wheels0 channel")));
+  EXPECT_THAT(faults_of(inspection), Not(Contains("wheels0 channel")));
 }
 
 TEST(InspectWheels, TellsTheWheelThatAllOthersContradictAndSinceWhen) {

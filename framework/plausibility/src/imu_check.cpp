@@ -169,14 +169,16 @@ void ImuCheck::find_stuck_channels(std::int64_t zero_ns, Findings& out) const {
 }
 
 /// A value that is cut off where its range ends comes again and again, to the last bit; noise
-/// reaches its largest value once. A converter has eight bits at least: what reaches fewer of its
-/// steps is coarse, and not cut off.
+/// reaches its largest value once, unless it has next to no steps. A converter has eight bits at
+/// least: what reaches fewer of its steps is coarse, and not cut off.
 void ImuCheck::find_saturated(Findings& out) const {
   if (!watch_.is_noise()) return;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const Axis& axis = axes_[i];
     const double share = static_cast<double>(axis.at_largest) / static_cast<double>(count_);
-    if (share < 0.02 || axis.largest < kFewestSteps * axis.finest) continue;
+    const bool is_coarse =
+        axis.most - axis.least <= 20. * axis.finest || axis.largest < kFewestSteps * axis.finest;
+    if (share < 0.02 || is_coarse) continue;
     out.push_back({name_ + " saturated " + kImuAxes[i],
                    name_ + ": the " + kImuAxes[i] + " is at +-" + significant(axis.largest, 3) +
                        unit_of(i) + " in " + percent(share) +

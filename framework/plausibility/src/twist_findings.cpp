@@ -299,9 +299,11 @@ void TwistCheck::find_axes(const Eigen::MatrixXd& C, Findings& out) const {
       {matrix(0, -1, 1, 0), "the IMU is turned: add -1.5708 to the yaw of wheels.rpy_ItoO_rad"},
       {matrix(0, 1, 1, 0), "axes exchanged; determinant -1: not a rotation"},
       {matrix(0, -1, -1, 0), "axes exchanged and reversed; determinant -1: not a rotation"},
+      // From here on one axis alone.
       {matrix(-1, 0, 0, 1), "sign of the accelerometer's x"},
       {matrix(1, 0, 0, -1), "sign of the accelerometer's y, or of the base's"},
   }};
+  constexpr std::size_t kFirstOfOneAxis = 6;
   const Eigen::Matrix4d M = of_forces(C);
   const double all = M(0, 0) + M(1, 1);
   std::array<double, 8> left{};
@@ -323,12 +325,22 @@ void TwistCheck::find_axes(const Eigen::MatrixXd& C, Findings& out) const {
     const int other = 2 + followed(axis);
     return M(axis, other) / std::sqrt(M(axis, axis) * M(other, other));
   };
-  // Each axis by itself: one that is reversed may be the one along which it hardly accelerates.
-  constexpr double kFollows = 0.5;
-  for (const int axis : {0, 1}) {
-    if (correlation(axis) * kMountings[best].P(axis, followed(axis)) < kFollows) return;
+  if (best < kFirstOfOneAxis) {
+    if (left[0] < all || second - left[best] < 0.1 * all) return;
+  } else {
+    // Each axis by itself: one that is reversed may be the one along which it hardly accelerates.
+    // On hills that slow it down the force is opposite, too, but as many times as large as part of
+    // the slope is lost.
+    constexpr double kFollows = 0.5, kMostTimes = 1.5;
+    for (const int axis : {0, 1}) {
+      const double times =
+          M(axis, 2 + axis) / M(2 + axis, 2 + axis) * kMountings[best].P(axis, axis);
+      if (std::abs(correlation(axis)) < kFollows || times > kMostTimes || times < 1. / kMostTimes) {
+        return;
+      }
+    }
+    if (second - left[best] < std::min(M(0, 0), M(1, 1))) return;
   }
-  if (second - left[best] < std::min(M(0, 0), M(1, 1))) return;
   const auto follows = [&](int axis) {
     return std::string(1, "xy"[axis]) +
            (axis == 0 ? " of the accelerometer follows " : " follows ") + "xy"[followed(axis)] +

@@ -188,6 +188,17 @@ TEST(Plausibility, TakesNoCoarseGyroForOneThatIsSaturated) {
               ElementsAre());
 }
 
+TEST(Plausibility, TakesNoCoarseAccelerometerForOneThatIsSaturated) {
+  // Gravity is 126 of its steps, and noise reaches two or three of them.
+  EXPECT_THAT(found({.imu =
+                         [](ImuSample& s) {
+                           double& force = s.accel_m_per_s2[2];
+                           constexpr double kStep = 0.0766;
+                           force = kStep * std::round((9.81 + 0.02 * (force - 9.81)) / kStep);
+                         }}),
+              Not(Contains(HasSubstr("saturated"))));
+}
+
 TEST(Plausibility, NamesReadingsThatJump) {
   int i = 0;
   EXPECT_THAT(found({.imu =

@@ -112,7 +112,7 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
   for (std::string& line : suspicions(rejections, result.noises, begin_ns)) {
     result.warnings.push_back(std::move(line));
   }
-  add_far_from_prior(sigmas_in_held_frame(*setup.filter), result);
+  add_far_from_prior(sigmas_from_prior(*setup.filter, result.calibration), result);
   for (std::string& line : too_sure(result)) {
     result.warnings.push_back(std::move(line));
   }

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include <Eigen/LU>
+
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
@@ -122,28 +124,43 @@ void add_findings(const Findings& findings, RunResult& result) {
   }
 }
 
-std::map<std::string, double> sigmas_in_held_frame(const FilterSetup& filter) {
-  std::map<std::string, double> sigmas;
+std::map<std::string, double> sigmas_from_prior(const FilterSetup& filter,
+                                                std::span<const CalibrationTrack> tracks) {
+  std::map<std::string, double> all;
   for (const WheelSet& set : filter.wheels) {
     const std::vector<IntrinsicSpec>& specs = set.model->description().intrinsics;
-    Intrinsics drawn(set.model->n_intrinsics());
-    bool is_held = true;
-    for (std::size_t i = 0; i < specs.size(); ++i) {
-      const auto k = static_cast<Eigen::Index>(i);
-      drawn[k] = specs[i].prior_sigma;
-      is_held = is_held && !(specs[i].gauge_fixed && set.prior.sigma_intrinsics[k] > 0.);
-    }
-    if (!is_held) continue;
-    const Eigen::MatrixXd P = prior_in_held_frame(*set.model, set.prior.wheels.x_WI, drawn);
+    const Intrinsics& sigma = set.prior.sigma_intrinsics;
     const std::string prefix = set.prior.name.empty() ? "" : set.prior.name + ".";
+    Intrinsics drawn(set.model->n_intrinsics());
+    Eigen::VectorXd change(set.model->n_intrinsics());
+    std::vector<int> free;
+    bool is_held = true, is_of_model = true;
     for (std::size_t i = 0; i < specs.size(); ++i) {
+      const auto k = static_cast<int>(i);
+      drawn[k] = specs[i].prior_sigma;
+      if (specs[i].gauge_fixed) {
+        is_held = is_held && sigma[k] == 0.;
+        continue;
+      }
+      const auto track = std::ranges::find(tracks, prefix + specs[i].name, &CalibrationTrack::name);
+      is_of_model = is_of_model && sigma[k] == drawn[k] && sigma[k] > 0. && track != tracks.end() &&
+                    !track->estimate.empty();
+      if (!is_of_model) break;
+      change[k] = track->estimate.back() - track->estimate.front();
+      free.push_back(k);
+    }
+    // Others are those of a calibration file, which are in the frame that is held.
+    if (!is_held || !is_of_model || free.empty()) continue;
+    const Eigen::MatrixXd P = prior_in_held_frame(*set.model, set.prior.wheels.x_WI, drawn);
+    const Eigen::MatrixXd information = P(free, free).inverse();
+    const Eigen::VectorXd left = information * change(free);
+    for (std::size_t i = 0; i < free.size(); ++i) {
       const auto k = static_cast<Eigen::Index>(i);
-      // Others are those of a calibration file, which are in the frame that is held.
-      if (set.prior.sigma_intrinsics[k] != specs[i].prior_sigma) continue;
-      sigmas[prefix + specs[i].name] = std::sqrt(P(k, k));
+      all[prefix + specs[static_cast<std::size_t>(free[i])].name] =
+          std::abs(left[k]) / std::sqrt(information(k, k));
     }
   }
-  return sigmas;
+  return all;
 }
 
 void add_far_from_prior(const std::map<std::string, double>& sigmas_of, RunResult& result) {
@@ -151,9 +168,11 @@ void add_far_from_prior(const std::map<std::string, double>& sigmas_of, RunResul
   const bool contradicted = is_contradicted(result);
   for (const CalibrationTrack& track : result.calibration) {
     if (track.estimate.empty() || !(track.sigma.front() > 0.)) continue;
-    const auto held = sigmas_of.find(track.name);
-    const double sigma = held == sigmas_of.end() ? track.sigma.front() : held->second;
-    const double sigmas = std::abs(track.estimate.back() - track.estimate.front()) / sigma;
+    const auto known = sigmas_of.find(track.name);
+    const double sigmas =
+        known != sigmas_of.end()
+            ? known->second
+            : std::abs(track.estimate.back() - track.estimate.front()) / track.sigma.front();
     if (!(sigmas > kFar)) continue;
     auto& lines = contradicted || sigmas > kHopeless ? result.doubts : result.warnings;
     lines.push_back(track.name + ": " + significant(track.estimate.back(), 4) + " " + track.unit +

@@ -14,16 +14,20 @@ constexpr double kLong_s = 0.5, kShare = 0.2;
 struct Run {
   std::int64_t samples = 0;                         ///< left out in all
   std::int64_t from_ns = 0, to_ns = 0, now_ns = 0;  ///< the longest without a break, and this one
+  std::int64_t end_ns = 0;                          ///< of the sample before
   bool lasts = false;
 
-  void add(bool is_bad, std::int64_t t_ns) {
-    if (is_bad && !lasts) now_ns = t_ns;
-    lasts = is_bad;
+  void add(bool is_bad, const EncoderSample& sample) {
+    // A hole of the log is no part of it.
+    lasts = lasts && is_bad && sample.begin_ns - end_ns <= 2 * (sample.end_ns - sample.begin_ns);
+    end_ns = sample.end_ns;
     if (!is_bad) return;
+    if (!lasts) now_ns = sample.begin_ns;
+    lasts = true;
     ++samples;
-    if (t_ns - now_ns <= to_ns - from_ns) return;
+    if (end_ns - now_ns <= to_ns - from_ns) return;
     from_ns = now_ns;
-    to_ns = t_ns;
+    to_ns = end_ns;
   }
 };
 
@@ -46,10 +50,15 @@ std::vector<ContradictedChannel> contradicted_channels(std::span<const EncoderSa
     if (left != nullptr && checked.bad_drives == 0 && checked.bad_steers == 0) {
       left->push_back(sample);
     }
+    std::size_t n_bad = 0;
+    const auto is_bad = [&](std::size_t i) {
+      return i < n_drive ? (checked.bad_drives >> i & 1u) != 0
+                         : (checked.bad_steers >> (i - n_drive) & 1u) != 0;
+    };
+    for (std::size_t i = 0; i < runs.size(); ++i) n_bad += is_bad(i) ? 1 : 0;
+    // All of them: nobody knows which one it is.
     for (std::size_t i = 0; i < runs.size(); ++i) {
-      const bool is_bad = i < n_drive ? (checked.bad_drives >> i & 1u) != 0
-                                      : (checked.bad_steers >> (i - n_drive) & 1u) != 0;
-      runs[i].add(is_bad, sample.t_ns);
+      runs[i].add(is_bad(i) && n_bad < runs.size(), sample);
     }
   }
   std::vector<ContradictedChannel> found;

@@ -26,7 +26,8 @@ constexpr double kMostUncertain = 0.3;
 /// A channel is worse than its kind if its variance is so by this factor and so many sigmas more.
 constexpr double kWorse = 1.3;
 constexpr double kSureSigmas = 4.;
-constexpr double kMoves = 4.;  ///< sigmas of a drive that turns
+/// Sigmas of a drive that turns, and what turns in any case.
+constexpr double kMoves = 4., kMoves_rad_per_s = 0.1;
 
 }  // namespace
 
@@ -71,7 +72,7 @@ bool WheelNoise::is_outlier(double chi2, int dof) {
   return true;
 }
 
-/// Whether no drive turns by more than its noise. Wheels that stand do not slip, and encoders that
+/// Whether no drive turns, by more than its noise. Wheels that stand do not slip, and encoders that
 /// stand have no noise: neither is that of driving.
 bool WheelNoise::stands(const EncoderSample& y) const {
   bool has_drives = false;
@@ -79,7 +80,7 @@ bool WheelNoise::stands(const EncoderSample& y) const {
     if (noise.kind != NoiseKind::kDrive) continue;
     has_drives = true;
     const double rate = y.drive_rad_per_s[static_cast<std::size_t>(noise.channel)];
-    if (std::abs(rate) > kMoves * noise.sigma) return false;
+    if (std::abs(rate) > std::min(kMoves * noise.sigma, kMoves_rad_per_s)) return false;
   }
   return has_drives;
 }

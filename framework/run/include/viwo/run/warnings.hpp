@@ -42,12 +42,15 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
 /// above what is configured.
 void add_findings(const Findings& findings, RunResult& result);
 
-/// Prior sigmas of intrinsics by name, with what the entries that the gauge holds may be off by in
-/// them (CAL-18): a first wheel whose zero is off turns the frame, and all other wheels in it.
-std::map<std::string, double> sigmas_in_held_frame(const FilterSetup& filter);
+/// By how many prior sigmas intrinsics have gone, by name, each given where the others are
+/// (CAL-18): a first wheel whose zero is off turns the frame that the gauge holds, and all other
+/// wheels in it; a wheel that has gone alone has gone by itself. Of wheels whose priors are those
+/// of their model.
+std::map<std::string, double> sigmas_from_prior(const FilterSetup& filter,
+                                                std::span<const CalibrationTrack> tracks);
 /// Calibration that has gone where its prior does not reach, beyond five sigmas: doubts beyond ten,
-/// and where a noise, too, is far above what is configured, else warnings. The sigmas are those of
-/// `sigmas_of` instead of the track's where it has any.
+/// and where a noise, too, is far above what is configured, else warnings. By how many sigmas says
+/// `sigmas_of` where it has the name, else the track.
 void add_far_from_prior(const std::map<std::string, double>& sigmas_of, RunResult& result);
 /// Of a calibration that is much surer than it ought to be, one line.
 std::vector<std::string> too_sure(const RunResult& result);
