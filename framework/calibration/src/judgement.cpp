@@ -140,8 +140,7 @@ void judge_contradicted(CalibrationResult& result) {
     for (const ContradictedChannel& channel :
          contradicted_channels(wheels, recording.setup.model, result.all.x_WI, P)) {
       auto& lines = channel.share > kMost ? result.doubts : result.warnings;
-      lines.push_back(name_of(recording.label) + ": " +
-                      text_of(channel, wheels.front().begin_ns));
+      lines.push_back(name_of(recording.label) + ": " + text_of(channel, wheels.front().begin_ns));
     }
   }
 }
