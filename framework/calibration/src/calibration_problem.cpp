@@ -101,7 +101,7 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
   }
   cut(begin_ns, end_ns);
   if (!poses.empty()) compare_with_reference();
-  for (auto* segments : {&segments_, &later_, &earlier_}) segments->resize(stamps_ns_.size() - 1);
+  segments_.resize(stamps_ns_.size() - 1);
   squares_.assign(motions_.size(), 0.);
   weights_.assign(motions_.size(), 1.);
   leave_out_holes();
@@ -217,21 +217,21 @@ void RecordingProblem::leave_out_holes() {
   }
 }
 
-void RecordingProblem::integrate(const CalibrationPoint& point, Segments& segments) {
+void RecordingProblem::integrate(const CalibrationPoint& point) {
   preintegrator_.move_intrinsics(point.x_WI);
   const std::int64_t shift_ns = to_ns(point.clock_offset_s);
   parity_.reset(n_);
   parity_gradients_.clear();
   guarded(recording_.setup.kinematics.info, "preintegration", [&] {
-    for (std::size_t k = 0; k < segments.size(); ++k) {
+    for (std::size_t k = 0; k < segments_.size(); ++k) {
       const std::int64_t begin_ns = stamps_ns_[k], length_ns = stamps_ns_[k + 1] - begin_ns;
       const std::int64_t pieces = 1 + length_ns / to_ns(kParityPiece_s);
-      segments[k].reset(n_);
+      segments_[k].reset(n_);
       for (std::int64_t i = 0; i < pieces; ++i) {
         preintegrator_.integrate(recording_.data.wheels(),
                                  begin_ns + length_ns * i / pieces - shift_ns,
                                  begin_ns + length_ns * (i + 1) / pieces - shift_ns, piece_);
-        append(segments[k], piece_);
+        append(segments_[k], piece_);
         parity_.Lambda += piece_.parity.Lambda;
         parity_.eta += piece_.parity.eta;
         parity_gradients_.push_back(piece_.parity.eta);
@@ -239,29 +239,47 @@ void RecordingProblem::integrate(const CalibrationPoint& point, Segments& segmen
     }
   });
   if (options_.segments != calibration::Segments::kTrajectory) return;
-  for (std::size_t k = 1; k < segments.size(); ++k) {
-    piece_ = segments[k - 1];
-    append(piece_, segments[k]);
-    std::swap(piece_, segments[k]);
+  for (std::size_t k = 1; k < segments_.size(); ++k) {
+    piece_ = segments_[k - 1];
+    append(piece_, segments_[k]);
+    std::swap(piece_, segments_[k]);
+  }
+}
+
+/// A segment that is shifted begins and ends elsewhere, and is between as it was.
+void RecordingProblem::differentiate_by_clock(const CalibrationPoint& point) {
+  const std::int64_t shift_ns = to_ns(point.clock_offset_s), step_ns = to_ns(kClockStep_s);
+  std::vector<Eigen::Vector3d> before, after;  // of each end, over the step
+  guarded(recording_.setup.kinematics.info, "preintegration", [&] {
+    for (const std::int64_t stamp_ns : stamps_ns_) {
+      const std::int64_t t_ns = stamp_ns - shift_ns;
+      preintegrator_.integrate(recording_.data.wheels(), t_ns - step_ns, t_ns, piece_);
+      before.push_back(piece_.g);
+      preintegrator_.integrate(recording_.data.wheels(), t_ns, t_ns + step_ns, piece_);
+      after.push_back(piece_.g);
+    }
+  });
+  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
+  by_clock_.resize(segments_.size());
+  for (std::size_t k = 0; k < segments_.size(); ++k) {
+    const std::size_t begin = from_start ? 0 : k, end = k + 1;
+    const Eigen::Vector3d& g = segments_[k].g;
+    const Eigen::Vector3d back = between(before[end], Eigen::Vector3d::Zero());
+    const Eigen::Vector3d later = compose(compose(before[begin], g), back);
+    const Eigen::Vector3d earlier = compose(between(after[begin], g), after[end]);
+    by_clock_[k] = (later - earlier) / (2. * kClockStep_s);
   }
 }
 
 void RecordingProblem::evaluate(const CalibrationPoint& point, bool jacobian,
                                 RecordingResiduals& out) {
   const bool clock = options_.prior_sigma_clock_offset_s > 0. && !motions_.empty();
-  if (jacobian && clock) {
-    CalibrationPoint shifted = point;
-    shifted.clock_offset_s = point.clock_offset_s + kClockStep_s;
-    integrate(shifted, later_);
-    shifted.clock_offset_s = point.clock_offset_s - kClockStep_s;
-    integrate(shifted, earlier_);
-    integrated_.reset();
-  }
   // A solver asks for the residuals of a point, then for their derivatives, which are there.
   if (!integrated_ || !(*integrated_ == point)) {
-    integrate(point, segments_);
+    integrate(point);
     integrated_ = point;
   }
+  if (jacobian && clock) differentiate_by_clock(point);
   out.r.setZero(static_cast<Eigen::Index>(kinds_.size()));
   out.J.setZero(out.r.size(), n_unknowns());
   int row = 0;
@@ -296,7 +314,7 @@ void RecordingProblem::add_segment(int row, std::size_t k, const CalibrationPoin
   J.leftCols(n_) = by_g * segments_[k].J_g_WI;
   J.block<3, 3>(0, n_) = whitening.asDiagonal() * motion.by_extrinsics;
   J.rightCols<2>().setZero();
-  if (clock) J.col(n_ + 3) = by_g * (later_[k].g - earlier_[k].g) / (2. * kClockStep_s);
+  if (clock) J.col(n_ + 3) = by_g * by_clock_[k];
   if (gyro) J(0, n_ + 4) = whitening[0] * duration_s;
   out.J.middleRows(row, rows) = std::sqrt(weights_[k]) * J.topRows(rows);
 }

@@ -80,15 +80,15 @@ class RecordingProblem {
   void evaluate(const CalibrationPoint& point, bool jacobian, RecordingResiduals& out);
 
  private:
-  using Segments = std::vector<PreintegratedPose>;
-
   void cut(std::int64_t begin_ns, std::int64_t end_ns);
   void require_one_clock(std::int64_t begin_ns, std::int64_t end_ns) const;
   void compare_with_reference();
   void leave_out_holes();
   std::optional<Eigen::Vector3d> reference_at(std::int64_t t_ns) const;
   /// Motion of O over all segments with the reference shifted by clock_offset_s.
-  void integrate(const CalibrationPoint& point, Segments& segments);
+  void integrate(const CalibrationPoint& point);
+  /// Of it by the clock offset, where it was integrated.
+  void differentiate_by_clock(const CalibrationPoint& point);
   void add_segment(int row, std::size_t k, const CalibrationPoint& point, bool jacobian,
                    RecordingResiduals& out);
   void add_parity(int row, RecordingResiduals& out) const;
@@ -105,8 +105,9 @@ class RecordingProblem {
   std::vector<double> squares_, weights_;
   std::vector<ResidualKind> kinds_;
   CalibrationNoise noise_;
-  Segments segments_, later_, earlier_;
-  ParityInformation parity_;  ///< of all segments
+  std::vector<PreintegratedPose> segments_;
+  std::vector<Eigen::Vector3d> by_clock_;  ///< derivative of the motion of each segment, 1/s
+  ParityInformation parity_;               ///< of all segments
   std::vector<Intrinsics> parity_gradients_;
   PreintegratedPose piece_;
   std::optional<CalibrationPoint> integrated_;  ///< where segments_ are
