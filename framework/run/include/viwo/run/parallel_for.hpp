@@ -8,6 +8,8 @@
 #include <exception>
 #include <mutex>
 #include <thread>
+
+#include <tbb/global_control.h>
 #else
 #include <tbb/parallel_for.h>
 #endif
@@ -34,9 +36,11 @@ void parallel_for(std::size_t n, const Work& work) {
       }
     }
   };
-  std::thread other(all);
+  using Limit = tbb::global_control;
+  std::thread other;
+  if (Limit::active_value(Limit::max_allowed_parallelism) > 1) other = std::thread(all);
   all();
-  other.join();
+  if (other.joinable()) other.join();
   if (error) std::rethrow_exception(error);
 #else
   tbb::parallel_for(std::size_t{0}, n, work);
