@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "checks.hpp"
-#include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/series/rate_grid.hpp"
 #include "wheel_calibration.hpp"
 
 namespace viwo::inspect {
@@ -30,19 +30,11 @@ void take_angles_of(const Wheels& wheels, int later, std::size_t stride, Wheels&
   }
 }
 
-double period_s_of(const Wheels& wheels) {
-  std::vector<double> periods_s;
-  for (const EncoderSample& sample : wheels.samples) {
-    periods_s.push_back(seconds_between(sample.begin_ns, sample.end_ns));
-  }
-  return periods_s.empty() ? 0. : eval::median(periods_s);
-}
-
 /// Where the wheels contradict each other clearly less with the angles of earlier or later.
 void check_steer_lag(const Wheels& wheels, const std::string& label, Findings& out) {
   constexpr double kPart = 0.7;  // of the squared residual, what is left of it at most
-  const double period_s = period_s_of(wheels);
   if (wheels.model->description().n_steer == 0 || wheels.model->n_rows() <= 3) return;
+  const double period_s = period_of(twists_of(wheels));
   if (!(period_s > 0.) || wheels.samples.size() < 1000) return;
   const auto calibration = calibrated(wheels);
   if (!calibration) return;

@@ -139,6 +139,7 @@ void demote_consequences(const Recording& recording, Findings& findings) {
   for (Finding& finding : findings) {
     if (finding.severity != Severity::kFault) continue;
     const std::string& sensor = finding.sensor;
+    const bool is_noise = finding.check.starts_with("sigma_");
     const auto follows = [&](Checks causes) {
       return !is_one_of(finding.check, causes) && is_fault_of(all, sensor, causes);
     };
@@ -146,11 +147,11 @@ void demote_consequences(const Recording& recording, Findings& findings) {
       demote(finding, sensor);
     } else if (sensor != imu && follows(kWheelCauses)) {
       if (!is_of_stamps(finding.check) || finding.check == "clock") demote(finding, sensor);
-    } else if (finding.check.starts_with("sigma_") && is_fault_of(all, sensor, kNoNoise)) {
+    } else if (is_noise && is_fault_of(all, sensor, kNoNoise)) {
       demote(finding, sensor);
-    } else if (finding.check.starts_with("sigma_") && is_fault_of(all, imu, kRate)) {
+    } else if (is_noise && is_fault_of(all, imu, kRate)) {
       demote(finding, imu);
-    } else if (finding.check.starts_with("sigma_") && has_stuck_channel(all, sensor)) {
+    } else if (is_noise && has_stuck_channel(all, sensor)) {
       demote(finding, sensor);
     } else if (follows(kContradicted) && (finding.check == "parity" || finding.check == "speed" ||
                                           finding.check == "clock")) {

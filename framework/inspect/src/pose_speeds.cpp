@@ -95,10 +95,9 @@ std::vector<Window> windows_of(const Wheels& wheels, const Poses& of, const Wind
     constexpr double kTurns_rad = 0.1, kUpright = 0.94;  // 20 deg
     if (goes && is_whole && turned_rad > kTurns_rad) {
       const Eigen::Quaterniond q_WtoB = from->q_BtoW.conjugate();
-      window.angle_rad = from->q_BtoW.angularDistance(to->q_BtoW);
-      const Vector3d axis = R_BtoO * (q_WtoB * to->q_BtoW).vec();
-      const double half = (q_WtoB * to->q_BtoW).w();
-      window.turned_rad = 2. * std::atan2(half < 0. ? -axis.z() : axis.z(), std::abs(half));
+      const Vector3d turn = R_BtoO * log_so3((q_WtoB * to->q_BtoW).toRotationMatrix());
+      window.angle_rad = turn.norm();
+      window.turned_rad = turn.z();
       window.moved_m = R_BtoO * (q_WtoB * (to->p_BinW - from->p_BinW));
       window.is_upright = Vector3d(R_BtoO * (q_WtoB * Vector3d::UnitZ())).z() > kUpright;
       windows.push_back(window);

@@ -1,5 +1,4 @@
 // What is suspicious of a run as a whole.
-#include <cmath>
 #include <string>
 
 #include <gmock/gmock.h>

@@ -1,5 +1,8 @@
 #include "viwo/wheel/contradicted_channels.hpp"
 
+#include <bit>
+#include <iterator>
+
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/wheel/wheel_check.hpp"
@@ -50,16 +53,14 @@ std::vector<ContradictedChannel> contradicted_channels(std::span<const EncoderSa
     if (left != nullptr && checked.bad_drives == 0 && checked.bad_steers == 0) {
       left->push_back(sample);
     }
-    std::size_t n_bad = 0;
     const auto is_bad = [&](std::size_t i) {
       return i < n_drive ? (checked.bad_drives >> i & 1u) != 0
                          : (checked.bad_steers >> (i - n_drive) & 1u) != 0;
     };
-    for (std::size_t i = 0; i < runs.size(); ++i) n_bad += is_bad(i) ? 1 : 0;
+    const auto n_bad = std::popcount(checked.bad_drives) + std::popcount(checked.bad_steers);
     // All of them: nobody knows which one it is.
-    for (std::size_t i = 0; i < runs.size(); ++i) {
-      runs[i].add(is_bad(i) && n_bad < runs.size(), sample);
-    }
+    const bool is_known = n_bad < std::ssize(runs);
+    for (std::size_t i = 0; i < runs.size(); ++i) runs[i].add(is_known && is_bad(i), sample);
   }
   std::vector<ContradictedChannel> found;
   for (std::size_t i = 0; i < runs.size(); ++i) {
