@@ -91,6 +91,9 @@ MovingStartOptions make_options() {
   prior.sigma_extrinsics << 0.01, 0.01, 0.01, 0.03, 0.03, 0.03;
   prior.sigma_time_offset_s = 0.005;
   prior.sigma_intrinsics = options.model->prior_sigma();
+  VectorXd sigma(prior.sigma_intrinsics.size() + 6);
+  sigma << prior.sigma_intrinsics, prior.sigma_extrinsics;
+  options.P_wheels = sigma.cwiseAbs2().asDiagonal();
   // The simulated wheels do not slip and the ground is flat; G is where the estimate says.
   options.sigma_velocity_m_per_s = 1e-4;
   options.sigma_yaw_rate_rad_per_s = 1e-4;

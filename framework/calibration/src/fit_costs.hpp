@@ -6,7 +6,7 @@
 
 #include "calibration_problem.hpp"
 #include "viwo/calibration/calibrate.hpp"
-#include "viwo/wheel/held_prior.hpp"
+#include "viwo/wheel/held_gauge.hpp"
 
 namespace viwo::calibration {
 
@@ -64,7 +64,8 @@ struct Prior {
 
  private:
   void hold_gauge(const WheelModel& model) {
-    const Eigen::MatrixXd P = prior_in_held_frame(model, x_WI, sigma, extrinsics, extrinsics_sigma);
+    const Eigen::MatrixXd P =
+        prior_in_held_frame(model, x_WI, sigma, known_of_body(extrinsics, extrinsics_sigma));
     const Eigen::VectorXd in_held = P.diagonal().cwiseSqrt();
     sigma = in_held.head(sigma.size());
     extrinsics_sigma = in_held.tail<3>();

@@ -10,6 +10,7 @@
 #include "simulated.hpp"
 #include "viwo/calibration/calibrate.hpp"
 #include "viwo/sim/encoder_simulator.hpp"
+#include "viwo/wheel/held_gauge.hpp"
 
 namespace viwo::testing {
 
@@ -44,9 +45,14 @@ inline calibration::CalibrationEstimate fit_all(const calibration::CalibrationSe
   return fit_of(setup, all_of(setup));
 }
 
-/// True intrinsics of the simulated robot: the sensor's seed is 1000 times the run's.
-inline Intrinsics truth_of(const calibration::CalibrationSetup& setup, std::uint64_t seed) {
-  return sim::perturbed_intrinsics(setup.recordings[0].setup.model->description(), 1., 1000 * seed);
+/// The true intrinsics of the simulated robot, and in R_ItoO, p_IinO the reference body, in the
+/// frame that the gauge holds: the sensor's seed is 1000 times the run's.
+inline WheelsView truth_of(const calibration::CalibrationSetup& setup, std::uint64_t seed) {
+  const WheelModel& model = *setup.recordings[0].setup.model;
+  WheelsView truth;
+  truth.x_WI = sim::perturbed_intrinsics(model.description(), 1., 1000 * seed);
+  move_to_held_gauge(model, model.nominal(), truth);  // bases without a gauge stay as they are
+  return truth;
 }
 
 }  // namespace viwo::testing

@@ -69,7 +69,7 @@ TEST(SegmentChoice, IsNotOfTheLuckiest) {
     MotionReference reference = motion_reference(label, run, data, ReferenceKind::kPoses);
     setup.recordings.push_back({label, std::move(run), std::move(data), std::move(reference)});
     const CalibrationResult result = calibrate(setup);
-    const Intrinsics truth = truth_of(setup, seed);
+    const Intrinsics truth = truth_of(setup, seed).x_WI;
     EXPECT_TRUE(result.all.noise.yaw_is_found && result.all.noise.position_is_found);
     for (const CalibrationEstimate& one : result.lengths) {
       if (one.residuals <= 6) {

@@ -6,7 +6,7 @@
 
 #include "simulated_calibration.hpp"
 #include "viwo/math/se2.hpp"
-#include "viwo/wheel/held_prior.hpp"
+#include "viwo/wheel/held_gauge.hpp"
 
 namespace viwo {
 namespace {
@@ -43,8 +43,7 @@ TEST(HeldPrior, HasInTheOthersWhatTheHeldMayBeOffBy) {
   Intrinsics sigma = Intrinsics::Zero(model.n_intrinsics());
   constexpr double kSigma = 1e-3;
   sigma[model.find("delta_o1")] = kSigma;
-  const auto n = static_cast<Eigen::Index>(model.n_intrinsics());
-  const Eigen::MatrixXd P = prior_in_held_frame(model, model.nominal(), sigma).topLeftCorner(n, n);
+  const Eigen::MatrixXd P = prior_in_held_frame(model, model.nominal(), sigma);
   const Intrinsics moved = in_held_frame(model, kSigma) - model.nominal();
   EXPECT_GT(moved.norm(), 0.1 * kSigma);
   // To the second order of the turn.
@@ -61,7 +60,8 @@ TEST(HeldPrior, MovesTheBodyOfThePosesWithO) {
   Intrinsics sigma = Intrinsics::Zero(model.n_intrinsics());
   sigma[model.find("delta_o1")] = kSigma;
   const PlanarExtrinsics E(0.2, -0.1, 0.7);
-  const Eigen::MatrixXd P = prior_in_held_frame(model, nominal, sigma, E, {kKnown, kKnown, kKnown});
+  const Eigen::MatrixXd P =
+      prior_in_held_frame(model, nominal, sigma, known_of_body(E, {kKnown, kKnown, kKnown}));
   const auto n = nominal.size();
   // Where the first wheel is in B, at the ends of what the zero may be off by.
   const Eigen::Vector2d wheel(nominal[model.find("x_1")], nominal[model.find("y_1")]);
@@ -78,8 +78,8 @@ TEST(HeldPrior, MovesTheBodyOfThePosesWithO) {
 TEST(HeldPrior, LeavesTheBodyWhereItIsHeld) {
   const auto setup = setup_of({"figure_eight"}, 1);
   const WheelModel& model = *setup.recordings[0].setup.model;
-  const Eigen::MatrixXd P =
-      prior_in_held_frame(model, model.nominal(), model.prior_sigma(), {0.2, -0.1, 0.7});
+  const Eigen::MatrixXd P = prior_in_held_frame(model, model.nominal(), model.prior_sigma(),
+                                                known_of_body({0.2, -0.1, 0.7}, {0., 0., 0.}));
   EXPECT_TRUE(P.bottomRows<3>().isZero(0.));
 }
 
@@ -108,13 +108,13 @@ TEST(HeldPrior, FindsARobotWhoseFirstWheelIsOff) {
   // As drawn, but for that zero.
   const WheelModel& model = *setup.recordings[0].setup.model;
   const CalibrationEstimate estimate = testing::fit_all(setup);
-  const Intrinsics drawn = testing::truth_of(setup, 1) - model.nominal();
-  const Intrinsics truth = in_held_frame(model, kOff_rad) + drawn;
+  WheelsView robot;
+  robot.x_WI = sim::perturbed_intrinsics(model.description(), 1., 1000);
+  robot.x_WI[model.find("delta_o1")] += kOff_rad;
+  ASSERT_TRUE(move_to_held_gauge(model, model.nominal(), robot));
   for (int i = 0; i < model.n_intrinsics(); ++i) {
     if (!(estimate.sigma[i] > 0.)) continue;
-    // The draw is made in the frame before, which is turned by kOff_rad.
-    const double tolerance = 5. * estimate.sigma[i] + 2. * kOff_rad * drawn.norm();
-    EXPECT_NEAR(estimate.x_WI[i], truth[i], tolerance)
+    EXPECT_NEAR(estimate.x_WI[i], robot.x_WI[i], 5. * estimate.sigma[i])
         << model.description().intrinsics[static_cast<std::size_t>(i)].name;
   }
 }

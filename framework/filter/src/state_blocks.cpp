@@ -85,6 +85,15 @@ bool is_pose(const BlockSpec& spec) {
   return spec.rotations == 1 && spec.entries.size() == kPoseSize;
 }
 
+void PriorCorrelations::append(const PriorCorrelations& other) {
+  const Eigen::Index n = matrix.rows(), m = other.matrix.rows();
+  entries.insert(entries.end(), other.entries.begin(), other.entries.end());
+  Eigen::MatrixXd both = Eigen::MatrixXd::Zero(n + m, n + m);
+  both.topLeftCorner(n, n) = matrix;
+  both.bottomRightCorner(m, m) = other.matrix;
+  matrix = std::move(both);
+}
+
 StateBlocks::StateBlocks(std::vector<BlockSpec> blocks, std::vector<RoomSpec> rooms,
                          int first_column)
     : first_column_(first_column), specs_(std::move(blocks)), rooms_(std::move(rooms)) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "covariance_track.hpp"
+#include "viwo/config/overrides.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/observability/directions.hpp"
 #include "viwo/observability/null_space.hpp"
@@ -271,7 +272,11 @@ ObservabilityReport analyse(const ExperimentSetup& setup, PluginRegistry& plugin
       ObservabilityResult result;
       result.motion = m;
       result.variant = v;
-      const Node cell = configuration_of(setup, setup.variants[v], setup.recordings[m]);
+      Node cell = configuration_of(setup, setup.variants[v], setup.recordings[m]);
+      // What a motion shows is asked, not what a prior says of one entry by another.
+      if (cell.find("kinematics") != nullptr) {
+        config::set_path(cell, "wheels.held_are_exact", Node::scalar_of("true"));
+      }
       RunSetup configured =
           of_recording(setup.recordings[m], [&] { return read_run(cell, plugins); });
       Node run = configured.resolved;

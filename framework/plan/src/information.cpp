@@ -8,7 +8,7 @@
 #include <Eigen/Dense>
 
 #include "viwo/api/status.hpp"
-#include "viwo/wheel/held_prior.hpp"
+#include "viwo/wheel/held_gauge.hpp"
 
 namespace viwo::plan {
 namespace {
@@ -24,8 +24,7 @@ Eigen::MatrixXd known_before(const WheelModel& model) {
   for (int i = 0; i < drawn.size(); ++i) {
     drawn[i] = model.description().intrinsics[static_cast<std::size_t>(i)].prior_sigma;
   }
-  return prior_in_held_frame(model, model.nominal(), drawn)
-      .topLeftCorner(drawn.size(), drawn.size());
+  return prior_in_held_frame(model, model.nominal(), drawn);
 }
 
 PreintegrationOptions preintegration() {

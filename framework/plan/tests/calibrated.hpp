@@ -5,6 +5,7 @@
 
 #include "plan_files.hpp"
 #include "viwo/calibration/calibrate.hpp"
+#include "viwo/wheel/held_gauge.hpp"
 
 namespace viwo::testing {
 
@@ -26,13 +27,19 @@ inline calibration::CalibrationEstimate calibrated(calibration::CalibrationSetup
 inline Eigen::VectorXd errors_in_goals(const plan::PlanSetup& setup,
                                        const calibration::CalibrationSetup& drive,
                                        const calibration::CalibrationEstimate& estimate) {
+  const WheelModel& model = *setup.model;
+  WheelsView truth;
+  truth.x_WI = model.nominal();
+  for (int i = 0; i < model.n_intrinsics(); ++i) {
+    const std::string& name = model.description().intrinsics[static_cast<std::size_t>(i)].name;
+    truth.x_WI[i] = drive.recordings[0].data.calibration.at(name);
+  }
+  move_to_held_gauge(model, model.nominal(), truth);  // bases without a gauge stay as they are
   Eigen::VectorXd out(static_cast<Eigen::Index>(setup.goals.size()));
   for (std::size_t i = 0; i < setup.goals.size(); ++i) {
     const plan::Goal& goal = setup.goals[i];
-    const auto& spec =
-        setup.model->description().intrinsics[static_cast<std::size_t>(goal.intrinsic)];
-    const double truth = drive.recordings[0].data.calibration.at(spec.name);
-    out[static_cast<Eigen::Index>(i)] = (estimate.x_WI[goal.intrinsic] - truth) / goal.sigma;
+    const double off = estimate.x_WI[goal.intrinsic] - truth.x_WI[goal.intrinsic];
+    out[static_cast<Eigen::Index>(i)] = off / goal.sigma;
   }
   return out;
 }

@@ -5,21 +5,34 @@
 #include <numbers>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
+
 #include "viwo/math/significant.hpp"
 #include "viwo/math/time_text.hpp"
 
 namespace viwo {
 
-EncoderCheck::EncoderCheck(const SensorName& wheels, std::shared_ptr<const WheelModel> model,
-                           const WheelsPrior& prior)
+namespace {
+
+/// Symmetric; of what is held, too.
+IntrinsicMatrix root_of(const Eigen::MatrixXd& P) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(P);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.).cwiseSqrt().asDiagonal() *
+         eigen.eigenvectors().transpose();
+}
+
+}  // namespace
+
+EncoderCheck::EncoderCheck(const SensorName& wheels, const WheelSet& set)
     : name_(wheels.text),
       sensor_(wheels.sensor),
-      solver_(model, {}),
-      sigma_WI_(prior.sigma_intrinsics),
-      n_steer_(model->description().n_steer),
-      trial_(model, prior.wheels.x_WI, channel_changes(model->description())) {
-  solver_.set_intrinsics(prior.wheels.x_WI);
-  drives_.resize(static_cast<std::size_t>(model->description().n_drive));
+      solver_(set.model, {}),
+      n_steer_(set.model->description().n_steer),
+      trial_(set.model, set.prior.wheels.x_WI, channel_changes(set.model->description())) {
+  solver_.set_intrinsics(set.prior.wheels.x_WI);
+  const Eigen::Index n = set.prior.wheels.x_WI.size();
+  prior_root_ = root_of(set.P_before().topLeftCorner(n, n));
+  drives_.resize(static_cast<std::size_t>(set.model->description().n_drive));
 }
 
 std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {

@@ -10,23 +10,23 @@
 
 #include "sensor_name.hpp"
 #include "stuck_channel.hpp"
-#include "viwo/api/rig.hpp"
 #include "viwo/plausibility/change_trial.hpp"
 #include "viwo/plausibility/finding.hpp"
+#include "viwo/setup/filter_setup.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo {
 
 class EncoderCheck {
  public:
-  EncoderCheck(const SensorName& wheels, std::shared_ptr<const WheelModel> model,
-               const WheelsPrior& prior);
+  EncoderCheck(const SensorName& wheels, const WheelSet& set);
 
   /// Samples in time order; the twist that they say, if they say one.
   std::optional<Twist> add(const EncoderSample& sample);
-  /// By what a prior sigma of each intrinsic changes the yaw rate of the sample last added.
+  /// By what each unit of the prior of the intrinsics, P = root root^T, changes the yaw rate of the
+  /// sample last added.
   Intrinsics rate_by_prior() const {
-    return solution_.J_xi_WI.row(2).transpose().cwiseProduct(sigma_WI_);
+    return prior_root_.transpose() * solution_.J_xi_WI.row(2).transpose();
   }
   /// Times in texts count from `zero_ns`.
   void findings(std::int64_t zero_ns, Findings& out) const;
@@ -40,7 +40,7 @@ class EncoderCheck {
   std::string name_, sensor_;
   TwistSolver solver_;
   TwistSolution solution_;
-  Intrinsics sigma_WI_;  ///< of the prior
+  IntrinsicMatrix prior_root_;
   int n_steer_;
   ChangeTrial trial_;
   std::vector<StuckChannel> drives_;

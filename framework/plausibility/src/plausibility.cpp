@@ -59,7 +59,7 @@ struct Plausibility::Checks {
   };
   void add(const Names& names, const WheelSet& set, Gyro gyro) {
     wheels.push_back(
-        {names.wheels.sensor, EncoderCheck(names.wheels, set.model, set.prior),
+        {names.wheels.sensor, EncoderCheck(names.wheels, set),
          TwistCheck(names.imu, names.wheels, set.model, set.prior, gyro),
          TwistCheck(names.heading, names.wheels, set.model, set.prior, Gyro::kHeading)});
   }

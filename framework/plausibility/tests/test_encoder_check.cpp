@@ -21,10 +21,7 @@ using ::testing::IsEmpty;
 /// What is found of ten seconds along `angle_rad` of a base with four steered wheels, with a fault.
 Findings driven(double angle_rad, const std::function<void(EncoderSample&)>& fault) {
   const RunSetup setup = read_run(testing::simulated("circle"), testing::registry());
-  WheelsPrior prior;
-  prior.wheels.x_WI = setup.x_WI;
-  prior.sigma_intrinsics = setup.sigma;
-  EncoderCheck check({"wheels0", "wheels0"}, setup.model, prior);
+  EncoderCheck check({"wheels0", "wheels0"}, wheels_alone(setup));
   std::mt19937_64 engine(1);
   std::normal_distribution<double> noise(0., 0.02);
   for (std::int64_t k = 0; k < 1000; ++k) {

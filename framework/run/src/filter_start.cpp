@@ -81,6 +81,7 @@ Initializer from_wheels(const Estimator& estimator, const FilterSetup& setup) {
   options.sigma_velocity_m_per_s = setup.start.sigma_velocity_m_per_s;
   options.model = setup.wheels.front().model;
   options.wheels = setup.wheels.front().prior;
+  options.P_wheels = setup.wheels.front().P_before();
   return [options, wheels = estimator.extra(0)](const StartData& data) {
     return start_from_motion(data.imu, data.samples<EncoderSample>(wheels), options);
   };

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "held_gauge.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/wheel/held_gauge.hpp"
 
 namespace viwo {
 namespace {
@@ -29,6 +29,10 @@ void write(const BlockSpec& block, int first, const Eigen::VectorXd& values, Tru
 }
 
 void hold_gauge(const WheelSet& set, Truth& truth) {
+  for (std::size_t i = 0; i < set.model->description().intrinsics.size(); ++i) {
+    const bool is_of_gauge = set.model->description().intrinsics[i].gauge_fixed;
+    if (is_of_gauge && set.prior.sigma_intrinsics[static_cast<Eigen::Index>(i)] > 0.) return;
+  }
   const auto [pose, clock, numbers] = wheels_blocks(set.prior);
   const auto theta = values_of(truth, pose, 0, 3), p = values_of(truth, pose, 3, 3);
   const auto x_WI = values_of(truth, numbers, 0, static_cast<int>(numbers.entries.size()));

@@ -11,7 +11,6 @@
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
-#include "viwo/wheel/held_prior.hpp"
 
 namespace viwo {
 namespace {
@@ -128,31 +127,27 @@ std::map<std::string, double> sigmas_from_prior(const FilterSetup& filter,
                                                 std::span<const CalibrationTrack> tracks) {
   std::map<std::string, double> all;
   for (const WheelSet& set : filter.wheels) {
+    if (set.correlations.size() == 0) continue;  // each is known by itself
     const std::vector<IntrinsicSpec>& specs = set.model->description().intrinsics;
-    const Intrinsics& sigma = set.prior.sigma_intrinsics;
     const std::string prefix = set.prior.name.empty() ? "" : set.prior.name + ".";
-    Intrinsics drawn(set.model->n_intrinsics());
     Eigen::VectorXd change(set.model->n_intrinsics());
     std::vector<int> free;
-    bool is_held = true, is_of_model = true;
     for (std::size_t i = 0; i < specs.size(); ++i) {
       const auto k = static_cast<int>(i);
-      drawn[k] = specs[i].prior_sigma;
-      if (specs[i].gauge_fixed) {
-        is_held = is_held && sigma[k] == 0.;
-        continue;
-      }
       const auto track = std::ranges::find(tracks, prefix + specs[i].name, &CalibrationTrack::name);
-      is_of_model = is_of_model && sigma[k] == drawn[k] && sigma[k] > 0. && track != tracks.end() &&
-                    !track->estimate.empty();
-      if (!is_of_model) break;
-      change[k] = track->estimate.back() - track->estimate.front();
+      if (track == tracks.end() || track->estimate.empty()) continue;
+      const double sigma = set.prior.sigma_intrinsics[k];
+      if (!(sigma > 0.)) continue;
+      change[k] = (track->estimate.back() - track->estimate.front()) / sigma;
       free.push_back(k);
     }
-    // Others are those of a calibration file, which are in the frame that is held.
-    if (!is_held || !is_of_model || free.empty()) continue;
-    const Eigen::MatrixXd P = prior_in_held_frame(*set.model, set.prior.wheels.x_WI, drawn);
-    const Eigen::MatrixXd information = P(free, free).inverse();
+    // Where one follows from others, none is by itself.
+    constexpr double kFollows = 1e-9;
+    Eigen::MatrixXd C = set.correlations(free, free);
+    C.diagonal().array() -= kFollows;
+    const Eigen::LLT<Eigen::MatrixXd> llt(C);
+    if (free.empty() || llt.info() != Eigen::Success) continue;
+    const Eigen::MatrixXd information = llt.solve(Eigen::MatrixXd::Identity(C.rows(), C.cols()));
     const Eigen::VectorXd left = information * change(free);
     for (std::size_t i = 0; i < free.size(); ++i) {
       const auto k = static_cast<Eigen::Index>(i);

@@ -11,7 +11,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "held_gauge.hpp"
 #include "message_of.hpp"
 #include "sensors_in_memory.hpp"
 #include "simulated.hpp"
@@ -198,26 +197,6 @@ TEST(FilterRun, AStartFromMotionNeedsWheelsOrTracks) {
   EXPECT_EQ(testing::error_of([&] { viwo::run(setup, data); }),
             "estimator.start: moving needs wheels, or cameras and an update that takes their "
             "tracks - choose standstill or reference");
-}
-
-TEST(HeldGauge, BringsATruthOfAnotherFrameIntoTheOneThatTheEstimateHolds) {
-  const RunSetup setup = inertia_and_wheels();
-  const WheelModel& model = *setup.model;
-  WheelsView here;
-  here.x_WI = model.nominal();
-  here.R_ItoO = exp_so3({0.02, -0.01, 0.3});
-  here.p_IinO = {0.1, -0.05, 0.2};
-  // The same base told in a frame that is turned by 0.2 rad and shifted.
-  const Eigen::Vector3d g(0.2, 0.03, -0.02);
-  WheelsView there = here;
-  ASSERT_EQ(model.model().move_frame(g, there.x_WI), Status::kOk);
-  there.R_ItoO = exp_so3({0., 0., -0.2}) * here.R_ItoO;
-  there.p_IinO = exp_so3({0., 0., -0.2}) * (here.p_IinO - Eigen::Vector3d(0.03, -0.02, 0.));
-  EXPECT_GT((there.x_WI - here.x_WI).norm(), 0.1);
-  ASSERT_TRUE(move_to_held_gauge(model, here.x_WI, there));
-  EXPECT_LT((there.x_WI - here.x_WI).norm(), 1e-9);
-  EXPECT_LT((there.R_ItoO - here.R_ItoO).norm(), 1e-9);
-  EXPECT_LT((there.p_IinO - here.p_IinO).norm(), 1e-9);
 }
 
 TEST(SimulateResult, IsDescribedByWhatThereIs) {

@@ -190,7 +190,8 @@ TEST(TrueCalibration, OfCamerasThatStartWrongIsKnownInARun) {
 std::vector<double> start_errors(const std::string& estimator, std::uint64_t seed) {
   const auto start = [&](const std::string& section) {
     return read_run(config::parse(testing::swerve_with_camera(0) + "estimator: {" + section +
-                                      "}\nupdates: {wheel_odometry: {}}\n",
+                                      "}\nwheels: {held_are_exact: true}\n"
+                                      "updates: {wheel_odometry: {}}\n",
                                   "run.yaml"),
                     registry(), seed)
         .filter->wheels.front()

@@ -30,6 +30,7 @@ class CalibrationStart {
   /// Of what was taken.
   PriorCorrelations correlations() const;
   bool took_anything() const { return !taken_.empty(); }
+  bool took(const std::string& entry) const { return taken_.contains(entry); }
   bool took_cameras() const { return taken_.contains("cam0.fx"); }
 
  private:

@@ -18,6 +18,8 @@
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/random.hpp"
 #include "viwo/sim/true_cameras.hpp"
+#include "wheels_setup.hpp"
+#include "wrong_start.hpp"
 
 namespace viwo {
 namespace {
@@ -25,17 +27,6 @@ namespace {
 using config::Errors;
 using config::Node;
 using Eigen::Vector3d;
-
-/// A section, and resolved; nothing if something in it is wrong.
-template <class T>
-std::optional<T> read_section(const Node& section, const std::string& path, Node& resolved,
-                              Errors& errors) {
-  const std::size_t before = errors.size();
-  const T params = config::read_section<T>(section, section.mark(), path, errors);
-  if (errors.size() > before) return std::nullopt;
-  resolved = config::write_section(params);
-  return params;
-}
 
 void read_estimator(const EstimatorParams& p, FilterSetup& setup) {
   setup.options.filter.clones = p.clones;
@@ -98,41 +89,6 @@ void read_imu(ImuParams p, const Node& section, FilterSetup& setup, Node& resolv
   setup.options.imu.max_accel_m_per_s2 = p.range_accel_m_per_s2;
 }
 
-/// How wrong calibration starts, in prior sigmas.
-struct CalibrationError {
-  double scale = 0.;
-  EstimatorParams::Draw draw = EstimatorParams::Draw::kGaussian;
-};
-
-/// Draws how wrong calibration starts: the same whether it is then calibrated or not.
-class WrongStart {
- public:
-  WrongStart(CalibrationError error, std::uint64_t seed, std::uint64_t index)
-      : error_(error), random_(seed, sim::Stream::kCalibrationError, index) {}
-  double draw(double sigma) {
-    const double gaussian = random_.gaussian();
-    switch (error_.draw) {
-      case EstimatorParams::Draw::kSign:
-        return std::copysign(error_.scale * sigma, gaussian);
-      case EstimatorParams::Draw::kPlus:
-        return error_.scale * sigma;
-      default:
-        return error_.scale * sigma * gaussian;
-    }
-  }
-  /// Each axis.
-  Vector3d draw(const Vector3d& sigma) {
-    Vector3d errors;
-    for (int i = 0; i < 3; ++i) errors[i] = draw(sigma[i]);
-    return errors;
-  }
-  bool is_wrong() const { return error_.scale > 0.; }
-
- private:
-  CalibrationError error_;
-  sim::RandomStream random_;
-};
-
 /// Draws of cameras follow those of any number of wheel sets.
 constexpr std::uint64_t kFirstCameraDraw = 1000;
 
@@ -186,122 +142,6 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
   }
   for (const CalibrationSample& true_one : sim::camera_truth(drawn_from, 0)) {
     setup.drawn_from[true_one.name] = true_one.value;
-  }
-}
-
-/// A wheel set from its section `wheels`; the intrinsics and their sigmas are those of its model.
-void read_wheels(const WheelsParams& p, WheelSet set, CalibrationError error,
-                 const ReadContext& context, FilterSetup& setup, Errors& errors) {
-  WheelsPrior& prior = set.prior;
-  prior.sensor = p.sensor;
-  prior.wheels.model = &set.model->model();
-  prior.wheels.R_ItoO = rotation_of_rpy(p.rpy_ItoO_rad);
-  prior.wheels.p_IinO = p.p_IinO_m;
-  prior.wheels.t_OtoI_s = p.t_OtoI_s;
-  prior.sigma_extrinsics << p.sigma_R_ItoO_rad, p.sigma_p_IinO_m;
-  prior.sigma_time_offset_s = p.sigma_t_OtoI_s;
-  if (context.start != nullptr) context.start->take_mount_and_clock(prior, errors);
-  for (Eigen::Index i = 0; i < prior.sigma_intrinsics.size(); ++i) {
-    const IntrinsicSpec& spec = set.model->description().intrinsics[static_cast<std::size_t>(i)];
-    double& sigma = prior.sigma_intrinsics[i];
-    if (!spec.gauge_fixed) continue;
-    // A calibration.yaml has a sigma where O was placed by something else than the gauge.
-    if (p.hold_gauge) sigma = 0.;
-    if (!p.hold_gauge && sigma == 0.) sigma = spec.prior_sigma;
-  }
-
-  WrongStart wrong(error, context.seed, setup.wheels.size());
-  const Vector3d turn = wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()));
-  const Vector3d shift = wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
-  const double later = wrong.draw(prior.sigma_time_offset_s);
-  if (wrong.is_wrong()) {
-    prior.wheels.R_ItoO = exp_so3(turn) * prior.wheels.R_ItoO;
-    prior.wheels.p_IinO += shift;
-    prior.wheels.t_OtoI_s += later;
-    for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
-      prior.wheels.x_WI[i] += wrong.draw(prior.sigma_intrinsics[i]);
-    }
-  }
-  prior.intrinsics_walk = p.intrinsics_walk_per_sqrt_s;
-  if (const double wander = p.intrinsics_wander; wander > 0. && !context.exact) {
-    prior.sigma_wander.resize(prior.wheels.x_WI.size());
-    for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      prior.sigma_wander[i] = wander * set.model->description().intrinsics[k].prior_sigma;
-    }
-    prior.wander_time_s = p.intrinsics_wander_time_s;
-  }
-  if (!p.calibrate_extrinsics) prior.sigma_extrinsics.setZero();
-  if (!p.calibrate_time_offset) prior.sigma_time_offset_s = 0.;
-  if (!p.calibrate_intrinsics) prior.sigma_intrinsics.setZero();
-  setup.wheels.push_back(std::move(set));
-}
-
-/// Further wheel sets: NAME: {kinematics: {...}, wheels: {...}}.
-void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext& context,
-                     FilterSetup& setup, Node& resolved, Errors& errors) {
-  const Node* sets = run.find("wheel_sets");
-  if (sets == nullptr) return;
-  if (!sets->is_map()) {
-    errors.add(sets->mark(), "'wheel_sets' is a section NAME: {kinematics: ..., wheels: ...}");
-    return;
-  }
-  Node resolved_sets = Node::empty_map(sets->mark());
-  for (const auto& entry : sets->entries()) {
-    if (!is_name(entry, "wheel_sets", errors)) continue;
-    const std::string path = "wheel_sets." + entry.key;
-    const Node* kinematics = entry.value.is_map() ? entry.value.find("kinematics") : nullptr;
-    if (kinematics == nullptr) {
-      errors.add(entry.value.mark(), path + " needs a section 'kinematics'");
-      continue;
-    }
-    for (const auto& part : entry.value.entries()) {
-      if (part.key != "kinematics" && part.key != "wheels") {
-        errors.add(part.key_mark,
-                   path + ": unknown key '" + part.key + "' - known: kinematics, wheels");
-      }
-    }
-    const std::string model_path = path + ".kinematics";
-    const auto model = context.plugins.make_kinematics(
-        *kinematics, model_path, instance_seed(context.seed, "kinematics", model_path), errors);
-    Node resolved_wheels;
-    const auto params = read_section<WheelsParams>(section_or_empty(entry.value, "wheels"),
-                                                   path + ".wheels", resolved_wheels, errors);
-    if (!model.object || !params) continue;
-    WheelSet set;
-    set.prior.name = entry.key;
-    set.model = guarded(model.info, "describe",
-                        [&] { return std::make_shared<const WheelModel>(model.object); });
-    set.prior.wheels.x_WI = set.model->nominal();
-    set.prior.sigma_intrinsics = set.model->prior_sigma();
-    set.info = model.info;
-    if (context.start != nullptr && context.start->has_wheels(entry.key, set.info.name)) {
-      context.start->take_intrinsics(entry.key, *set.model, set.info.name, set.prior.wheels.x_WI,
-                                     set.prior.sigma_intrinsics, errors);
-    }
-    read_wheels(*params, std::move(set), error, context, setup, errors);
-    Node resolved_set = Node::empty_map();
-    resolved_set.set("kinematics", model.resolved);
-    resolved_set.set("wheels", resolved_wheels);
-    resolved_sets.set(entry.key, resolved_set);
-  }
-  resolved.set("wheel_sets", resolved_sets);
-}
-
-/// A wheel set whose sensor does not exist would get no samples and never say so.
-void check_wheel_sensors(const Node& run, const FilterSetup& setup, Errors& errors) {
-  const Node* sensors = run.find("sensors");
-  if (sensors == nullptr || !sensors->is_map()) return;
-  std::vector<std::string> names;
-  for (const auto& entry : sensors->entries()) names.push_back(entry.key);
-  for (const WheelSet& set : setup.wheels) {
-    const std::string &name = set.prior.name, &sensor = set.prior.sensor;
-    if (sensor.empty() || sensors->find(sensor) != nullptr) continue;
-    const Node* at = &run;
-    if (!name.empty()) at = at->find("wheel_sets")->find(name);
-    errors.add(at->find("wheels")->find("sensor")->mark(),
-               (name.empty() ? "" : "wheel_sets." + name + ".") + "wheels.sensor: no sensor '" +
-                   sensor + "'" + config::did_you_mean(sensor, names));
   }
 }
 
@@ -363,9 +203,10 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
   }
   read_wheel_sets(run, error, context, setup, resolved, errors);
   check_wheel_sensors(run, setup, errors);
-  // Starts that are made wrong are drawn entry by entry.
+  setup.options.filter.correlations = correlations_of(setup.wheels);
+  // Starts of a file that are made wrong are drawn entry by entry.
   if (context.start != nullptr && error.scale == 0.) {
-    setup.options.filter.correlations = context.start->correlations();
+    setup.options.filter.correlations.append(context.start->correlations());
   }
   read_updates(run, context, setup, resolved, errors);
   return setup;

@@ -269,7 +269,8 @@ void warn_of(const CalibrationStart& start, RunSetup& setup) {
     setup.warnings.push_back("calibration " + doubts);
   }
   if (!setup.filter || start.correlations().entries.empty()) return;
-  if (setup.filter->options.filter.correlations.entries.empty()) {
+  const std::vector<std::string>& used = setup.filter->options.filter.correlations.entries;
+  if (std::ranges::find(used, start.correlations().entries.front()) == used.end()) {
     setup.warnings.push_back(
         "estimator.calibration_error_scale draws each parameter by itself: the correlations of " +
         start.file().path.string() + " are not used");

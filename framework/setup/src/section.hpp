@@ -1,10 +1,12 @@
 // Sections of a configuration, and the names in them.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "viwo/config/errors.hpp"
 #include "viwo/config/node.hpp"
+#include "viwo/config/params.hpp"
 
 namespace viwo {
 
@@ -12,6 +14,17 @@ namespace viwo {
 inline config::Node section_or_empty(const config::Node& parent, const char* key) {
   const config::Node* section = parent.find(key);
   return section != nullptr ? *section : config::Node::empty_map(parent.mark());
+}
+
+/// A section, and resolved; nothing if something in it is wrong.
+template <class T>
+std::optional<T> read_section(const config::Node& section, const std::string& path,
+                              config::Node& resolved, config::Errors& errors) {
+  const std::size_t before = errors.size();
+  const T params = config::read_section<T>(section, section.mark(), path, errors);
+  if (errors.size() > before) return std::nullopt;
+  resolved = config::write_section(params);
+  return params;
 }
 
 /// Whether `entry` of `section` has a name that can be told in results and in --set.

@@ -275,6 +275,7 @@ struct WheelsParams {
   Eigen::Vector3d sigma_R_ItoO_rad{0.01, 0.01, 0.01};
   double sigma_t_OtoI_s = 0.01;
   bool hold_gauge = true;
+  bool held_are_exact = false;
   bool calibrate_intrinsics = true;
   bool calibrate_extrinsics = true;
   bool calibrate_time_offset = true;
@@ -310,6 +311,10 @@ struct WheelsParams {
     b(VIWO_PARAM(hold_gauge),
       {.help = "hold the intrinsics that place O on the base; false leaves three directions "
                "unobservable, to be looked at (viwo observability)"});
+    b(VIWO_PARAM(held_are_exact),
+      {.help = "the intrinsics that hold_gauge holds are exactly right on the robot; false: they "
+               "are as well known as their prior sigmas say, and what they are off by is in the "
+               "priors of the others and of the mount"});
     b(VIWO_PARAM(calibrate_intrinsics),
       {.help = "estimate what the kinematic model gives a prior for"});
     b(VIWO_PARAM(calibrate_extrinsics), {.help = "estimate R_ItoO and p_IinO"});

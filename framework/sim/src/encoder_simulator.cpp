@@ -267,8 +267,8 @@ Intrinsics perturbed_intrinsics(const ModelDescription& description, double scal
   Intrinsics x = nominal_intrinsics(description);
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const IntrinsicSpec& spec = description.intrinsics[static_cast<std::size_t>(i)];
-    const double draw = stream.gaussian();  // also for held entries, so that each keeps its draw
-    if (!spec.gauge_fixed) x[i] += scale * spec.prior_sigma * draw;
+    // Also where the gauge will hold an entry: a robot does not know of that.
+    x[i] += scale * spec.prior_sigma * stream.gaussian();
   }
   return x;
 }

@@ -252,11 +252,10 @@ TEST(PerturbedIntrinsics, AreDrawnWithThePriorSigmaAroundTheNominalValues) {
       sum2[i] += e * e;
     }
   }
-  for (const int i : {0, 1, 3}) {
+  for (int i = 0; i < 4; ++i) {  // also what the gauge holds
     EXPECT_NEAR(sum[i] / n, 0., 4. / std::sqrt(n)) << i;
     EXPECT_NEAR(sum2[i] / n, 1., 4. * std::sqrt(2. / n)) << i;
   }
-  EXPECT_EQ(sum2[2], 0.);  // held by the gauge
   EXPECT_EQ(perturbed_intrinsics(description, 0., 5), nominal_intrinsics(description));
 }
 

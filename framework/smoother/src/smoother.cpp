@@ -24,7 +24,7 @@ using config::Node;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostPasses = 15;
+constexpr int kMostPasses = 25;
 /// Nothing moves by more than a tenth of its sigma. Gates, which open and close, leave less.
 constexpr double kConverged = 0.01;
 
@@ -230,9 +230,29 @@ Normal sum(std::vector<Recording>& recordings, const Shared& shared) {
   return sum;
 }
 
-/// Moves the estimate of a recording.
-void move(Recording& recording, const VectorXd& dx_shared) {
-  const VectorXd own = recording.factors->system().own(dx_shared);
+/// The part of each step that is taken (SM-7): where the next step leads back, the last one was too
+/// long.
+class StepLength {
+ public:
+  double of(const VectorXd& dx, const MatrixXd& Lambda) {
+    constexpr double kLeast = 0.3;
+    if (last_.size() > 0) {
+      const VectorXd change = last_ - dx;
+      const double length = part_ * last_.dot(Lambda * change) / change.dot(Lambda * change);
+      part_ = length > kLeast ? std::min(length, 1.) : kLeast;
+    }
+    last_ = dx;
+    return part_;
+  }
+
+ private:
+  double part_ = 1.;
+  VectorXd last_;
+};
+
+/// Moves the estimate of a recording by a part of a step.
+void move(Recording& recording, const VectorXd& dx_shared, double part) {
+  const VectorXd own = part * recording.factors->system().own(dx_shared);
   retract(own.head<kImuSize>(), recording.start);
   auto path = std::make_shared<GivenPath>(recording.factors->path());
   for (std::size_t k = 0; k < path->epochs.size(); ++k) {
@@ -248,7 +268,7 @@ void move(Recording& recording, const VectorXd& dx_shared) {
     for (Eigen::Index i = 0; i < dx.size(); ++i) {
       const int unknown = recording.columns.unknown[static_cast<std::size_t>(prior.first[b] + i)];
       if (unknown == kHeld) continue;
-      dx[i] = unknown < 0 ? dx_shared[~unknown] : own[behind + unknown];
+      dx[i] = unknown < 0 ? part * dx_shared[~unknown] : own[behind + unknown];
     }
     retract(prior.specs[b], dx, recording.blocks[b]);
   }
@@ -308,6 +328,7 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
   for (Recording& recording : recordings) take_shared_blocks(recordings.front(), recording);
   Smoothed out;
   MatrixXd covariance;
+  StepLength length;
   while (!out.converged && out.iterations < kMostPasses) {
     for_each([&](Recording& recording) { collect_factors(recording, shared.size(), plugins); });
     const Normal normal = sum(recordings, shared);
@@ -316,7 +337,8 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
     covariance = llt.solve(MatrixXd::Identity(shared.size(), shared.size()));
     const VectorXd dx = llt.solve(normal.eta);
     out.left = normal.eta.dot(dx);
-    for (Recording& recording : recordings) move(recording, dx);
+    const double part = length.of(dx, normal.Lambda);
+    for (Recording& recording : recordings) move(recording, dx, part);
     ++out.iterations;
     out.converged = out.left < kConverged;
     progress.note("smoother, pass " + std::to_string(out.iterations) +

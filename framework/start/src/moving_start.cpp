@@ -116,19 +116,22 @@ class Window {
     covariance_.block<2, 2>(kLastVelocity, kLastVelocity) +=
         end_.P_g.bottomRightCorner<2, 2>() / squared(h);
     const WheelsPrior& prior = options_.wheels;
-    auto calibration = covariance_.diagonal().tail(none.size() - kMountTheta);
-    calibration.head<6>() = prior.sigma_extrinsics.cwiseAbs2();
-    calibration[6] = squared(prior.sigma_time_offset_s);
-    calibration.tail(prior.sigma_intrinsics.size()) = prior.sigma_intrinsics.cwiseAbs2();
+    const Eigen::Index n = prior.wheels.x_WI.size();
+    const MatrixXd& P = options_.P_wheels;
+    const MatrixXd P_WI = P.topLeftCorner(n, n);
+    covariance_.block<6, 6>(kMountTheta, kMountTheta) = P.bottomRightCorner<6, 6>();
+    covariance_.block(kMountTheta, kIntrinsics, 6, n) = P.bottomLeftCorner(6, n);
+    covariance_.block(kIntrinsics, kMountTheta, n, 6) = P.topRightCorner(n, 6);
+    covariance_.block(kIntrinsics, kIntrinsics, n, n) = P_WI;
+    covariance_(kClock, kClock) = squared(prior.sigma_time_offset_s);
 
     // (F-14): how much of what the rates differ by is the bias.
     Matrix3d V = covariance_.block<3, 3>(kRate, kRate) + covariance_.block<3, 3>(kGyro, kGyro);
     const double yaw_rate = window_.g[0] / T;
     V.topLeftCorner<2, 2>() +=
-        squared(yaw_rate) * prior.sigma_extrinsics.head<2>().reverse().cwiseAbs2().asDiagonal();
-    V(2, 2) +=
-        (window_.J_g_WI.row(0).transpose().cwiseProduct(prior.sigma_intrinsics)).squaredNorm() /
-        squared(T);
+        squared(yaw_rate) * P.diagonal().segment<2>(n).reverse().asDiagonal();
+    const Eigen::RowVectorXd by_WI = window_.J_g_WI.row(0);
+    V(2, 2) += by_WI.dot(by_WI * P_WI) / squared(T);
     const double bias_variance = squared(options_.sigma_gyro_bias_rad_per_s);
     const Matrix3d S = V + bias_variance * Matrix3d::Identity();
     share_ = bias_variance * S.inverse();

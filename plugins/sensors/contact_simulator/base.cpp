@@ -106,12 +106,11 @@ Base draw_base(Base base, const TrueBaseErrors& sigma, std::uint64_t seed) {
     wheel.radius_m += sigma.radius_m * stream.gaussian();
     const double y = stream.gaussian(), x = stream.gaussian();  // arguments have no order
     const Eigen::Vector2d draw(x, y);
-    if (swerve && j > 0) wheel.place_m += sigma.position_m * draw;
+    if (swerve) wheel.place_m += sigma.position_m * draw;
     if (swerve) base.steerings[j].place_m = wheel.place_m;
   }
   for (std::size_t k = 0; k < base.steerings.size(); ++k) {
-    const double draw = sigma.angle_rad * stream.gaussian();
-    if (!swerve || k > 0) base.steerings[k].offset_rad += draw;
+    base.steerings[k].offset_rad += sigma.angle_rad * stream.gaussian();
   }
   return base;
 }

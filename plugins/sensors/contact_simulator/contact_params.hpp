@@ -82,14 +82,9 @@ struct Params : log::JointParams, sim::DriveParams, sim::RigParams {
     b(VIWO_PARAM(sigma_true_radius_m),
       {.unit = "m", .min = 0., .help = "the true radii differ by draws of this"});
     b(VIWO_PARAM(sigma_true_position_m),
-      {.unit = "m",
-       .min = 0.,
-       .help = "the true places of swerve wheels differ by draws of this; not that of the first"});
+      {.unit = "m", .min = 0., .help = "the true places of swerve wheels differ by draws of this"});
     b(VIWO_PARAM(sigma_true_steer_offset_rad),
-      {.unit = "rad",
-       .min = 0.,
-       .help = "the true steering offsets differ by draws of this; not that of the first swerve "
-               "wheel"});
+      {.unit = "rad", .min = 0., .help = "the true steering offsets differ by draws of this"});
     b(VIWO_PARAM(controller_knows),
       {.choices = "truth|nominal",
        .help = "what the wheels are commanded with: the true base, or what stands here"});

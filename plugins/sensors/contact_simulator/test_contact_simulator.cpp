@@ -146,8 +146,8 @@ TEST(ContactSimulator, TruthIsWhatTheWheelsRollWithUnderTheirLoad) {
   EXPECT_NEAR(truth.at("r_2"), 0.0255 - 1e-6 * share * (1. - 0.05 / 0.1125), 1e-12);
   const auto drawn = truth_of(play(*make_sensor(
       section("duration_s: 1, sigma_true_position_m: 0.01, sigma_true_steer_offset_rad: 0.02"))));
-  EXPECT_EQ(drawn.at("x_1"), 0.1125);
-  EXPECT_EQ(drawn.at("delta_o1"), 0.);
+  EXPECT_NE(drawn.at("x_1"), 0.1125);  // also what a filter holds
+  EXPECT_NE(drawn.at("delta_o1"), 0.);
   EXPECT_NE(drawn.at("x_2"), -0.1125);
   EXPECT_NE(drawn.at("delta_o3"), 0.);
 }

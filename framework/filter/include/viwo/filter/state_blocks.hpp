@@ -24,6 +24,9 @@ struct BlockEstimate {
 struct PriorCorrelations {
   std::vector<std::string> entries;  ///< names; those that no block has do not matter
   Eigen::MatrixXd matrix = {};       ///< symmetric, of ones on its diagonal
+
+  /// Entries that hang together with none of these.
+  void append(const PriorCorrelations& other);
 };
 
 /// Blocks that the monitor of excitation watches together.

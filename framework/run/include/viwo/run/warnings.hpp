@@ -44,8 +44,8 @@ void add_findings(const Findings& findings, RunResult& result);
 
 /// By how many prior sigmas intrinsics have gone, by name, each given where the others are
 /// (CAL-18): a first wheel whose zero is off turns the frame that the gauge holds, and all other
-/// wheels in it; a wheel that has gone alone has gone by itself. Of wheels whose priors are those
-/// of their model.
+/// wheels in it; a wheel that has gone alone has gone by itself. Of wheels of which the gauge
+/// holds some entries.
 std::map<std::string, double> sigmas_from_prior(const FilterSetup& filter,
                                                 std::span<const CalibrationTrack> tracks);
 /// Calibration that has gone where its prior does not reach, beyond five sigmas: doubts beyond ten,

@@ -45,6 +45,12 @@ struct WheelSet {
   std::shared_ptr<const WheelModel> model;
   WheelsPrior prior;     ///< name "" for the first: its parameters have no prefix
   PluginInfo info = {};  ///< of the model
+  /// Of [x_WI, theta_ItoO, p_IinO] at the start, where what the gauge holds may be off (CAL-18);
+  /// empty: each is known by itself.
+  Eigen::MatrixXd correlations = {};
+
+  /// Covariance of [x_WI, theta_ItoO, p_IinO] at the start.
+  Eigen::MatrixXd P_before() const;
 };
 
 struct FilterSetup {

@@ -68,8 +68,8 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
                                              const PlanarMotion& motion,
                                              const EncoderSimulation& options, std::uint64_t seed);
 
-/// nominal + scale * prior_sigma * gaussian for every entry that is not held by the gauge. The draw
-/// of an entry depends on seed and index alone.
+/// nominal + scale * prior_sigma * gaussian for every entry, also those that a filter holds by its
+/// gauge. The draw of an entry depends on seed and index alone.
 Intrinsics perturbed_intrinsics(const ModelDescription& description, double scale,
                                 std::uint64_t seed);
 

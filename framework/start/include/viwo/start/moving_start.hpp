@@ -19,7 +19,8 @@ struct MovingStartOptions : StartOptions {
   double sigma_yaw_rate_rad_per_s = 0.002;       ///< mean over the window
   double sigma_tilt_rate_rad_per_s = 0.02;       ///< the same about the other two axes of O
   std::shared_ptr<const WheelModel> model = {};  ///< of the wheel set
-  WheelsPrior wheels = {};                       ///< its calibration, and how well it is known
+  WheelsPrior wheels = {};                       ///< its calibration
+  Eigen::MatrixXd P_wheels = {};                 ///< how well [x_WI, theta_ItoO, p_IinO] are known
 };
 
 /// The state shortly (0.05 s) before the end of the measurements, from the last `window_s` before

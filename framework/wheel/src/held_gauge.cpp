@@ -1,0 +1,120 @@
+#include "viwo/wheel/held_gauge.hpp"
+
+#include <iterator>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "viwo/math/so3.hpp"
+
+namespace viwo {
+namespace {
+
+std::vector<int> held_by_gauge(const WheelModel& model) {
+  std::vector<int> held;
+  for (int i = 0; i < model.n_intrinsics(); ++i) {
+    if (model.description().intrinsics[static_cast<std::size_t>(i)].gauge_fixed) held.push_back(i);
+  }
+  return held;
+}
+
+/// How the intrinsics change with the frame, by yaw, x and y of O' in O, above how the mount does;
+/// directions in which the frame cannot be moved are left out.
+Eigen::MatrixXd by_frame(const WheelModel& model, const Intrinsics& x_WI,
+                         const Eigen::Ref<const Eigen::MatrixXd>& mount) {
+  constexpr double kStep = 1e-5;
+  Eigen::MatrixXd N(x_WI.size() + mount.rows(), 0);
+  for (int j = 0; j < 3; ++j) {
+    const Eigen::Vector3d g = kStep * Eigen::Vector3d::Unit(j);
+    Intrinsics ahead = x_WI, behind = x_WI;
+    if (model.model().move_frame(g, ahead) != Status::kOk ||
+        model.model().move_frame(-g, behind) != Status::kOk) {
+      continue;
+    }
+    N.conservativeResize(Eigen::NoChange, N.cols() + 1);
+    N.rightCols<1>() << (ahead - behind) / (2. * kStep), mount.col(j);
+  }
+  return N;
+}
+
+}  // namespace
+
+bool move_to_held_gauge(const WheelModel& model, const Intrinsics& held, WheelsView& truth) {
+  const std::vector<int> gauge = held_by_gauge(model);
+  if (gauge.size() != 3) return false;
+  // g = [yaw, x, y] of the new frame in the old one such that the held entries agree.
+  Eigen::Vector3d g = Eigen::Vector3d::Zero();
+  const auto residual = [&](const Eigen::Vector3d& at, Intrinsics& moved, Eigen::Vector3d& r) {
+    moved = truth.x_WI;
+    if (model.model().move_frame(at, moved) != Status::kOk) return false;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const int i = gauge[static_cast<std::size_t>(k)];
+      r[k] = moved[i] - held[i];
+    }
+    return true;
+  };
+  Intrinsics moved;
+  Eigen::Vector3d r, r_plus, r_minus;
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    if (!residual(g, moved, r)) return false;
+    if (r.norm() < 1e-13) break;
+    Eigen::Matrix3d J;
+    constexpr double kStep = 1e-6;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      Intrinsics unused;
+      const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(k);
+      if (!residual(g + step, unused, r_plus) || !residual(g - step, unused, r_minus)) return false;
+      J.col(k) = (r_plus - r_minus) / (2. * kStep);
+    }
+    g -= J.fullPivLu().solve(r);
+  }
+  if (!residual(g, moved, r) || !(r.norm() < 1e-9)) return false;
+  const Eigen::Matrix3d back = exp_so3({0., 0., -g[0]});
+  truth.x_WI = moved;
+  truth.R_ItoO = back * truth.R_ItoO;
+  truth.p_IinO = back * (truth.p_IinO - Eigen::Vector3d(g[1], g[2], 0.));
+  return true;
+}
+
+MountKnowledge known_of_body(const Eigen::Vector3d& E, const Eigen::Vector3d& sigma) {
+  MountKnowledge out{Eigen::MatrixXd::Zero(3, 3), sigma};
+  out.by_frame(2, 0) = 1.;
+  out.by_frame.topRightCorner<2, 2>() = Eigen::Rotation2Dd(E[2]).toRotationMatrix();
+  return out;
+}
+
+MountKnowledge known_of_imu(const Eigen::Vector3d& p_IinO,
+                            const Eigen::Matrix<double, 6, 1>& sigma) {
+  // (F-43)
+  MountKnowledge out{Eigen::MatrixXd::Zero(6, 3), sigma};
+  out.by_frame(2, 0) = 1.;
+  out.by_frame.middleRows<2>(3) << p_IinO.y(), -1., 0., -p_IinO.x(), 0., -1.;
+  return out;
+}
+
+Eigen::MatrixXd prior_in_held_frame(const WheelModel& model, const Intrinsics& x_WI,
+                                    const Intrinsics& sigma, const MountKnowledge& mount) {
+  const std::vector<int> held = held_by_gauge(model);
+  Eigen::MatrixXd mount_by_frame = mount.by_frame;
+  for (Eigen::Index i = 0; i < mount.sigma.size(); ++i) {
+    if (mount.sigma[i] == 0.) mount_by_frame.row(i).setZero();
+  }
+  const Eigen::MatrixXd N = by_frame(model, x_WI, mount_by_frame);
+  Eigen::VectorXd drawn(N.rows());
+  drawn << sigma, mount.sigma;
+  Eigen::MatrixXd to_held = Eigen::MatrixXd::Identity(N.rows(), N.rows());
+  if (!held.empty() && N.cols() == std::ssize(held)) {
+    const Eigen::FullPivLU<Eigen::MatrixXd> lu(N(held, Eigen::all));
+    if (lu.isInvertible()) to_held(Eigen::all, held) -= N * lu.inverse();
+  }
+  const Eigen::MatrixXd moved = to_held * drawn.asDiagonal();
+  Eigen::MatrixXd P = moved * moved.transpose();
+  for (const int i : held) {
+    P.row(i).setZero();
+    P.col(i).setZero();
+  }
+  return P;
+}
+
+}  // namespace viwo
