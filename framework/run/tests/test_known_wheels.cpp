@@ -1,9 +1,12 @@
 // What a filter knows of its wheels before it starts, where the gauge holds some of their entries:
 // starts that are drawn, robots that are drawn, and a robot whose first wheel is off (CAL-18).
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <string>
 
 #include <Eigen/Dense>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "simulated.hpp"
@@ -13,6 +16,9 @@
 
 namespace viwo {
 namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 
 const std::string kRobot =
     "{type: four_wis_wid, x_m: [0.3, -0.3, -0.3, 0.3], y_m: [0.25, 0.25, -0.25, -0.25], "
@@ -134,6 +140,55 @@ TEST(KnownWheels, AreWhereRobotsAreDrawn) {
   EXPECT_GT(drawn("held_are_exact: true").mean_square, 2.);
   // Where nothing is held each entry is known by itself.
   EXPECT_NEAR(drawn("hold_gauge: false").mean_square, 1., kChance);
+}
+
+/// The same swerve with intrinsics of a calibration.yaml, known to `sigma` but for the held ones.
+FilterSetup calibrated_swerve(const std::string& mount_in_file) {
+  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "known_wheels";
+  std::filesystem::create_directories(folder);
+  RunSetup nominal = swerve("duration_s: 0.1", "", "hold_gauge: true", "clones: 2", 1);
+  const WheelModel& model = *nominal.model;
+  std::ofstream file(folder / "calibration.yaml");
+  file << "model: four_wis_wid\ntwist: plain\nintrinsics:\n";
+  for (int i = 0; i < model.n_intrinsics(); ++i) {
+    const IntrinsicSpec& spec = model.description().intrinsics[static_cast<std::size_t>(i)];
+    file << "  " << spec.name << ": {estimate: " << spec.nominal
+         << ", sigma: " << (spec.gauge_fixed ? 0. : 1e-4) << "}\n";
+  }
+  file << mount_in_file;
+  file.close();
+  config::Node run = nominal.resolved;
+  run.set("calibration", config::Node::scalar_of((folder / "calibration.yaml").string()));
+  return *read_run(run, testing::registry(), 1).filter;
+}
+
+// The file knows how the wheels are placed in the frame that the first one holds; how the IMU is
+// placed in it a drawing does not say any better than where that wheel is.
+TEST(KnownWheels, OfAFileLeaveTheMountToTheDrawing) {
+  const FilterSetup setup = calibrated_swerve("");
+  const WheelSet& set = setup.wheels.front();
+  const int x_2 = set.model->find("x_2");
+  EXPECT_DOUBLE_EQ(set.prior.sigma_intrinsics[x_2], 1e-4);
+  EXPECT_EQ(set.prior.sigma_intrinsics[set.model->find("delta_o1")], 0.);
+  EXPECT_NEAR(set.prior.sigma_extrinsics[2], std::hypot(0.02, 0.02), 1e-6);
+  EXPECT_EQ(set.prior.sigma_extrinsics[0], 0.02);
+  const auto& entries = setup.options.filter.correlations.entries;
+  EXPECT_THAT(entries, ElementsAre("theta_ItoO_z", "p_IinO_x", "p_IinO_y"));
+}
+
+TEST(KnownWheels, OfAFileWithTheMountAreThoseOfTheFile) {
+  std::string mount = "mount:\n";
+  for (const char* name : {"theta_ItoO_x", "theta_ItoO_y", "theta_ItoO_z"}) {
+    mount += std::string("  ") + name + ": {estimate: 0.1, sigma: 0.003, unit: rad}\n";
+  }
+  for (const char* name : {"p_IinO_x", "p_IinO_y", "p_IinO_z"}) {
+    mount += std::string("  ") + name + ": {estimate: 0.1, sigma: 0.003, unit: m}\n";
+  }
+  const FilterSetup setup = calibrated_swerve(mount);
+  for (const double sigma : setup.wheels.front().prior.sigma_extrinsics) {
+    EXPECT_DOUBLE_EQ(sigma, 0.003);
+  }
+  EXPECT_THAT(setup.options.filter.correlations.entries, IsEmpty());
 }
 
 /// The largest error of a minute of a figure eight, in sigmas, of a robot whose first zero is off
