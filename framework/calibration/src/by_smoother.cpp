@@ -1,6 +1,9 @@
 #include "by_smoother.hpp"
 
 #include <algorithm>
+#include <iterator>
+
+#include <Eigen/Cholesky>
 
 #include "recording_name.hpp"
 #include "undetermined.hpp"
@@ -17,6 +20,29 @@ smoother::Smoothed smooth(const CalibrationSetup& setup, const std::vector<std::
   return smoother::smooth(inputs, *setup.plugins, progress);
 }
 
+namespace {
+
+/// Correlations of some entries; those that are not there hang together with nothing.
+Eigen::MatrixXd among(const PriorCorrelations& all, const std::vector<std::string>& names) {
+  const auto n = static_cast<Eigen::Index>(names.size());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Identity(n, n);
+  std::vector<std::ptrdiff_t> at;
+  for (const std::string& name : names) {
+    at.push_back(std::ranges::find(all.entries, name) - all.entries.begin());
+  }
+  const std::ptrdiff_t none = std::ssize(all.entries);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const std::ptrdiff_t row = at[static_cast<std::size_t>(i)];
+      const std::ptrdiff_t column = at[static_cast<std::size_t>(k)];
+      if (row < none && column < none) out(i, k) = all.matrix(row, column);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
 CalibrationEstimate estimate_of(const smoother::Smoothed& smoothed, const CalibrationSetup& setup) {
   const auto& specs = setup.recordings.front().setup.model->description().intrinsics;
   const CalibrationFile& file = smoothed.calibration;
@@ -26,10 +52,11 @@ CalibrationEstimate estimate_of(const smoother::Smoothed& smoothed, const Calibr
   out.correlations = Eigen::MatrixXd::Zero(n, n);
   out.extrinsics = setup.options.extrinsics_x_m_y_m_yaw_rad;
   std::vector<int> free;
-  std::vector<Eigen::Index> known;  // where they stand among the correlations
+  std::vector<std::string> names;
   for (std::size_t i = 0; i < specs.size(); ++i) {
     const CalibrationEntry* const entry = find(file.intrinsics, specs[i].name);
-    if (entry == nullptr) {
+    const CalibrationEntry* const before = find(smoothed.before.intrinsics, specs[i].name);
+    if (entry == nullptr || before == nullptr) {
       throw InputError(setup.name +
                        ": reference: smoother, but no update of the base takes wheels");
     }
@@ -38,23 +65,21 @@ CalibrationEstimate estimate_of(const smoother::Smoothed& smoothed, const Calibr
     out.sigma[k] = entry->sigma;
     if (!(entry->sigma > 0.)) continue;
     free.push_back(static_cast<int>(i));
-    out.prior_sigma[k] = specs[i].prior_sigma;
-    const auto& names = file.correlations.entries;
-    known.push_back(std::find(names.begin(), names.end(), entry->name) - names.begin());
+    names.push_back(entry->name);
+    out.prior_sigma[k] = before->sigma;
   }
   if (free.empty()) {
     throw InputError(setup.name + ": reference: smoother, but the base estimates no intrinsics");
   }
-  const Eigen::MatrixXd correlations = file.correlations.matrix(known, known);
+  const Eigen::MatrixXd correlations = among(file.correlations, names);
   out.correlations(free, free) = correlations;
-  Eigen::VectorXd ratio(static_cast<Eigen::Index>(free.size()));
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    ratio[static_cast<Eigen::Index>(i)] =
-        out.sigma[free[i]] / specs[static_cast<std::size_t>(free[i])].prior_sigma;
-  }
+  const Eigen::VectorXd ratio = out.sigma(free).cwiseQuotient(out.prior_sigma(free));
+  // In what was known before, which hangs together where the gauge holds entries.
+  const Eigen::MatrixXd root = among(smoothed.before.correlations, names).llt().matrixL();
+  const Eigen::MatrixXd to_white =
+      root.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd(ratio.asDiagonal()));
   out.undetermined =
-      undetermined_of(ratio.asDiagonal() * correlations * ratio.asDiagonal(),
-                      Eigen::MatrixXd::Identity(ratio.size(), ratio.size()), free, specs);
+      undetermined_of(to_white * correlations * to_white.transpose(), root, free, specs);
   out.residuals = static_cast<int>(smoothed.residuals);
   // What each factor tells is in the covariance: nothing is counted.
   out.unknowns = out.parity_directions = static_cast<int>(free.size());

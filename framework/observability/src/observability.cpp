@@ -246,6 +246,19 @@ void look_at_wheels_alone(const Watched& run, double tolerance, ObservabilityRes
   out.wheels_and_mount = null_dimension(run, columns, tolerance);
 }
 
+/// What a motion shows is asked, not what a prior says of one entry by another.
+void ask_motion_alone(Node& run) {
+  const Node exact = Node::scalar_of("true");
+  if (run.find("kinematics") != nullptr) config::set_path(run, "wheels.held_are_exact", exact);
+  const Node* const sets = run.find("wheel_sets");
+  if (sets == nullptr || !sets->is_map()) return;
+  std::vector<std::string> paths;
+  for (const auto& set : sets->entries()) {
+    paths.push_back("wheel_sets." + set.key + ".wheels.held_are_exact");
+  }
+  for (const std::string& path : paths) config::set_path(run, path, exact);
+}
+
 }  // namespace
 
 ExperimentSetup read_observability(const std::filesystem::path& path,
@@ -273,10 +286,7 @@ ObservabilityReport analyse(const ExperimentSetup& setup, PluginRegistry& plugin
       result.motion = m;
       result.variant = v;
       Node cell = configuration_of(setup, setup.variants[v], setup.recordings[m]);
-      // What a motion shows is asked, not what a prior says of one entry by another.
-      if (cell.find("kinematics") != nullptr) {
-        config::set_path(cell, "wheels.held_are_exact", Node::scalar_of("true"));
-      }
+      ask_motion_alone(cell);
       RunSetup configured =
           of_recording(setup.recordings[m], [&] { return read_run(cell, plugins); });
       Node run = configured.resolved;

@@ -20,11 +20,7 @@ constexpr std::int64_t kPathPiece_ns = 50'000'000;
 constexpr double kNoWay_m = 1e-6;
 
 Eigen::MatrixXd known_before(const WheelModel& model) {
-  Intrinsics drawn(model.n_intrinsics());
-  for (int i = 0; i < drawn.size(); ++i) {
-    drawn[i] = model.description().intrinsics[static_cast<std::size_t>(i)].prior_sigma;
-  }
-  return prior_in_held_frame(model, model.nominal(), drawn);
+  return prior_in_held_frame(model, model.nominal(), model.drawn_sigma());
 }
 
 PreintegrationOptions preintegration() {

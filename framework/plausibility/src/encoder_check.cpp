@@ -16,6 +16,7 @@ namespace {
 
 /// Symmetric; of what is held, too.
 IntrinsicMatrix root_of(const Eigen::MatrixXd& P) {
+  if (P.size() == 0) return {};
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(P);
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.).cwiseSqrt().asDiagonal() *
          eigen.eigenvectors().transpose();

@@ -60,8 +60,8 @@ class TwistCheck {
 
   void add_imu(const ImuSample& sample);
   void add_heading(const HeadingSample& sample);
-  /// `xi`: twist of O over the time of the sample; `rate_by_prior`: by what a prior sigma of each
-  /// intrinsic changes its yaw rate.
+  /// `xi`: twist of O over the time of the sample; `rate_by_prior`: by what each unit of the prior
+  /// of the intrinsics changes its yaw rate.
   void add_wheels(const EncoderSample& sample, const Twist& xi, const Intrinsics& rate_by_prior);
   /// Nothing more is to come.
   void finish() { slip_ = find_slip(turns_); }
@@ -89,6 +89,8 @@ class TwistCheck {
     Entries mean = Entries::Zero();
     Eigen::Vector2d v = Eigen::Vector2d::Zero();
   };
+
+  static constexpr double kLeastForce = 0.1;  // m/s^2, standard deviation about the mean
 
   void advance();
   void begin_anew();

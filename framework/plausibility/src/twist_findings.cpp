@@ -2,11 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 #include <numbers>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include "twist_check.hpp"
@@ -20,26 +18,12 @@ namespace {
 constexpr std::int64_t kFewestWindows = 40;  ///< 8 s
 constexpr std::int64_t kFewestUpright = 15;  ///< of them, for a verdict on gravity
 constexpr double kLeastRate = 0.05;          ///< rad/s, standard deviation about the mean
-constexpr double kLeastForce = 0.1;          ///< m/s^2, likewise
 constexpr double kAlike = 0.9;               ///< correlation
 constexpr double kVeryAlike = 0.98;
 constexpr double kFactorTolerance = 0.15;
 
 bool is_about(double value, double wanted) {
   return std::abs(value / wanted - 1.) < kFactorTolerance;
-}
-
-/// Which axis of the base each of the accelerometer's is, and its sign.
-struct Mounting {
-  Eigen::Matrix2d P;
-  const char* text;
-};
-
-/// About z of the base.
-Eigen::Matrix3d embedded(const Eigen::Matrix2d& P) {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = P.transpose();
-  return R;
 }
 
 /// The quarter or half turn that takes the axis next to `is` to z.
@@ -49,10 +33,6 @@ Eigen::Matrix3d upright(const Eigen::Vector3d& is) {
   if (i == 2 && is.z() < 0.) return Eigen::Vector3d(1., -1., -1.).asDiagonal();
   const Eigen::Vector3d axis = i == 2 ? is : std::copysign(1., is[i]) * Eigen::Vector3d::Unit(i);
   return Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-}
-
-Eigen::Matrix2d matrix(double a, double b, double c, double d) {
-  return (Eigen::Matrix2d() << a, b, c, d).finished();
 }
 
 }  // namespace
@@ -99,44 +79,6 @@ void TwistCheck::findings(const Eigen::Vector3d& up, std::int64_t zero_ns, Findi
     return;
   }
   find_turned(C, out);
-}
-
-/// Covariance of [force, what the wheels say of it].
-Eigen::Matrix4d TwistCheck::of_forces(const Eigen::MatrixXd& C) {
-  Eigen::Matrix<double, 4, kEntries> S = Eigen::Matrix<double, 4, kEntries>::Zero();
-  for (int i = 0; i < 2; ++i) {
-    S(i, kForce + i) = 1.;
-    S(2 + i, kChange + i) = S(2 + i, kTurn + i) = 1.;
-  }
-  return S * C * S.transpose();
-}
-
-/// Where it hardly turns, wheels still accelerate with the IMU, or opposite to it, or across.
-void TwistCheck::find_turned(const Eigen::MatrixXd& C, Findings& out) const {
-  if (gyro_is_ != Gyro::kMounted) return;
-  const Eigen::Matrix4d M = of_forces(C);
-  const double force = M(0, 0) + M(1, 1), wheels = M(2, 2) + M(3, 3);
-  // Slopes are in the force, too, but have no direction: of 40 windows and more it is beyond
-  // chance.
-  constexpr double kLeast = kLeastForce * kLeastForce, kClear = 0.7;
-  if (std::min(force, wheels) < kLeast) return;
-  const double size = std::sqrt(force * wheels);
-  const double along = (M(0, 2) + M(1, 3)) / size, across = (M(1, 2) - M(0, 3)) / size;
-  if (along < -kClear) {
-    out.push_back({imu_ + " axes", wheels_ + ": accelerate opposite to " + imu_ + " (correlation " +
-                                       significant(along, 2) +
-                                       "): sign of all drives, or the IMU is turned: add 3.1416 to "
-                                       "the yaw of wheels.rpy_ItoO_rad"});
-  } else if (std::abs(across) > kClear) {
-    const bool is_left = across > 0.;
-    out.push_back({imu_ + " axes",
-                   imu_ + ": accelerates to the " + (is_left ? "left" : "right") + " where " +
-                       wheels_ + " accelerate forwards (correlation " +
-                       significant(std::abs(across), 2) + "): the IMU is turned: add " +
-                       (is_left ? "-" : "") + "1.5708 to the yaw of wheels.rpy_ItoO_rad",
-                   false,
-                   {turned_by(embedded(is_left ? matrix(0, -1, 1, 0) : matrix(0, 1, -1, 0)))}});
-  }
 }
 
 /// The rates are alike but for a factor.
@@ -285,73 +227,6 @@ void TwistCheck::find_reversed(const Eigen::MatrixXd& C, Findings& out) const {
   if (is_clear) finding.text = texts[order[0]];
   if (is_clear && order[0] == 1) finding.remedies = {drives_times(-1.)};
   out.push_back(std::move(finding));
-}
-
-/// The rates agree: so should the accelerometer and what the wheels' velocity takes.
-void TwistCheck::find_axes(const Eigen::MatrixXd& C, Findings& out) const {
-  if (gyro_is_ != Gyro::kMounted) return;
-  static const std::array<Mounting, 8> kMountings = {{
-      {matrix(1, 0, 0, 1), ""},
-      {matrix(-1, 0, 0, -1),
-       "the IMU is turned: add 3.1416 to the yaw of wheels.rpy_ItoO_rad, or the base's x points "
-       "backwards"},
-      {matrix(0, 1, -1, 0), "the IMU is turned: add 1.5708 to the yaw of wheels.rpy_ItoO_rad"},
-      {matrix(0, -1, 1, 0), "the IMU is turned: add -1.5708 to the yaw of wheels.rpy_ItoO_rad"},
-      {matrix(0, 1, 1, 0), "axes exchanged; determinant -1: not a rotation"},
-      {matrix(0, -1, -1, 0), "axes exchanged and reversed; determinant -1: not a rotation"},
-      // From here on one axis alone.
-      {matrix(-1, 0, 0, 1), "sign of the accelerometer's x"},
-      {matrix(1, 0, 0, -1), "sign of the accelerometer's y, or of the base's"},
-  }};
-  constexpr std::size_t kFirstOfOneAxis = 6;
-  const Eigen::Matrix4d M = of_forces(C);
-  const double all = M(0, 0) + M(1, 1);
-  std::array<double, 8> left{};
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    Eigen::Matrix<double, 2, 4> h;
-    h << Eigen::Matrix2d::Identity(), -kMountings[i].P;
-    left[i] = (h * M * h.transpose()).trace();
-  }
-  const std::size_t best =
-      static_cast<std::size_t>(std::min_element(left.begin(), left.end()) - left.begin());
-  double second = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    if (i != best) second = std::min(second, left[i]);
-  }
-  const double least = kLeastForce * kLeastForce;
-  if (best == 0 || M(2, 2) < least || M(3, 3) < least || left[best] > 0.7 * all) return;
-  const auto followed = [&](int axis) { return kMountings[best].P(axis, 0) != 0. ? 0 : 1; };
-  const auto correlation = [&](int axis) {
-    const int other = 2 + followed(axis);
-    return M(axis, other) / std::sqrt(M(axis, axis) * M(other, other));
-  };
-  if (best < kFirstOfOneAxis) {
-    if (left[0] < all || second - left[best] < 0.1 * all) return;
-  } else {
-    // Each axis by itself: one that is reversed may be the one along which it hardly accelerates.
-    // On hills that slow it down the force is opposite, too, but as many times as large as part of
-    // the slope is lost.
-    constexpr double kFollows = 0.5, kMostTimes = 1.5;
-    for (const int axis : {0, 1}) {
-      const double times =
-          M(axis, 2 + axis) / M(2 + axis, 2 + axis) * kMountings[best].P(axis, axis);
-      if (std::abs(correlation(axis)) < kFollows || times > kMostTimes || times < 1. / kMostTimes) {
-        return;
-      }
-    }
-    if (second - left[best] < std::min(M(0, 0), M(1, 1))) return;
-  }
-  const auto follows = [&](int axis) {
-    return std::string(1, "xy"[axis]) +
-           (axis == 0 ? " of the accelerometer follows " : " follows ") + "xy"[followed(axis)] +
-           " of the wheels (correlation " + significant(correlation(axis), 2) + ")";
-  };
-  out.push_back({imu_ + " axes",
-                 imu_ + ": in the base's frame " + follows(0) + ", " + follows(1) + ": " +
-                     kMountings[best].text,
-                 false,
-                 best >= 1 && best <= 3 ? std::vector{turned_by(embedded(kMountings[best].P))}
-                                        : std::vector<Remedy>{}});
 }
 
 /// What is left of the squared differences, for each lag, `information` being what is known of the

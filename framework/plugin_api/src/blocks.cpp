@@ -120,8 +120,14 @@ std::array<BlockSpec, 3> wheels_blocks(const WheelsPrior& prior) {
   add_intrinsics(intrinsics, prefix, prior, prior.wheels.x_WI, prior.sigma_intrinsics);
   if (prior.intrinsics_walk > 0.) {
     intrinsics.process = Process::kRandomWalk;
-    for (BlockEntry& entry : intrinsics.entries) {
-      entry.process_sigma = prior.intrinsics_walk * entry.sigma;
+    ModelDescription description;
+    if (prior.wheels.model != nullptr) prior.wheels.model->describe(description);
+    for (std::size_t i = 0; i < intrinsics.entries.size(); ++i) {
+      BlockEntry& entry = intrinsics.entries[i];
+      // Of the drawing, whatever is known of the entry since.
+      const bool is_described = i < description.intrinsics.size();
+      const double sigma = is_described ? description.intrinsics[i].prior_sigma : entry.sigma;
+      if (entry.sigma > 0.) entry.process_sigma = prior.intrinsics_walk * sigma;
     }
   }
   return {extrinsics, clock, intrinsics};

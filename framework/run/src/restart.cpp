@@ -85,9 +85,17 @@ Continuation HealthyState::after_failure() {
   };
   if (const State* state = newest_before(kCalibrationAgeS)) {
     last_.blocks.clear();
+    // What is known of blocks of a group before hangs together: they are kept together.
+    const auto is_kept_with_others = [&](std::size_t i) {
+      for (std::size_t k = 0; k < declared_.size(); ++k) {
+        const bool is_tied =
+            k == i || (!declared_[i].group.empty() && declared_[k].group == declared_[i].group);
+        if (is_tied && !is_kept(k, state->blocks[k])) return false;
+      }
+      return true;
+    };
     for (std::size_t i = 0; i < declared_.size(); ++i) {
-      if (is_kept(i, state->blocks[i]))
-        last_.blocks.emplace_back(declared_[i].name, state->blocks[i]);
+      if (is_kept_with_others(i)) last_.blocks.emplace_back(declared_[i].name, state->blocks[i]);
     }
   }
   if (const State* state = newest_before(kPlaceAgeS)) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include <Eigen/Dense>
@@ -13,6 +14,7 @@
 #include "viwo/math/stamp.hpp"
 #include "viwo/plausibility/plausibility.hpp"
 #include "viwo/run/warnings.hpp"
+#include "viwo/wheel/held_gauge.hpp"
 
 namespace viwo {
 
@@ -102,6 +104,45 @@ class PlanarNees {
   int count_ = 0;
 };
 
+/// Intrinsics of the drawing, in whose frame nothing is held; else they are those of a file.
+bool is_as_drawn(const RunSetup& setup) {
+  return setup.x_WI == setup.model->nominal() && setup.sigma == setup.model->prior_sigma();
+}
+
+/// In the frame of the intrinsics; nothing if one of them is not known.
+std::optional<Intrinsics> true_intrinsics(const RunSetup& setup, const RunData& data) {
+  WheelsView truth;
+  truth.x_WI = setup.x_WI;
+  for (int i = 0; i < setup.model->n_intrinsics(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const auto known = data.calibration.find(setup.model->description().intrinsics[k].name);
+    if (known == data.calibration.end()) return std::nullopt;
+    truth.x_WI[i] = known->second;
+  }
+  if (!is_as_drawn(setup)) move_to_held_gauge(*setup.model, setup.x_WI, truth);
+  return truth.x_WI;
+}
+
+/// Nothing is estimated while running here: the same at the start and at the end.
+std::vector<CalibrationTrack> constant_tracks(const RunSetup& setup, const Intrinsics& sigma,
+                                              const RunData& data) {
+  const std::optional<Intrinsics> truth = true_intrinsics(setup, data);
+  std::vector<CalibrationTrack> tracks;
+  for (int i = 0; i < setup.model->n_intrinsics(); ++i) {
+    CalibrationTrack& track = tracks.emplace_back();
+    const IntrinsicSpec& spec = setup.model->description().intrinsics[static_cast<std::size_t>(i)];
+    track.name = spec.name;
+    track.unit = spec.unit;
+    track.estimate.assign(2, setup.x_WI[i]);
+    track.sigma.assign(2, sigma[i]);
+    if (truth) {
+      track.truth = (*truth)[i];
+      track.final_error = setup.x_WI[i] - (*truth)[i];
+    }
+  }
+  return tracks;
+}
+
 /// What the samples alone say against the estimate.
 void look_at_samples(const RunSetup& setup, const RunData& data, RunResult& result) {
   const std::int64_t begin_ns = data.wheels().front().begin_ns;
@@ -129,6 +170,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   const Eigen::Vector3d B_start = start ? planar(*start) : Eigen::Vector3d::Zero();
   const Eigen::Vector3d O_start = compose(B_start, O_in_B);
 
+  const Intrinsics sigma = is_as_drawn(setup) ? setup.model->drawn_sigma() : setup.sigma;
   const auto wheels = data.wheels();
   Preintegrator preintegrator(setup.model, setup.preintegration);
   preintegrator.set_intrinsics(setup.x_WI);
@@ -161,7 +203,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
     const Eigen::Vector3d O_now = compose(O_start, result.total.g);
     result.estimate.push_back(stamped(stamps[k] + offset_ns, compose(O_now, B_in_O)));
     if (const auto truth = reference_at(stamps[k]); truth && start) {
-      const auto scaled = (result.total.J_g_WI * setup.sigma.asDiagonal()).eval();
+      const auto scaled = (result.total.J_g_WI * sigma.asDiagonal()).eval();
       const Eigen::Matrix3d P = result.total.P_g + scaled * scaled.transpose();
       nees.add(result.total.g, between(O_start, compose(planar(*truth), O_in_B)), P);
     }
@@ -173,21 +215,8 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   for (const auto& [t_s, ms] : result.epoch_ms) spent_ms.push_back(ms);
   result.total_ms = stage_time(spent_ms);
   result.stages = {{"preintegration", result.total_ms}};
-  // Nothing is estimated while running here: the same at the start and at the end.
   result.epoch_t_s = {0., result.duration_s};
-  for (int i = 0; i < setup.model->n_intrinsics(); ++i) {
-    CalibrationTrack track;
-    const IntrinsicSpec& spec = setup.model->description().intrinsics[static_cast<std::size_t>(i)];
-    track.name = spec.name;
-    track.unit = spec.unit;
-    track.estimate.assign(2, setup.x_WI[i]);
-    track.sigma.assign(2, setup.sigma[i]);
-    if (const auto truth = data.calibration.find(track.name); truth != data.calibration.end()) {
-      track.truth = truth->second;
-      track.final_error = setup.x_WI[i] - truth->second;
-    }
-    result.calibration.push_back(std::move(track));
-  }
+  result.calibration = constant_tracks(setup, sigma, data);
   if (result.status == RunStatus::kOk && result.total.rejected >= result.total.samples) {
     result.status = RunStatus::kFailed;
     result.cause = "none of the encoder samples could be used";

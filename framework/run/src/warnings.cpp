@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"

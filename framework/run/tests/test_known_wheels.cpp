@@ -26,15 +26,18 @@ const std::string kRobot =
     "prior_sigma_steer_offset_rad: 0.02, sigma_drive_rad_per_s: 0.02, sigma_steer_rad: 0.002, "
     "sigma_lateral_m_per_s: 0.003";
 
+const std::string kMountSigmas =
+    ", sigma_p_IinO_m: [0.02, 0.02, 0.02], sigma_R_ItoO_rad: [0.02, 0.02, 0.02]";
+
 /// The IMU sits off O and is turned.
 RunSetup swerve(const std::string& simulator, const std::string& robot, const std::string& wheels,
-                const std::string& estimator, std::uint64_t seed) {
+                const std::string& estimator, std::uint64_t seed,
+                const std::string& sigmas = kMountSigmas) {
   const std::string mount = "p_IinO_m: [0.2, -0.1, 0.15], rpy_ItoO_rad: [0, 0, 0.7], ";
   const std::string text =
       "sensors: {simulator0: {type: simulator, features: 0, ground: flat, " + mount + simulator +
       ", robot: " + kRobot + robot + "}}}\nkinematics: " + kRobot + "}\nwheels: {" + mount +
-      wheels + ", sigma_p_IinO_m: [0.02, 0.02, 0.02], sigma_R_ItoO_rad: [0.02, 0.02, 0.02]}\n" +
-      "estimator: {start: reference, max_epoch_s: 0.1, " + estimator +
+      wheels + sigmas + "}\nestimator: {start: reference, max_epoch_s: 0.1, " + estimator +
       "}\nupdates: {wheel_odometry: {}, wheel_parity: {}, planar_motion: {}}\n";
   return read_run(config::parse(text, "run.yaml"), testing::registry(), seed);
 }
@@ -57,6 +60,29 @@ TEST(HeldGauge, BringsATruthOfAnotherFrameIntoTheOneThatTheEstimateHolds) {
   EXPECT_LT((there.x_WI - here.x_WI).norm(), 1e-9);
   EXPECT_LT((there.R_ItoO - here.R_ItoO).norm(), 1e-9);
   EXPECT_LT((there.p_IinO - here.p_IinO).norm(), 1e-9);
+}
+
+// Of a skid-steered base two entries place O, which cannot be turned about itself.
+TEST(HeldGauge, MovesABaseOfWhichTwoEntriesPlaceIt) {
+  const RunSetup setup = read_run(
+      config::parse("sensors: {simulator0: {type: simulator, features: 0, duration_s: 0.1, "
+                    "robot: &robot {type: skid_steer, radius_left_m: 0.1, radius_right_m: 0.1, "
+                    "y_icr_left_m: 0.31, y_icr_right_m: -0.28}}}\nkinematics: *robot\n",
+                    "run.yaml"),
+      testing::registry(), 1);
+  const WheelModel& model = *setup.model;
+  WheelsView here;
+  here.x_WI = model.nominal();
+  here.p_IinO = {0.1, -0.05, 0.2};
+  WheelsView there = here;
+  there.x_WI[model.find("x_icr")] += 0.03;
+  there.x_WI[model.find("y_icr_left")] += 0.02;
+  ASSERT_TRUE(move_to_held_gauge(model, here.x_WI, there));
+  EXPECT_EQ(there.x_WI[model.find("x_icr")], here.x_WI[model.find("x_icr")]);
+  EXPECT_NEAR(there.x_WI[model.find("y_icr_right")], here.x_WI[model.find("y_icr_right")] - 0.02,
+              1e-9);
+  EXPECT_LT((there.p_IinO - here.p_IinO + Eigen::Vector3d(0.03, 0.02, 0.)).norm(), 1e-9);
+  EXPECT_EQ(there.R_ItoO, here.R_ItoO);
 }
 
 /// Errors of the start, [x_WI, theta_ItoO, p_IinO].
@@ -122,6 +148,17 @@ TEST(KnownWheels, AreWhereStartsAreDrawn) {
     EXPECT_NEAR(found.mean_square, 1., kChance) << wheels;
     EXPECT_LT(found.held, 1e-9) << wheels;
   }
+}
+
+TEST(KnownWheels, LeaveAnAxisThatIsHeldWhereItIs) {
+  const Consistency found = consistency_of(
+      [&](std::uint64_t seed) {
+        return swerve("duration_s: 0.1", "", "held_are_exact: false", "calibration_error_scale: 1",
+                      seed, ", sigma_p_IinO_m: [0, 0.02, 0.02], sigma_R_ItoO_rad: [0.02, 0.02, 0]");
+      },
+      kSeeds);
+  EXPECT_LT(found.held, 1e-9);
+  EXPECT_NEAR(found.mean_square, 1., 1.1 * kChance);  // 17 entries
 }
 
 TEST(KnownWheels, AreWhereRobotsAreDrawn) {

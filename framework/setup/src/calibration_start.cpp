@@ -52,6 +52,7 @@ bool CalibrationStart::take(const CalibrationFile::Entries& section, const Block
     // What was held tells nothing about itself; what is to be held stays held.
     if (sigma[k] > 0. && entry->sigma > 0.) sigma[k] = entry->sigma;
     taken_.insert(entry->name);
+    if (entry->sigma > 0.) known_.insert(entry->name);
   }
   if (known == nullptr) return false;
   for (const std::string& name : missing) {
@@ -111,6 +112,7 @@ void CalibrationStart::take_intrinsics(const std::string& set, const WheelModel&
     x_WI[k] = entry->estimate;
     if (entry->sigma > 0.) sigma[k] = entry->sigma;
     taken_.insert(entry->name);
+    if (entry->sigma > 0.) known_.insert(entry->name);
   }
 }
 

@@ -30,7 +30,8 @@ class CalibrationStart {
   /// Of what was taken.
   PriorCorrelations correlations() const;
   bool took_anything() const { return !taken_.empty(); }
-  bool took(const std::string& entry) const { return taken_.contains(entry); }
+  /// Whether an entry was taken and the file says how well it is known.
+  bool knows(const std::string& entry) const { return known_.contains(entry); }
   bool took_cameras() const { return taken_.contains("cam0.fx"); }
 
  private:
@@ -40,7 +41,7 @@ class CalibrationStart {
 
   CalibrationFile file_;
   bool only_wheels_;
-  std::set<std::string> taken_;
+  std::set<std::string> taken_, known_;
 };
 
 /// The calibration.yaml that a run configuration names at its top level or in `kinematics`; nothing

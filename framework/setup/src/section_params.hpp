@@ -193,8 +193,8 @@ struct EstimatorParams {
        .help = "simulation: start wrong by this times a draw from the prior (start: reference)"});
     b(VIWO_PARAM(calibration_error_scale),
       {.min = 0.,
-       .help = "simulation: every calibration parameter that the gauge does not hold starts "
-               "wrong by this times a draw from its prior"});
+       .help = "simulation: calibration starts wrong by this times a draw from its prior, where "
+               "the gauge holds entries moved to what they are held at"});
     b(VIWO_PARAM(calibration_error),
       {{"gaussian", Draw::kGaussian}, {"sign", Draw::kSign}, {"plus", Draw::kPlus}},
       {.help = "what that draw is: gaussian, one prior sigma up or down by chance, or one "

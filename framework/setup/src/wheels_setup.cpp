@@ -1,6 +1,7 @@
 #include "wheels_setup.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -30,7 +31,9 @@ Drawn hold_gauge(const WheelsParams& p, const CalibrationStart* start, WheelSet&
   const std::vector<IntrinsicSpec>& specs = set.model->description().intrinsics;
   const auto [mount, clock, intrinsics] = wheels_blocks(set.prior);
   const auto is_from_file = [&](const BlockSpec& block) {
-    return start != nullptr && !block.entries.empty() && start->took(block.entries[0].name);
+    return start != nullptr && std::ranges::any_of(block.entries, [&](const BlockEntry& e) {
+             return start->knows(e.name);
+           });
   };
   Drawn out{!is_from_file(intrinsics), !is_from_file(mount), Intrinsics::Zero(std::ssize(specs))};
   for (std::size_t k = 0; k < specs.size(); ++k) {
@@ -69,9 +72,10 @@ void make_wrong(WrongStart wrong, const Drawn& drawn, WheelSet& set) {
   there.x_WI += is_held.select(by, 0.);
   const bool has_moved = is_held.any() && move_to_held_gauge(*set.model, wheels.x_WI, there);
   if (!has_moved || !drawn.intrinsics) there.x_WI = unmoved.x_WI;
-  if (!has_moved || !drawn.mount) {
-    there.R_ItoO = unmoved.R_ItoO;
-    there.p_IinO = unmoved.p_IinO;
+  const auto& held = prior.sigma_extrinsics;  // zero: an axis that stays as it is
+  if (!has_moved || !drawn.mount || held[2] == 0.) there.R_ItoO = unmoved.R_ItoO;
+  for (int i = 0; i < 3; ++i) {
+    if (!has_moved || !drawn.mount || held[3 + i] == 0.) there.p_IinO[i] = unmoved.p_IinO[i];
   }
   there.x_WI += is_held.select(0., by);
   wheels = there;

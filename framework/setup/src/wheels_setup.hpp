@@ -1,6 +1,8 @@
 // The sections `wheels` and `wheel_sets` of a run configuration.
 #pragma once
 
+#include <span>
+
 #include "section_params.hpp"
 #include "viwo/setup/filter_setup.hpp"
 #include "wrong_start.hpp"

@@ -265,10 +265,14 @@ Intrinsics perturbed_intrinsics(const ModelDescription& description, double scal
                                 std::uint64_t seed) {
   RandomStream stream(seed, Stream::kIntrinsics);
   Intrinsics x = nominal_intrinsics(description);
+  const auto held = std::ranges::count_if(description.intrinsics, &IntrinsicSpec::gauge_fixed);
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const IntrinsicSpec& spec = description.intrinsics[static_cast<std::size_t>(i)];
-    // Also where the gauge will hold an entry: a robot does not know of that.
-    x[i] += scale * spec.prior_sigma * stream.gaussian();
+    const double draw = stream.gaussian();  // of all, so that each keeps its draw
+    // Also where the gauge will hold an entry: a robot does not know of that. A base that cannot
+    // turn O about itself does not move sideways, and then O is where it turns.
+    constexpr std::ptrdiff_t kPlacesAll = 3;
+    if (!spec.gauge_fixed || held == kPlacesAll) x[i] += scale * spec.prior_sigma * draw;
   }
   return x;
 }

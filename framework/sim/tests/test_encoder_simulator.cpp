@@ -1,4 +1,5 @@
 // Simulated encoders: rows satisfied, noise as described, streams apart, faults where asked.
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -239,24 +240,35 @@ TEST(EncoderSimulator, SaysWhichMotionABaseCannotFollow) {
             "0 s)");
 }
 
-TEST(PerturbedIntrinsics, AreDrawnWithThePriorSigmaAroundTheNominalValues) {
-  const ModelDescription description = description_of(TwoWheels());
+/// Mean and mean square, in prior sigmas.
+std::array<Eigen::Vector4d, 2> moments_of(const ModelDescription& description, int n) {
   Eigen::Vector4d sum = Eigen::Vector4d::Zero(), sum2 = sum;
-  const int n = 20'000;
   for (int seed = 0; seed < n; ++seed) {
     const Intrinsics x = perturbed_intrinsics(description, 2., static_cast<std::uint64_t>(seed));
     for (int i = 0; i < 4; ++i) {
       const IntrinsicSpec& spec = description.intrinsics[static_cast<std::size_t>(i)];
       const double e = (x[i] - spec.nominal) / (2. * spec.prior_sigma);
-      sum[i] += e;
-      sum2[i] += e * e;
+      sum[i] += e / n;
+      sum2[i] += e * e / n;
     }
   }
-  for (int i = 0; i < 4; ++i) {  // also what the gauge holds
-    EXPECT_NEAR(sum[i] / n, 0., 4. / std::sqrt(n)) << i;
-    EXPECT_NEAR(sum2[i] / n, 1., 4. * std::sqrt(2. / n)) << i;
-  }
+  return {sum, sum2};
+}
+
+TEST(PerturbedIntrinsics, AreDrawnWithThePriorSigmaAroundTheNominalValues) {
+  ModelDescription description = description_of(TwoWheels());
+  const int n = 20'000;
+  const auto is_drawn = [&](int i) {
+    const auto [mean, square] = moments_of(description, n);
+    EXPECT_NEAR(mean[i], 0., 4. / std::sqrt(n)) << i;
+    EXPECT_NEAR(square[i], 1., 4. * std::sqrt(2. / n)) << i;
+  };
+  for (const int i : {0, 1, 3}) is_drawn(i);
+  EXPECT_EQ(moments_of(description, n)[1][2], 0.);  // held alone: it is where the base turns
   EXPECT_EQ(perturbed_intrinsics(description, 0., 5), nominal_intrinsics(description));
+  // Three place all of O, and a robot knows nothing of that.
+  for (const std::size_t i : {0u, 1u, 2u}) description.intrinsics[i].gauge_fixed = true;
+  for (const int i : {0, 1, 2, 3}) is_drawn(i);
 }
 
 TEST(SolveInverse, LeavesTheSampleAloneWhereThereIsNoSolution) {

@@ -274,6 +274,13 @@ void move(Recording& recording, const VectorXd& dx_shared, double part) {
   }
 }
 
+/// The values of all blocks as they were declared, and how they hung together.
+CalibrationFile known_before(const Recording& first, const RunSetup& setup) {
+  FilterOptions options;
+  options.correlations = setup.filter->options.filter.correlations;
+  return calibration_file_of(Filter(options, first.filter->prior().specs));
+}
+
 /// The values of all blocks with the covariance of the shared ones, as a filter has them that
 /// begins with what was found.
 CalibrationFile calibration_of(const Recording& first, const Shared& shared,
@@ -300,7 +307,7 @@ CalibrationFile calibration_of(const Recording& first, const Shared& shared,
   options.correlations.matrix =
       sigma.cwiseInverse().asDiagonal() * covariance * sigma.cwiseInverse().asDiagonal();
   CalibrationFile file = calibration_file_of(Filter(options, std::move(specs)));
-  const CalibrationFile nominal = calibration_file_of(Filter({}, prior.specs));
+  const CalibrationFile nominal = known_before(first, setup);
   for (auto section : {&CalibrationFile::intrinsics, &CalibrationFile::mount,
                        &CalibrationFile::clock, &CalibrationFile::cameras}) {
     for (std::size_t i = 0; i < (file.*section).size(); ++i) {
@@ -355,8 +362,9 @@ Smoothed smooth(std::span<const Input> inputs, PluginRegistry& plugins, WorkProg
     out.residuals += recording.factors->rows();
     out.weighed_down += recording.factors->weighed_down();
   }
-  out.calibration =
-      calibration_of(recordings.front(), shared, covariance, set_up(recordings.front(), plugins));
+  const RunSetup setup = set_up(recordings.front(), plugins);
+  out.calibration = calibration_of(recordings.front(), shared, covariance, setup);
+  out.before = known_before(recordings.front(), setup);
   return out;
 }
 

@@ -42,34 +42,41 @@ Eigen::MatrixXd by_frame(const WheelModel& model, const Intrinsics& x_WI,
 
 bool move_to_held_gauge(const WheelModel& model, const Intrinsics& held, WheelsView& truth) {
   const std::vector<int> gauge = held_by_gauge(model);
-  if (gauge.size() != 3) return false;
+  const auto n = static_cast<Eigen::Index>(gauge.size());
+  constexpr double kStep = 1e-6;
+  std::vector<int> moves;
+  for (int j = 0; j < 3; ++j) {
+    Intrinsics unused = truth.x_WI;
+    const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(j);
+    if (model.model().move_frame(step, unused) == Status::kOk) moves.push_back(j);
+  }
+  if (gauge.empty() || moves.size() != gauge.size()) return false;
   // g = [yaw, x, y] of the new frame in the old one such that the held entries agree.
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
-  const auto residual = [&](const Eigen::Vector3d& at, Intrinsics& moved, Eigen::Vector3d& r) {
+  using Few = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
+  const auto residual = [&](const Eigen::Vector3d& at, Intrinsics& moved, Few& r) {
     moved = truth.x_WI;
     if (model.model().move_frame(at, moved) != Status::kOk) return false;
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      const int i = gauge[static_cast<std::size_t>(k)];
-      r[k] = moved[i] - held[i];
-    }
+    r = moved(gauge) - held(gauge);
     return true;
   };
   Intrinsics moved;
-  Eigen::Vector3d r, r_plus, r_minus;
+  Few r, r_plus, r_minus;
   for (int iteration = 0; iteration < 20; ++iteration) {
     if (!residual(g, moved, r)) return false;
     if (r.norm() < 1e-13) break;
-    Eigen::Matrix3d J;
-    constexpr double kStep = 1e-6;
-    for (Eigen::Index k = 0; k < 3; ++k) {
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> J(n, n);
+    for (Eigen::Index k = 0; k < n; ++k) {
       Intrinsics unused;
-      const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(k);
+      const Eigen::Vector3d step =
+          kStep * Eigen::Vector3d::Unit(moves[static_cast<std::size_t>(k)]);
       if (!residual(g + step, unused, r_plus) || !residual(g - step, unused, r_minus)) return false;
       J.col(k) = (r_plus - r_minus) / (2. * kStep);
     }
-    g -= J.fullPivLu().solve(r);
+    g(moves) -= J.fullPivLu().solve(r);
   }
   if (!residual(g, moved, r) || !(r.norm() < 1e-9)) return false;
+  for (const int i : gauge) moved[i] = held[i];  // not off by rounding
   const Eigen::Matrix3d back = exp_so3({0., 0., -g[0]});
   truth.x_WI = moved;
   truth.R_ItoO = back * truth.R_ItoO;

@@ -49,10 +49,17 @@ WheelModel::WheelModel(std::shared_ptr<const KinematicModel> model) : model_(std
 Intrinsics WheelModel::nominal() const { return nominal_intrinsics(description_); }
 
 Intrinsics WheelModel::prior_sigma() const {
+  Intrinsics sigma = drawn_sigma();
+  for (int i = 0; i < n_intrinsics(); ++i) {
+    if (description_.intrinsics[static_cast<std::size_t>(i)].gauge_fixed) sigma[i] = 0.;
+  }
+  return sigma;
+}
+
+Intrinsics WheelModel::drawn_sigma() const {
   Intrinsics sigma(n_intrinsics());
   for (int i = 0; i < n_intrinsics(); ++i) {
-    const IntrinsicSpec& spec = description_.intrinsics[static_cast<std::size_t>(i)];
-    sigma[i] = spec.gauge_fixed ? 0. : spec.prior_sigma;
+    sigma[i] = description_.intrinsics[static_cast<std::size_t>(i)].prior_sigma;
   }
   return sigma;
 }

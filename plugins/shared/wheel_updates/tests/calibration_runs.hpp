@@ -50,6 +50,56 @@ inline double nees(const Eigen::VectorXd& error, const Eigen::MatrixXd& P,
   return scaled.dot(correlation.ldlt().solve(scaled)) / static_cast<double>(n);
 }
 
+/// Calibration off by draws of its prior.
+inline void start_wrong(const CalibrationRuns& options, const Intrinsics& sigma,
+                        std::mt19937_64& rng, SmallFilter& filter) {
+  const int m0 = filter.column(filter.wheels.extrinsics);
+  Eigen::VectorXd prior = Eigen::VectorXd::Zero(filter.P.rows());
+  if (options.extrinsics) {
+    prior.segment<3>(m0).setConstant(0.01);
+    prior.segment<3>(m0 + 3).setConstant(0.1);
+    prior[m0 + 6] = 0.01;
+  }
+  prior.tail(sigma.size()) = sigma;
+  filter.P = prior.cwiseAbs2().asDiagonal();
+  filter.plus(-prior.cwiseProduct(gaussian(static_cast<int>(prior.size()), rng)));
+}
+
+/// Poses as an independent source tells them, new at each epoch.
+inline void give_poses(const CalibrationRuns& options, std::mt19937_64& rng, SmallFilter& filter) {
+  for (CloneState& clone : filter.clones) {
+    const int c = clone.column;
+    filter.P.middleRows(c, 6).setZero();
+    filter.P.middleCols(c, 6).setZero();
+    const Eigen::VectorXd noise = gaussian(6, rng);
+    for (int i = 0; i < 6; ++i) {
+      const double s = i < 3 ? options.pose_sigma_rad : options.pose_sigma_m;
+      filter.P(c + i, c + i) = s * s;
+    }
+    clone.R_GtoI = exp_so3(options.pose_sigma_rad * noise.head<3>()) * clone.R_GtoI;
+    clone.p_IinG -= options.pose_sigma_m * noise.tail<3>();
+    clone.R_GtoI_fej = clone.R_GtoI;
+    clone.p_IinG_fej = clone.p_IinG;
+  }
+}
+
+/// Of the end of a seed.
+inline void add_errors(const CalibrationRuns& options, const Intrinsics& sigma,
+                       const Eigen::VectorXd& error, SmallFilter& filter,
+                       CalibrationResult& result) {
+  const int m0 = filter.column(filter.wheels.extrinsics);
+  std::vector<int> intrinsics;
+  for (int i = 0; i < sigma.size(); ++i) {
+    if (sigma[i] == 0.) continue;
+    intrinsics.push_back(m0 + 7 + i);
+    result.rms[i] += std::pow(error[m0 + 7 + i] / sigma[i], 2) / options.seeds;
+  }
+  result.nees_intrinsics += nees(error, filter.P, intrinsics) / options.seeds;
+  if (!options.extrinsics) return;
+  result.nees_mount +=
+      nees(error, filter.P, {m0, m0 + 1, m0 + 2, m0 + 3, m0 + 4, m0 + 5, m0 + 6}) / options.seeds;
+}
+
 inline CalibrationResult run_calibration(const CalibrationRuns& options) {
   constexpr double kTimeOffset = 0.02;
   constexpr std::int64_t kEpochNs = 100'000'000;
@@ -74,15 +124,7 @@ inline CalibrationResult run_calibration(const CalibrationRuns& options) {
     filter.clones.resize(2);
     filter.layout();
     const int m0 = filter.column(filter.wheels.extrinsics);
-    Eigen::VectorXd prior = Eigen::VectorXd::Zero(filter.P.rows());
-    if (options.extrinsics) {
-      prior.segment<3>(m0).setConstant(0.01);
-      prior.segment<3>(m0 + 3).setConstant(0.1);
-      prior[m0 + 6] = 0.01;
-    }
-    prior.tail(n) = sigma;
-    filter.P = prior.cwiseAbs2().asDiagonal();
-    filter.plus(-prior.cwiseProduct(gaussian(static_cast<int>(prior.size()), rng)));
+    start_wrong(options, sigma, rng, filter);
 
     std::vector<std::shared_ptr<Update>> updates;
     for (const std::string& yaml : options.updates) {
@@ -102,21 +144,7 @@ inline CalibrationResult run_calibration(const CalibrationRuns& options) {
       filter.clones[1] = now;
       before = now;
       filter.layout();
-      // Poses as an independent source tells them, new at each epoch.
-      for (CloneState& clone : filter.clones) {
-        const int c = clone.column;
-        filter.P.middleRows(c, 6).setZero();
-        filter.P.middleCols(c, 6).setZero();
-        const Eigen::VectorXd noise = gaussian(6, rng);
-        for (int i = 0; i < 6; ++i) {
-          const double s = i < 3 ? options.pose_sigma_rad : options.pose_sigma_m;
-          filter.P(c + i, c + i) = s * s;
-        }
-        clone.R_GtoI = exp_so3(options.pose_sigma_rad * noise.head<3>()) * clone.R_GtoI;
-        clone.p_IinG -= options.pose_sigma_m * noise.tail<3>();
-        clone.R_GtoI_fej = clone.R_GtoI;
-        clone.p_IinG_fej = clone.p_IinG;
-      }
+      give_poses(options, rng, filter);
       const auto first = std::max<std::int64_t>(0, 10 * (k - 4));
       const auto count =
           std::min<std::int64_t>(70, static_cast<std::int64_t>(encoders.size()) - first);
@@ -148,18 +176,7 @@ inline CalibrationResult run_calibration(const CalibrationRuns& options) {
     error.segment<3>(m0 + 3) = drive.p_IinO - estimate.p_IinO;
     error[m0 + 6] = kTimeOffset - estimate.t_OtoI_s;
     error.tail(n) = truth - estimate.x_WI;
-    std::vector<int> intrinsics;
-    for (int i = 0; i < n; ++i) {
-      if (sigma[i] == 0.) continue;
-      intrinsics.push_back(m0 + 7 + i);
-      result.rms[i] += std::pow(error[m0 + 7 + i] / sigma[i], 2) / options.seeds;
-    }
-    result.nees_intrinsics += nees(error, filter.P, intrinsics) / options.seeds;
-    if (options.extrinsics) {
-      result.nees_mount +=
-          nees(error, filter.P, {m0, m0 + 1, m0 + 2, m0 + 3, m0 + 4, m0 + 5, m0 + 6}) /
-          options.seeds;
-    }
+    add_errors(options, sigma, error, filter, result);
   }
   result.rms = result.rms.cwiseSqrt().eval();
   if (rows > 0.) result.chi2 /= rows;

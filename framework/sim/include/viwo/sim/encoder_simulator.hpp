@@ -69,7 +69,8 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
                                              const EncoderSimulation& options, std::uint64_t seed);
 
 /// nominal + scale * prior_sigma * gaussian for every entry, also those that a filter holds by its
-/// gauge. The draw of an entry depends on seed and index alone.
+/// gauge if they place all of O (of skid_steer they do not). The draw of an entry depends on seed
+/// and index alone.
 Intrinsics perturbed_intrinsics(const ModelDescription& description, double scale,
                                 std::uint64_t seed);
 

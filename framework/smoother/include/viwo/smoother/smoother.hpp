@@ -22,6 +22,7 @@ struct Input {
 struct Smoothed {
   /// Of wheels and cameras, from all recordings; `nominal` are the values of the configuration.
   CalibrationFile calibration;
+  CalibrationFile before;  ///< the same as it was known before
   /// The last pass over each recording, along its smoothed path. What it says of the calibration is
   /// that of a filter that is linearised there.
   std::vector<RunResult> runs;

@@ -27,6 +27,7 @@ class WheelModel {
 
   Intrinsics nominal() const;
   Intrinsics prior_sigma() const;                ///< 0 where the gauge holds an entry
+  Intrinsics drawn_sigma() const;                ///< of a drawing, in whose frame nothing is held
   int find(const std::string& intrinsic) const;  ///< index, or -1
 
   /// Throws InputError naming both counts when a sample has other channels than the model needs.
