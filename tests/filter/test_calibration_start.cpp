@@ -185,7 +185,10 @@ TEST_F(CalibrationStartTest, WhatIsHeldStaysHeldAndWhatWasHeldHasTheConfiguredPr
   of_held.correlations = {};
   const auto changed = write(calibration_text(of_held, "a test"));
   const CalibrationFile start = start_of(setup({"calibration=" + changed.string()}));
-  EXPECT_EQ(find(start.mount, "p_IinO_x")->sigma, 0.1);
+  const CalibrationFile configured = start_of(setup({}));
+  EXPECT_NEAR(find(start.mount, "p_IinO_x")->sigma, find(configured.mount, "p_IinO_x")->sigma,
+              1e-4);
+  EXPECT_GT(find(start.mount, "p_IinO_x")->sigma, 0.1) << "the first wheel may be off";
   EXPECT_NEAR(find(start.mount, "p_IinO_x")->estimate, find(end_.mount, "p_IinO_x")->estimate,
               kRounding);
 }
