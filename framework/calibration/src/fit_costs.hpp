@@ -69,10 +69,7 @@ struct Prior {
     const Eigen::VectorXd in_held = P.diagonal().cwiseSqrt();
     sigma = in_held.head(sigma.size());
     extrinsics_sigma = in_held.tail<3>();
-    const Eigen::VectorXd per = (in_held.array() > 0.).select(in_held.cwiseInverse(), 0.);
-    Eigen::MatrixXd C = per.asDiagonal() * P * per.asDiagonal();
-    for (int i = 0; i < C.rows(); ++i) C(i, i) = 1.;  // also of what is held
-    const Eigen::LLT<Eigen::MatrixXd> llt(C);
+    const Eigen::LLT<Eigen::MatrixXd> llt(correlation_matrix(P));
     if (llt.info() != Eigen::Success) {
       throw InputError(
           "the prior sigmas of the intrinsics are too unlike: one that is zero, but "

@@ -30,10 +30,15 @@ WheelNames names_of(const WheelsPrior& prior) {
 }
 
 /// Entries for all intrinsics of the model of `prior`, called as it calls them.
-void add_intrinsics(BlockSpec& block, const std::string& prefix, const WheelsPrior& prior,
-                    const Intrinsics& value, const Intrinsics& sigma) {
+ModelDescription description_of(const WheelsPrior& prior) {
   ModelDescription description;
   if (prior.wheels.model != nullptr) prior.wheels.model->describe(description);
+  return description;
+}
+
+void add_intrinsics(BlockSpec& block, const std::string& prefix, const WheelsPrior& prior,
+                    const Intrinsics& value, const Intrinsics& sigma) {
+  const ModelDescription description = description_of(prior);
   for (Eigen::Index i = 0; i < value.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     const bool named = k < description.intrinsics.size();
@@ -120,8 +125,7 @@ std::array<BlockSpec, 3> wheels_blocks(const WheelsPrior& prior) {
   add_intrinsics(intrinsics, prefix, prior, prior.wheels.x_WI, prior.sigma_intrinsics);
   if (prior.intrinsics_walk > 0.) {
     intrinsics.process = Process::kRandomWalk;
-    ModelDescription description;
-    if (prior.wheels.model != nullptr) prior.wheels.model->describe(description);
+    const ModelDescription description = description_of(prior);
     for (std::size_t i = 0; i < intrinsics.entries.size(); ++i) {
       BlockEntry& entry = intrinsics.entries[i];
       // Of the drawing, whatever is known of the entry since.

@@ -96,9 +96,7 @@ void move_prior(const Drawn& drawn, WheelSet& set) {
     P.topLeftCorner(n, n) = prior.sigma_intrinsics.cwiseAbs2().asDiagonal();
   }
   const Eigen::VectorXd sigmas = P.diagonal().cwiseSqrt();
-  const Eigen::VectorXd per = (sigmas.array() > 0.).select(sigmas.cwiseInverse(), 0.);
-  set.correlations = per.asDiagonal() * P * per.asDiagonal();
-  set.correlations.diagonal().setOnes();
+  set.correlations = correlation_matrix(P);
   prior.sigma_intrinsics = sigmas.head(n);
   prior.sigma_extrinsics = sigmas.tail<6>();
 }

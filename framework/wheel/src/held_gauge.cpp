@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "viwo/math/se2.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
@@ -42,40 +43,21 @@ Eigen::MatrixXd by_frame(const WheelModel& model, const Intrinsics& x_WI,
 
 bool move_to_held_gauge(const WheelModel& model, const Intrinsics& held, WheelsView& truth) {
   const std::vector<int> gauge = held_by_gauge(model);
-  const auto n = static_cast<Eigen::Index>(gauge.size());
-  constexpr double kStep = 1e-6;
-  std::vector<int> moves;
-  for (int j = 0; j < 3; ++j) {
-    Intrinsics unused = truth.x_WI;
-    const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(j);
-    if (model.model().move_frame(step, unused) == Status::kOk) moves.push_back(j);
-  }
-  if (gauge.empty() || moves.size() != gauge.size()) return false;
+  if (gauge.empty()) return false;
   // g = [yaw, x, y] of the new frame in the old one such that the held entries agree.
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
-  using Few = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
-  const auto residual = [&](const Eigen::Vector3d& at, Intrinsics& moved, Few& r) {
+  Intrinsics moved = truth.x_WI;
+  const auto off = [&] { return (moved(gauge) - held(gauge)).eval(); };
+  for (int iteration = 0; iteration < 20 && !(off().norm() < 1e-13); ++iteration) {
+    // In the place of a mount: the directions in which the frame can be moved.
+    const Eigen::MatrixXd N = by_frame(model, moved, Eigen::Matrix3d::Identity());
+    if (N.cols() != std::ssize(gauge)) return false;
+    const Eigen::Vector3d step = -N.bottomRows<3>() * N(gauge, Eigen::all).fullPivLu().solve(off());
+    g = compose(g, step);
     moved = truth.x_WI;
-    if (model.model().move_frame(at, moved) != Status::kOk) return false;
-    r = moved(gauge) - held(gauge);
-    return true;
-  };
-  Intrinsics moved;
-  Few r, r_plus, r_minus;
-  for (int iteration = 0; iteration < 20; ++iteration) {
-    if (!residual(g, moved, r)) return false;
-    if (r.norm() < 1e-13) break;
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> J(n, n);
-    for (Eigen::Index k = 0; k < n; ++k) {
-      Intrinsics unused;
-      const Eigen::Vector3d step =
-          kStep * Eigen::Vector3d::Unit(moves[static_cast<std::size_t>(k)]);
-      if (!residual(g + step, unused, r_plus) || !residual(g - step, unused, r_minus)) return false;
-      J.col(k) = (r_plus - r_minus) / (2. * kStep);
-    }
-    g(moves) -= J.fullPivLu().solve(r);
+    if (model.model().move_frame(g, moved) != Status::kOk) return false;
   }
-  if (!residual(g, moved, r) || !(r.norm() < 1e-9)) return false;
+  if (!(off().norm() < 1e-9)) return false;
   for (const int i : gauge) moved[i] = held[i];  // not off by rounding
   const Eigen::Matrix3d back = exp_so3({0., 0., -g[0]});
   truth.x_WI = moved;
@@ -122,6 +104,14 @@ Eigen::MatrixXd prior_in_held_frame(const WheelModel& model, const Intrinsics& x
     P.col(i).setZero();
   }
   return P;
+}
+
+Eigen::MatrixXd correlation_matrix(const Eigen::MatrixXd& P) {
+  const Eigen::VectorXd sigma = P.diagonal().cwiseSqrt();
+  const Eigen::VectorXd per = (sigma.array() > 0.).select(sigma.cwiseInverse(), 0.);
+  Eigen::MatrixXd C = per.asDiagonal() * P * per.asDiagonal();
+  C.diagonal().setOnes();
+  return C;
 }
 
 }  // namespace viwo

@@ -34,4 +34,7 @@ MountKnowledge known_of_imu(const Eigen::Vector3d& p_IinO,
 Eigen::MatrixXd prior_in_held_frame(const WheelModel& model, const Intrinsics& x_WI,
                                     const Intrinsics& sigma, const MountKnowledge& mount = {});
 
+/// Of such a covariance; what is held hangs together with nothing.
+Eigen::MatrixXd correlation_matrix(const Eigen::MatrixXd& P);
+
 }  // namespace viwo
