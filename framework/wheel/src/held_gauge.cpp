@@ -20,26 +20,33 @@ std::vector<int> held_by_gauge(const WheelModel& model) {
   return held;
 }
 
-/// How the intrinsics change with the frame, by yaw, x and y of O' in O, above how the mount does;
-/// directions in which the frame cannot be moved are left out.
+/// How intrinsics and mount change with the frame; directions in which it cannot be moved are left
+/// out.
 Eigen::MatrixXd by_frame(const WheelModel& model, const Intrinsics& x_WI,
                          const Eigen::Ref<const Eigen::MatrixXd>& mount) {
-  constexpr double kStep = 1e-5;
   Eigen::MatrixXd N(x_WI.size() + mount.rows(), 0);
-  for (int j = 0; j < 3; ++j) {
-    const Eigen::Vector3d g = kStep * Eigen::Vector3d::Unit(j);
-    Intrinsics ahead = x_WI, behind = x_WI;
-    if (model.model().move_frame(g, ahead) != Status::kOk ||
-        model.model().move_frame(-g, behind) != Status::kOk) {
-      continue;
-    }
+  for (int k = 0; k < 3; ++k) {
+    const std::optional<Intrinsics> of_wheels = intrinsics_by_frame(model, x_WI, k);
+    if (!of_wheels) continue;
     N.conservativeResize(Eigen::NoChange, N.cols() + 1);
-    N.rightCols<1>() << (ahead - behind) / (2. * kStep), mount.col(j);
+    N.rightCols<1>() << *of_wheels, mount.col(k);
   }
   return N;
 }
 
 }  // namespace
+
+std::optional<Intrinsics> intrinsics_by_frame(const WheelModel& model, const Intrinsics& x_WI,
+                                              int k) {
+  constexpr double kStep = 1e-5;
+  const Eigen::Vector3d g = kStep * Eigen::Vector3d::Unit(k);
+  Intrinsics ahead = x_WI, behind = x_WI;
+  if (model.model().move_frame(g, ahead) != Status::kOk ||
+      model.model().move_frame(-g, behind) != Status::kOk) {
+    return std::nullopt;
+  }
+  return (ahead - behind) / (2. * kStep);
+}
 
 bool move_to_held_gauge(const WheelModel& model, const Intrinsics& held, WheelsView& truth) {
   const std::vector<int> gauge = held_by_gauge(model);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include <Eigen/Core>
 
@@ -56,6 +57,7 @@ struct Interval {
   wheel_motion::MovingPose first_fej, last_fej;  ///< first estimates, for the Jacobian
   Rate rate;
   States states;
+  std::optional<Intrinsics> by_yaw;  ///< how they change with the yaw of another O (WO-22)
   Eigen::Matrix3d curvature_noise = Eigen::Matrix3d::Zero();  ///< (WO-18)
 };
 

@@ -15,6 +15,18 @@ namespace {
 /// nearly quadratic in them, so that they may be large.
 constexpr double kSecondDerivativeStep = 1e-4;
 
+/// Of the mount in a CalibrationJacobian; x and y follow.
+constexpr int kYawColumn = 2;
+
+/// Whether a pose does not tell an intrinsic that turns with O, although it is not known.
+bool hides_turn(const IntrinsicJacobian& J_g_WI, const Intrinsics& by_yaw,
+                const Eigen::Ref<const Intrinsics>& variance) {
+  for (Eigen::Index i = 0; i < by_yaw.size(); ++i) {
+    if (by_yaw[i] != 0. && variance[i] > 0. && J_g_WI.col(i).isZero(0.)) return true;
+  }
+  return false;
+}
+
 /// `at` with the mount or the time offset, entry k of the geometry, a step on.
 Point stepped(Point at, int k) {
   Eigen::Vector3d d = Eigen::Vector3d::Zero();
@@ -61,8 +73,7 @@ Linearised IntervalFactor::linearise(const Point& at, const PreintegratedPose& p
   // would count their noise as motion, and so as information: it is taken at the motion that the
   // wheels measured, with a tilt that intervals before tell.
   const Eigen::Vector3d& p_IinO = at.mount.p_IinO;
-  const CalibrationJacobian measured =
-      calibration_jacobian(pose.g, out.tilt, interval_.rate.g, p_IinO);
+  CalibrationJacobian measured = calibration_jacobian(pose.g, out.tilt, interval_.rate.g, p_IinO);
   const States& states = interval_.states;
   const auto n = states.n_intrinsics();
   out.lasting.setZero();
@@ -76,8 +87,13 @@ Linearised IntervalFactor::linearise(const Point& at, const PreintegratedPose& p
   const Eigen::Vector2d tilt =
       params_.motion_sigmas > 0. ? before_.tilt.expected(pose.duration_s) : out.tilt;
   const Rate& rate = interval_.rate;
-  const CalibrationJacobian moving =
+  CalibrationJacobian moving =
       calibration_jacobian(motion_of_O, tilt, planar_part(rate.g, rate.variance), p_IinO);
+  if (n > 0 && interval_.by_yaw) {
+    const Eigen::Vector3d yaw = hidden_yaw(pose.J_g_WI, measured, p_IinO);
+    if (!motion_of_O.isZero()) moving.col(kYawColumn) += yaw - measured.col(kYawColumn);
+    measured.col(kYawColumn) = yaw;
+  }
   geometry.rightCols<kCalibrationSize>() = moving;
   out.H.resize(3, states.P.cols());
   for (int k = 0; k < states.n_geometry; ++k) out.H.col(k) = geometry.col(states.geometry_at(k));
@@ -89,6 +105,17 @@ Linearised IntervalFactor::linearise(const Point& at, const PreintegratedPose& p
            states.geometry_P.bottomRightCorner<kCalibrationSize, kCalibrationSize>() *
            D.transpose();
   return out;
+}
+
+Eigen::Vector3d IntervalFactor::hidden_yaw(const IntrinsicJacobian& J_g_WI,
+                                           const CalibrationJacobian& measured,
+                                           const Eigen::Vector3d& p_IinO) const {
+  const Intrinsics& by_yaw = *interval_.by_yaw;
+  if (!hides_turn(J_g_WI, by_yaw, interval_.states.P.diagonal().tail(by_yaw.size()))) {
+    return measured.col(kYawColumn);
+  }
+  return J_g_WI * by_yaw - p_IinO.y() * measured.col(kYawColumn + 1) +
+         p_IinO.x() * measured.col(kYawColumn + 2);
 }
 
 /// (WO-15): zero where its noise alone explains all of it.

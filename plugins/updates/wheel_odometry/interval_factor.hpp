@@ -58,6 +58,11 @@ class IntervalFactor {
   double tilt_variance(const Point& at) const;
 
  private:
+  /// The column of the yaw of the mount: `measured`, or such that a turn of O that the wheels hide
+  /// changes nothing (WO-22).
+  Eigen::Vector3d hidden_yaw(const IntrinsicJacobian& J_g_WI,
+                             const wheel_motion::CalibrationJacobian& measured,
+                             const Eigen::Vector3d& p_IinO) const;
   template <class Vector, class Variance>
   Vector moving_part(const Vector& measured, const Variance& variance) const;
   Eigen::Vector3d planar_part(const Eigen::Vector3d& g, const Eigen::Vector3d& variance) const;

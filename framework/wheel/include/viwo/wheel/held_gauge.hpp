@@ -2,12 +2,19 @@
 // another frame is moved there, and what is known is.
 #pragma once
 
+#include <optional>
+
 #include <Eigen/Core>
 
 #include "viwo/api/rig.hpp"
 #include "viwo/wheel/wheel_model.hpp"
 
 namespace viwo {
+
+/// How the intrinsics change with the frame, by yaw (k = 0), x or y of O' in O; nothing where the
+/// model's frame cannot be moved like that (KinematicModel::move_frame).
+std::optional<Intrinsics> intrinsics_by_frame(const WheelModel& model, const Intrinsics& x_WI,
+                                              int k);
 
 /// Rewrites the true calibration of a wheel set (extrinsics and intrinsics) for the odometry frame
 /// in which the entries that the gauge holds have the values of `held` (F-12). False, and nothing
