@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <string>
@@ -48,6 +49,8 @@ constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 
 /// Says that the folder was written here.
 constexpr const char* kMark = "viwo_log.txt";
+/// Where a log is written until it is whole.
+constexpr const char* kPart = "part";
 
 [[noreturn]] void refuse(const fs::path& folder, const fs::path& stranger) {
   throw InputError(folder.string() + "  already holds " + stranger.string() +
@@ -82,12 +85,15 @@ void check_images_are_ours(const fs::path& folder, const fs::path& data) {
 
 /// Everything in `folder` must come from an earlier log, and that from here: a recording of
 /// somebody has the same names.
-void check_is_ours(const fs::path& folder) {
-  const bool is_marked = fs::exists(folder / kMark);
+void check_is_ours(const fs::path& folder, bool is_marked) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     const fs::path name = entry.path().filename();
     if (name == kMark && entry.is_regular_file()) continue;
     if (!is_marked) refuse(folder, name);
+    if (name == kPart && entry.is_directory()) {
+      check_is_ours(entry.path(), is_marked);
+      continue;
+    }
     const bool is_camera = is_camera_folder(name);
     const bool is_table = std::find(kFolders.begin(), kFolders.end(), name) != kFolders.end();
     if (!(is_camera || is_table) || !entry.is_directory()) refuse(folder, name);
@@ -118,7 +124,7 @@ bool fits_a_field(const std::string& name) {
 }  // namespace
 
 struct AslWriter::Tables {
-  fs::path folder;
+  fs::path folder;  ///< of the log that is not whole yet
   std::array<std::optional<TextWriter>, kTables> writers;
   int n_drive = 0;
   int n_steer = 0;
@@ -273,29 +279,35 @@ void AslWriter::Tables::write(const ImageSample& image) {
   *table << image.t_ns << "," << name << "\n";
 }
 
-AslWriter::AslWriter(const fs::path& folder) : tables_(std::make_unique<Tables>()) {
-  tables_->folder = folder;
+AslWriter::AslWriter(const fs::path& folder)
+    : tables_(std::make_unique<Tables>()), folder_(folder) {
   if (fs::exists(folder) && !fs::is_directory(folder)) {
     throw InputError(folder.string() + "  is a file, not a folder");
   }
   make_folder(folder);
-  check_is_ours(folder);
+  check_is_ours(folder, fs::exists(folder / kMark));
   write_text(folder / kMark,
              "A log of viwo. The next one that is written to this folder replaces it.\n");
-  // A table that the new log does not have must not stay behind.
-  for_each_folder([&](const fs::path& ours) { fs::remove_all(folder / ours); });
+  tables_->folder = folder / kPart;
+  fs::remove_all(tables_->folder);
+  make_folder(tables_->folder);
 }
 
 AslWriter::~AslWriter() {
-  if (closed_) return;
-  const fs::path folder = std::move(tables_->folder);
+  if (state_ == State::kWhole) return;
   tables_.reset();
   try {
-    for_each_folder([&](const fs::path& ours) { fs::remove_all(folder / ours); });
-    fs::remove(folder / kMark);
+    fs::remove_all(folder_ / kPart);
+    if (state_ == State::kReplacing) remove_tables();
+    const fs::directory_iterator left(folder_);
+    if (std::distance(begin(left), end(left)) == 1) fs::remove(folder_ / kMark);
   } catch (...) {
     // Why it is not closed is known; what stays has no table, or not all of them.
   }
+}
+
+void AslWriter::remove_tables() const {
+  for_each_folder([&](const fs::path& ours) { fs::remove_all(folder_ / ours); });
 }
 
 bool AslWriter::write(const Measurement& measurement) {
@@ -312,7 +324,15 @@ void AslWriter::close() {
   for (auto& table : tables_->image_tables) {
     if (table) table->close();
   }
-  closed_ = true;
+  const fs::path part = tables_->folder;
+  // A table that the new log does not have must not stay behind.
+  state_ = State::kReplacing;
+  remove_tables();
+  for_each_folder([&](const fs::path& ours) {
+    if (fs::exists(part / ours)) fs::rename(part / ours, folder_ / ours);
+  });
+  fs::remove(part);
+  state_ = State::kWhole;
 }
 
 }  // namespace viwo::log

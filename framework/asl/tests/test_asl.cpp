@@ -1,4 +1,5 @@
 // Log folders: reading, rejecting, writing.
+#include <memory>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -197,6 +198,27 @@ TEST_F(AslTest, ALogThatIsNotClosedLeavesNothing) {
     }
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder_ / "log"));
+}
+
+TEST_F(AslTest, ALogThatIsNotClosedLeavesTheEarlierOne) {
+  const auto write_log = [&](std::int64_t t_ns) {
+    auto writer = std::make_unique<AslWriter>(folder_ / "log");
+    PoseSample pose;
+    pose.t_ns = t_ns;
+    EXPECT_TRUE(writer->write(pose));
+    return writer;
+  };
+  write_log(7)->close();
+  const auto table = folder_ / "log/state_groundtruth_estimate0/data.csv";
+  const std::string earlier = text_of(table);
+  write_log(8).reset();
+  EXPECT_EQ(text_of(table), earlier);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "log/part"));
+  // What a command that was killed leaves is replaced.
+  write("log/part/wheels0/data.csv", "half");
+  write_log(8)->close();
+  EXPECT_NE(text_of(table), earlier);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "log/part"));
 }
 
 TEST_F(AslTest, WritesTheDocumentedColumns) {

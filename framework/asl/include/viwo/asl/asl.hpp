@@ -55,7 +55,8 @@ int camera_index(const TableReader& table, std::size_t column);
 /// the cells of encoder samples, which follow from the stamps as make_cells() has it).
 class AslWriter {
  public:
-  /// Creates the folder. An earlier log in it is replaced; InputError when it holds anything else.
+  /// Creates the folder. An earlier log in it is replaced once this one is whole, in close();
+  /// InputError when it holds anything else.
   explicit AslWriter(const std::filesystem::path& folder);
   ~AslWriter();
   AslWriter(const AslWriter&) = delete;
@@ -74,8 +75,14 @@ class AslWriter {
 
  private:
   struct Tables;
+  enum class State { kWriting, kReplacing, kWhole };
+
+  /// Those of a whole log.
+  void remove_tables() const;
+
   std::unique_ptr<Tables> tables_;
-  bool closed_ = false;
+  std::filesystem::path folder_;
+  State state_ = State::kWriting;
 };
 
 }  // namespace viwo::log
