@@ -93,7 +93,6 @@ TEST(NullDimensions, OfTheTwistAloneAreThoseOfTheTable) {
 }
 
 // Drive rows alone: the four offsets under every motion, and on a rectangle one direction more.
-// (The gauge does not come out clean where all wheels are nearly parallel: the solver cuts there.)
 TEST(NullDimensions, OfDriveRowsAloneHaveTheSteeringOffsetsUnderEveryMotion) {
   const std::pair<const char*, int> rows[] = {{"general", 5},   {"figure_eight", 5},
                                               {"spin", 13},     {"constant_steering", 13},
