@@ -18,9 +18,10 @@ constexpr double kSecondDerivativeStep = 1e-4;
 /// Of the mount in a CalibrationJacobian; x and y follow.
 constexpr int kYawColumn = 2;
 
-/// Whether a pose does not tell an intrinsic that turns with O, although it is not known.
+/// Whether a pose tells of some intrinsics, but not of one that turns with O and is not known.
 bool hides_turn(const IntrinsicJacobian& J_g_WI, const Intrinsics& by_yaw,
                 const Eigen::Ref<const Intrinsics>& variance) {
+  if (J_g_WI.isZero(0.)) return false;  // of a base that stands
   for (Eigen::Index i = 0; i < by_yaw.size(); ++i) {
     if (by_yaw[i] != 0. && variance[i] > 0. && J_g_WI.col(i).isZero(0.)) return true;
   }
