@@ -106,6 +106,17 @@ TEST(HiddenDirections, OfACircleAreMostOfTheWheels) {
   EXPECT_NE(faults(runs("circle", "uneven", first_order), {}), "");
 }
 
+TEST(HiddenDirections, OfRollingRowsAreTheOffsetsAndOnALineTheYawOfTheMount) {
+  std::vector<std::string> rolling{"kinematics.type=four_wis_wid_drive_only",
+                                   "updates.wheel_parity.enabled=false"};
+  const std::vector<std::string> hidden{"delta_o", "theta_ItoO_z"};
+  for (const char* motion : {"straight", "lateral"}) {
+    EXPECT_EQ(faults(runs(motion, "flat", rolling), hidden), "") << motion;  // (WO-22)
+  }
+  rolling.emplace_back("kinematics.offset_derivative=measured");
+  EXPECT_NE(faults(runs("straight", "flat", rolling), {"theta_ItoO_z"}), "");
+}
+
 TEST(HiddenDirections, AreNoneOfASweepOverUnevenGround) {
   EXPECT_EQ(faults(runs("icr_sweep", "uneven", {}), {}), "");
   EXPECT_EQ(faults(runs("figure_eight", "uneven", {}), {}), "");
