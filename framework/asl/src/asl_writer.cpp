@@ -148,7 +148,8 @@ struct AslWriter::Tables {
   /// False when the measurement is of none of the kinds.
   template <class... Samples>
   bool write_one_of(const Measurement& measurement) {
-    return visit_one_of<Samples...>(measurement, [this](const auto& sample) { write(sample); });
+    return visit_one_of<Samples...>(measurement,
+                                    [this](const auto& sample) { this->write(sample); });
   }
 
   std::vector<std::optional<TextWriter>> image_tables;  ///< by camera
