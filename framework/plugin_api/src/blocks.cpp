@@ -29,13 +29,14 @@ WheelNames names_of(const WheelsPrior& prior) {
   return {prior.name + ".", "wheels." + prior.name};
 }
 
-/// Entries for all intrinsics of the model of `prior`, called as it calls them.
+/// Empty without a model.
 ModelDescription description_of(const WheelsPrior& prior) {
   ModelDescription description;
   if (prior.wheels.model != nullptr) prior.wheels.model->describe(description);
   return description;
 }
 
+/// Entries for all intrinsics of the model of `prior`, called as it calls them.
 void add_intrinsics(BlockSpec& block, const std::string& prefix, const WheelsPrior& prior,
                     const Intrinsics& value, const Intrinsics& sigma) {
   const ModelDescription description = description_of(prior);
