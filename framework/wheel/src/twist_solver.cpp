@@ -52,6 +52,7 @@ BlockMatrix<kSize> invert_block(const BlockMatrix<kSize>& R) {
 void ParityInformation::reset(int n) {
   Lambda.setZero(n, n);
   eta.setZero(n);
+  of_noise.setZero(n, n);
   chi2 = 0.;
   dof = 0;
 }
@@ -154,7 +155,7 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   }
   // With weights, W e takes the place of e in (W-4).
   if (options_.fitted_jacobian) {
-    differentiate_fitted(fit.xi, out.P_xi, no_residual_);
+    differentiate_fitted(moves(fit.xi, out.P_xi) ? fit.xi : Twist::Zero(), no_residual_);
   } else {
     model.intrinsic_derivatives(y, x_WI_, rows_, rows_.b, fit.xi,
                                 options_.noise_weighted ? We_ : fit.e, by_x_);
@@ -169,15 +170,17 @@ Status TwistSolver::solve(const EncoderSample& y, TwistSolution& out) {
   return Status::kOk;
 }
 
-/// Derivatives by the intrinsics at what the rows would read at a twist, or at rest if its noise P
-/// alone explains it (W-16).
-void TwistSolver::differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P,
-                                       const RowVector& e) {
+/// Whether more than noise of covariance P is needed to explain a twist (W-16).
+bool TwistSolver::moves(const Twist& xi, const Eigen::Matrix3d& P) const {
   bool moves = moves_;
   for (int i = 0; i < 3; ++i) moves |= !is_noise(xi[i], P(i, i), options_.motion_sigmas);
-  const Twist moving = moves ? xi : Twist::Zero();
-  const RowVector b = rows_.A * moving;
-  model_->model().intrinsic_derivatives(*y_, x_WI_, rows_, b, moving, e, by_x_);
+  return moves;
+}
+
+/// Derivatives by the intrinsics at what the rows would read at a twist.
+void TwistSolver::differentiate_fitted(const Twist& xi, const RowVector& e) {
+  const RowVector b = rows_.A * xi;
+  model_->model().intrinsic_derivatives(*y_, x_WI_, rows_, b, xi, e, by_x_);
   clear_left_out(by_x_.J);
 }
 

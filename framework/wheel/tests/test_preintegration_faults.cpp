@@ -226,6 +226,24 @@ TEST(Preintegration, OfABaseAtRestTeachesNothingAboutItsWheels) {
   EXPECT_EQ(parked.P_g, misled.P_g);
 }
 
+TEST(Preintegration, ExpectsOfTheNoiseOfTheTwistsWhatItAddsToTheInformation) {
+  const auto model = load_model(swerve("four_wis_wid"));
+  const PreintegratedPose straight = with_noise_of({0.5, 0., 0.}, 5.);
+  const PreintegratedPose turning = with_noise_of({0.4, -0.2, 0.6}, 5.);
+  for (int k = 0; k < model->n_intrinsics(); ++k) {
+    const std::string& name = model->description().intrinsics[static_cast<std::size_t>(k)].name;
+    const double Lambda = straight.parity.Lambda(k, k);
+    if (name[0] == 'x' || name[0] == 'y') {
+      // Nothing turns: all of it is noise, the square of one normal number in each of 1000 samples.
+      EXPECT_NEAR(straight.parity.of_noise(k, k) / Lambda, 1., 3. * std::sqrt(2. / 1000.)) << name;
+    } else {
+      EXPECT_LT(straight.parity.of_noise(k, k), 1e-2 * Lambda) << name;
+    }
+    EXPECT_LT(turning.parity.of_noise(k, k), 1e-3 * turning.parity.Lambda(k, k)) << name;
+  }
+  EXPECT_TRUE(with_noise_of(Twist::Zero(), 5.).parity.of_noise.isZero());
+}
+
 TEST(Preintegration, TakesAMotionThatOnlyTheMeanOfTheSamplesShowsForMotion) {
   const PreintegratedPose parked = with_noise_of(Twist::Zero(), 5.);
   const double sigma = std::sqrt(parked.P_g(0, 0) / 10. / 0.01);  // rad/s, of a sample

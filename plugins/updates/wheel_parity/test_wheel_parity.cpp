@@ -1,4 +1,7 @@
 // The parity factor: its cost against the sum over samples, where it lands, gate, consistency.
+#include <algorithm>
+#include <array>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,10 +24,7 @@ class ParityInterval : public ::testing::Test {
   ParityInterval()
       : model_(testing::load_model(testing::swerve("four_wis_wid"))),
         filter_(testing::free_wheels({}, model_.get())) {
-    const sim::PlanarMotion motion("icr_sweep", {.ramp_s = 0.});
-    sim::EncoderSimulation simulation;
-    simulation.duration_s = 4.;
-    encoders_ = sim::simulate_encoders(model_->model(), model_->nominal(), motion, simulation, 1);
+    drive("icr_sweep", 1);
     filter_.clones.resize(2);
     for (int k = 0; k < 2; ++k) {
       filter_.clones[static_cast<std::size_t>(k)].t_ns = (1000 + 500 * k) * kMs;
@@ -33,6 +33,14 @@ class ParityInterval : public ::testing::Test {
     filter_.layout();
     first_ = filter_.column(filter_.wheels.intrinsics);
     filter_.P.diagonal().tail(model_->n_intrinsics()) = model_->prior_sigma().cwiseAbs2();
+  }
+
+  void drive(const std::string& how, std::uint64_t seed) {
+    const sim::PlanarMotion motion(how, {.ramp_s = 0.});
+    sim::EncoderSimulation simulation;
+    simulation.duration_s = 4.;
+    encoders_ =
+        sim::simulate_encoders(model_->model(), model_->nominal(), motion, simulation, seed);
   }
 
   void run(Update& update, testing::SmallFilter filter, FactorSink& sink) const {
@@ -61,8 +69,6 @@ class ParityInterval : public ::testing::Test {
 };
 
 TEST_F(ParityInterval, HasTheGradientOfTheParityCostAndLeavesOutTheGauge) {
-  // A tight prior: the factor is linearised at the estimate.
-  filter_.P *= 1e-8;
   const auto update = testing::load_update(
       "{type: wheel_parity, period_s: 0, max_iterations: 1, second_order_noise: false, "
       "gate_probability: 0}");
@@ -129,6 +135,42 @@ TEST_F(ParityInterval, IsLinearisedOnceAndAddsNoNoiseWhenItIsToBeExactWhateverTh
   // Otherwise both are seen.
   EXPECT_FALSE(exact == information(", second_order_noise: false"));
   EXPECT_FALSE(exact == information(", max_iterations: 1"));
+}
+
+TEST_F(ParityInterval, OfAStraightLineTellsOffsetsAndNotWhatTheNoiseOfTheTurnRateSays) {
+  // Linearised once, at the truth.
+  const auto update = testing::load_update(
+      "{type: wheel_parity, period_s: 0, second_order_noise: false, find_noise: false, "
+      "max_iterations: 1}");
+  Preintegrator preintegrator(model_, {.twist = {.noise_weighted = true, .motion_sigmas = 5.}});
+  PreintegratedPose pose;
+  // Of all intervals together: what the factors say, and what the measured derivatives would.
+  const std::array<int, 3> entries{model_->find("y_2"), model_->find("x_3"),
+                                   model_->find("delta_o3")};
+  Eigen::Array3d told = Eigen::Array3d::Zero(), measured = told;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    drive("straight", seed);
+    FactorSink sink(1, 60);
+    run(*update, filter_, sink);
+    ASSERT_NE(sink.information(), nullptr);
+    ASSERT_TRUE(preintegrator.integrate(encoders_, 1000 * kMs, 1500 * kMs, pose));
+    int k = 0;
+    for (const ColumnRange block : sink.information()->columns.blocks()) {
+      for (int i = 0; i < block.count; ++i, ++k) {
+        const auto entry =
+            std::find(entries.begin(), entries.end(), block.first + i - first_) - entries.begin();
+        if (entry < 3) told[entry] += sink.information()->Lambda(k, k);
+      }
+    }
+    for (int i = 0; i < 3; ++i) {
+      const auto entry = entries[static_cast<std::size_t>(i)];
+      measured[i] += pose.parity.Lambda(entry, entry);
+    }
+  }
+  const Eigen::Array3d share = told / measured;
+  EXPECT_LT(share[0], 0.05);
+  EXPECT_LT(share[1], 0.05);
+  EXPECT_GT(share[2], 0.9);
 }
 
 TEST_F(ParityInterval, GatesASlippingWheelButNotWrongIntrinsics) {

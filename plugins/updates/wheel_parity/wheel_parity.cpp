@@ -55,8 +55,12 @@ using Square = IntrinsicMatrix;
 /// is needed.
 constexpr double kConverged = 1e-2;
 
-/// Information about a direction, relative to the prior, that is not worth being corrected.
+/// Information about a direction, relative to the prior, that is not worth being corrected for
+/// curvature, and that is but rounding.
 constexpr double kNegligibleInformation = 1e-4;
+constexpr double kNoInformation = 1e-12;
+/// Of the share that noise has in what an interval tells: taken so many of its sigmas larger.
+constexpr double kShareSigmas = 2.;
 /// Epochs do not come to the nanosecond: a period may end a little early.
 constexpr double kPeriodSlackS = 0.02;
 
@@ -134,11 +138,12 @@ class WheelParity final : public Update {
     }
     tallies_.add(pose_, data.end_ns);
     ++intervals_used_;
+    Square curvature = Square::Zero(n_free_, n_free_);
     if (params_.second_order_noise && --unchecked_ < 0) {
-      add_second_order_noise(
-          encoders, *interval,
-          intervals_alike(intervals_used_, wheels.wander_time_s, pose_.duration_s));
+      curvature = intervals_alike(intervals_used_, wheels.wander_time_s, pose_.duration_s) *
+                  second_order_noise(encoders, *interval);
     }
+    weigh(curvature);
     emit(wheels, sink.add_information());
   }
 
@@ -230,10 +235,10 @@ class WheelParity final : public Update {
     cost_ = weight * parity.chi2 + back.dot(2. * eta_at_x + Lambda_back);
   }
 
-  /// (WP-6), (WP-7): the noise of eta_ grows by what the curvature makes of the prior
+  /// (WP-6): by how much the noise of eta_ grows for what the curvature makes of the prior
   /// uncertainty.
-  void add_second_order_noise(std::span<const EncoderSample> encoders,
-                              const EncoderInterval& interval, double alike) {
+  Square second_order_noise(std::span<const EncoderSample> encoders,
+                            const EncoderInterval& interval) {
     const Square L = directions_of(C_, eigen_);
     Square M(n_free_, n_free_);
     const double weight = parity_weight();
@@ -256,16 +261,18 @@ class WheelParity final : public Update {
       mean += 0.5 * h.col(i);
     }
     noise += mean * mean.transpose();
-    if (!noise.allFinite()) return;
-    inflate(noise, alike);
+    if (!noise.allFinite()) noise.setZero();
+    return noise;
   }
 
-  /// Lambda_ and eta_ for noise of covariance Lambda_ + `noise` in eta_.
-  void inflate(const Square& noise, double alike) {
+  /// (WP-7), (WP-8), (WP-9): Lambda_ and eta_ where eta_ has the noise `curvature` besides that of
+  /// the encoders, and tells of the intrinsics only what the motion does.
+  void weigh(const Square& curvature) {
+    const double negligible = curvature.isZero() ? kNoInformation : kNegligibleInformation;
     eigen_.compute(Lambda_);
     const Intrinsics information = eigen_.eigenvalues();
     int dropped = 0;  // directions that the interval tells next to nothing about
-    while (dropped < n_free_ && information[dropped] <= kNegligibleInformation) ++dropped;
+    while (dropped < n_free_ && information[dropped] <= negligible) ++dropped;
     const int kept = n_free_ - dropped;
     if (kept == 0) return;
     // Directions whitened: unit noise before the curvature adds to it.
@@ -273,20 +280,32 @@ class WheelParity final : public Update {
     const Square to_eta = eigen_.eigenvectors().rightCols(kept) * root.asDiagonal();
     const Square to_white =
         root.cwiseInverse().asDiagonal() * eigen_.eigenvectors().rightCols(kept).transpose();
+    Square of_noise(n_free_, n_free_);
+    for (int k = 0; k < n_free_; ++k) {
+      for (int i = 0; i < n_free_; ++i) {
+        of_noise(i, k) = sigma_[i] * sigma_[k] * pose_.parity.of_noise(free(i), free(k));
+      }
+    }
+    const Square S = to_white * of_noise * to_white.transpose();
+    eigen_.compute(S);
+    // The samples of one interval tell the share of noise only so well.
+    const auto n = static_cast<double>(std::max<std::int64_t>(pose_.samples, 1));
+    const double at_most = 1. + kShareSigmas * std::sqrt(2. / n);
+    const Intrinsics told = (1. - at_most * eigen_.eigenvalues().array()).max(0.);
+    const Square T = eigen_.eigenvectors() * told.asDiagonal() * eigen_.eigenvectors().transpose();
     // The same curvature bends every interval the same way as long as the excitation is the same,
     // so that it does not average out: after K intervals its share is K times that of one, and the
     // last one adds the difference of Lambda K / (1 + K R) (WP-8).
-    Square R = alike * to_white * noise * to_white.transpose();
-    if (R.trace() < kNegligibleCurvature) {
+    Square R = to_white * curvature * to_white.transpose();
+    if (R.trace() < kNegligibleCurvature && unchecked_ < 0) {
       unchecked_ = kIntervalsUnchecked;
-      return;
     }
     R.diagonal().array() += 1.;
     const Square once = R.llt().solve(Square::Identity(kept, kept));
-    const Square W = once * once;
+    const Square TW = T * once * once;
     const Intrinsics white = to_white * eta_;
-    eta_ = to_eta * (W * white);
-    Lambda_ = to_eta * W * to_eta.transpose();
+    eta_ = to_eta * (TW * white);
+    Lambda_ = to_eta * TW * T * to_eta.transpose();
   }
 
   double gate(double dof) {

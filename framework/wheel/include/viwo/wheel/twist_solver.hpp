@@ -53,10 +53,11 @@ struct TwistSolution {
 /// Information about x_WI from parity residuals: cost(d) = chi2 + 2 eta^T d + d^T Lambda d for a
 /// change d of the intrinsics, to first order (W-10).
 struct ParityInformation {
-  IntrinsicMatrix Lambda;  ///< n x n: sum H^T R^-1 H
-  Intrinsics eta;          ///< n: sum H^T R^-1 e
-  double chi2 = 0.;        ///< sum e^T R^-1 e
-  double dof = 0.;         ///< what chi2 is to be expected to be: of cut samples there are parts
+  IntrinsicMatrix Lambda;    ///< n x n: sum H^T R^-1 H
+  Intrinsics eta;            ///< n: sum H^T R^-1 e
+  IntrinsicMatrix of_noise;  ///< n x n: what the noise of the twists adds to Lambda (W-17)
+  double chi2 = 0.;          ///< sum e^T R^-1 e
+  double dof = 0.;           ///< what chi2 is to be expected to be: of cut samples there are parts
 
   void reset(int n);
 };
@@ -95,6 +96,8 @@ class TwistSolver {
   /// Adds `weight` times the parity of the sample last solved. The Jacobian is that at the fitted
   /// signal (W-9).
   void add_parity(const Parity& parity, double weight, ParityInformation& out);
+  /// Adds `weight` times what the noise of its twist is expected to have in its information.
+  void add_parity_of_noise(const Parity& parity, double weight, ParityInformation& out);
 
  private:
   // What has three entries gets a fourth lane, so that it is one register; the lane holds zero or
@@ -117,7 +120,8 @@ class TwistSolver {
   /// With noise weights, of directions that A cannot tell at all.
   static constexpr double kWeightedRankTolerance = 1e-6;
 
-  void differentiate_fitted(const Twist& xi, const Eigen::Matrix3d& P, const RowVector& e);
+  bool moves(const Twist& xi, const Eigen::Matrix3d& P) const;
+  void differentiate_fitted(const Twist& xi, const RowVector& e);
   void find_left_out(const EncoderSample& y);
   template <class Rows>
   void clear_left_out(Rows& rows) const;
@@ -138,7 +142,8 @@ class TwistSolver {
   template <int kSize>
   void weigh_jacobian();
   template <int kSize>
-  void add_information(const Fit& fit, double weight, ParityInformation& out) const;
+  void add_information(const Fit& fit, double weight, IntrinsicMatrix& Lambda,
+                       Intrinsics& eta) const;
 
   /// kSize if that is known, else what the model says.
   template <int kSize>
