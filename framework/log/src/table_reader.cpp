@@ -82,19 +82,37 @@ TableReader::TableReader(const std::filesystem::path& file) : reader_(file) {
 }
 
 TableReader::TableReader(const std::filesystem::path& file, const TableLayout& layout)
-    : reader_(file), separator_(layout.separator), is_own_(false), has_row_(!layout.has_header) {
+    : reader_(file),
+      separator_(layout.separator),
+      decimal_comma_(layout.decimal_comma),
+      is_own_(false),
+      has_row_(!layout.has_header) {
   const std::string_view line = first_line(layout.skip_lines);
   if (separator_ == 0) {
     separator_ = ' ';
     for (const char candidate : {'\t', ',', ';'}) {
+      if (decimal_comma_ && candidate == ',') continue;
       if (line.find(candidate) != std::string_view::npos) separator_ = candidate;
     }
   }
-  split(line, separator_, true, fields_);
+  if (has_row_) {
+    take_apart(line);
+  } else {
+    split(line, separator_, true, fields_);
+  }
   check_columns();
   for (std::size_t i = 0; i < fields_.size(); ++i) {
     columns_.push_back(has_row_ ? std::to_string(i + 1) : std::string(fields_[i]));
   }
+}
+
+void TableReader::take_apart(std::string_view row) {
+  if (decimal_comma_) {
+    with_points_ = row;
+    std::replace(with_points_.begin(), with_points_.end(), ',', '.');
+    row = with_points_;
+  }
+  split(row, separator_, !is_own_, fields_);
 }
 
 void TableReader::check_columns() const {
@@ -173,7 +191,7 @@ bool TableReader::next() {
     do {
       if (!reader_.next(line)) return false;
     } while (trim(line).empty());
-    split(line, separator_, !is_own_, fields_);
+    take_apart(line);
   }
   if (reader_.unterminated() && (fields_.size() < columns_.size() ||
                                  (fields_.size() == columns_.size() && is_begun(fields_.back())))) {
@@ -189,11 +207,7 @@ bool TableReader::next() {
 
 double TableReader::number(std::size_t column) const {
   if (const auto value = parse_number(fields_[column])) return *value;
-  std::string with_point(fields_[column]);
-  std::replace(with_point.begin(), with_point.end(), ',', '.');
-  fail(column, quoted(fields_[column]) + (parse_number(with_point)
-                                              ? " has a decimal comma: numbers have points here"
-                                              : " is not a number"));
+  fail_as(column, " is not a number");
 }
 
 std::int64_t TableReader::integer(std::size_t column) const {
@@ -216,7 +230,17 @@ std::int64_t TableReader::seconds_ns(std::size_t column) const {
 
 std::int64_t TableReader::time_ns(std::size_t column, TimeUnit unit) const {
   if (const auto value = parse_time_ns(fields_[column], unit)) return *value;
-  fail(column, quoted(fields_[column]) + " is no time");
+  fail_as(column, " is no time");
+}
+
+void TableReader::fail_as(std::size_t column, const char* what) const {
+  std::string with_point(fields_[column]);
+  std::replace(with_point.begin(), with_point.end(), ',', '.');
+  const bool has_comma = parse_number(with_point) && !parse_number(fields_[column]);
+  fail(column, quoted(fields_[column]) +
+                   (!has_comma ? what
+                    : is_own_  ? " has a decimal comma: numbers have points here"
+                               : " has a decimal comma: 'decimal_comma: true' reads it"));
 }
 
 void TableReader::fail(std::size_t column, const std::string& text) const {

@@ -251,10 +251,14 @@ TEST_F(TableReaderTest, RefusesAHeaderWithAmbiguousColumns) {
 
 TEST_F(TableReaderTest, NamesADecimalComma) {
   const auto file = write("comma.csv", "t;v\n1;2,5\n");
-  TableReader table(file, {.separator = ';'});
-  ASSERT_TRUE(table.next());
-  EXPECT_THAT(error_of<std::exception>([&] { table.number(1); }),
+  TableReader own(file), table(file, {.separator = ';'});
+  ASSERT_TRUE(own.next());
+  EXPECT_THAT(error_of<std::exception>([&] { own.number(1); }),
               EndsWith(":2  column 'v': '2,5' has a decimal comma: numbers have points here"));
+  ASSERT_TRUE(table.next());
+  EXPECT_THAT(
+      error_of<std::exception>([&] { table.number(1); }),
+      EndsWith(":2  column 'v': '2,5' has a decimal comma: 'decimal_comma: true' reads it"));
 }
 
 TEST_F(TableReaderTest, RefusesAQuantityThatIsThereTwice) {

@@ -26,6 +26,7 @@ struct LayoutParams {
   Separator separator = Separator::kAuto;
   bool header = true;
   int skip_lines = 0;
+  bool decimal_comma = false;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(separator),
@@ -38,8 +39,16 @@ struct LayoutParams {
     b(VIWO_PARAM(header), {.help = "the first line names the columns"});
     b(VIWO_PARAM(skip_lines),
       {.min = 0., .max = 1e6, .help = "lines before the first of the table"});
+    b(VIWO_PARAM(decimal_comma),
+      {.help = "numbers are written as 1,5; what separates them is then no comma"});
   }
-  log::TableLayout layout() const { return {static_cast<char>(separator), skip_lines, header}; }
+  /// ParamError where a comma would be both.
+  log::TableLayout layout() const {
+    if (decimal_comma && separator == Separator::kComma) {
+      throw ParamError("decimal_comma", "the separator is a comma already");
+    }
+    return {static_cast<char>(separator), skip_lines, header, decimal_comma};
+  }
 };
 
 struct TimeParams {

@@ -39,6 +39,29 @@ TEST_F(CsvTable, WheelsComeFromColumnsInAnyOrderAndUnit) {
   EXPECT_NEAR(samples[1].steer_rad[0], -M_PI / 4., 1e-12);
 }
 
+TEST_F(CsvTable, DecimalCommasAreReadWhereTheConfigurationSaysSo) {
+  const std::string text = "t;drive, left\n1,0005;1,5\n1,0105;-2,25e-1\n";
+  const std::string rest =
+      "time_column: t, time_unit: s, drive_columns: [\"drive, left\"], max_gap_s: 1";
+  for (const std::string more : {"", ", separator: semicolon"}) {
+    const auto samples =
+        play_only<EncoderSample>(table(text, rest + ", decimal_comma: true" + more));
+    ASSERT_EQ(samples.size(), 2U);
+    EXPECT_EQ(samples[0].t_ns, 1'000'500'000);
+    EXPECT_EQ(samples[0].drive_rad_per_s[0], 1.5);
+    EXPECT_EQ(samples[1].drive_rad_per_s[0], -0.225);
+  }
+  const auto bare = play_only<EncoderSample>(
+      table("0,5 1,5\n0,6 2,5\n",
+            "time_column: 1, time_unit: s, drive_columns: [2], header: false, "
+            "decimal_comma: true, max_gap_s: 1"));
+  ASSERT_EQ(bare.size(), 2U);
+  EXPECT_EQ(bare[0].t_ns, 500'000'000);
+  EXPECT_THAT(error_of(table(text, rest)), HasSubstr("decimal_comma: true"));
+  EXPECT_THAT(error_of(table(text, rest + ", separator: comma, decimal_comma: true")),
+              HasSubstr("decimal_comma: the separator is a comma already"));
+}
+
 struct DriveUnit {
   const char* parameters;
   double factor;

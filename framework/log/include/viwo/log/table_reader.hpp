@@ -33,9 +33,10 @@ class BadRow : public InputError {
 /// How a table is laid out that is not one of viwo's own. Its columns may be unnamed or have one
 /// name twice, and are also found by their number, from 1; texts may be in double quotes.
 struct TableLayout {
-  char separator = 0;      ///< ' ': any blanks; 0: of ';' ',' tab blanks the first that occurs
-  int skip_lines = 0;      ///< lines before the header, or the first row
-  bool has_header = true;  ///< without one, numbers are the names of the columns
+  char separator = 0;          ///< ' ': any blanks; 0: of ';' ',' tab blanks the first that occurs
+  int skip_lines = 0;          ///< lines before the header, or the first row
+  bool has_header = true;      ///< without one, numbers are the names of the columns
+  bool decimal_comma = false;  ///< in rows, of numbers; the separator is then another
 };
 
 /// Reads row by row. The header may begin with '#' as in EuRoC files; the separator is ';' if the
@@ -92,19 +93,25 @@ class TableReader {
   [[noreturn]] void fail(std::size_t column, const std::string& text) const;
 
  private:
+  /// Of a field that is not `what` it should be.
+  [[noreturn]] void fail_as(std::size_t column, const char* what) const;
   [[noreturn]] void refuse(const std::string& text) const;
   std::optional<std::size_t> find(std::string_view name) const;
   /// Throws InputError where two columns have the name, in whatever units.
   void require_one(std::string_view name) const;
 
   void check_columns() const;
+  /// Of a row, to fields_.
+  void take_apart(std::string_view row);
   /// The line behind `skip` others; without the '#' before a header.
   std::string_view first_line(int skip);
 
   TextReader reader_;
   char separator_ = ',';
-  bool is_own_ = true;    ///< not of any layout
-  bool has_row_ = false;  ///< the first row has been read where the header is looked for
+  bool decimal_comma_ = false;
+  std::string with_points_;  ///< the row, if it has decimal commas
+  bool is_own_ = true;       ///< not of any layout
+  bool has_row_ = false;     ///< the first row has been read where the header is looked for
   std::vector<std::string> columns_;
   std::vector<std::string_view> fields_;
 };
