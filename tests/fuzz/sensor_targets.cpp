@@ -54,7 +54,8 @@ constexpr Reader kReaders[] = {
      TABLES "plugins/sensors/csv_table"},
     {"csv_table_bare", "table.csv",
      "{type: csv_table, path: FILE, header: false, separator: blank, skip_lines: 1, "
-     "time_column: 1, time_unit: us, drive_columns: [2], drive_input: angle, drive_unit: turn, "
+     "decimal_comma: true, time_column: 1, time_unit: us, drive_columns: [2], drive_input: angle, "
+     "drive_unit: turn, "
      "position_columns: [3, 4, 5], quaternion_columns: [6, 7, 8, 9], " ALL "}",
      TABLES "plugins/sensors/csv_table"},
     {"vio_csv_imu", "vio/imu.csv",
