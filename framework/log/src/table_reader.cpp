@@ -28,6 +28,12 @@ std::string_view without_quotes(std::string_view field) {
   return is_quoted ? trim(field.substr(1, field.size() - 2)) : field;
 }
 
+std::string with_points(std::string_view text) {
+  std::string out(text);
+  std::replace(out.begin(), out.end(), ',', '.');
+  return out;
+}
+
 void split(std::string_view line, char separator, bool quotes,
            std::vector<std::string_view>& fields) {
   fields.clear();
@@ -108,8 +114,7 @@ TableReader::TableReader(const std::filesystem::path& file, const TableLayout& l
 
 void TableReader::take_apart(std::string_view row) {
   if (decimal_comma_) {
-    with_points_ = row;
-    std::replace(with_points_.begin(), with_points_.end(), ',', '.');
+    with_points_ = with_points(row);
     row = with_points_;
   }
   split(row, separator_, !is_own_, fields_);
@@ -234,9 +239,8 @@ std::int64_t TableReader::time_ns(std::size_t column, TimeUnit unit) const {
 }
 
 void TableReader::fail_as(std::size_t column, const char* what) const {
-  std::string with_point(fields_[column]);
-  std::replace(with_point.begin(), with_point.end(), ',', '.');
-  const bool has_comma = parse_number(with_point) && !parse_number(fields_[column]);
+  const bool has_comma =
+      parse_number(with_points(fields_[column])) && !parse_number(fields_[column]);
   fail(column, quoted(fields_[column]) +
                    (!has_comma ? what
                     : is_own_  ? " has a decimal comma: numbers have points here"

@@ -214,19 +214,26 @@ class WheelParity final : public Update {
     return 1. / (params_.noise_scale * params_.noise_scale * noise_.variance());
   }
 
+  /// `weight` times information of the free intrinsics, in units of their sigma.
+  Square in_sigmas(const IntrinsicMatrix& information, double weight) const {
+    Square out(n_free_, n_free_);
+    for (int k = 0; k < n_free_; ++k) {
+      for (int i = 0; i < n_free_; ++i) {
+        out(i, k) = weight * sigma_[i] * sigma_[k] * information(free(i), free(k));
+      }
+    }
+    return out;
+  }
+
   /// (WP-1), (WP-2), (WP-3): the parity information at x as a cost of errors about x0, in units
   /// of sigma.
   void linearise(const Intrinsics& x0, const Intrinsics& x) {
     const ParityInformation& parity = pose_.parity;
     const double weight = parity_weight();
-    Lambda_.resize(n_free_, n_free_);
-    eta_.resize(n_free_);
+    Lambda_ = in_sigmas(parity.Lambda, weight);
     Intrinsics back(n_free_);
     Intrinsics eta_at_x(n_free_);
     for (int k = 0; k < n_free_; ++k) {
-      for (int i = 0; i < n_free_; ++i) {
-        Lambda_(i, k) = weight * sigma_[i] * sigma_[k] * parity.Lambda(free(i), free(k));
-      }
       eta_at_x[k] = weight * sigma_[k] * parity.eta[free(k)];
       back[k] = (x0[free(k)] - x[free(k)]) / sigma_[k];
     }
@@ -240,8 +247,6 @@ class WheelParity final : public Update {
   Square second_order_noise(std::span<const EncoderSample> encoders,
                             const EncoderInterval& interval) {
     const Square L = directions_of(C_, eigen_);
-    Square M(n_free_, n_free_);
-    const double weight = parity_weight();
     Square noise = Square::Zero(n_free_, n_free_);
     Intrinsics mean = Intrinsics::Zero(n_free_);
     for (int i = 0; i < n_free_; ++i) {
@@ -249,13 +254,8 @@ class WheelParity final : public Update {
       for (int k = 0; k < n_free_; ++k) x[free(k)] += kCurvatureStep * sigma_[k] * L(k, i);
       preintegrator_->move_intrinsics(x);
       preintegrator_->integrate(encoders, interval.begin_ns, interval.end_ns, moved_);
-      for (int k = 0; k < n_free_; ++k) {
-        for (int l = 0; l < n_free_; ++l) {
-          M(l, k) = (weight * sigma_[l] * sigma_[k] * moved_.parity.Lambda(free(l), free(k)) -
-                     Lambda_(l, k)) /
-                    kCurvatureStep;
-        }
-      }
+      const Square M =
+          (in_sigmas(moved_.parity.Lambda, parity_weight()) - Lambda_) / kCurvatureStep;
       const Square h = M * L;
       noise += 0.5 * h * h.transpose();
       mean += 0.5 * h.col(i);
@@ -268,7 +268,8 @@ class WheelParity final : public Update {
   /// (WP-7), (WP-8), (WP-9): Lambda_ and eta_ where eta_ has the noise `curvature` besides that of
   /// the encoders, and tells of the intrinsics only what the motion does.
   void weigh(const Square& curvature) {
-    const double negligible = curvature.isZero() ? kNoInformation : kNegligibleInformation;
+    const bool bends = !curvature.isZero();
+    const double negligible = bends ? kNegligibleInformation : kNoInformation;
     eigen_.compute(Lambda_);
     const Intrinsics information = eigen_.eigenvalues();
     int dropped = 0;  // directions that the interval tells next to nothing about
@@ -280,29 +281,26 @@ class WheelParity final : public Update {
     const Square to_eta = eigen_.eigenvectors().rightCols(kept) * root.asDiagonal();
     const Square to_white =
         root.cwiseInverse().asDiagonal() * eigen_.eigenvectors().rightCols(kept).transpose();
-    Square of_noise(n_free_, n_free_);
-    for (int k = 0; k < n_free_; ++k) {
-      for (int i = 0; i < n_free_; ++i) {
-        of_noise(i, k) = sigma_[i] * sigma_[k] * pose_.parity.of_noise(free(i), free(k));
-      }
-    }
-    const Square S = to_white * of_noise * to_white.transpose();
+    const Square S = to_white * in_sigmas(pose_.parity.of_noise, 1.) * to_white.transpose();
     eigen_.compute(S);
     // The samples of one interval tell the share of noise only so well.
     const auto n = static_cast<double>(std::max<std::int64_t>(pose_.samples, 1));
     const double at_most = 1. + kShareSigmas * std::sqrt(2. / n);
     const Intrinsics told = (1. - at_most * eigen_.eigenvalues().array()).max(0.);
     const Square T = eigen_.eigenvectors() * told.asDiagonal() * eigen_.eigenvectors().transpose();
-    // The same curvature bends every interval the same way as long as the excitation is the same,
-    // so that it does not average out: after K intervals its share is K times that of one, and the
-    // last one adds the difference of Lambda K / (1 + K R) (WP-8).
-    Square R = to_white * curvature * to_white.transpose();
-    if (R.trace() < kNegligibleCurvature && unchecked_ < 0) {
+    Square TW = T;
+    if (bends) {
+      // The same curvature bends every interval the same way as long as the excitation is the same,
+      // so that it does not average out: after K intervals its share is K times that of one, and
+      // the last one adds the difference of Lambda K / (1 + K R) (WP-8).
+      Square R = to_white * curvature * to_white.transpose();
+      if (R.trace() < kNegligibleCurvature) unchecked_ = kIntervalsUnchecked;
+      R.diagonal().array() += 1.;
+      const Square once = R.llt().solve(Square::Identity(kept, kept));
+      TW = T * once * once;
+    } else if (unchecked_ < 0) {
       unchecked_ = kIntervalsUnchecked;
     }
-    R.diagonal().array() += 1.;
-    const Square once = R.llt().solve(Square::Identity(kept, kept));
-    const Square TW = T * once * once;
     const Intrinsics white = to_white * eta_;
     eta_ = to_eta * (TW * white);
     Lambda_ = to_eta * TW * T * to_eta.transpose();
