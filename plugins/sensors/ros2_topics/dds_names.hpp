@@ -20,4 +20,9 @@ std::string dds_type(std::string_view type);
 /// And back; another name stays as it is.
 std::string ros_type(std::string_view type);
 
+/// What an endpoint of "sensor_msgs/Imu" says of its type in its user data: the hash of the
+/// definition (REP 2016, RIHS01), which ROS 2 of Iron and later looks for. Empty for a type that
+/// viwo neither hears nor says.
+std::string said_of_type(std::string_view type);
+
 }  // namespace viwo::ros2

@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "dds_names.hpp"
 #include "viwo/api/status.hpp"
 
 namespace viwo::ros2 {
@@ -51,6 +52,12 @@ dds::DomainParticipantQos qos_of(const DdsSettings& settings) {
         std::make_shared<eprosima::fastdds::rtps::SharedMemTransportDescriptor>());
   }
   return qos;
+}
+
+template <class Qos>
+void say_type(Qos& qos, const std::string& dds_type) {
+  const std::string said = said_of_type(ros_type(dds_type));
+  qos.user_data().data_vec({said.begin(), said.end()});
 }
 
 /// DDS tells a participant of its own writers, too.
@@ -134,6 +141,7 @@ dds::Topic& DdsNode::topic_of(const std::string& topic, const std::string& type)
 dds::DataReader& DdsNode::make_reader(const std::string& topic, const std::string& type,
                                       Delivery delivery, int most) {
   dds::DataReaderQos qos = dds::DATAREADER_QOS_DEFAULT;
+  say_type(qos, type);
   qos.reliability().kind = delivery == Delivery::kBestEffort ? dds::BEST_EFFORT_RELIABILITY_QOS
                                                              : dds::RELIABLE_RELIABILITY_QOS;
   qos.durability().kind = delivery == Delivery::kLatched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS
@@ -153,6 +161,7 @@ dds::DataReader& DdsNode::make_reader(const std::string& topic, const std::strin
 
 dds::DataWriter& DdsNode::make_writer(const std::string& topic, const std::string& type, int most) {
   dds::DataWriterQos qos = dds::DATAWRITER_QOS_DEFAULT;
+  say_type(qos, type);
   qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
   qos.durability().kind = dds::VOLATILE_DURABILITY_QOS;
   qos.history().kind = dds::KEEP_LAST_HISTORY_QOS;

@@ -8,6 +8,7 @@
 #include "dds_names.hpp"
 #include "dds_settings.hpp"
 #include "message_of.hpp"
+#include "messages.hpp"
 
 namespace viwo::ros2 {
 namespace {
@@ -21,6 +22,15 @@ TEST(DdsNames, AreThoseThatRos2Makes) {
   EXPECT_EQ(ros_type("sensor_msgs::msg::dds_::Imu_"), "sensor_msgs/Imu");
   EXPECT_EQ(ros_type("Imu"), "Imu");
   EXPECT_EQ(ros_type("sensor_msgs::msg::dds_::Imu"), "sensor_msgs::msg::dds_::Imu");
+}
+
+TEST(DdsNames, SayTheHashOfEachTypeThatIsHeard) {
+  for (int kind = 0; kind <= static_cast<int>(bag::Kind::kNavSatFix); ++kind) {
+    const auto type = bag::type_name(static_cast<bag::Kind>(kind));
+    EXPECT_THAT(said_of_type(type), ::testing::MatchesRegex("typehash=RIHS01_[0-9a-f]+;")) << type;
+    EXPECT_EQ(said_of_type(type).size(), 81U) << type;
+  }
+  EXPECT_EQ(said_of_type("sensor_msgs/Range"), "");
 }
 
 TEST(DdsNames, SayWhatIsNoTopic) {

@@ -11,6 +11,9 @@
 //                                 until SIGTERM
 //   ros2_node record DOMAIN FILE  viwo/odometry, viwo/path, /tf and /diagnostics, a line each,
 //                                 until SIGTERM
+//   ros2_node endpoints DOMAIN FILE  readers and writers of others, a line each: which of them,
+//   topic,
+//                                 type, user data; until SIGTERM
 //   ros2_node play DOMAIN BAG     a ROS 2 bag in its own time, best effort
 //   ros2_node step DOMAIN BAG     as fast as it is taken: reliable, keeping all
 //   ros2_node lossy DOMAIN BAG    as fast as possible on a lossy line: reliable, keeping one
@@ -162,6 +165,32 @@ int record(dds_entity_t node, const std::string& file) {
   return 0;
 }
 
+void write_user_data(std::ostream& out, const dds_qos_t* qos) {
+  void* data = nullptr;
+  std::size_t size = 0;
+  if (!dds_qget_userdata(qos, &data, &size) || data == nullptr) return;
+  out.write(static_cast<const char*>(data), static_cast<std::streamsize>(size));
+  dds_free(data);
+}
+
+int record_endpoints(dds_entity_t node, const std::string& file) {
+  std::ofstream out(file);
+  const Reader<dds_builtintopic_endpoint_t> writers(node, DDS_BUILTIN_TOPIC_DCPSPUBLICATION);
+  const Reader<dds_builtintopic_endpoint_t> readers(node, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION);
+  const auto write = [&out](const char* which, const dds_builtintopic_endpoint_t& there) {
+    out << which << " " << there.topic_name << " " << there.type_name << " ";
+    write_user_data(out, there.qos);
+    out << "\n";
+  };
+  while (!terminated) {
+    writers.read([&write](const auto& there) { write("writer", there); });
+    readers.read([&write](const auto& there) { write("reader", there); });
+    out.flush();
+    dds_sleepfor(DDS_MSECS(20));
+  }
+  return 0;
+}
+
 int play(dds_entity_t node, const std::string& file, Delivery delivery) {
   const RobotBag robot(file);
   std::vector<std::unique_ptr<Writer>> writers;
@@ -206,6 +235,7 @@ int run(const std::string& mode, int domain, const std::string& what) {
   if (mode == "wrong") code = publish_wrong(node, std::stoi(what));
   if (mode == "mount") code = publish_mount(node, what);
   if (mode == "record") code = record(node, what);
+  if (mode == "endpoints") code = record_endpoints(node, what);
   if (mode == "play") code = play(node, what, Delivery::kBestEffort);
   if (mode == "step") code = play(node, what, Delivery::kKeepAll);
   if (mode == "lossy") code = play(node, what, Delivery::kKeepOne);
@@ -217,7 +247,8 @@ int run(const std::string& mode, int domain, const std::string& what) {
 
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::cerr << "ros2_node publish|wrong|mount|record|play|step|lossy DOMAIN N|Z|FILE|BAG\n";
+    std::cerr
+        << "ros2_node publish|wrong|mount|record|endpoints|play|step|lossy DOMAIN N|Z|FILE|BAG\n";
     return 2;
   }
   std::signal(SIGTERM, [](int) { terminated = true; });

@@ -144,6 +144,11 @@ class Reader {
     dds_delete_qos(qos);
     require(reader_, "reader of " + topic);
   }
+  /// Of a topic that is built in: what other participants have.
+  Reader(dds_entity_t participant, dds_entity_t topic)
+      : reader_(dds_create_reader(participant, topic, nullptr, nullptr)) {
+    require(reader_, "reader of a topic that is built in");
+  }
   template <class Take>
   void read(const Take& take) const {
     void* sample[1] = {nullptr};

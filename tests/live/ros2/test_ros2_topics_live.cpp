@@ -1,6 +1,7 @@
 // The sensor ros2_topics with another DDS on loopback.
 #include <algorithm>
 #include <chrono>
+#include <regex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -221,6 +222,42 @@ TEST_F(Ros2Topics, PublishesTheEstimate) {
   EXPECT_THAT(heard, ContainsRegex("path map [0-9]+ 0.5"));
   EXPECT_THAT(heard, ContainsRegex("diagnostics 170000000[0-9]+ level 1 latency_s=0.0125 "));
   EXPECT_THAT(heard, HasSubstr(" r_1=0.0255 sigma r_1=0.25"));
+}
+
+TEST_F(Ros2Topics, SaysTheHashesOfItsTypes) {
+  const auto sensor = make(
+      ", imu_topic: /imu0, joint_topic: /joint_states, drive_joints: [drive_1], imu_frame: "
+      "imu_link, "
+      "body_frame: base_link");
+  // A reader of a sensor is made when its publisher is met, who waits for readers of all topics.
+  const auto rest = make(
+      ", publish: false, image_topics: [/cam0/image_raw, "
+      "/cam1/image_raw/compressed]");
+  Child publisher(dds_->node("publish", "200"), dds_->file("publisher.log"));
+  Child listing(dds_->node("endpoints", dds_->file("endpoints.txt")), dds_->file("listing.log"));
+  const std::vector<std::string> all{
+      "writer rt/viwo/odometry nav_msgs::msg::dds_::Odometry_ "
+      "typehash=RIHS01_3cc97dc7fb75[0-9a-f]+;\n",
+      "writer rt/viwo/path nav_msgs::msg::dds_::Path_ typehash=RIHS01_1957a5bb3cee[0-9a-f]+;\n",
+      "writer rt/tf tf2_msgs::msg::dds_::TFMessage_ typehash=RIHS01_e369d0f05a23[0-9a-f]+;\n",
+      "writer rt/diagnostics diagnostic_msgs::msg::dds_::DiagnosticArray_ "
+      "typehash=RIHS01_5a8a36efb05f[0-9a-f]+;\n",
+      "reader rt/tf_static tf2_msgs::msg::dds_::TFMessage_ "
+      "typehash=RIHS01_e369d0f05a23[0-9a-f]+;\n",
+      "reader rt/robot_description std_msgs::msg::dds_::String_ "
+      "typehash=RIHS01_df668c740482[0-9a-f]+;\n",
+      "reader rt/imu0 sensor_msgs::msg::dds_::Imu_ typehash=RIHS01_7d9a00ff1310[0-9a-f]+;\n"};
+  const auto deadline = steady_clock::now() + 20s;
+  const auto is_there = [](const std::string& one) {
+    return std::regex_search(dds_->text_of("endpoints.txt"), std::regex(one));
+  };
+  while (!std::all_of(all.begin(), all.end(), is_there) && steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(50ms);
+  }
+  for (const std::string& one : all) {
+    EXPECT_TRUE(is_there(one)) << one << dds_->text_of("endpoints.txt")
+                               << dds_->text_of("listing.log") << dds_->text_of("publisher.log");
+  }
 }
 
 TEST_F(Ros2Topics, TellsTheRobotThatThereIsNoEstimate) {
