@@ -62,9 +62,10 @@ double equidistant_part(const Eigen::Vector4d& k, double t2) {
   return 1. + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3])));
 }
 
-/// How fast that distance grows with the angle.
-double equidistant_slope(const Eigen::Vector4d& k, double t2) {
-  return 1. + t2 * (3. * k[0] + t2 * (5. * k[1] + t2 * (7. * k[2] + t2 * 9. * k[3])));
+/// How fast that distance grows with the angle; of one angle or of several.
+template <class Squares>
+Squares equidistant_slope(const Eigen::Vector4d& k, const Squares& t2) {
+  return 1. + t2 * (3. * k[0] + t2 * (5. * k[1] + t2 * (7. * k[2] + t2 * (9. * k[3]))));
 }
 
 /// Whether it has grown all the way up to there: behind a fold it may grow again, and what is seen
@@ -74,11 +75,9 @@ bool is_before_fold(const Eigen::Vector4d& k, double theta) {
   if (!(theta >= 0.) || theta > 3.14 || !(equidistant_slope(k, t2) > 0.)) return false;
   // Not even if all that makes it less were there at once.
   if (equidistant_slope(k.cwiseMin(0.), t2) > 0.) return true;
-  constexpr int kSteps = 32;
-  for (int i = 1; i < kSteps; ++i) {
-    if (!(equidistant_slope(k, t2 * i / kSteps) > 0.)) return false;
-  }
-  return true;
+  using Steps = Eigen::Array<double, 32, 1>;
+  static const Steps fractions = Steps::LinSpaced(1. / 32., 1.);
+  return (equidistant_slope(k, Steps(fractions * t2)) > 0.).all();
 }
 
 bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out,
@@ -126,7 +125,7 @@ bool distort(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& ou
 }
 
 /// A step of Newton's method this small leaves an error of about its square.
-constexpr double kStepTolerance = 1e-13;
+constexpr double kStepTolerance = 1e-9;
 
 Eigen::Vector3d direction_of(const Eigen::Vector2d& point) {
   return Eigen::Vector3d(point.x(), point.y(), 1.).normalized();
@@ -172,18 +171,25 @@ std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::
     if (d < 1e-12) return Eigen::Vector3d(target.x(), target.y(), 1.).normalized();
     const Eigen::Vector4d k = camera.intrinsics.tail<4>();
     double theta = d, step = -d;  // half a step where it would leave what is not folded
+    double not_folded = 0.;       // up to there
+    const auto is_allowed = [&] {
+      if (theta >= 0. && theta <= not_folded) return true;
+      if (!is_before_fold(k, theta)) return false;
+      not_folded = theta;
+      return true;
+    };
     for (int i = 0; i < 60; ++i) {
-      const double t2 = theta * theta;
-      if (!is_before_fold(k, theta)) {
+      if (!is_allowed()) {
         step *= 0.5;
         theta += step;
         continue;
       }
+      const double t2 = theta * theta;
       step = (theta * equidistant_part(k, t2) - d) / equidistant_slope(k, t2);
       theta -= step;
-      if (std::abs(step) < 1e-14) break;
+      if (std::abs(step) < kStepTolerance) break;
     }
-    if (!is_before_fold(k, theta) || std::abs(step) > 1e-9) return std::nullopt;
+    if (!is_allowed() || std::abs(step) > kStepTolerance) return std::nullopt;
     const double s = std::sin(theta) / d;
     return Eigen::Vector3d(s * target.x(), s * target.y(), std::cos(theta));
   }

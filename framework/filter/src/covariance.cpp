@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "upper_triangular.hpp"
 #include "viwo/math/chi2.hpp"
 
 namespace viwo {
@@ -63,7 +64,9 @@ class Innovation {
   SmallVector white_;
 };
 
-void mirror_lower(Eigen::MatrixXd& M) { M.triangularView<Eigen::StrictlyUpper>() = M.transpose(); }
+void mirror_lower(Eigen::Ref<Eigen::MatrixXd> M) {
+  M.triangularView<Eigen::StrictlyUpper>() = M.transpose();
+}
 
 }  // namespace
 
@@ -223,76 +226,87 @@ void Covariance::collect_columns(const FactorColumns& columns) {
   }
 }
 
-FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd& dx) {
-  dx.setZero();
+Eigen::Index Covariance::gather(const InformationFactor& factor) {
   collect_columns(factor.columns);
   const Index m = static_cast<Index>(factor_index_.size());
-  const Index n = static_cast<Index>(order_.size());
-  if (m == 0) return FactorResult::kRejected;
-  const auto at = [](const std::vector<int>& list, Index i) {
-    return list[static_cast<std::size_t>(i)];
+  const auto in_factor = [this](const Run& run) {
+    return factor_index_[static_cast<std::size_t>(run.start)];
   };
-  auto C = C_.topLeftCorner(m, m);
-  auto Lambda = W_.topLeftCorner(m, m);
-  for (Index j = 0; j < m; ++j) {
-    for (Index i = j; i < m; ++i) {
-      const int row = at(factor_index_, i), col = at(factor_index_, j);
-      Lambda(i, j) = row >= col ? factor.Lambda(row, col) : factor.Lambda(col, row);
-      Lambda(j, i) = Lambda(i, j);
-      C(i, j) = P_(at(order_, i), at(order_, j));
+  auto Lambda = G_.topLeftCorner(m, m);
+  auto reversed = W_.topLeftCorner(m, m);
+  for (const Run& rows : runs_) {
+    if (rows.start >= m) break;
+    y_.segment(rows.start, rows.count) = factor.eta.segment(in_factor(rows), rows.count);
+    for (const Run& cols : runs_) {
+      if (cols.start > rows.start) break;
+      Lambda.block(rows.start, cols.start, rows.count, cols.count) =
+          factor.Lambda.block(in_factor(rows), in_factor(cols), rows.count, cols.count);
+      reversed.block(m - cols.start - cols.count, m - rows.start - rows.count, cols.count,
+                     rows.count) =
+          P_.block(cols.column, rows.column, cols.count, rows.count).reverse();
     }
   }
+  mirror_lower(Lambda);
+  return m;
+}
+
+FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd& dx) {
+  dx.setZero();
+  const Index m = gather(factor);
+  const Index n = static_cast<Index>(order_.size());
+  if (m == 0) return FactorResult::kRejected;
   auto y = y_.head(m);
-  for (Index i = 0; i < m; ++i) y[i] = factor.eta[at(factor_index_, i)];
+  auto G = G_.topLeftCorner(n, n);
+  const auto Lambda = G.topLeftCorner(m, m);
   if (!Lambda.allFinite() || !y.allFinite()) return FactorResult::kRejected;
 
-  // P_cc = C C^T; T = I + C^T Lambda C = L L^T; Z = L^-1 C^-1 P_c: (F-8).
-  Eigen::Ref<Eigen::MatrixXd> C_ref(C);
-  if (InPlaceCholesky(C_ref).info() != Eigen::Success) return FactorResult::kFailed;
-  C.triangularView<Eigen::StrictlyUpper>().setZero();
-  auto LambdaC = G_.topLeftCorner(m, m);
-  LambdaC.noalias() = Lambda * C.triangularView<Eigen::Lower>();
+  auto C = C_.topLeftCorner(m, m);
   auto T = T_.topLeftCorner(m, m);
-  T.noalias() = C.transpose().triangularView<Eigen::Upper>() * LambdaC;
-  T.diagonal().array() += 1.;
-  Eigen::Ref<Eigen::MatrixXd> T_ref(T);
-  if (InPlaceCholesky(T_ref).info() != Eigen::Success) return FactorResult::kRejected;
+  auto work = W_.topLeftCorner(m, m);
+  if (!upper_triangular::factorise(work, C)) return FactorResult::kFailed;
+  upper_triangular::weigh(C, Lambda, work, T);
+  Eigen::Ref<Eigen::MatrixXd> L(T);
+  if (InPlaceCholesky(L).info() != Eigen::Success) return FactorResult::kRejected;
 
-  auto Y = Y_.topLeftCorner(m, n);
-  Y.leftCols(m) = C.transpose();
+  auto Y_o = Y_.topLeftCorner(m, n - m);
   for (const Run& rows : runs_) {
     for (const Run& cols : runs_) {
       if (rows.start >= m || cols.start < m) continue;
-      Y.block(rows.start, cols.start, rows.count, cols.count) =
+      Y_o.block(rows.start, cols.start - m, rows.count, cols.count) =
           P_.block(rows.column, cols.column, rows.count, cols.count);
     }
   }
-  auto Y_others = Y.rightCols(n - m);
-  C.triangularView<Eigen::Lower>().solveInPlace(Y_others);
-  auto Z = Z_.topLeftCorner(m, n);
-  Z = Y;
-  T.triangularView<Eigen::Lower>().solveInPlace(Z);
-
-  // dx = P_:c (I + Lambda P_cc)^-1 eta = Z^T L^-1 C^T eta.
-  auto product = G_.col(0).head(m);  // y cannot be both sides, and a temporary would be allocated
-  product.noalias() = C.transpose().triangularView<Eigen::Upper>() * y;
+  C.triangularView<Eigen::Upper>().solveInPlace(Y_o);
+  auto Z_o = Z_.topLeftCorner(m, n - m);
+  Z_o = Y_o;
+  L.triangularView<Eigen::Lower>().solveInPlace(Z_o);
+  auto product = W_.col(0).head(m);  // y cannot be both sides, and a temporary would be allocated
+  product.noalias() = C.transpose().triangularView<Eigen::Lower>() * y;
   y = product;
-  T.triangularView<Eigen::Lower>().solveInPlace(y);
-  auto G = G_.topLeftCorner(n, n);
-  G.triangularView<Eigen::Lower>().setZero();
-  G.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose());
-  // What the factor does not see directly: P_oo - Y_o^T Y_o + Z_o^T Z_o.
-  auto G_others = G.bottomRightCorner(n - m, n - m);
-  G_others.selfadjointView<Eigen::Lower>().rankUpdate(Y_others.transpose(), -1.);
+  L.triangularView<Eigen::Lower>().solveInPlace(y);
+
+  upper_triangular::divide(C, L);
   auto correction = W_.col(0).head(n);
-  correction.noalias() = Z.transpose() * y;
-  G.triangularView<Eigen::StrictlyUpper>() = G.transpose();
-  // Back into the order of the state, run by run.
+  correction.head(m).noalias() = C.triangularView<Eigen::Upper>() * y;
+  correction.tail(n - m).noalias() = Z_o.transpose() * y;
+  upper_triangular::square(C, G.topLeftCorner(m, m));
+  G.bottomLeftCorner(n - m, m).noalias() =
+      Z_o.transpose() * C.transpose().triangularView<Eigen::Lower>();
+  auto G_o = G.bottomRightCorner(n - m, n - m);
+  G_o.triangularView<Eigen::Lower>().setZero();
+  G_o.selfadjointView<Eigen::Lower>().rankUpdate(Z_o.transpose());
+  G_o.selfadjointView<Eigen::Lower>().rankUpdate(Y_o.transpose(), -1.);
+  mirror_lower(G);
+  scatter(m, dx);
+  return FactorResult::kApplied;
+}
+
+void Covariance::scatter(Eigen::Index m, Eigen::VectorXd& dx) {
   for (const Run& cols : runs_) {
-    dx.segment(cols.column, cols.count) = correction.segment(cols.start, cols.count);
+    dx.segment(cols.column, cols.count) = W_.col(0).segment(cols.start, cols.count);
     for (const Run& rows : runs_) {
       auto P_block = P_.block(rows.column, cols.column, rows.count, cols.count);
-      const auto G_block = G.block(rows.start, cols.start, rows.count, cols.count);
+      const auto G_block = G_.block(rows.start, cols.start, rows.count, cols.count);
       if (rows.start < m || cols.start < m) {
         P_block = G_block;
       } else {
@@ -300,7 +314,6 @@ FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd&
       }
     }
   }
-  return FactorResult::kApplied;
 }
 
 }  // namespace viwo

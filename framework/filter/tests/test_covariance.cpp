@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "filter_fixture.hpp"
+#include "rows_fixture.hpp"
 #include "viwo/filter/covariance.hpp"
 
 namespace viwo {
@@ -14,9 +15,9 @@ using testing::Random;
 
 constexpr int kDenseSize = 40;
 
-MatrixXd random_covariance(Random& random) {
-  const MatrixXd A = random.matrix(kDenseSize, kDenseSize);
-  MatrixXd P = 0.1 * MatrixXd::Identity(kDenseSize, kDenseSize);
+MatrixXd random_covariance(Random& random, int size = kDenseSize) {
+  const MatrixXd A = random.matrix(size, size);
+  MatrixXd P = 0.1 * MatrixXd::Identity(size, size);
   P.selfadjointView<Eigen::Lower>().rankUpdate(A);
   return P.selfadjointView<Eigen::Lower>();  // symmetric to the bit, which a product need not be
 }
@@ -91,6 +92,27 @@ TEST(Covariance, InformationFactorIsTheSameUpdateWithoutStackingRows) {
   const Textbook expected = textbook(P, H, MatrixXd::Identity(60, 60), r);
   EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
   EXPECT_LT((dx - expected.dx).norm(), 1e-10);
+  EXPECT_EQ(covariance.matrix(), covariance.matrix().transpose());
+}
+
+/// More columns than the products of (F-8) take at a time, some of them held.
+TEST(Covariance, InformationFactorOfManyColumnsIsTheSameUpdate) {
+  constexpr int kSize = 140;
+  Random random(11);
+  MatrixXd P = random_covariance(random, kSize);
+  for (const int held : {47, 100}) {
+    P.row(held).setZero();
+    P.col(held).setZero();
+  }
+  const testing::Rows rows =
+      testing::random_rows(random, 150, {{90, 31}, {40, 17}, {15, 20}, {60, 30}});
+  Covariance covariance(kSize);
+  covariance.set_block(0, P);
+  VectorXd dx(kSize);
+  ASSERT_EQ(covariance.apply(rows.factor(kSize), dx), FactorResult::kApplied);
+  const Textbook expected = textbook(P, rows.dense(kSize), MatrixXd::Identity(150, 150), rows.r);
+  EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
+  EXPECT_LT((dx - expected.dx).norm(), 1e-9 * expected.dx.norm());
   EXPECT_EQ(covariance.matrix(), covariance.matrix().transpose());
 }
 

@@ -79,6 +79,12 @@ class Covariance {
  private:
   double gate(int rows, double probability);
   void collect_columns(const FactorColumns& columns);
+  /// Lambda of an information factor into G_, eta into y_, P_cc with its order reversed into W_;
+  /// the number of columns.
+  Eigen::Index gather(const InformationFactor& factor);
+  /// Back into the order of the state: G_, of m columns of a factor and of what is added to the
+  /// others, and the correction in the first column of W_.
+  void scatter(Eigen::Index m, Eigen::VectorXd& dx);
 
   Eigen::MatrixXd P_;
   Eigen::MatrixXd PHt_;  // n x rows
