@@ -216,10 +216,15 @@ void Covariance::collect_columns(const FactorColumns& columns) {
       order_.push_back(column);
     }
   }
-  // Neighbours that are neighbours in the state, too; a run is of the factor or of the others.
+  // Neighbours that are neighbours in the state and in the factor, too; a run is of the factor or
+  // of the others.
+  const auto follows = [&](std::size_t i) {
+    return order_[i] == order_[i - 1] + 1 &&
+           (i >= m || factor_index_[i] == factor_index_[i - 1] + 1);
+  };
   runs_.clear();
   for (std::size_t i = 0; i < order_.size(); ++i) {
-    if (i == 0 || i == m || order_[i] != order_[i - 1] + 1) {
+    if (i == 0 || i == m || !follows(i)) {
       runs_.push_back({static_cast<int>(i), order_[i], 0});
     }
     ++runs_.back().count;

@@ -116,6 +116,22 @@ TEST(Covariance, InformationFactorOfManyColumnsIsTheSameUpdate) {
   EXPECT_EQ(covariance.matrix(), covariance.matrix().transpose());
 }
 
+/// Neighbours in the state that are none in the factor: what stands between them there is held.
+TEST(Covariance, InformationFactorOfNeighboursApartIsTheSameUpdate) {
+  Random random(12);
+  MatrixXd P = random_covariance(random);
+  P.middleRows(30, 2).setZero();
+  P.middleCols(30, 2).setZero();
+  const testing::Rows rows = testing::random_rows(random, 40, {{10, 3}, {30, 2}, {13, 4}});
+  Covariance covariance(kDenseSize);
+  covariance.set_block(0, P);
+  VectorXd dx(kDenseSize);
+  ASSERT_EQ(covariance.apply(rows.factor(kDenseSize), dx), FactorResult::kApplied);
+  const Textbook expected = textbook(P, rows.dense(kDenseSize), MatrixXd::Identity(40, 40), rows.r);
+  EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
+  EXPECT_LT((dx - expected.dx).norm(), 1e-10);
+}
+
 TEST(Covariance, ColumnsWithoutVarianceNeverMove) {
   Random random(3);
   MatrixXd P = random_covariance(random);
