@@ -72,7 +72,7 @@ Squares equidistant_slope(const Eigen::Vector4d& k, const Squares& t2) {
 /// there is nothing.
 bool is_before_fold(const Eigen::Vector4d& k, double theta) {
   const double t2 = theta * theta;
-  if (!(theta >= 0.) || theta > 3.14 || !(equidistant_slope(k, t2) > 0.)) return false;
+  if (!(theta >= 0.) || theta > 3.14) return false;
   // Not even if all that makes it less were there at once.
   if (equidistant_slope(k.cwiseMin(0.), t2) > 0.) return true;
   using Steps = Eigen::Array<double, 32, 1>;

@@ -11,9 +11,8 @@
 //                                 until SIGTERM
 //   ros2_node record DOMAIN FILE  viwo/odometry, viwo/path, /tf and /diagnostics, a line each,
 //                                 until SIGTERM
-//   ros2_node endpoints DOMAIN FILE  readers and writers of others, a line each: which of them,
-//   topic,
-//                                 type, user data; until SIGTERM
+//   ros2_node endpoints DOMAIN FILE   readers and writers of others, a line each: which of them,
+//                                 topic, type, user data; until SIGTERM
 //   ros2_node play DOMAIN BAG     a ROS 2 bag in its own time, best effort
 //   ros2_node step DOMAIN BAG     as fast as it is taken: reliable, keeping all
 //   ros2_node lossy DOMAIN BAG    as fast as possible on a lossy line: reliable, keeping one

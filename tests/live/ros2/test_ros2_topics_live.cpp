@@ -41,10 +41,15 @@ class Ros2Topics : public testing::DdsTest {
   static std::string error_of(const std::string& rest) {
     return testing::error_of([&] { make(rest); });
   }
-  static bool wait_until_said(const std::string& text) {
+  /// Whether it holds, within twenty seconds.
+  template <class Condition>
+  static bool wait_until(const Condition& holds) {
     const auto deadline = steady_clock::now() + 20s;
-    while (!said().has(text) && steady_clock::now() < deadline) std::this_thread::sleep_for(20ms);
-    return said().has(text);
+    while (!holds() && steady_clock::now() < deadline) std::this_thread::sleep_for(20ms);
+    return holds();
+  }
+  static bool wait_until_said(const std::string& text) {
+    return wait_until([&text] { return said().has(text); });
   }
   /// What the recorder has heard when all of that is there, or after twenty seconds.
   static std::string publish_until_heard(Sensor& sensor, EstimateSample estimate,
@@ -225,14 +230,9 @@ TEST_F(Ros2Topics, PublishesTheEstimate) {
 }
 
 TEST_F(Ros2Topics, SaysTheHashesOfItsTypes) {
-  const auto sensor = make(
-      ", imu_topic: /imu0, joint_topic: /joint_states, drive_joints: [drive_1], imu_frame: "
-      "imu_link, "
-      "body_frame: base_link");
-  // A reader of a sensor is made when its publisher is met, who waits for readers of all topics.
-  const auto rest = make(
-      ", publish: false, image_topics: [/cam0/image_raw, "
-      "/cam1/image_raw/compressed]");
+  // The reader of a topic is made when its publisher is met, who waits for readers of all topics.
+  const auto sensor =
+      make(std::string(kAllTopics) + ", imu_frame: imu_link, body_frame: base_link");
   Child publisher(dds_->node("publish", "200"), dds_->file("publisher.log"));
   Child listing(dds_->node("endpoints", dds_->file("endpoints.txt")), dds_->file("listing.log"));
   const std::vector<std::string> all{
@@ -247,28 +247,22 @@ TEST_F(Ros2Topics, SaysTheHashesOfItsTypes) {
       "reader rt/robot_description std_msgs::msg::dds_::String_ "
       "typehash=RIHS01_df668c740482[0-9a-f]+;\n",
       "reader rt/imu0 sensor_msgs::msg::dds_::Imu_ typehash=RIHS01_7d9a00ff1310[0-9a-f]+;\n"};
-  const auto deadline = steady_clock::now() + 20s;
-  const auto is_there = [](const std::string& one) {
-    return std::regex_search(dds_->text_of("endpoints.txt"), std::regex(one));
-  };
-  while (!std::all_of(all.begin(), all.end(), is_there) && steady_clock::now() < deadline) {
-    std::this_thread::sleep_for(50ms);
-  }
   for (const std::string& one : all) {
-    EXPECT_TRUE(is_there(one)) << one << dds_->text_of("endpoints.txt")
-                               << dds_->text_of("listing.log") << dds_->text_of("publisher.log");
+    const std::regex line(one);
+    EXPECT_TRUE(wait_until([&line] {
+      return std::regex_search(dds_->text_of("endpoints.txt"), line);
+    })) << one
+        << dds_->text_of("endpoints.txt") << dds_->text_of("listing.log")
+        << dds_->text_of("publisher.log");
   }
 }
 
 TEST_F(Ros2Topics, TellsTheRobotThatThereIsNoEstimate) {
   Child recorder(dds_->node("record", dds_->file("heard.txt")), dds_->file("recorder.log"));
   const auto sensor = make(", imu_topic: /imu0");
-  const auto heard = [] { return dds_->text_of("heard.txt").find(" level 1 rejections=0"); };
-  const auto deadline = steady_clock::now() + 20s;
-  while (heard() == std::string::npos && steady_clock::now() < deadline) {
-    std::this_thread::sleep_for(50ms);
-  }
-  EXPECT_NE(heard(), std::string::npos) << dds_->text_of("heard.txt");
+  EXPECT_TRUE(wait_until([] {
+    return dds_->text_of("heard.txt").find(" level 1 rejections=0") != std::string::npos;
+  })) << dds_->text_of("heard.txt");
 }
 
 TEST_F(Ros2Topics, NamesWhatIsMissingBeforeItEndsForWantOfIt) {

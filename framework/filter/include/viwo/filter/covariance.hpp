@@ -97,7 +97,7 @@ class Covariance {
     int column;  ///< in P
     int count;
   };
-  std::vector<Run> runs_;  // order_ in pieces that are contiguous in both
+  std::vector<Run> runs_;  // order_ in pieces that are contiguous in P and in the factor
   Eigen::MatrixXd C_, T_, Y_, Z_, G_, W_;
   Eigen::VectorXd y_;
   // Delayed initialisation: new columns, those that they are tied to, and what ties them.
