@@ -24,6 +24,8 @@ constexpr int kMaxDepth = 100;
 constexpr std::size_t kMaxValues = 100'000;
 constexpr std::size_t kMaxCharacters = 4 * kMaxYamlBytes;
 
+constexpr std::string_view kBlanks = " \t\r\n";
+
 /// What a value needs, with all that is below it.
 struct Extent {
   std::size_t values = 1;
@@ -135,7 +137,7 @@ class TreeBuilder final : public YAML::EventHandler {
                 const std::string& value) override {
     count(mark, {.characters = value.size()});
     if (value.find('\0') != std::string::npos) fail(mark_of(mark), "a text with a zero byte");
-    require_closed(mark);
+    require_readable_quotes(mark);
     add(Node::scalar_of(value, mark_of(mark), tag == "!"), anchor, mark);
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
@@ -159,15 +161,22 @@ class TreeBuilder final : public YAML::EventHandler {
   void OnMapEnd() override { close(); }
 
  private:
-  /// The parser takes the end of the text for that of a quoted value, with all that is between.
-  void require_closed(const YAML::Mark& mark) const {
-    const auto begin = static_cast<std::size_t>(std::max(mark.pos, 0));
+  /// The parser takes the end of the text for that of a quoted value, with all that is between, and
+  /// half of a character for each of two escapes.
+  void require_readable_quotes(const YAML::Mark& mark) const {
+    auto begin = static_cast<std::size_t>(std::max(mark.pos, 0));
+    while (begin < text_.size() && (text_[begin] == '&' || text_[begin] == '!')) {
+      begin = text_.find_first_not_of(kBlanks, text_.find_first_of(kBlanks, begin));
+    }
     if (begin >= text_.size()) return;
     const char quote = text_[begin];
     if (quote != '"' && quote != '\'') return;
     for (std::size_t i = begin + 1; i < text_.size(); ++i) {
       if (quote == '"' && text_[i] == '\\') {
-        ++i;
+        if (const auto escape = text_.substr(i++, 2); escape == "\\N" || escape == "\\_") {
+          fail(mark_of(mark),
+               std::string(escape) + " within quotes is not read: write the character itself");
+        }
       } else if (text_[i] == quote) {
         if (quote == '"' || i + 1 == text_.size() || text_[i + 1] != quote) return;
         ++i;

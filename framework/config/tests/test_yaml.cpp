@@ -194,6 +194,17 @@ TEST(Yaml, RefusesAZeroByteThatIsWrittenInLetters) {
   EXPECT_EQ(parse_error("a: \"b\\0c\"\n"), "f.yaml:1:4  a text with a zero byte");
 }
 
+TEST(Yaml, RefusesEscapesThatYieldHalfOfACharacter) {
+  for (const std::string escape : {"\\N", "\\_"}) {
+    for (const std::string before : {"", "&x ", "!!str "}) {
+      EXPECT_EQ(parse_error("a: " + before + "\"b" + escape + "c\"\n"),
+                "f.yaml:1:4  " + escape + " within quotes is not read: write the character itself");
+    }
+    EXPECT_EQ(parse("a: 'b" + escape + "'\n", "f.yaml").entries().front().value.scalar(),
+              "b" + escape);
+  }
+}
+
 TEST(Yaml, RefusesBinaryText) {
   EXPECT_EQ(parse_error(std::string_view("a: 1\0", 5)), "f.yaml  is not a text file");
 }
