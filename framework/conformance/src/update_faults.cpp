@@ -2,41 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include <Eigen/Eigenvalues>
 
 #include "findings.hpp"
+#include "viwo/estimator/factor_fit.hpp"
 
 namespace viwo::conformance {
 
-std::string fault_of(const FactorColumns& columns, int state_size) {
-  std::vector<bool> taken(static_cast<std::size_t>(state_size), false);
-  for (const ColumnRange& block : columns.blocks()) {
-    const std::string text = "columns " + std::to_string(block.first) + " to " +
-                             std::to_string(block.first + block.count - 1);
-    if (block.first < 0 || block.count < 1 || block.first + block.count > state_size) {
-      return text + " are not in the state of " + std::to_string(state_size);
-    }
-    for (int i = block.first; i < block.first + block.count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (taken[k]) return text + " overlap another block (column " + std::to_string(i) + ")";
-      taken[k] = true;
-    }
-  }
-  return columns.size() == 0 ? "has no columns" : "";
-}
-
 std::string fault_of(const ResidualFactor& factor, int state_size, bool numbers_matter) {
-  const std::string columns = fault_of(factor.columns, state_size);
-  if (!columns.empty()) return columns;
-  const auto rows = factor.residual.size();
-  if (factor.H.rows() != rows || factor.R.rows() != rows || factor.R.cols() != rows ||
-      factor.H.cols() != factor.columns.size()) {
-    return "H is " + std::to_string(factor.H.rows()) + " x " + std::to_string(factor.H.cols()) +
-           " for " + std::to_string(rows) + " residuals and " +
-           std::to_string(factor.columns.size()) + " columns - call set_rows() after the columns";
-  }
+  if (std::string misfit = misfit_of(factor, state_size); !misfit.empty()) return misfit;
+  if (factor.columns.size() == 0) return "has no columns";
   if (!numbers_matter) return "";
   if (!factor.H.allFinite()) return "H has entries that are not finite";
   if (!factor.residual.allFinite()) return "residual has entries that are not finite";
@@ -55,8 +31,8 @@ std::string fault_of(const ResidualFactor& factor, int state_size, bool numbers_
 }
 
 std::string fault_of(const InformationFactor& factor, int state_size, bool numbers_matter) {
-  const std::string columns = fault_of(factor.columns, state_size);
-  if (!columns.empty()) return columns;
+  if (std::string misfit = misfit_of(factor, state_size); !misfit.empty()) return misfit;
+  if (factor.columns.size() == 0) return "has no columns";
   if (!numbers_matter) return "";
   const int n = factor.columns.size();
   Eigen::MatrixXd Lambda = factor.Lambda.topLeftCorner(n, n).triangularView<Eigen::Lower>();

@@ -7,9 +7,6 @@
 
 namespace viwo::conformance {
 
-/// The columns of a factor: within the state, each once.
-std::string fault_of(const FactorColumns& columns, int state_size);
-
 /// `numbers_matter`: what is absurd may give absurd factors, which the filter drops and counts.
 std::string fault_of(const ResidualFactor& factor, int state_size, bool numbers_matter);
 std::string fault_of(const InformationFactor& factor, int state_size, bool numbers_matter);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "viwo/api/status.hpp"
+#include "viwo/estimator/factor_fit.hpp"
 #include "viwo/plugin_host/plugin_info.hpp"
 
 namespace viwo {
@@ -63,6 +64,16 @@ void take_off(const Eigen::VectorXd& dx, InformationFactor& factor) {
   }
 }
 
+/// ContractError for a factor that does not fit the state, or itself.
+void require_fitting(const FactorSink& sink, const Filter& filter) {
+  const auto require = [&](const char* what, const auto& factor) {
+    const std::string misfit = misfit_of(factor, filter.size());
+    if (!misfit.empty()) throw ContractError(std::string(what) + ": " + misfit);
+  };
+  for (const ResidualFactor& factor : sink.residuals()) require("a residual factor", factor);
+  if (sink.information() != nullptr) require("an information factor", *sink.information());
+}
+
 /// Blocks of the rooms of one update; nobody else's.
 class OwnBlocks final : public BlockEdits {
  public:
@@ -81,9 +92,8 @@ class OwnBlocks final : public BlockEdits {
     if (block.J.rows() != entries || block.J.cols() != block.columns.size()) {
       throw ContractError("rewrites a block with a Jacobian of another size");
     }
-    for (const ColumnRange& range : block.columns.blocks()) {
-      if (range.first + range.count <= filter_.size()) continue;
-      throw ContractError("rewrites a block with columns that are not in the state");
+    if (const std::string misfit = misfit_of(block.columns, filter_.size()); !misfit.empty()) {
+      throw ContractError("rewrites a block: " + misfit);
     }
     const auto is_finite = [entries](const std::array<double, kMaxRoomEntries>& values) {
       return std::all_of(values.begin(), values.begin() + entries,
@@ -225,7 +235,11 @@ void UpdateRunner::run(std::size_t index, const EpochData& data, Filter& filter,
   const EpochData own = data_of(index, data);
   sink_.clear();
   Update& update = *updates_[index].update;
-  if (!call(index, [&] { update.update(filter.view(), own, sink_); })) return;
+  const bool has_run = call(index, [&] {
+    update.update(filter.view(), own, sink_);
+    require_fitting(sink_, filter);
+  });
+  if (!has_run) return;
   counts_[index].applied += sink_.applied();
   counts_[index].rejected += sink_.rejected();
   has_moved_ = false;

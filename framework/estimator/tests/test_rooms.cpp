@@ -257,11 +257,15 @@ TEST(Rooms, RewritingAgainstTheContractTurnsTheUpdateOff) {
   EXPECT_EQ(with([](BlockRewrite& anew, auto&) { anew.J.setIdentity(2, 3); }), size);
   EXPECT_EQ(with([](BlockRewrite& anew, auto&) { anew.J.setIdentity(3, 4); }), size);
   EXPECT_EQ(with([](BlockRewrite& anew, auto&) { anew.columns.add(0, 3); }), size);
-  EXPECT_EQ(with([](BlockRewrite& anew, const FilterView& filter) {
-              anew.columns.clear();
-              anew.columns.add(filter.size - 2, 3);
-            }),
-            "rewrites a block with columns that are not in the state");
+  int state_size = 0;
+  const std::string beyond = with([&](BlockRewrite& anew, const FilterView& filter) {
+    state_size = filter.size;
+    anew.columns.clear();
+    anew.columns.add(filter.size - 2, 3);
+  });
+  EXPECT_EQ(beyond, "rewrites a block: columns " + std::to_string(state_size - 2) + " to " +
+                        std::to_string(state_size) + " are not in the state of " +
+                        std::to_string(state_size));
   const std::string not_finite = "rewrites a block with what is not finite";
   EXPECT_EQ(with([](BlockRewrite& anew, auto&) { anew.J(1, 1) = kNaN; }), not_finite);
   EXPECT_EQ(with([](BlockRewrite& anew, auto&) { anew.value[2] = kNaN; }), not_finite);

@@ -107,6 +107,57 @@ TEST(UpdateRunner, NamesTheUpdateThatThrewInAnAnalysis) {
             "update 'fake' failed: too many residual factors");
 }
 
+TEST(UpdateRunner, TurnsAnUpdateOffWhoseFactorsDoNotFit) {
+  int size = 0;
+  const auto offence = [&size](auto make) {
+    int calls = 0;
+    Bench bench = Bench::started({}, [&](const FilterView& filter, FactorSink& sink) {
+      ++calls;
+      size = filter.size;
+      make(sink);
+    });
+    bench.imu(-10, 300);
+    for (const std::int64_t t : {100, 200}) bench.tick(t);
+    EXPECT_EQ(bench.steps(), 2);
+    const UpdateFailures& failures = bench.estimator.failures()[0];
+    EXPECT_EQ(calls, failures.disabled ? 1 : 2);
+    EXPECT_EQ(bench.estimator.counts()[0].applied, failures.disabled ? 0 : 2);
+    return failures.cause;
+  };
+  const auto residual = [](auto change) {
+    return [change](FactorSink& sink) {
+      ResidualFactor& factor = sink.add_residual();
+      factor = observation(kPositionColumn, Eigen::Vector3d::Zero(), 1.);
+      change(factor);
+    };
+  };
+  EXPECT_EQ(offence(residual([](auto&) {})), "");
+  const std::string from = "a residual factor: ";
+  const std::string set_rows = " columns - call set_rows() after the columns";
+  EXPECT_EQ(offence(residual([](auto& factor) {
+              factor.columns.add(1000000, 3);
+              factor.set_rows(3);
+            })),
+            from + "columns 1000000 to 1000002 are not in the state of " + std::to_string(size));
+  EXPECT_EQ(offence(residual([](auto& factor) {
+              factor.columns.add(kPositionColumn + 2, 2);
+              factor.set_rows(3);
+            })),
+            from + "columns " + std::to_string(kPositionColumn + 2) + " to " +
+                std::to_string(kPositionColumn + 3) + " overlap another block");
+  EXPECT_EQ(offence(residual([](auto& factor) { factor.columns.add(0, 3); })),
+            from + "H is 3 x 3 and R 3 x 3 for 3 residuals and 6" + set_rows);
+  EXPECT_EQ(offence(residual([](auto& factor) { factor.R.setIdentity(2, 2); })),
+            from + "H is 3 x 3 and R 2 x 2 for 3 residuals and 3" + set_rows);
+  EXPECT_EQ(
+      offence([](FactorSink& sink) {
+        InformationFactor& factor = sink.add_information();
+        factor.columns.add(kPositionColumn, 3);
+        factor.Lambda.setZero(2, 2);
+      }),
+      "an information factor: Lambda is 2 x 2 and eta " + std::to_string(size) + " for 3 columns");
+}
+
 TEST(UpdateRunner, CountsFactorsAndWhatUpdatesCountThemselves) {
   Bench bench = Bench::started({}, [](const FilterView&, FactorSink& sink) {
     sink.count(5, 2);
