@@ -217,6 +217,17 @@ void judge_scale(CalibrationResult& result) {
       "a distance measured with a tape (distance_m) would tell");
 }
 
+/// States of the IMU are a reference by way of the wheels' mount.
+void judge_mount(CalibrationResult& result) {
+  const CalibrationRecording& first = result.setup->recordings.front();
+  const bool is_used = first.motion.kind == ReferenceKind::kPoses && !first.data.states().empty() &&
+                       first.setup.O_in_I && !result.setup->options.estimate_extrinsics;
+  if (!is_used || first.setup.O_in_I_is_exact) return;
+  result.warnings.push_back(
+      "the mount of the IMU (wheels.p_IinO_m and R_ItoO, whose sigmas are above 0) is taken to be "
+      "exact: what it is off by is learned as wheels (estimate_extrinsics: true finds it)");
+}
+
 /// What turns the base as drives that are all reversed do, and drives it the other way.
 void judge_signs(CalibrationResult& result) {
   const auto& signs = result.search.drive_signs;
@@ -372,6 +383,7 @@ void judge(CalibrationResult& result) {
   judge_ends(result);
   judge_lengths(result);
   judge_scale(result);
+  judge_mount(result);
 }
 
 }  // namespace viwo::calibration

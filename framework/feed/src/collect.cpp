@@ -184,7 +184,10 @@ RunData collect(RunSetup& setup, LiveSensors live) {
     config::fail(setup.sensors_mark, "no sensor of this run gave encoder samples");
   }
   // States are those of the IMU: then it is the reference body.
-  if (!data.states().empty() && setup.O_in_I) setup.extrinsics = *setup.O_in_I;
+  if (!data.states().empty() && setup.O_in_I) {
+    setup.extrinsics = *setup.O_in_I;
+    if (!setup.knows_reference_time_offset) setup.reference_time_offset_s = setup.t_OtoI_s;
+  }
   for (const StateSample& state : data.states()) {
     data.reference.push_back(
         planar_pose(state.t_ns, state.p_IinG_m, to_quaternion(state.q_ItoG_xyzw)));

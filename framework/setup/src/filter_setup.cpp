@@ -181,7 +181,10 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
       errors.add(run.find("estimator")->mark(),
                  "estimator.hold_unexcited needs estimator.monitor: true");
     }
-    if (!context.exact) error = {params->calibration_error_scale, params->calibration_error};
+    // Wheels alone begin with what is nominal.
+    if (!context.exact && wants_filter(run)) {
+      error = {params->calibration_error_scale, params->calibration_error};
+    }
     if (context.exact) setup.start.state_error_scale = 0.;
   }
   if (const auto params = read("imu", std::type_identity<ImuParams>())) {

@@ -160,6 +160,8 @@ void read_options(const Node& run, const CalibrationStart* start, RunSetup& setu
     o.reference_time_offset_s = clock->estimate;
   }
   setup.reference_time_offset_s = o.reference_time_offset_s;
+  setup.knows_reference_time_offset =
+      clock != nullptr || odometry.find("reference_time_offset_s") != nullptr;
   setup.evaluation.alignment = e.alignment;
   setup.evaluation.segment_lengths_m = e.segment_lengths_m;
   setup.evaluation.max_reference_gap_s = e.reference_max_gap_s;
@@ -333,6 +335,8 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
       const WheelsView& wheels = filter.wheels.front().prior.wheels;
       // Wheels alone have no other use for it than to say whose errors these are.
       if (wants_filter(run) || place_of_O(run) == nullptr) setup.O_in_I = planar_mount(wheels);
+      const auto& sigma = filter.wheels.front().prior.sigma_extrinsics;
+      setup.O_in_I_is_exact = sigma[2] == 0. && sigma[3] == 0. && sigma[4] == 0.;
       setup.t_OtoI_s = wheels.t_OtoI_s;
     }
     measuring = filter.measuring;

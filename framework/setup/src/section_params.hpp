@@ -53,7 +53,11 @@ struct OdometryParams {
     b(VIWO_PARAM(epoch_s),
       {.unit = "s", .min = 0.001, .help = "time between two poses of the estimate"});
     b(VIWO_PARAM(reference_time_offset_s),
-      {.unit = "s", .min = -10., .max = 10., .help = "t_reference = t_wheel + offset"});
+      {.unit = "s",
+       .min = -10.,
+       .max = 10.,
+       .help = "t_reference = t_wheel + offset; where states are the reference, wheels.t_OtoI_s "
+               "unless it is written"});
   }
 };
 

@@ -39,11 +39,13 @@ struct RunSetup {
   /// Of measured poses, where that is known; else B is O for the wheels alone, I for a filter.
   std::optional<PlanarExtrinsics> extrinsics;
   std::optional<PlanarExtrinsics> O_in_I;  ///< of the section `wheels`: where states are reference
+  bool O_in_I_is_exact = false;            ///< no sigma of it in x, y and yaw
   double t_OtoI_s = 0.;                    ///< of the section `wheels`: t_imu = t_wheel + t_OtoI
   std::vector<SensorEntry> sensors;        ///< those that take an input behind their input
   PreintegrationOptions preintegration;
   double epoch_s = 0.1;
-  double reference_time_offset_s = 0.;  ///< t_reference = t_wheel + offset
+  double reference_time_offset_s = 0.;       ///< t_reference = t_wheel + offset
+  bool knows_reference_time_offset = false;  ///< else it is t_OtoI where states are reference
   eval::Options evaluation;
   std::optional<FilterSetup> filter;           ///< nothing: dead reckoning from the wheels alone
   Routes routes;                               ///< who gets what the sensors give
