@@ -32,6 +32,7 @@ class CalibrationStart {
   bool took_anything() const { return !taken_.empty(); }
   /// Whether an entry was taken and the file says how well it is known.
   bool knows(const std::string& entry) const { return known_.contains(entry); }
+  bool has_cameras() const { return !only_wheels_ && !file_.camera_models.empty(); }
   bool took_cameras() const { return taken_.contains("cam0.fx"); }
 
  private:

@@ -10,6 +10,7 @@
 #include "section.hpp"
 #include "section_params.hpp"
 #include "update_setup.hpp"
+#include "viwo/camera/camera_chain.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/log/kalibr.hpp"
@@ -92,14 +93,41 @@ void read_imu(ImuParams p, const Node& section, FilterSetup& setup, Node& resolv
 /// Draws of cameras follow those of any number of wheel sets.
 constexpr std::uint64_t kFirstCameraDraw = 1000;
 
-/// Moves a camera off by draws from its prior; what it was goes to `drawn_from`.
-void make_wrong(CameraPrior& prior, WrongStart& wrong, std::vector<CameraView>& drawn_from) {
-  if (!wrong.is_wrong()) return;
-  CameraView& camera = prior.camera;
-  drawn_from.push_back(camera);
-  camera.R_ItoC = exp_so3(wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()))) * camera.R_ItoC;
-  camera.p_IinC += wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
-  for (int i = 0; i < 8; ++i) camera.intrinsics[i] += wrong.draw(prior.sigma_intrinsics[i]);
+/// Moves cameras off by draws from their priors, one after the other; what they were is
+/// `drawn_from`.
+struct WrongCameras {
+  double relative;
+  std::vector<CameraView> drawn_from = {};
+  Vector3d first_turn = Vector3d::Zero(), first_shift = Vector3d::Zero();
+
+  void make_wrong(CameraPrior& prior, WrongStart& wrong) {
+    if (!wrong.is_wrong()) return;
+    CameraView& camera = prior.camera;
+    const std::size_t index = drawn_from.size();
+    drawn_from.push_back(camera);
+    const Vector3d turn = wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()));
+    const Vector3d shift = wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
+    if (index == 0) first_turn = turn;
+    if (index == 0) first_shift = shift;
+    camera.R_ItoC =
+        exp_so3(chained_error(relative, drawn_from, index, first_turn, turn)) * camera.R_ItoC;
+    camera.p_IinC += chained_error(relative, drawn_from, index, first_shift, shift);
+    for (int i = 0; i < 8; ++i) camera.intrinsics[i] += wrong.draw(prior.sigma_intrinsics[i]);
+  }
+};
+
+/// What the cameras of a file are off by together.
+PriorCorrelations chain_of(const std::vector<CameraPrior>& cameras, double relative) {
+  PriorCorrelations chain;
+  if (relative == 1. || cameras.size() < 2 || cameras[0].sigma_extrinsics.isZero(0.)) return chain;
+  std::vector<CameraView> views;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    views.push_back(cameras[i].camera);
+    const BlockSpec extrinsics = camera_blocks(i, cameras[i]).front();
+    for (const BlockEntry& entry : extrinsics.entries) chain.entries.push_back(entry.name);
+  }
+  chain.matrix = chain_correlations(relative, views);
+  return chain;
 }
 
 void read_cameras(const CamerasParams& p, const Node& section, CalibrationError error,
@@ -118,7 +146,9 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
   if (!calibrates) error.scale = 0.;
   WrongStart clock(error, context.seed, kFirstCameraDraw);
   std::optional<double> later_s;  // of all that share one clock
-  std::vector<CameraView> drawn_from;
+  // A calibration.yaml tells by itself what hangs together.
+  const bool is_known = context.start != nullptr && context.start->has_cameras();
+  WrongCameras wrong_cameras{is_known ? 1. : p.relative};
   for (const CameraView& camera : *cameras) {
     const std::size_t index = setup.cameras.size();
     CameraPrior prior;
@@ -132,7 +162,7 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
     if (context.start != nullptr) context.start->take_camera(index, prior, errors);
     if (!later_s) later_s = clock.draw(prior.sigma_clock_s);
     WrongStart wrong(error, context.seed, kFirstCameraDraw + 1 + index);
-    make_wrong(prior, wrong, drawn_from);
+    wrong_cameras.make_wrong(prior, wrong);
     const double own_s = wrong.draw(prior.sigma_clock_s);
     if (wrong.is_wrong()) prior.camera.t_CtoI_s += prior.shares_clock ? *later_s : own_s;
     if (!calibrates || !p.calibrate_extrinsics) prior.sigma_extrinsics.setZero();
@@ -140,9 +170,10 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
     if (!calibrates || !p.calibrate_time_offset) prior.sigma_clock_s = 0.;
     setup.cameras.push_back(prior);
   }
-  for (const CalibrationSample& true_one : sim::camera_truth(drawn_from, 0)) {
+  for (const CalibrationSample& true_one : sim::camera_truth(wrong_cameras.drawn_from, 0)) {
     setup.drawn_from[true_one.name] = true_one.value;
   }
+  setup.options.filter.correlations.append(chain_of(setup.cameras, wrong_cameras.relative));
 }
 
 }  // namespace
@@ -206,7 +237,7 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
   }
   read_wheel_sets(run, error, context, setup, resolved, errors);
   check_wheel_sensors(run, setup, errors);
-  setup.options.filter.correlations = correlations_of(setup.wheels);
+  setup.options.filter.correlations.append(correlations_of(setup.wheels));
   // Starts of a file that are made wrong are drawn entry by entry.
   if (context.start != nullptr && error.scale == 0.) {
     setup.options.filter.correlations.append(context.start->correlations());

@@ -231,6 +231,7 @@ struct CamerasParams {
   int use = 0;
   double sigma_orientation_rad = 0.005;
   double sigma_position_m = 0.01;
+  double relative = 0.1;
   double sigma_focal_px = 1.;
   double sigma_distortion = 0.005;
   double sigma_t_CtoI_s = 0.01;
@@ -251,6 +252,11 @@ struct CamerasParams {
        .help = "prior of R_ItoC, each axis; the defaults are what a Kalibr calibration "
                "deserves"});
     b(VIWO_PARAM(sigma_position_m), {.unit = "m", .min = 0., .help = "prior of p_IinC, each axis"});
+    b(VIWO_PARAM(relative),
+      {.min = 0.,
+       .max = 1.,
+       .help = "part of these two by which a camera is off against the first, as they were "
+               "calibrated together; 1: the cameras are known each by itself"});
     b(VIWO_PARAM(sigma_focal_px),
       {.unit = "px", .min = 0., .help = "prior of focal lengths and principal point"});
     b(VIWO_PARAM(sigma_distortion), {.min = 0., .help = "prior of the distortion coefficients"});

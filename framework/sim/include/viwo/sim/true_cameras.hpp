@@ -19,6 +19,7 @@ struct TrueCameraParams {
   std::vector<double> camera_clock_error_s{0.};
   double sigma_true_camera_orientation_rad = 0.;
   double sigma_true_camera_position_m = 0.;
+  double true_camera_relative = 0.1;
   double sigma_true_camera_focal_px = 0.;
   double sigma_true_camera_distortion = 0.;
 
@@ -35,6 +36,11 @@ struct TrueCameraParams {
        .help = "of what is drawn to turn the true cameras from the file's, per axis"});
     b(VIWO_PARAM(sigma_true_camera_position_m),
       {.unit = "m", .min = 0., .help = "the same of p_IinC, per axis"});
+    b(VIWO_PARAM(true_camera_relative),
+      {.min = 0.,
+       .max = 1.,
+       .help = "part of these two by which a true camera is off against the first; 1: each by "
+               "itself"});
     b(VIWO_PARAM(sigma_true_camera_focal_px),
       {.unit = "px", .min = 0., .help = "the same of fx, fy, cx and cy"});
     b(VIWO_PARAM(sigma_true_camera_distortion),
@@ -47,8 +53,8 @@ std::vector<CameraView> cameras_of_file(const std::filesystem::path& file, int n
 
 /// The cameras as they are: the clock by what is given,
 /// R_ItoC = Exp(-dtheta) R_ItoC of the file, everything else by adding what is drawn. The draw of
-/// a camera depends on seed and index alone. With `services.exact` they are those of the file.
-/// ParamError for a list of a wrong length.
+/// a camera depends on seed and index alone; its pose moves with that of the first (F-44). With
+/// `services.exact` they are those of the file. ParamError for a list of a wrong length.
 std::vector<CameraView> true_cameras(const TrueCameraParams& params,
                                      std::vector<CameraView> of_file, const HostServices& services);
 
