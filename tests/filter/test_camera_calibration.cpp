@@ -6,9 +6,12 @@
 #include <gtest/gtest.h>
 
 #include "filter_runs.hpp"
+#include "viwo/math/chi2.hpp"
 
 namespace viwo {
 namespace {
+
+constexpr int kPairs = 20;
 
 /// Fifteen seconds of the sweep, stereo, with stamps of the cameras that are off.
 RunResult run(const std::string& clock_error_s, std::vector<std::string> more) {
@@ -55,6 +58,32 @@ TEST(CameraClock, IsFoundForEachOfTwoCamerasThatRunFree) {
       run("[0.015, -0.01]", {"cameras.calibrate=true", "cameras.synchronised=false"});
   expect_found(found, "cam0.t_CtoI", 0.015);
   expect_found(found, "cam1.t_CtoI", -0.01);
+}
+
+/// Mean square of the errors of a radius, in sigmas, over pairs that are drawn around the file:
+/// each against the first by `drawn` of what all are off by, as the filter believes of `believed`.
+double nees_of_radius(const std::string& drawn, const std::string& believed) {
+  double sum = 0.;
+  for (int seed = 1; seed <= kPairs; ++seed) {
+    const RunResult result =
+        run("[0]",
+            {"seed=" + std::to_string(seed), "cameras.calibrate=true",
+             "sensors.simulator0.sigma_true_camera_position_m=0.01",
+             "sensors.simulator0.sigma_true_camera_orientation_rad=0.005",
+             "sensors.simulator0.true_camera_relative=" + drawn, "cameras.relative=" + believed});
+    const CalibrationTrack& radius = parameter(result, "r_1");
+    sum += std::pow(radius.final_error / radius.sigma.back(), 2);
+  }
+  return sum / kPairs;
+}
+
+TEST(CameraPair, ThatIsKnownToItselfTellsTheRadiiConsistently) {
+  const double least = chi2_quantile(0.0005, kPairs) / kPairs;
+  const double most = chi2_quantile(0.9995, kPairs) / kPairs;
+  const double found = nees_of_radius("0.1", "0.1");
+  EXPECT_GT(found, least);
+  EXPECT_LT(found, most);
+  EXPECT_GT(nees_of_radius("1", "0.1"), most) << "a pair that is not what is believed";
 }
 
 }  // namespace

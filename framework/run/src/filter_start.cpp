@@ -92,6 +92,7 @@ Initializer from_wheels(const Estimator& estimator, const FilterSetup& setup) {
 Initializer from_images(const Estimator& estimator, const FilterSetup& setup) {
   VisualStartOptions options{start_options(setup)};
   options.cameras = setup.cameras;
+  options.correlations = setup.options.filter.correlations;
   // It takes as long as some images.
   constexpr std::int64_t kPeriodNs = 200'000'000;
   return [options, rest = from_standstill(estimator, setup), tracks = estimator.extra(0),

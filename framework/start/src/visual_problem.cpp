@@ -23,6 +23,27 @@ using Eigen::VectorXd;
 constexpr double kHuber = 3.;              ///< sigmas from where on a sight counts less
 constexpr double kFarthestInverse = 1e-4;  ///< 1/m
 
+/// Inverse of the correlations of what is known of the calibration, in its order.
+MatrixXd inverse_correlations(const VisualStartOptions& options) {
+  const std::vector<std::string>& names = options.correlations.entries;
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> known;  // column, and index in the options
+  Eigen::Index columns = 0;
+  for (std::size_t c = 0; c < options.cameras.size(); ++c) {
+    for (const BlockSpec& block : camera_blocks(c, options.cameras[c])) {
+      for (const BlockEntry& entry : block.entries) {
+        const auto found = std::ranges::find(names, entry.name);
+        if (found != names.end()) known.emplace_back(columns, found - names.begin());
+        ++columns;
+      }
+    }
+  }
+  MatrixXd C = MatrixXd::Identity(columns, columns);
+  for (const auto& [row, i] : known) {
+    for (const auto& [column, j] : known) C(row, column) = options.correlations.matrix(i, j);
+  }
+  return C.ldlt().solve(MatrixXd::Identity(columns, columns));
+}
+
 }  // namespace
 
 VisualProblem::VisualProblem(const VisualWindow& window, const VisualStartOptions& options)
@@ -31,6 +52,7 @@ VisualProblem::VisualProblem(const VisualWindow& window, const VisualStartOption
     // A camera that shares its clock has that of the first one.
     clocks_.push_back(options.cameras[c].shares_clock ? 0 : c);
   }
+  known_ = inverse_correlations(options);
 }
 
 VisualEstimate VisualProblem::initial(const LinearStart& linear, const Vector3d& gyro_bias) const {
@@ -109,9 +131,10 @@ void VisualProblem::add_priors(const VisualEstimate& x, VisualNormals& n) const 
   };
   add(kGyroBiasColumn, x.keys.front().gyro_bias, options_.sigma_gyro_bias_rad_per_s);
   add(kAccelBiasColumn, x.keys.front().accel_bias, options_.sigma_accel_bias_m_per_s2);
-  n.H.diagonal().tail(x.calibration.size()).array() += 1.;
-  n.b.tail(x.calibration.size()) -= x.calibration;
-  n.cost += x.calibration.squaredNorm();
+  n.H.bottomRightCorner(known_.rows(), known_.cols()) += known_;
+  const VectorXd pull = known_ * x.calibration;
+  n.b.tail(x.calibration.size()) -= pull;
+  n.cost += x.calibration.dot(pull);
   constexpr double kHeld = 1e10;
   const Eigen::Index last = imu_columns() - kImuSize;
   const Vector3d up = x.keys.back().R_GtoI.col(2);

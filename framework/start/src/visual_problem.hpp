@@ -91,6 +91,7 @@ class VisualProblem {
   const VisualWindow& window_;
   const VisualStartOptions& options_;
   std::vector<std::size_t> clocks_;  ///< whose clock each camera has
+  Eigen::MatrixXd known_;            ///< inverse of the correlations of the calibration
 };
 
 }  // namespace viwo

@@ -10,6 +10,7 @@
 
 #include <Eigen/Dense>
 
+#include "viwo/camera/camera_chain.hpp"
 #include "viwo/start/visual_start.hpp"
 
 namespace viwo::testing {
@@ -23,6 +24,7 @@ struct FlightOptions {
   double noise = 1.;        ///< times the configured one
   double biases = 1.;       ///< sigmas
   double calibration = 1.;  ///< prior sigmas by which the cameras are wrong
+  double relative = 1.;     ///< part of these by which a camera is wrong against the first
   double outliers = 0.;     ///< share of sights that are off by up to 50 px
   std::int64_t begin_ns = 7'000'000'000;
 };
@@ -91,10 +93,18 @@ class Flight {
     CameraPrior out = camera;
     CameraView& view = out.camera;
     const double scale = options_.calibration;
-    const Eigen::Vector3d turn = scale * camera.sigma_extrinsics.head<3>().cwiseProduct(normal3());
+    const auto off = [&](int part, Eigen::Vector3d& first) -> Eigen::Vector3d {
+      const Eigen::Vector3d own = normal3();
+      if (cameras_.empty()) first = own;
+      const Eigen::Vector3d error =
+          chained_error(options_.relative, views_, cameras_.size(), first, own);
+      return scale * camera.sigma_extrinsics.segment<3>(part).cwiseProduct(error);
+    };
+    views_.push_back(camera.camera);
+    const Eigen::Vector3d turn = off(0, first_turn_);
     view.R_ItoC =
         Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix() * view.R_ItoC;
-    view.p_IinC += scale * camera.sigma_extrinsics.tail<3>().cwiseProduct(normal3());
+    view.p_IinC += off(3, first_shift_);
     for (int i = 0; i < 8; ++i) {
       view.intrinsics[i] += scale * camera.sigma_intrinsics[i] * normal();
     }
@@ -170,6 +180,8 @@ class Flight {
   Eigen::Vector3d phase_, turn_phase_, hertz_, turn_hertz_;
   std::vector<CameraPrior> cameras_;  // as they are
   double later_s_ = 0.;
+  std::vector<CameraView> views_;  ///< before they were made wrong
+  Eigen::Vector3d first_turn_, first_shift_;
   std::vector<Eigen::Vector3d> points_;
 };
 

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "synthetic_flight.hpp"
+#include "viwo/camera/camera_chain.hpp"
 #include "viwo/math/chi2.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/start/visual_start.hpp"
@@ -71,6 +72,22 @@ TEST(VisualStart, IsExactForMeasurementsWithoutNoise) {
   }
 }
 
+/// Cameras that are known better to each other than to the IMU.
+VisualStartOptions chained(VisualStartOptions options, double relative) {
+  std::vector<CameraView> cameras;
+  for (std::size_t c = 0; c < options.cameras.size(); ++c) {
+    CameraPrior& prior = options.cameras[c];
+    if (relative < 1.) prior.sigma_extrinsics << 0.01, 0.01, 0.01, 0.01, 0.01, 0.01;
+    cameras.push_back(prior.camera);
+    const BlockSpec extrinsics = camera_blocks(c, prior).front();
+    for (const BlockEntry& entry : extrinsics.entries) {
+      options.correlations.entries.push_back(entry.name);
+    }
+  }
+  options.correlations.matrix = chain_correlations(relative, cameras);
+  return options;
+}
+
 /// Mean NEES over flights, and how many of them started.
 struct Consistency {
   double nees = 0.;
@@ -82,8 +99,9 @@ struct Consistency {
   }
 };
 constexpr int kFlights = 60;
-Consistency fly(int n_cameras, const FlightOptions& flown, double covariance_scale = 1.) {
-  const VisualStartOptions options = with_cameras(n_cameras);
+Consistency fly(int n_cameras, const FlightOptions& flown, double covariance_scale = 1.,
+                double relative = 1.) {
+  const VisualStartOptions options = chained(with_cameras(n_cameras), relative);
   Consistency result;
   for (int seed = 0; seed < kFlights; ++seed) {
     const Flight flight(options, flown, static_cast<std::uint64_t>(seed));
@@ -108,6 +126,14 @@ TEST(VisualStart, IsConsistentWithItsCovarianceWithTwoCameras) {
   const Consistency found = fly(2, {.duration_s = 1.3});
   EXPECT_TRUE(found.holds()) << found.nees << " of 11";
   EXPECT_GT(found.starts, kFlights * 9 / 10);
+}
+
+TEST(VisualStart, IsConsistentWithCamerasThatAreKnownToEachOther) {
+  const FlightOptions flown{.duration_s = 1.3, .relative = 0.1};
+  const Consistency found = fly(2, flown, 1., 0.1);
+  EXPECT_TRUE(found.holds()) << found.nees << " of 11";
+  EXPECT_GT(found.starts, kFlights * 9 / 10);
+  EXPECT_FALSE(fly(2, {.duration_s = 1.3}, 1., 0.1).holds()) << "cameras that are not";
 }
 
 TEST(VisualStart, ConsistencyCheckSeesCovariancesAndCalibrationsThatAreWrong) {

@@ -9,12 +9,14 @@
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/rig.hpp"
 #include "viwo/estimator/start_search.hpp"
+#include "viwo/filter/state_blocks.hpp"
 #include "viwo/start/start_options.hpp"
 
 namespace viwo {
 
 struct VisualStartOptions : StartOptions {
   std::vector<CameraPrior> cameras = {};  ///< by FeatureSample::camera
+  PriorCorrelations correlations = {};    ///< of what the cameras' blocks have, by names
 };
 
 /// The state at the last image, from the images of the last `window_s` before it, or of twice that
