@@ -281,6 +281,11 @@ void doubt(RunResult& result) {
     (is_doubt ? result.doubts : result.warnings).push_back(std::move(found.text));
   }
   if (!is_done) return;
+  for (const UpdateTrack& update : result.updates) {
+    if (!update.failures.disabled) continue;
+    result.doubts.push_back("update '" + update.name +
+                            "' was disabled: what it measures is missing from there on");
+  }
   const PreintegratedPose& wheels = result.total;
   if (result.updates.empty() && 2 * wheels.rejected > wheels.samples) {
     result.doubts.push_back(std::to_string(wheels.rejected) + " of " +

@@ -102,17 +102,19 @@ class EncoderIntervals {
 class SampleTallies {
  public:
   void add(const PreintegratedPose& pose, std::int64_t t_ns) {
+    samples_ += pose.samples;
     rejected_.add(pose.rejected, t_ns);
     gated_.add(pose.gated, t_ns);
     rank_deficient_.add(pose.rank_deficient, t_ns);
   }
   void append_rejections(std::vector<RejectionCount>& out) const {
-    rejected_.append_to(out);
+    rejected_.append_to(out, samples_);
     gated_.append_to(out);
     rank_deficient_.append_to(out);
   }
 
  private:
+  std::int64_t samples_ = 0;
   Tally rejected_{
       "encoder sample refused by the kinematic model, or with no wheel to be believed (bridged)"};
   Tally gated_{"encoder sample whose wheels contradict each other (bridged)"};
