@@ -88,7 +88,7 @@ TEST_F(HostileTest, BytesThatAreNoTextInWhatAPluginSaysLoseNothing) {
   const Outcome run =
       viwo({"run", swerve, "--out", "out", "--set", "sensors.simulator0.duration_s=2", "--set",
             "updates.failing={what: bytes}", "--plugin-path", bad});
-  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(run.code, 1) << run.err;  // it was disabled
   expect_readable("out");
   EXPECT_EQ(summary().at("updates").at("failing").at("cause"), "lost in a " + kReplaced);
 }

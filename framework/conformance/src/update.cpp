@@ -5,6 +5,7 @@
 
 #include "checks.hpp"
 #include "update_declarations.hpp"
+#include "update_derivatives.hpp"
 #include "update_hostile.hpp"
 #include "update_watch.hpp"
 #include "viwo/robot/robot.hpp"
@@ -127,6 +128,7 @@ std::vector<NamedCheck> update_checks(const Subject& subject) {
           {"start", running(subject, false, check_start)},
           {"empty epochs", running(subject, false, check_empty_epochs)},
           {"factors", running(subject, true, check_factors)},
+          {"derivatives", running(subject, true, check_update_derivatives)},
           {"held calibration", running(subject, true, check_held_calibration)},
           {"full rooms", running(subject, true, check_full_rooms)},
           {"repeatable", running(subject, true, check_update_repeatable)},

@@ -132,9 +132,9 @@ class Broken final : public Update {
     if (is("held")) factor.columns.add(filter.block(camera_).column(), 6);
     const int height = factor.columns.add(filter.block(ground_).column(), 1);
     factor.set_rows(2);
-    factor.H(0, 2) = 1.;
+    factor.H(0, 2) = is("wrong_sign") ? -1. : 1.;
     factor.H(1, 1) = 1e-3;
-    factor.H(0, height) = 1.;
+    factor.H(0, height) = is("no_derivative") ? 0. : 1.;
     factor.residual[0] = 0.1 - filter.imu.p_IinG.z() - filter.block(ground_).numbers()[0];
     if (is("nan")) factor.residual[1] = std::nan("");
     factor.R = 1e-2 * Eigen::Matrix2d::Identity() + sigma_m_ * Eigen::Matrix2d::Identity();

@@ -115,6 +115,22 @@ TEST(BrokenUpdate, ColumnsOfABlockThatIsHeld) {
             "leave out what cannot be used, and count it in rejections()");
 }
 
+TEST(BrokenUpdate, JacobiansThatTheResidualDoesNotFollow) {
+  const std::string begin = "derivatives: residual factor 0, column ";
+  const std::string end =
+      " - residual = measured - predicted = H dx + noise, R_GtoI = Exp(-dtheta) R_GtoI_hat";
+  EXPECT_EQ(update_failures("wrong_sign"),
+            begin +
+                "5 (p of the IMU, 3): by H row 0 of the residual should change by 1 for 1, and "
+                "does by -1" +
+                end);
+  EXPECT_EQ(update_failures("no_derivative"),
+            begin +
+                "103 (block 7, entry 1): by H row 0 of the residual should change by 0 for 1, "
+                "and does by -1" +
+                end);
+}
+
 TEST(BrokenUpdate, ANoiseThatIsNotSymmetric) {
   EXPECT_EQ(update_failures("asymmetric"),
             "start: residual factor 0 of epoch 1: R is not symmetric (by up to 0.001)");
@@ -207,7 +223,7 @@ std::vector<std::string> skipped(const std::string& name) {
 
 TEST(UpdateThatWantsMore, OfSamplesIsNotCheckedWhereTheyMatter) {
   const auto texts = skipped("foreign");
-  ASSERT_EQ(texts.size(), 5u);
+  ASSERT_EQ(texts.size(), 6u);
   EXPECT_EQ(texts.front(),
             "factors: takes samples of kinds that the robot of these checks does not give: 'range' "
             "- try it in a run with the sensor that does");
@@ -216,7 +232,7 @@ TEST(UpdateThatWantsMore, OfSamplesIsNotCheckedWhereTheyMatter) {
 
 TEST(UpdateThatWantsMore, OfBlocksIsNotStarted) {
   const auto texts = skipped("wants_block");
-  ASSERT_EQ(texts.size(), 7u);
+  ASSERT_EQ(texts.size(), 8u);
   EXPECT_EQ(texts.front(),
             "start: needs 'gnss0.p_AinI', blocks of other updates, which these checks lack");
 }

@@ -189,13 +189,14 @@ class Neighbour final : public Update {
 
 /// Adds what the rig measures, with images at the stamps of the tracks.
 void add_rig(const sim::BodyTrajectory& trajectory, double duration_s, std::uint64_t seed,
-             Drive& drive) {
+             bool noise, Drive& drive) {
   sim::RigSimulation rig;
   rig.mounting = mounting();
   rig.cameras = {camera()};
   rig.imu.duration_s = rig.features.duration_s = duration_s;
   rig.imu.start_ns = rig.features.start_ns = kStart;
   rig.features.features = 40;
+  rig.imu.noise = rig.features.noise = noise;
   const auto stripes = std::make_shared<Stripes>();
   bool has_start = false;
   for (Measurement& m : sim::simulate_rig(trajectory, rig, seed)) {
@@ -220,16 +221,17 @@ void feed(const Measurement& measurement, Estimator& estimator) {
 
 }  // namespace
 
-Drive simulate_drive(const char* motion, double duration_s) {
+Drive simulate_drive(const char* motion, double duration_s, bool noise) {
   const sim::BodyTrajectory trajectory =
       sim::BodyTrajectory::drive(sim::PlanarMotion(motion), sim::Ground(), -1., duration_s + 1.);
   constexpr std::uint64_t kSeed = 5;
   Drive drive;
-  add_rig(trajectory, duration_s, kSeed, drive);
+  add_rig(trajectory, duration_s, kSeed, noise, drive);
   sim::EncoderSimulation encoders;
   encoders.duration_s = duration_s;
   encoders.start_ns = kStart;
   encoders.sliding_m_per_s = 0.01;
+  encoders.noise = noise;
   for (const EncoderSample& sample : sim::simulate_encoders(
            base(), nominal_intrinsics(base_description()),
            [&](double t_s) { return trajectory.twist(t_s); }, motion, encoders, kSeed)) {

@@ -18,8 +18,8 @@ struct Drive {
   std::vector<Measurement> measurements;  ///< in time order
 };
 
-/// A motion of sim::PlanarMotion.
-Drive simulate_drive(const char* motion, double duration_s);
+/// A motion of sim::PlanarMotion. Without `noise` the measurements are those of the motion itself.
+Drive simulate_drive(const char* motion, double duration_s, bool noise = true);
 
 /// Whether the calibration of camera and wheels is estimated, or held: then their blocks have no
 /// columns.

@@ -1,0 +1,354 @@
+#include "update_derivatives.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "viwo/math/so3.hpp"
+#include "viwo/robot/robot.hpp"
+
+namespace viwo::conformance {
+namespace {
+
+using Eigen::VectorXd;
+
+/// A part of the largest derivative by a block that Jacobians at first estimates, and what is left
+/// out of them on purpose, may be off by.
+constexpr double kTolerance = 0.1;
+/// Steps are so small a part of what a column is known to.
+constexpr double kStep = 1e-3;
+
+/// What an update emitted in an epoch.
+struct Emitted {
+  std::vector<ResidualFactor> residuals;
+  std::optional<InformationFactor> information;
+  std::vector<std::pair<int, VectorXd>> added;  ///< first columns and values of new blocks
+  int now = -1;                                 ///< column of the newest clone, which the IMU is
+
+  Emitted(const FactorSink& sink, const FilterView& filter)
+      : residuals(sink.residuals().begin(), sink.residuals().end()) {
+    if (sink.information() != nullptr) information = *sink.information();
+    if (!filter.clones.empty()) now = filter.clones.back().column;
+    for (const AddedBlock& block : sink.added()) {
+      const BlockView& view = filter.block(block.id);
+      added.emplace_back(view.column(),
+                         Eigen::Map<const VectorXd>(block.value.data(), view.size()));
+    }
+  }
+  bool is_empty() const { return residuals.empty() && !information; }
+};
+
+/// A column of the error state: of what, and how well it is known.
+struct Column {
+  int index = 0;
+  int block = 0;  ///< columns of one have the same
+  std::string name;
+  double sigma = 0.;
+};
+
+std::vector<Column> columns_of(const FilterView& filter) {
+  std::vector<Column> columns;
+  int block = 0;
+  const auto add = [&](const std::string& of, int first, int count) {
+    for (int i = first; i < first + count; ++i) {
+      const double sigma = std::sqrt(std::max(0., filter.P()(i, i)));
+      columns.push_back({i, block, of + std::to_string(i - first + 1), sigma});
+    }
+    ++block;
+  };
+  add("theta of the IMU, ", kThetaColumn, 3);
+  add("p of the IMU, ", kPositionColumn, 3);
+  add("v of the IMU, ", kVelocityColumn, 3);
+  add("gyro bias, ", kGyroBiasColumn, 3);
+  add("accelerometer bias, ", kAccelBiasColumn, 3);
+  // The newest is where the IMU is, and moved with it.
+  for (std::size_t i = 0; i + 1 < filter.clones.size(); ++i) {
+    const std::string clone = " of clone " + std::to_string(i) + ", ";
+    add("theta" + clone, filter.clones[i].column, 3);
+    add("p" + clone, filter.clones[i].column + 3, 3);
+  }
+  for (std::size_t i = 0; i < filter.blocks.size(); ++i) {
+    const BlockView& view = filter.blocks[i];
+    if (view.column() < 0) continue;
+    add("block " + std::to_string(i) + ", entry ", view.column(), view.size());
+  }
+  return columns;
+}
+
+/// A filter whose estimate is moved along one column, first estimates stay.
+class MovedView {
+ public:
+  MovedView(const FilterView& filter, int column, double step)
+      : view_(filter),
+        clones_(filter.clones.begin(), filter.clones.end()),
+        blocks_(filter.blocks.begin(), filter.blocks.end()) {
+    const auto along = [&](int first, int count) {
+      VectorXd dx = VectorXd::Zero(count);
+      if (column >= first && column < first + count) dx[column - first] = step;
+      return dx;
+    };
+    move_imu(along(0, kImuSize));
+    for (CloneState& clone : clones_) {
+      const bool is_now = &clone == &clones_.back() && column < kPoseSize;
+      const VectorXd dx = is_now ? along(0, kPoseSize) : along(clone.column, kPoseSize);
+      clone.R_GtoI = exp_so3(Eigen::Vector3d(-dx.head<3>())) * clone.R_GtoI;
+      clone.p_IinG += dx.tail<3>();
+    }
+    for (BlockView& block : blocks_) {
+      if (block.column() < 0 || column < block.column()) continue;
+      if (column < block.column() + block.size()) move(along(block.column(), block.size()), block);
+    }
+    view_.clones = clones_;
+    view_.blocks = blocks_;
+  }
+  const FilterView& operator*() const { return view_; }
+
+ private:
+  void move_imu(const VectorXd& dx) {
+    ImuState& imu = view_.imu;
+    imu.R_GtoI = exp_so3(Eigen::Vector3d(-dx.segment<3>(kThetaColumn))) * imu.R_GtoI;
+    imu.p_IinG += dx.segment<3>(kPositionColumn);
+    imu.v_IinG += dx.segment<3>(kVelocityColumn);
+    imu.gyro_bias += dx.segment<3>(kGyroBiasColumn);
+    imu.accel_bias += dx.segment<3>(kAccelBiasColumn);
+  }
+
+  void move(const VectorXd& dx, BlockView& block) {
+    const int numbers = static_cast<int>(block.numbers().size());
+    const int rotations = (block.size() - numbers) / 3;
+    value_.resize(9 * rotations + numbers);
+    first_.resize(9 * rotations + numbers);
+    for (int i = 0; i < rotations; ++i) {
+      Eigen::Map<Eigen::Matrix3d> moved(value_.data() + 9 * i), first(first_.data() + 9 * i);
+      moved = exp_so3(Eigen::Vector3d(-dx.segment<3>(3 * i))) * block.rotation(i);
+      first = block.first_rotation(i);
+    }
+    value_.tail(numbers) = block.numbers() + dx.tail(numbers);
+    first_.tail(numbers) = block.first_numbers();
+    block = BlockView(block.column(), block.size(), rotations, value_.data(), first_.data());
+  }
+
+  FilterView view_;
+  std::vector<CloneState> clones_;
+  std::vector<BlockView> blocks_;
+  VectorXd value_, first_;
+};
+
+/// Where a filter is moved for the update, and by how much; the filter itself is not.
+struct Move {
+  int epoch = -1;  ///< none
+  int column = 0;
+  double step = 0.;
+};
+
+/// Stands in for the plugin, and keeps what it emits in an epoch.
+class Differenced final : public Update {
+ public:
+  Differenced(Loaded<Update> plugin, Move move) : plugin_(std::move(plugin)), move_(move) {}
+
+  void declare(Declarations& host) override { plugin_.object->declare(host); }
+  void start(const UpdateSetup& setup) override { plugin_.object->start(setup); }
+  void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
+    const int epoch = ++epoch_;
+    if (epoch == move_.epoch) {
+      plugin_.object->update(*MovedView(filter, move_.column, move_.step), data, sink);
+      emitted_.emplace(sink, filter);
+      return;
+    }
+    plugin_.object->update(filter, data, sink);
+    if (move_.epoch >= 0 || Emitted(sink, filter).is_empty()) return;
+    emitted_.emplace(sink, filter);
+    emitted_in_ = epoch;
+    columns_ = columns_of(filter);
+  }
+  void settle(const FilterView& filter, BlockEdits& edits) override {
+    plugin_.object->settle(filter, edits);
+  }
+
+  const std::optional<Emitted>& emitted() const { return emitted_; }
+  int emitted_in() const { return emitted_in_; }
+  const std::vector<Column>& columns() const { return columns_; }
+
+ private:
+  Loaded<Update> plugin_;
+  Move move_;
+  int epoch_ = -1;
+  int emitted_in_ = -1;  ///< the last epoch with anything
+  std::optional<Emitted> emitted_;
+  std::vector<Column> columns_;
+};
+
+/// Where a column of the state stands in a factor; -1: not in it.
+int place_in(const FactorColumns& columns, int column) {
+  int start = 0;
+  for (const ColumnRange& block : columns.blocks()) {
+    if (column >= block.first && column < block.first + block.count) {
+      return start + column - block.first;
+    }
+    start += block.count;
+  }
+  return -1;
+}
+
+/// Compares one epoch with the same epoch from a moved estimate.
+class Comparison {
+ public:
+  Comparison(const Emitted& there, const std::vector<Column>& columns, Findings& findings)
+      : there_(there), columns_(columns), findings_(findings) {}
+
+  bool has(int column) const {
+    const auto in = [&](const FactorColumns& columns) {
+      return place_in(columns, column) >= 0 ||
+             (column < kPoseSize && place_in(columns, there_.now + column) >= 0);
+    };
+    return std::ranges::any_of(there_.residuals, [&](const auto& f) { return in(f.columns); }) ||
+           (there_.information && in(there_.information->columns));
+  }
+
+  void with(const Emitted& moved, const Column& column, double step) {
+    if (moved.residuals.size() == there_.residuals.size()) {
+      for (std::size_t i = 0; i < there_.residuals.size(); ++i) {
+        const ResidualFactor& there = there_.residuals[i];
+        const VectorXd dx = errors(there.columns, moved, column, step);
+        compare("residual factor " + std::to_string(i), there, moved.residuals[i], dx, column);
+      }
+    }
+    if (there_.information && moved.information) {
+      const VectorXd dx = errors(there_.information->columns, moved, column, step);
+      compare(*there_.information, *moved.information, dx, column);
+    }
+  }
+
+ private:
+  /// What the columns of a factor were moved by, blocks that are added in this epoch, too; in steps
+  /// of what the column is known to.
+  VectorXd errors(const FactorColumns& columns, const Emitted& moved, const Column& column,
+                  double step) const {
+    VectorXd dx = VectorXd::Zero(columns.size());
+    const auto move = [&](int index, double by) {
+      if (const int place = place_in(columns, index); place >= 0) dx[place] += by / kStep;
+    };
+    move(column.index, step);
+    if (column.index < kPoseSize) move(there_.now + column.index, step);
+    for (std::size_t k = 0; k < there_.added.size() && k < moved.added.size(); ++k) {
+      const VectorXd by = moved.added[k].second - there_.added[k].second;
+      for (int i = 0; i < by.size(); ++i) move(there_.added[k].first + i, by[i]);
+    }
+    return dx;
+  }
+
+  /// How well the columns of a factor are known; 0 for those of another block than `block`, if that
+  /// is one.
+  VectorXd known(const FactorColumns& columns, int block = -1) const {
+    VectorXd sigma = VectorXd::Zero(columns.size());
+    for (const Column& column : columns_) {
+      if (block >= 0 && column.block != block) continue;
+      for (const int index : {column.index, there_.now + column.index}) {
+        const int place = place_in(columns, index);
+        if (place >= 0 && (index == column.index || column.index < kPoseSize)) {
+          sigma[place] = column.sigma;
+        }
+      }
+    }
+    return sigma;
+  }
+
+  void compare(const std::string& what, const ResidualFactor& there, const ResidualFactor& moved,
+               const VectorXd& dx, const Column& column) {
+    if (moved.residual.size() != there.residual.size()) return;
+    const VectorXd found = (there.residual - moved.residual) / kStep;
+    const VectorXd of_block = known(there.columns, column.block), of_all = known(there.columns);
+    for (Eigen::Index i = 0; i < found.size(); ++i) {
+      const auto row = there.H.row(i).transpose().cwiseAbs();
+      const double expected = there.H.row(i).dot(dx);
+      const double allowed = kTolerance * row.cwiseProduct(of_block).maxCoeff() +
+                             kNegligible * row.cwiseProduct(of_all).maxCoeff() +
+                             kNegligible * std::sqrt(there.R(i, i));
+      if (std::abs(found[i] - expected) <= allowed) continue;
+      fail(what, column,
+           "by H row " + std::to_string(i) + " of the residual should change by " +
+               number(0. - expected / column.sigma) + " for 1, and does by " +
+               number(-found[i] / column.sigma) +
+               " - residual = measured - predicted = H dx + noise, R_GtoI = Exp(-dtheta) "
+               "R_GtoI_hat");
+    }
+  }
+
+  void compare(const InformationFactor& there, const InformationFactor& moved, const VectorXd& dx,
+               const Column& column) {
+    const Eigen::Index n = dx.size();
+    if (moved.columns.size() != n) return;
+    const Eigen::MatrixXd Lambda = there.Lambda.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
+    const VectorXd found = (there.eta.head(n) - moved.eta.head(n)) / kStep;
+    const VectorXd expected = Lambda * dx, scale = Lambda.diagonal().cwiseSqrt();
+    const VectorXd sigma = known(there.columns);
+    const double size = scale.cwiseProduct(dx).norm();
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double off = std::abs(found[i] - expected[i]);
+      if (off <= scale[i] * (kTolerance * size + kNegligible) || off * sigma[i] <= kNegligible) {
+        continue;
+      }
+      fail("information factor", column,
+           "by Lambda row " + std::to_string(i) + " of eta should change by " +
+               number(0. - expected[i] / column.sigma) + " for 1, and does by " +
+               number(-found[i] / column.sigma) + " - eta = sum H^T R^-1 residual");
+    }
+  }
+
+  /// The first of a factor and a block.
+  void fail(const std::string& what, const Column& column, const std::string& text) {
+    if (!reported_.insert(what + std::to_string(column.block)).second) return;
+    findings_.fail(what + ", column " + std::to_string(column.index) + " (" + column.name +
+                   "): " + text);
+  }
+
+  static constexpr double kNegligible = 1e-2;  ///< sigmas of a measurement
+  const Emitted& there_;
+  const std::vector<Column>& columns_;
+  Findings& findings_;
+  std::set<std::string> reported_;
+};
+
+/// The numbers of columns that were looked at.
+int check_on(const char* motion, const Subject& subject, Findings& findings) {
+  const robot::Drive drive = robot::simulate_drive(motion, 2., false);
+  const auto run = [&](std::vector<Move> moves) {
+    std::vector<std::shared_ptr<Differenced>> runs;
+    for (const Move& move : moves) {
+      runs.push_back(std::make_shared<Differenced>(subject.make<Update>(), move));
+    }
+    const std::vector<std::shared_ptr<Update>> updates(runs.begin(), runs.end());
+    robot::run_updates(updates, subject.info().name, drive, robot::Calibration::kEstimated);
+    return runs;
+  };
+  const auto there = run({Move{}}).front();
+  if (!there->emitted()) return 0;
+  Comparison compare(*there->emitted(), there->columns(), findings);
+  std::vector<Column> columns;
+  std::vector<Move> moves;
+  for (const Column& column : there->columns()) {
+    if (!(column.sigma > 0.) || !compare.has(column.index)) continue;
+    columns.push_back(column);
+    moves.push_back({there->emitted_in(), column.index, kStep * column.sigma});
+  }
+  const auto moved = run(moves);
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    if (moved[i]->emitted()) compare.with(*moved[i]->emitted(), columns[i], moves[i].step);
+  }
+  return static_cast<int>(moves.size());
+}
+
+}  // namespace
+
+void check_update_derivatives(const Subject& subject, Findings& findings) {
+  int columns = 0;
+  for (const char* motion : {"stationary", "figure_eight"}) {
+    columns += check_on(motion, subject, findings);
+  }
+  findings.note(std::to_string(columns) + " columns moved");
+}
+
+}  // namespace viwo::conformance
