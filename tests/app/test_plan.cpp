@@ -25,6 +25,18 @@ TEST_F(PlanTest, WritesADriveThatASimulatorFollowsAndACalibrationTakes) {
   EXPECT_NE(calibrated.out.find("delta_o4"), std::string::npos) << calibrated.out;
 }
 
+TEST_F(PlanTest, SaysThatThereIsNothingToDrive) {
+  write("easy.yaml",
+        "plan: easy\nkinematics: {type: differential, radius_left_m: 0.1, radius_right_m: 0.1, "
+        "baseline_m: 0.5}\nbase_radius_m: 0.3\nfloor_x_m: 4\nfloor_y_m: 4\nmax_speed_m_per_s: "
+        "0.5\nmax_yaw_rate_rad_per_s: 1\nmax_acceleration_m_per_s2: 0.5\ngoals: {r_left: 0.01}\n");
+  const Outcome outcome = expect_done({"plan", "easy.yaml", "--out", "out"});
+  EXPECT_NE(outcome.out.find("nothing to drive: all goals are within the priors of the kinematics "
+                             "(the worst sigma is 0.1 (r_left) x its goal)"),
+            std::string::npos)
+      << outcome.out;
+}
+
 TEST_F(PlanTest, SaysWhatIsMissingOfARun) {
   const std::string run = kPlans + "../runs/viwo_swerve.yaml";
   const std::vector<std::string> words{"run",    run,

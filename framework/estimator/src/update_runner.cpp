@@ -14,6 +14,8 @@ namespace viwo {
 namespace {
 
 constexpr int kMaxFactorsPerUpdate = 16;
+constexpr const char* kNoFactor =
+    "residual factor that is not finite, or whose noise is not positive definite";
 constexpr const char* kUndetermined = "new blocks that no information determines";
 
 struct Thrown {
@@ -293,6 +295,7 @@ void UpdateRunner::apply_residuals(const Context& context) {
     const std::int64_t t_ns = context.filter.t_ns();
     if (result == FactorResult::kGated) gated_[context.index].add(t_ns);
     if (result == FactorResult::kWeakened) weakened_[context.index].add(t_ns);
+    if (result == FactorResult::kRejected) rejected_[context.index].add(kNoFactor, t_ns);
     ++(result == FactorResult::kApplied ? counts.applied : counts.rejected);
     if (!is_applied(result)) continue;
     if (!has_moved_) moved_.setZero();

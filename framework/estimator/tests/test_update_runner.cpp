@@ -176,14 +176,17 @@ TEST(UpdateRunner, CountsFactorsAndWhatUpdatesCountThemselves) {
   EXPECT_LT(bench.estimator.filter().imu().p_IinG.norm(), 1.);
   EXPECT_EQ(bench.estimator.updates()[0].name, "fake");
   const std::vector<RejectionCount> rejections = bench.estimator.rejections();
-  ASSERT_GE(rejections.size(), 2U);
-  const RejectionCount& own = rejections[rejections.size() - 2];
+  ASSERT_GE(rejections.size(), 3U);
+  const RejectionCount& own = rejections[rejections.size() - 3];
   EXPECT_EQ(own.reason, "fake: a reason of its own");
   EXPECT_EQ(own.count, 3);
-  const RejectionCount& gated = rejections.back();
+  const RejectionCount& gated = rejections[rejections.size() - 2];
   EXPECT_EQ(gated.reason, "fake: measurement dropped by the chi-square gate");
   EXPECT_EQ(gated.count, 2);
   EXPECT_EQ(gated.first, "stamp " + std::to_string(kStart + 100 * kMs) + " ns");
+  EXPECT_EQ(rejections.back().reason,
+            "fake: residual factor that is not finite, or whose noise is not positive definite");
+  EXPECT_EQ(rejections.back().count, 2);
 }
 
 TEST(UpdateRunner, CountsInformationThatIsNotFinite) {

@@ -38,6 +38,11 @@ std::string result_text(const PlanSetup& setup, const Plan& plan) {
   const std::string way = significant(plan.cost_m(), 3) + " m of the fastest point of the base (" +
                           significant(plan.path_m(), 3) + " m of O), " +
                           significant(plan.duration_s(), 3) + " s";
+  if (plan.reached && plan.pieces.empty()) {
+    return "nothing to drive: all goals are within the priors of the kinematics (the worst sigma "
+           "is " +
+           worst_text(setup, sigma_before(*setup.model)) + " x its goal)";
+  }
   if (plan.reached) return "all goals are reached after " + way;
   const Intrinsics sigma =
       plan.pieces.empty() ? sigma_before(*setup.model) : plan.pieces.back().sigma;
