@@ -253,10 +253,11 @@ struct CamerasParams {
                "deserves"});
     b(VIWO_PARAM(sigma_position_m), {.unit = "m", .min = 0., .help = "prior of p_IinC, each axis"});
     b(VIWO_PARAM(relative),
-      {.min = 0.,
+      {.min = 0.001,
        .max = 1.,
-       .help = "part of these two by which a camera is off against the first, as they were "
-               "calibrated together; 1: the cameras are known each by itself"});
+       .help = "part of sigma_orientation_rad and sigma_position_m by which a camera is off "
+               "against the first, as they were calibrated together; 1: the cameras are known "
+               "each by itself"});
     b(VIWO_PARAM(sigma_focal_px),
       {.unit = "px", .min = 0., .help = "prior of focal lengths and principal point"});
     b(VIWO_PARAM(sigma_distortion), {.min = 0., .help = "prior of the distortion coefficients"});

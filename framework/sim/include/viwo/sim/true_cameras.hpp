@@ -39,8 +39,8 @@ struct TrueCameraParams {
     b(VIWO_PARAM(true_camera_relative),
       {.min = 0.,
        .max = 1.,
-       .help = "part of these two by which a true camera is off against the first; 1: each by "
-               "itself"});
+       .help = "part of what is drawn for their poses by which true cameras are off against the "
+               "first; 1: each by itself"});
     b(VIWO_PARAM(sigma_true_camera_focal_px),
       {.unit = "px", .min = 0., .help = "the same of fx, fy, cx and cy"});
     b(VIWO_PARAM(sigma_true_camera_distortion),
