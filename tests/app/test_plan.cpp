@@ -32,7 +32,7 @@ TEST_F(PlanTest, SaysThatThereIsNothingToDrive) {
         "0.5\nmax_yaw_rate_rad_per_s: 1\nmax_acceleration_m_per_s2: 0.5\ngoals: {r_left: 0.01}\n");
   const Outcome outcome = expect_done({"plan", "easy.yaml", "--out", "out"});
   EXPECT_NE(outcome.out.find("nothing to drive: all goals are within the priors of the kinematics "
-                             "(the worst sigma is 0.1 (r_left) x its goal)"),
+                             "(the worst sigma is 0.03 (r_left) x its goal)"),
             std::string::npos)
       << outcome.out;
 }
