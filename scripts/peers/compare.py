@@ -92,7 +92,7 @@ class Row:
         settings = [f'estimator.clones={self.clones}', f'updates.visual_features.max_landmarks={self.landmarks}',
                     'updates.visual_features.gate_probability=0.05',
                     f'cameras.kalibr={rig}', f'cameras.calibrate={"true" if self.calibrate else "false"}',
-                    'cameras.sigma_position_m=0.015']
+                    'cameras.sigma_position_m=0.015', 'cameras.relative=1']
         if not self.images:
             config = 'openvins_sim.yaml'
             settings += [f'placeholders.data={data.parent}', f'placeholders.rig={data.name}']
