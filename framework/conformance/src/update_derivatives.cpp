@@ -7,6 +7,7 @@
 #include <set>
 #include <vector>
 
+#include "viwo/estimator/factor_fit.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/robot/robot.hpp"
 
@@ -39,6 +40,11 @@ struct Emitted {
     }
   }
   bool is_empty() const { return residuals.empty() && !information; }
+  /// Otherwise other checks say what is wrong.
+  bool fits(int state_size) const {
+    const auto good = [state_size](const auto& f) { return misfit_of(f, state_size).empty(); };
+    return std::ranges::all_of(residuals, good) && (!information || good(*information));
+  }
 };
 
 /// A column of the error state: of what, and how well it is known.
@@ -155,12 +161,12 @@ class Differenced final : public Update {
     const int epoch = ++epoch_;
     if (epoch == move_.epoch) {
       plugin_.object->update(*MovedView(filter, move_.column, move_.step), data, sink);
-      emitted_.emplace(sink, filter);
+      keep(Emitted(sink, filter), filter);
       return;
     }
     plugin_.object->update(filter, data, sink);
-    if (move_.epoch >= 0 || Emitted(sink, filter).is_empty()) return;
-    emitted_.emplace(sink, filter);
+    Emitted emitted(sink, filter);
+    if (move_.epoch >= 0 || emitted.is_empty() || !keep(std::move(emitted), filter)) return;
     emitted_in_ = epoch;
     columns_ = columns_of(filter);
   }
@@ -173,6 +179,12 @@ class Differenced final : public Update {
   const std::vector<Column>& columns() const { return columns_; }
 
  private:
+  bool keep(Emitted emitted, const FilterView& filter) {
+    const bool fits = emitted.fits(filter.size);
+    if (fits) emitted_ = std::move(emitted);
+    return fits;
+  }
+
   Loaded<Update> plugin_;
   Move move_;
   int epoch_ = -1;
