@@ -32,10 +32,10 @@ TEST(CameraChain, CorrelationsAreThoseOfWhatIsDrawn) {
     for (int draw = 0; draw < kDraws; ++draw) {
       Eigen::VectorXd errors(18);
       for (const Eigen::Index part : {0, 3}) {
-        const Vector3d first = drawn();
-        for (std::size_t k = 0; k < 3; ++k) {
-          errors.segment<3>(6 * static_cast<Eigen::Index>(k) + part) =
-              chained_error(relative, cameras, k, first, drawn());
+        ChainedErrors chained(relative);
+        for (Eigen::Index k = 0; k < 3; ++k) {
+          errors.segment<3>(6 * k + part) =
+              chained.next(cameras[static_cast<std::size_t>(k)].R_ItoC, drawn());
         }
       }
       scatter += errors * errors.transpose() / kDraws;
@@ -54,12 +54,14 @@ TEST(CameraChain, WhatIsOfTheFirstMovesTheCamerasTogether) {
   cameras[1].p_IinC = Vector3d(-0.3, 0.02, 0.4);
   cameras[2].p_IinC = Vector3d(0.01, 0.2, -0.1);
   const Vector3d turn(0.3, -0.2, 0.5), shift(0.2, 0.1, -0.4);
+  ChainedErrors turns(0.), shifts(0.);
   std::vector<CameraView> moved = cameras;
   for (std::size_t k = 0; k < 3; ++k) {
-    const Vector3d theta = chained_error(0., cameras, k, turn, Vector3d::Ones());
+    const Matrix3d& R_ItoC = cameras[k].R_ItoC;
+    const Vector3d theta = turns.next(R_ItoC, k == 0 ? turn : Vector3d::Ones());
     moved[k].R_ItoC =
         AngleAxisd(theta.norm(), theta.normalized()).toRotationMatrix() * cameras[k].R_ItoC;
-    moved[k].p_IinC += chained_error(0., cameras, k, shift, Vector3d::Ones());
+    moved[k].p_IinC += shifts.next(R_ItoC, k == 0 ? shift : Vector3d::Ones());
   }
   const auto between = [](const std::vector<CameraView>& of, std::size_t k) {
     const Matrix3d R_C0toC = of[k].R_ItoC * of[0].R_ItoC.transpose();

@@ -96,22 +96,17 @@ constexpr std::uint64_t kFirstCameraDraw = 1000;
 /// Moves cameras off by draws from their priors, one after the other; what they were is
 /// `drawn_from`.
 struct WrongCameras {
-  double relative;
+  ChainedErrors turns, shifts;
   std::vector<CameraView> drawn_from = {};
-  Vector3d first_turn = Vector3d::Zero(), first_shift = Vector3d::Zero();
 
   void make_wrong(CameraPrior& prior, WrongStart& wrong) {
     if (!wrong.is_wrong()) return;
     CameraView& camera = prior.camera;
-    const std::size_t index = drawn_from.size();
     drawn_from.push_back(camera);
-    const Vector3d turn = wrong.draw(Vector3d(prior.sigma_extrinsics.head<3>()));
-    const Vector3d shift = wrong.draw(Vector3d(prior.sigma_extrinsics.tail<3>()));
-    if (index == 0) first_turn = turn;
-    if (index == 0) first_shift = shift;
-    camera.R_ItoC =
-        exp_so3(chained_error(relative, drawn_from, index, first_turn, turn)) * camera.R_ItoC;
-    camera.p_IinC += chained_error(relative, drawn_from, index, first_shift, shift);
+    const auto& sigma = prior.sigma_extrinsics;
+    const Vector3d turn = turns.next(camera.R_ItoC, wrong.draw(Vector3d(sigma.head<3>())));
+    camera.p_IinC += shifts.next(camera.R_ItoC, wrong.draw(Vector3d(sigma.tail<3>())));
+    camera.R_ItoC = exp_so3(turn) * camera.R_ItoC;
     for (int i = 0; i < 8; ++i) camera.intrinsics[i] += wrong.draw(prior.sigma_intrinsics[i]);
   }
 };
@@ -148,7 +143,8 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
   std::optional<double> later_s;  // of all that share one clock
   // A calibration.yaml tells by itself what hangs together.
   const bool is_known = context.start != nullptr && context.start->has_cameras();
-  WrongCameras wrong_cameras{is_known ? 1. : p.relative};
+  const double relative = is_known ? 1. : p.relative;
+  WrongCameras wrong_cameras{ChainedErrors(relative), ChainedErrors(relative)};
   for (const CameraView& camera : *cameras) {
     const std::size_t index = setup.cameras.size();
     CameraPrior prior;
@@ -173,7 +169,7 @@ void read_cameras(const CamerasParams& p, const Node& section, CalibrationError 
   for (const CalibrationSample& true_one : sim::camera_truth(wrong_cameras.drawn_from, 0)) {
     setup.drawn_from[true_one.name] = true_one.value;
   }
-  setup.options.filter.correlations.append(chain_of(setup.cameras, wrong_cameras.relative));
+  setup.options.filter.correlations.append(chain_of(setup.cameras, relative));
 }
 
 }  // namespace

@@ -29,8 +29,7 @@ std::vector<CameraView> true_cameras(const TrueCameraParams& params,
                                                  std::to_string(clock_s.size()));
   }
   if (services.exact) return of_file;
-  const std::vector<CameraView> drawn_from = of_file;
-  Eigen::Vector3d first_turn, first_shift;
+  ChainedErrors turns(params.true_camera_relative), shifts(params.true_camera_relative);
   for (std::size_t k = 0; k < of_file.size(); ++k) {
     CameraView& camera = of_file[k];
     camera.t_CtoI_s += clock_s[clock_s.size() == 1 ? 0 : k];
@@ -40,17 +39,11 @@ std::vector<CameraView> true_cameras(const TrueCameraParams& params,
       for (double& value : out) value = sigma * random.gaussian();
       return out;
     };
-    const Eigen::Vector3d turn = three(params.sigma_true_camera_orientation_rad);
-    const Eigen::Vector3d shift = three(params.sigma_true_camera_position_m);
-    if (k == 0) first_turn = turn;
-    if (k == 0) first_shift = shift;
-    const auto chained = [&](const Eigen::Vector3d& first, const Eigen::Vector3d& own) {
-      return chained_error(params.true_camera_relative, drawn_from, k, first, own);
-    };
-    const Eigen::Vector3d dtheta = chained(first_turn, turn);
+    const Eigen::Vector3d dtheta =
+        turns.next(camera.R_ItoC, three(params.sigma_true_camera_orientation_rad));
+    camera.p_IinC += shifts.next(camera.R_ItoC, three(params.sigma_true_camera_position_m));
     // So that the file's numbers stay to the bit where nothing is drawn.
     if (!dtheta.isZero(0.)) camera.R_ItoC = exp_so3(-dtheta) * camera.R_ItoC;
-    camera.p_IinC += chained(first_shift, shift);
     const double focal_px = params.sigma_true_camera_focal_px;
     const double distortion = params.sigma_true_camera_distortion;
     for (int i = 0; i < 8; ++i) {

@@ -93,18 +93,13 @@ class Flight {
     CameraPrior out = camera;
     CameraView& view = out.camera;
     const double scale = options_.calibration;
-    const auto off = [&](int part, Eigen::Vector3d& first) -> Eigen::Vector3d {
-      const Eigen::Vector3d own = normal3();
-      if (cameras_.empty()) first = own;
-      const Eigen::Vector3d error =
-          chained_error(options_.relative, views_, cameras_.size(), first, own);
-      return scale * camera.sigma_extrinsics.segment<3>(part).cwiseProduct(error);
-    };
-    views_.push_back(camera.camera);
-    const Eigen::Vector3d turn = off(0, first_turn_);
+    const Eigen::Matrix3d& R_ItoC = camera.camera.R_ItoC;
+    const Eigen::Vector3d turn =
+        scale * camera.sigma_extrinsics.head<3>().cwiseProduct(turns_.next(R_ItoC, normal3()));
     view.R_ItoC =
         Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix() * view.R_ItoC;
-    view.p_IinC += off(3, first_shift_);
+    view.p_IinC +=
+        scale * camera.sigma_extrinsics.tail<3>().cwiseProduct(shifts_.next(R_ItoC, normal3()));
     for (int i = 0; i < 8; ++i) {
       view.intrinsics[i] += scale * camera.sigma_intrinsics[i] * normal();
     }
@@ -180,8 +175,7 @@ class Flight {
   Eigen::Vector3d phase_, turn_phase_, hertz_, turn_hertz_;
   std::vector<CameraPrior> cameras_;  // as they are
   double later_s_ = 0.;
-  std::vector<CameraView> views_;  ///< before they were made wrong
-  Eigen::Vector3d first_turn_, first_shift_;
+  ChainedErrors turns_{options_.relative}, shifts_{options_.relative};
   std::vector<Eigen::Vector3d> points_;
 };
 
