@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "viwo/estimator/factor_fit.hpp"
+#include "viwo/filter/propagation.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/robot/robot.hpp"
 
@@ -27,12 +28,10 @@ struct Emitted {
   std::vector<ResidualFactor> residuals;
   std::optional<InformationFactor> information;
   std::vector<std::pair<int, VectorXd>> added;  ///< first columns and values of new blocks
-  int now = -1;                                 ///< column of the newest clone, which the IMU is
 
   Emitted(const FactorSink& sink, const FilterView& filter)
       : residuals(sink.residuals().begin(), sink.residuals().end()) {
     if (sink.information() != nullptr) information = *sink.information();
-    if (!filter.clones.empty()) now = filter.clones.back().column;
     for (const AddedBlock& block : sink.added()) {
       const BlockView& view = filter.block(block.id);
       added.emplace_back(view.column(),
@@ -40,7 +39,6 @@ struct Emitted {
     }
   }
   bool is_empty() const { return residuals.empty() && !information; }
-  /// Otherwise other checks say what is wrong.
   bool fits(int state_size) const {
     const auto good = [state_size](const auto& f) { return misfit_of(f, state_size).empty(); };
     return std::ranges::all_of(residuals, good) && (!information || good(*information));
@@ -49,8 +47,8 @@ struct Emitted {
 
 /// A column of the error state: of what, and how well it is known.
 struct Column {
-  int index = 0;
-  int block = 0;  ///< columns of one have the same
+  std::vector<int> indices;  ///< of the pose of the IMU also that of the newest clone, which it is
+  int block = 0;             ///< columns of one have the same
   std::string name;
   double sigma = 0.;
 };
@@ -61,7 +59,10 @@ std::vector<Column> columns_of(const FilterView& filter) {
   const auto add = [&](const std::string& of, int first, int count) {
     for (int i = first; i < first + count; ++i) {
       const double sigma = std::sqrt(std::max(0., filter.P()(i, i)));
-      columns.push_back({i, block, of + std::to_string(i - first + 1), sigma});
+      columns.push_back({{i}, block, of + std::to_string(i - first + 1), sigma});
+      if (i < kPoseSize && !filter.clones.empty()) {
+        columns.back().indices.push_back(filter.clones.back().column + i);
+      }
     }
     ++block;
   };
@@ -70,7 +71,6 @@ std::vector<Column> columns_of(const FilterView& filter) {
   add("v of the IMU, ", kVelocityColumn, 3);
   add("gyro bias, ", kGyroBiasColumn, 3);
   add("accelerometer bias, ", kAccelBiasColumn, 3);
-  // The newest is where the IMU is, and moved with it.
   for (std::size_t i = 0; i + 1 < filter.clones.size(); ++i) {
     const std::string clone = " of clone " + std::to_string(i) + ", ";
     add("theta" + clone, filter.clones[i].column, 3);
@@ -87,25 +87,27 @@ std::vector<Column> columns_of(const FilterView& filter) {
 /// A filter whose estimate is moved along one column, first estimates stay.
 class MovedView {
  public:
-  MovedView(const FilterView& filter, int column, double step)
+  MovedView(const FilterView& filter, const Column& column, double step)
       : view_(filter),
         clones_(filter.clones.begin(), filter.clones.end()),
         blocks_(filter.blocks.begin(), filter.blocks.end()) {
     const auto along = [&](int first, int count) {
       VectorXd dx = VectorXd::Zero(count);
-      if (column >= first && column < first + count) dx[column - first] = step;
+      for (const int index : column.indices) {
+        if (index >= first && index < first + count) dx[index - first] = step;
+      }
       return dx;
     };
-    move_imu(along(0, kImuSize));
+    retract(along(0, kImuSize), view_.imu);
     for (CloneState& clone : clones_) {
-      const bool is_now = &clone == &clones_.back() && column < kPoseSize;
-      const VectorXd dx = is_now ? along(0, kPoseSize) : along(clone.column, kPoseSize);
+      const VectorXd dx = along(clone.column, kPoseSize);
       clone.R_GtoI = exp_so3(Eigen::Vector3d(-dx.head<3>())) * clone.R_GtoI;
       clone.p_IinG += dx.tail<3>();
     }
     for (BlockView& block : blocks_) {
-      if (block.column() < 0 || column < block.column()) continue;
-      if (column < block.column() + block.size()) move(along(block.column(), block.size()), block);
+      if (block.column() < 0) continue;
+      const VectorXd dx = along(block.column(), block.size());
+      if (!dx.isZero(0.)) move(dx, block);
     }
     view_.clones = clones_;
     view_.blocks = blocks_;
@@ -113,15 +115,6 @@ class MovedView {
   const FilterView& operator*() const { return view_; }
 
  private:
-  void move_imu(const VectorXd& dx) {
-    ImuState& imu = view_.imu;
-    imu.R_GtoI = exp_so3(Eigen::Vector3d(-dx.segment<3>(kThetaColumn))) * imu.R_GtoI;
-    imu.p_IinG += dx.segment<3>(kPositionColumn);
-    imu.v_IinG += dx.segment<3>(kVelocityColumn);
-    imu.gyro_bias += dx.segment<3>(kGyroBiasColumn);
-    imu.accel_bias += dx.segment<3>(kAccelBiasColumn);
-  }
-
   void move(const VectorXd& dx, BlockView& block) {
     const int numbers = static_cast<int>(block.numbers().size());
     const int rotations = (block.size() - numbers) / 3;
@@ -146,14 +139,15 @@ class MovedView {
 /// Where a filter is moved for the update, and by how much; the filter itself is not.
 struct Move {
   int epoch = -1;  ///< none
-  int column = 0;
+  Column column = {};
   double step = 0.;
 };
 
 /// Stands in for the plugin, and keeps what it emits in an epoch.
 class Differenced final : public Update {
  public:
-  Differenced(Loaded<Update> plugin, Move move) : plugin_(std::move(plugin)), move_(move) {}
+  Differenced(Loaded<Update> plugin, Move move)
+      : plugin_(std::move(plugin)), move_(std::move(move)) {}
 
   void declare(Declarations& host) override { plugin_.object->declare(host); }
   void start(const UpdateSetup& setup) override { plugin_.object->start(setup); }
@@ -161,12 +155,11 @@ class Differenced final : public Update {
     const int epoch = ++epoch_;
     if (epoch == move_.epoch) {
       plugin_.object->update(*MovedView(filter, move_.column, move_.step), data, sink);
-      keep(Emitted(sink, filter), filter);
+      keep(sink, filter);
       return;
     }
     plugin_.object->update(filter, data, sink);
-    Emitted emitted(sink, filter);
-    if (move_.epoch >= 0 || emitted.is_empty() || !keep(std::move(emitted), filter)) return;
+    if (move_.epoch >= 0 || !keep(sink, filter)) return;
     emitted_in_ = epoch;
     columns_ = columns_of(filter);
   }
@@ -179,10 +172,12 @@ class Differenced final : public Update {
   const std::vector<Column>& columns() const { return columns_; }
 
  private:
-  bool keep(Emitted emitted, const FilterView& filter) {
-    const bool fits = emitted.fits(filter.size);
-    if (fits) emitted_ = std::move(emitted);
-    return fits;
+  /// False for nothing, or what other checks say is wrong.
+  bool keep(const FactorSink& sink, const FilterView& filter) {
+    Emitted emitted(sink, filter);
+    if (emitted.is_empty() || !emitted.fits(filter.size)) return false;
+    emitted_ = std::move(emitted);
+    return true;
   }
 
   Loaded<Update> plugin_;
@@ -211,13 +206,13 @@ class Comparison {
   Comparison(const Emitted& there, const std::vector<Column>& columns, Findings& findings)
       : there_(there), columns_(columns), findings_(findings) {}
 
-  bool has(int column) const {
-    const auto in = [&](const FactorColumns& columns) {
-      return place_in(columns, column) >= 0 ||
-             (column < kPoseSize && place_in(columns, there_.now + column) >= 0);
+  bool has(const Column& column) const {
+    const auto in = [&](const auto& factor) {
+      return std::ranges::any_of(column.indices,
+                                 [&](int index) { return place_in(factor.columns, index) >= 0; });
     };
-    return std::ranges::any_of(there_.residuals, [&](const auto& f) { return in(f.columns); }) ||
-           (there_.information && in(there_.information->columns));
+    return std::ranges::any_of(there_.residuals, in) ||
+           (there_.information && in(*there_.information));
   }
 
   void with(const Emitted& moved, const Column& column, double step) {
@@ -243,8 +238,7 @@ class Comparison {
     const auto move = [&](int index, double by) {
       if (const int place = place_in(columns, index); place >= 0) dx[place] += by / kStep;
     };
-    move(column.index, step);
-    if (column.index < kPoseSize) move(there_.now + column.index, step);
+    for (const int index : column.indices) move(index, step);
     for (std::size_t k = 0; k < there_.added.size() && k < moved.added.size(); ++k) {
       const VectorXd by = moved.added[k].second - there_.added[k].second;
       for (int i = 0; i < by.size(); ++i) move(there_.added[k].first + i, by[i]);
@@ -258,11 +252,8 @@ class Comparison {
     VectorXd sigma = VectorXd::Zero(columns.size());
     for (const Column& column : columns_) {
       if (block >= 0 && column.block != block) continue;
-      for (const int index : {column.index, there_.now + column.index}) {
-        const int place = place_in(columns, index);
-        if (place >= 0 && (index == column.index || column.index < kPoseSize)) {
-          sigma[place] = column.sigma;
-        }
+      for (const int index : column.indices) {
+        if (const int place = place_in(columns, index); place >= 0) sigma[place] = column.sigma;
       }
     }
     return sigma;
@@ -313,8 +304,8 @@ class Comparison {
   /// The first of a factor and a block.
   void fail(const std::string& what, const Column& column, const std::string& text) {
     if (!reported_.insert(what + std::to_string(column.block)).second) return;
-    findings_.fail(what + ", column " + std::to_string(column.index) + " (" + column.name +
-                   "): " + text);
+    findings_.fail(what + ", column " + std::to_string(column.indices.front()) + " (" +
+                   column.name + "): " + text);
   }
 
   static constexpr double kNegligible = 1e-2;  ///< sigmas of a measurement
@@ -336,19 +327,17 @@ int check_on(const char* motion, const Subject& subject, Findings& findings) {
     robot::run_updates(updates, subject.info().name, drive, robot::Calibration::kEstimated);
     return runs;
   };
-  const auto there = run({Move{}}).front();
+  const auto there = run({Move()}).front();
   if (!there->emitted()) return 0;
   Comparison compare(*there->emitted(), there->columns(), findings);
-  std::vector<Column> columns;
   std::vector<Move> moves;
   for (const Column& column : there->columns()) {
-    if (!(column.sigma > 0.) || !compare.has(column.index)) continue;
-    columns.push_back(column);
-    moves.push_back({there->emitted_in(), column.index, kStep * column.sigma});
+    if (!(column.sigma > 0.) || !compare.has(column)) continue;
+    moves.push_back({there->emitted_in(), column, kStep * column.sigma});
   }
   const auto moved = run(moves);
   for (std::size_t i = 0; i < moved.size(); ++i) {
-    if (moved[i]->emitted()) compare.with(*moved[i]->emitted(), columns[i], moves[i].step);
+    if (moved[i]->emitted()) compare.with(*moved[i]->emitted(), moves[i].column, moves[i].step);
   }
   return static_cast<int>(moves.size());
 }
