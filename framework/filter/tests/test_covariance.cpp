@@ -33,6 +33,24 @@ Textbook textbook(const MatrixXd& P, const MatrixXd& H, const MatrixXd& R, const
   return {P - K * S * K.transpose(), K * r};
 }
 
+/// Applies a factor, which leaves the covariance of the textbook, symmetric to the bit.
+struct Updated {
+  VectorXd dx, of_textbook;
+  double off() const { return (dx - of_textbook).norm(); }
+};
+template <class Factor>
+Updated expect_textbook(const MatrixXd& P, const Factor& factor, const MatrixXd& H,
+                        const MatrixXd& R, const VectorXd& r) {
+  Covariance covariance(static_cast<int>(P.rows()));
+  covariance.set_block(0, P);
+  VectorXd dx(P.rows());
+  EXPECT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
+  const Textbook expected = textbook(P, H, R, r);
+  EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
+  EXPECT_EQ(covariance.matrix(), covariance.matrix().transpose());
+  return {dx, expected.dx};
+}
+
 ResidualFactor residual_factor(Random& random, MatrixXd& dense_H) {
   ResidualFactor factor;
   factor.columns.add(20, 6);
@@ -55,14 +73,7 @@ TEST(Covariance, ResidualFactorIsTheTextbookUpdate) {
   const MatrixXd P = random_covariance(random);
   MatrixXd H;
   const ResidualFactor factor = residual_factor(random, H);
-  Covariance covariance(kDenseSize);
-  covariance.set_block(0, P);
-  VectorXd dx(kDenseSize);
-  ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
-  const Textbook expected = textbook(P, H, factor.R, factor.residual);
-  EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
-  EXPECT_LT((dx - expected.dx).norm(), 1e-10);
-  EXPECT_EQ(covariance.matrix(), covariance.matrix().transpose());
+  EXPECT_LT(expect_textbook(P, factor, H, factor.R, factor.residual).off(), 1e-10);
 }
 
 TEST(Covariance, InformationFactorIsTheSameUpdateWithoutStackingRows) {
@@ -85,14 +96,7 @@ TEST(Covariance, InformationFactorIsTheSameUpdateWithoutStackingRows) {
   factor.Lambda.topLeftCorner(15, 15).triangularView<Eigen::Lower>() =
       compact.transpose() * compact;
   factor.eta.head(15) = compact.transpose() * r;
-  Covariance covariance(kDenseSize);
-  covariance.set_block(0, P);
-  VectorXd dx(kDenseSize);
-  ASSERT_EQ(covariance.apply(factor, dx), FactorResult::kApplied);
-  const Textbook expected = textbook(P, H, MatrixXd::Identity(60, 60), r);
-  EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
-  EXPECT_LT((dx - expected.dx).norm(), 1e-10);
-  EXPECT_EQ(covariance.matrix(), covariance.matrix().transpose());
+  EXPECT_LT(expect_textbook(P, factor, H, MatrixXd::Identity(60, 60), r).off(), 1e-10);
 }
 
 /// More columns than the products of (F-8) take at a time, some of them held.
@@ -106,14 +110,9 @@ TEST(Covariance, InformationFactorOfManyColumnsIsTheSameUpdate) {
   }
   const testing::Rows rows =
       testing::random_rows(random, 150, {{90, 31}, {40, 17}, {15, 20}, {60, 30}});
-  Covariance covariance(kSize);
-  covariance.set_block(0, P);
-  VectorXd dx(kSize);
-  ASSERT_EQ(covariance.apply(rows.factor(kSize), dx), FactorResult::kApplied);
-  const Textbook expected = textbook(P, rows.dense(kSize), MatrixXd::Identity(150, 150), rows.r);
-  EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
-  EXPECT_LT((dx - expected.dx).norm(), 1e-9 * expected.dx.norm());
-  EXPECT_EQ(covariance.matrix(), covariance.matrix().transpose());
+  const Updated update = expect_textbook(P, rows.factor(kSize), rows.dense(kSize),
+                                         MatrixXd::Identity(150, 150), rows.r);
+  EXPECT_LT(update.off(), 1e-9 * update.of_textbook.norm());
 }
 
 /// Neighbours in the state that are none in the factor: what stands between them there is held.
@@ -123,13 +122,9 @@ TEST(Covariance, InformationFactorOfNeighboursApartIsTheSameUpdate) {
   P.middleRows(30, 2).setZero();
   P.middleCols(30, 2).setZero();
   const testing::Rows rows = testing::random_rows(random, 40, {{10, 3}, {30, 2}, {13, 4}});
-  Covariance covariance(kDenseSize);
-  covariance.set_block(0, P);
-  VectorXd dx(kDenseSize);
-  ASSERT_EQ(covariance.apply(rows.factor(kDenseSize), dx), FactorResult::kApplied);
-  const Textbook expected = textbook(P, rows.dense(kDenseSize), MatrixXd::Identity(40, 40), rows.r);
-  EXPECT_LT((covariance.matrix() - expected.P).norm(), 1e-10 * P.norm());
-  EXPECT_LT((dx - expected.dx).norm(), 1e-10);
+  const Updated update = expect_textbook(P, rows.factor(kDenseSize), rows.dense(kDenseSize),
+                                         MatrixXd::Identity(40, 40), rows.r);
+  EXPECT_LT(update.off(), 1e-10);
 }
 
 TEST(Covariance, ColumnsWithoutVarianceNeverMove) {
