@@ -124,8 +124,8 @@ def shared_libraries():
 
 
 def made_as(file):
-    """The file that is made from the same sources for any processor (viwo_faster_copy.cmake)."""
-    copy = re.fullmatch(r'lib/viwo/(plugins/\w+/)?x86-64-v3/(.*)', str(file))
+    """The file that is made from the same sources for any processor (viwo_faster_copies.cmake)."""
+    copy = re.fullmatch(r'lib/viwo/(plugins/\w+/)?x86-64-v[34]/(.*)', str(file))
     if not copy:
         return file
     return f'lib/viwo/{copy[1]}{copy[2]}' if copy[1] else f'bin/{copy[2]}'

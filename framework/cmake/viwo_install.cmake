@@ -65,5 +65,5 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/plugins
   DESTINATION ${viwo_doc_dir} FILES_MATCHING PATTERN "*.md"
   PATTERN "images" EXCLUDE PATTERN "tests" EXCLUDE PATTERN "shared" EXCLUDE)
 
-include(viwo_faster_copy)
+include(viwo_faster_copies)
 include(viwo_packages)

@@ -31,15 +31,19 @@ class FasterCopy(ConsumerTest):
         program = self.folder / 'bin/viwo'
         itself = self.run_command(program, '--version')
         self.assertRegex(itself, r'^viwo \d')
-        copy = self.folder / 'lib/viwo/x86-64-v3/viwo'
-        copy.parent.mkdir()
-        copy.write_text('#!/bin/sh\necho "the copy of $0: $*"\n', encoding='utf-8')
-        # As long as it is not a program, the other one does it.
-        self.assertEqual(self.run_command(program, '--version'), itself)
-        copy.chmod(0o755)
-        processor = pathlib.Path('/proc/cpuinfo').read_text(encoding='utf-8')
-        if all(flag in processor.split() for flag in ('avx2', 'fma', 'bmi2')):
-            self.assertEqual(self.run_command(program, '--version'), f'the copy of {copy}: --version\n')
+        expected = itself
+        processor = pathlib.Path('/proc/cpuinfo').read_text(encoding='utf-8').split()
+        for instructions, flags in (('x86-64-v3', ('avx2', 'fma', 'bmi2')),
+                                    ('x86-64-v4', ('avx512bw', 'avx512dq', 'avx512vl'))):
+            copy = self.folder / 'lib/viwo' / instructions / 'viwo'
+            copy.parent.mkdir()
+            copy.write_text('#!/bin/sh\necho "the copy of $0: $*"\n', encoding='utf-8')
+            # As long as it is not a program, the one before does it.
+            self.assertEqual(self.run_command(program, '--version'), expected)
+            copy.chmod(0o755)
+            if all(flag in processor for flag in flags):
+                expected = f'the copy of {copy}: --version\n'
+            self.assertEqual(self.run_command(program, '--version'), expected)
         self.assertEqual(self.run_command('env', 'VIWO_NO_FASTER_COPY=1', program, '--version'), itself)
 
 

@@ -19,16 +19,19 @@ fs::path this_program() {
 
 }  // namespace
 
-std::string_view faster_instruction_set() {
+std::vector<std::string_view> faster_instruction_sets() {
+  std::vector<std::string_view> sets;
 #ifdef __x86_64__
-  if (std::getenv("VIWO_NO_FASTER_COPY") != nullptr) return {};
-  // All processors that have these have the rest of x86-64-v3.
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-      __builtin_cpu_supports("bmi2")) {
-    return "x86-64-v3";
-  }
+  if (std::getenv("VIWO_NO_FASTER_COPY") != nullptr) return sets;
+  // All processors that have these have the rest of the set.
+  const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                  __builtin_cpu_supports("bmi2");
+  const bool v4 = v3 && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512cd") &&
+                  __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+  if (v4) sets.push_back("x86-64-v4");
+  if (v3) sets.push_back("x86-64-v3");
 #endif
-  return {};
+  return sets;
 }
 
 fs::path installation_prefix() {
@@ -39,19 +42,21 @@ fs::path installation_prefix() {
 }
 
 fs::path fastest_copy(const fs::path& plugin) {
-  const std::string_view set = faster_instruction_set();
-  if (set.empty()) return plugin;
-  fs::path copy = plugin.parent_path() / set / plugin.filename();
-  std::error_code error;
-  return fs::exists(copy, error) ? copy : plugin;
+  for (const std::string_view set : faster_instruction_sets()) {
+    fs::path copy = plugin.parent_path() / set / plugin.filename();
+    std::error_code error;
+    if (fs::exists(copy, error)) return copy;
+  }
+  return plugin;
 }
 
 void become_faster_copy(char** argv) {
-  const std::string_view set = faster_instruction_set();
-  if (set.empty()) return;
   const fs::path program = this_program();
-  const fs::path copy = installation_prefix() / kCopies / set / program.filename();
-  if (copy != program) ::execv(copy.c_str(), argv);  // Where it fails, this one goes on.
+  for (const std::string_view set : faster_instruction_sets()) {
+    const fs::path copy = installation_prefix() / kCopies / set / program.filename();
+    if (copy == program) return;
+    ::execv(copy.c_str(), argv);  // Where it fails, a slower one goes on.
+  }
 }
 
 }  // namespace viwo
