@@ -1,6 +1,5 @@
 #include "forecast_output.hpp"
 
-#include <algorithm>
 #include <iostream>
 #include <limits>
 
@@ -48,22 +47,18 @@ void ForecastOutput::look(double t_s, const Filter& filter) {
   CalibrationFile file = calibration_file_of(filter);
   widen(file, *calibration_);  // one that is surer than it ought to be would call too little enough
   std::vector<std::string> names;
-  std::vector<Eigen::Index> at;
   std::vector<double> sigmas;
   for (const CalibrationEntry& entry : file.intrinsics) {
     if (entry.name.find('.') != std::string::npos) continue;  // of a further wheel set
-    const auto& known = file.correlations.entries;
-    const auto found = std::find(known.begin(), known.end(), entry.name);
-    if (found == known.end()) continue;
+    if (!(entry.sigma > 0.)) continue;
     names.push_back(entry.name);
-    at.push_back(found - known.begin());
     sigmas.push_back(entry.sigma);
   }
   if (names.empty()) throw InputError("the run estimates no intrinsics of wheels");
   const Eigen::Map<const Eigen::VectorXd> sigma(sigmas.data(),
                                                 static_cast<Eigen::Index>(sigmas.size()));
   const plan::Forecast forecast = forecaster_.of(
-      names, sigma.asDiagonal() * file.correlations.matrix(at, at) * sigma.asDiagonal());
+      names, sigma.asDiagonal() * file.correlations.among(names) * sigma.asDiagonal());
   text_ = text_of(forecast);
   const std::string what = forecast.is_enough() ? "enough" : forecast.parameter + forecast.piece;
   if (live_ && what != said_) {

@@ -1,8 +1,5 @@
 #include "by_smoother.hpp"
 
-#include <algorithm>
-#include <iterator>
-
 #include <Eigen/Cholesky>
 
 #include "recording_name.hpp"
@@ -19,29 +16,6 @@ smoother::Smoothed smooth(const CalibrationSetup& setup, const std::vector<std::
   }
   return smoother::smooth(inputs, *setup.plugins, progress);
 }
-
-namespace {
-
-/// Correlations of some entries; those that are not there hang together with nothing.
-Eigen::MatrixXd among(const PriorCorrelations& all, const std::vector<std::string>& names) {
-  const auto n = static_cast<Eigen::Index>(names.size());
-  Eigen::MatrixXd out = Eigen::MatrixXd::Identity(n, n);
-  std::vector<std::ptrdiff_t> at;
-  for (const std::string& name : names) {
-    at.push_back(std::ranges::find(all.entries, name) - all.entries.begin());
-  }
-  const std::ptrdiff_t none = std::ssize(all.entries);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const std::ptrdiff_t row = at[static_cast<std::size_t>(i)];
-      const std::ptrdiff_t column = at[static_cast<std::size_t>(k)];
-      if (row < none && column < none) out(i, k) = all.matrix(row, column);
-    }
-  }
-  return out;
-}
-
-}  // namespace
 
 CalibrationEstimate estimate_of(const smoother::Smoothed& smoothed, const CalibrationSetup& setup) {
   const auto& specs = setup.recordings.front().setup.model->description().intrinsics;
@@ -71,11 +45,11 @@ CalibrationEstimate estimate_of(const smoother::Smoothed& smoothed, const Calibr
   if (free.empty()) {
     throw InputError(setup.name + ": reference: smoother, but the base estimates no intrinsics");
   }
-  const Eigen::MatrixXd correlations = among(file.correlations, names);
+  const Eigen::MatrixXd correlations = file.correlations.among(names);
   out.correlations(free, free) = correlations;
   const Eigen::VectorXd ratio = out.sigma(free).cwiseQuotient(out.prior_sigma(free));
   // In what was known before, which hangs together where the gauge holds entries.
-  const Eigen::MatrixXd root = among(smoothed.before.correlations, names).llt().matrixL();
+  const Eigen::MatrixXd root = smoothed.before.correlations.among(names).llt().matrixL();
   const Eigen::MatrixXd to_white =
       root.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd(ratio.asDiagonal()));
   out.undetermined =

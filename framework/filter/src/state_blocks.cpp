@@ -94,6 +94,20 @@ void PriorCorrelations::append(const PriorCorrelations& other) {
   matrix = std::move(both);
 }
 
+Eigen::MatrixXd PriorCorrelations::among(std::span<const std::string> names) const {
+  const auto n = static_cast<Eigen::Index>(names.size());
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> known;  // where in the result, and where here
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto found = std::ranges::find(entries, names[static_cast<std::size_t>(i)]);
+    if (found != entries.end()) known.emplace_back(i, found - entries.begin());
+  }
+  Eigen::MatrixXd out = Eigen::MatrixXd::Identity(n, n);
+  for (const auto& [row, i] : known) {
+    for (const auto& [column, j] : known) out(row, column) = matrix(i, j);
+  }
+  return out;
+}
+
 StateBlocks::StateBlocks(std::vector<BlockSpec> blocks, std::vector<RoomSpec> rooms,
                          int first_column)
     : first_column_(first_column), specs_(std::move(blocks)), rooms_(std::move(rooms)) {
@@ -159,30 +173,18 @@ std::vector<double> StateBlocks::value(std::size_t block) const {
 }
 
 void StateBlocks::set_prior(Covariance& covariance, const PriorCorrelations& correlations) const {
-  const auto& names = correlations.entries;
-  std::vector<std::pair<int, Eigen::Index>> correlated;  // column, index in `correlations`
+  std::vector<std::string> names(static_cast<std::size_t>(columns_));  // of rooms: none
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(columns_);
   for (std::size_t i = 0; i < specs_.size(); ++i) {
     if (views_[i].column() < 0) continue;
-    Eigen::VectorXd variance(views_[i].size());
-    for (Eigen::Index k = 0; k < variance.size(); ++k) {
-      const BlockEntry& entry = specs_[i].entries[static_cast<std::size_t>(k)];
-      variance[k] = entry.sigma * entry.sigma;
-      const auto known = std::find(names.begin(), names.end(), entry.name);
-      if (known == names.end()) continue;
-      correlated.emplace_back(views_[i].column() + static_cast<int>(k), known - names.begin());
-    }
-    covariance.set_block(views_[i].column(), variance.asDiagonal());
-  }
-  if (correlated.empty()) return;
-  Eigen::MatrixXd P = covariance.matrix().block(first_column_, first_column_, columns_, columns_);
-  const Eigen::VectorXd sigma = P.diagonal().cwiseSqrt();
-  for (const auto& [row, i] : correlated) {
-    for (const auto& [column, j] : correlated) {
-      const Eigen::Index k = row - first_column_, l = column - first_column_;
-      if (k != l) P(k, l) = sigma[k] * correlations.matrix(i, j) * sigma[l];
+    int column = views_[i].column() - first_column_;
+    for (const BlockEntry& entry : specs_[i].entries) {
+      names[static_cast<std::size_t>(column)] = entry.name;
+      sigma[column++] = entry.sigma;
     }
   }
-  covariance.set_block(first_column_, P);
+  covariance.set_block(first_column_,
+                       sigma.asDiagonal() * correlations.among(names) * sigma.asDiagonal());
 }
 
 void StateBlocks::estimates(BlockId id, const Covariance& covariance,

@@ -157,22 +157,31 @@ TEST(StateBlocks, ShowRotationVectorsNumbersAndSigmas) {
   EXPECT_EQ(blocks.value(1), spec.value);
 }
 
-TEST(StateBlocks, PriorIsTheSquareOfTheSigmasAndCorrelatesNothing) {
+TEST(StateBlocks, PriorIsTheSquareOfTheSigmasCorrelatesNothingAndEmptiesRooms) {
   const StateBlocks blocks({pose("a"), testing::base_numbers()}, {{"points", 2, 3}}, 3);
   Covariance covariance(3 + blocks.columns());
   covariance.set_block(0, MatrixXd::Ones(covariance.size(), covariance.size()));
   blocks.set_prior(covariance);
-  MatrixXd expected = MatrixXd::Ones(covariance.size(), covariance.size());
+  MatrixXd expected = MatrixXd::Zero(covariance.size(), covariance.size());
+  expected.topLeftCorner<3, 3>().setOnes();  // of what is not in blocks
   for (const auto& [first, sigma] :
        {std::pair{3, std::vector<double>(6, 1.)}, std::pair{15, testing::kBaseNumbersSigma}}) {
     for (std::size_t i = 0; i < sigma.size(); ++i) {
       const Eigen::Index k = first + static_cast<Eigen::Index>(i);
-      expected.row(k).setZero();
-      expected.col(k).setZero();
       expected(k, k) = sigma[i] * sigma[i];
     }
   }
   EXPECT_EQ(covariance.matrix(), expected);
+}
+
+TEST(StateBlocks, CorrelationsAmongSomeAreInTheirOrder) {
+  Eigen::Matrix3d matrix;
+  matrix << 1., 0.1, 0.2, 0.1, 1., 0.3, 0.2, 0.3, 1.;
+  const PriorCorrelations correlations{{"a", "b", "c"}, matrix};
+  const std::vector<std::string> names{"c", "unknown", "a"};
+  Eigen::Matrix3d expected;
+  expected << 1., 0., 0.2, 0., 1., 0., 0.2, 0., 1.;
+  EXPECT_EQ(correlations.among(names), expected);
 }
 
 /// A covariance that correlates everything.

@@ -1,6 +1,7 @@
 #include "calibration_start.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "viwo/config/regular_file.hpp"
@@ -167,15 +168,10 @@ void CalibrationStart::take_camera(std::size_t index, CameraPrior& prior, Errors
 }
 
 PriorCorrelations CalibrationStart::correlations() const {
-  const PriorCorrelations& all = file_.correlations;
-  std::vector<Eigen::Index> kept;
   PriorCorrelations out;
-  for (std::size_t i = 0; i < all.entries.size(); ++i) {
-    if (!taken_.contains(all.entries[i])) continue;
-    kept.push_back(static_cast<Eigen::Index>(i));
-    out.entries.push_back(all.entries[i]);
-  }
-  out.matrix = all.matrix(kept, kept);
+  std::ranges::copy_if(file_.correlations.entries, std::back_inserter(out.entries),
+                       [&](const std::string& entry) { return taken_.contains(entry); });
+  out.matrix = file_.correlations.among(out.entries);
   return out;
 }
 

@@ -25,23 +25,14 @@ constexpr double kFarthestInverse = 1e-4;  ///< 1/m
 
 /// Inverse of the correlations of what is known of the calibration, in its order.
 MatrixXd inverse_correlations(const VisualStartOptions& options) {
-  const std::vector<std::string>& names = options.correlations.entries;
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> known;  // column, and index in the options
-  Eigen::Index columns = 0;
+  std::vector<std::string> names;
   for (std::size_t c = 0; c < options.cameras.size(); ++c) {
     for (const BlockSpec& block : camera_blocks(c, options.cameras[c])) {
-      for (const BlockEntry& entry : block.entries) {
-        const auto found = std::ranges::find(names, entry.name);
-        if (found != names.end()) known.emplace_back(columns, found - names.begin());
-        ++columns;
-      }
+      for (const BlockEntry& entry : block.entries) names.push_back(entry.name);
     }
   }
-  MatrixXd C = MatrixXd::Identity(columns, columns);
-  for (const auto& [row, i] : known) {
-    for (const auto& [column, j] : known) C(row, column) = options.correlations.matrix(i, j);
-  }
-  return C.ldlt().solve(MatrixXd::Identity(columns, columns));
+  const MatrixXd C = options.correlations.among(names);
+  return C.ldlt().solve(MatrixXd::Identity(C.rows(), C.cols()));
 }
 
 }  // namespace

@@ -27,6 +27,9 @@ struct PriorCorrelations {
 
   /// Entries that hang together with none of these.
   void append(const PriorCorrelations& other);
+  /// Of entries with these names, in their order; those that are not known hang together with
+  /// nothing.
+  Eigen::MatrixXd among(std::span<const std::string> names) const;
 };
 
 /// Blocks that the monitor of excitation watches together.
@@ -66,7 +69,7 @@ class StateBlocks {
   /// Where the groups begin; all columns from there on are watched.
   int first_watched() const { return first_watched_; }
 
-  /// The prior of all declared blocks: their sigmas, with these correlations.
+  /// The prior of all declared blocks: their sigmas, with these correlations. Rooms are empty.
   void set_prior(Covariance& covariance, const PriorCorrelations& correlations = {}) const;
   /// Estimates of the entries of a declared block, in their order.
   void estimates(BlockId id, const Covariance& covariance, std::vector<BlockEstimate>& out) const;
