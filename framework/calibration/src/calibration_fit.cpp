@@ -1,6 +1,5 @@
 // The fit of a batch calibration: priors, noise scales found in the data, solver.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 
@@ -10,58 +9,13 @@
 #include "calibration_problem.hpp"
 #include "fit_costs.hpp"
 #include "recording_name.hpp"
+#include "residual_groups.hpp"
 #include "undetermined.hpp"
 #include "viwo/calibration/calibrate.hpp"
-#include "viwo/math/chi2.hpp"
 #include "viwo/math/se2.hpp"
 
 namespace viwo::calibration {
 namespace {
-
-/// Residuals of one kind, and their information about all unknowns [shared, own of each
-/// recording].
-struct NoiseGroup {
-  Eigen::MatrixXd information;  ///< J^T J
-  double squares = 0.;
-  int residuals = 0;
-  std::vector<Eigen::VectorXd> batches;  ///< J^T r, of segments that follow each other
-};
-
-/// All residuals at a solution, by kind.
-using Linearisation = std::array<NoiseGroup, kResidualKinds>;
-
-/// How the gradients of the batches scatter (CAL-14).
-struct Persistence {
-  /// By how much what is left adds up over time, where it would cancel if it were white: 1 for
-  /// white noise.
-  double ratio = 0.;
-  /// About their mean: variance times a chi-square of so many degrees of freedom.
-  double squares = 0., dof = 0.;
-};
-
-Persistence persistence(const NoiseGroup& group) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(group.information);
-  const Eigen::VectorXd& values = eigen.eigenvalues();
-  const double smallest = 1e-9 * values[values.size() - 1];
-  const auto n_batches = static_cast<double>(group.batches.size());
-  Persistence out;
-  double rank = 0.;
-  for (int i = 0; i < values.size(); ++i) {
-    if (!(values[i] > smallest)) continue;
-    double squares = 0., all = 0.;
-    for (const Eigen::VectorXd& gradient : group.batches) {
-      const double along = eigen.eigenvectors().col(i).dot(gradient);
-      squares += along * along;
-      all += along;
-    }
-    ++rank;
-    out.ratio += squares / values[i];
-    out.squares += (n_batches * squares - all * all) / values[i];
-  }
-  if (rank > 0.) out.ratio /= rank;
-  out.dof = rank * (n_batches - 1.);
-  return out;
-}
 
 class Fit {
  public:
@@ -233,44 +187,6 @@ class Fit {
         rescale_noise(variance_of(at[index(ResidualKind::kYaw)], P), noise.yaw_rad);
     rescale_noise(variance_of_parity(at, P), noise.parity_scale);
     return most;
-  }
-
-  static std::size_t index(ResidualKind kind) { return static_cast<std::size_t>(kind); }
-
-  static double redundancy(const NoiseGroup& group, const Eigen::MatrixXd& P) {
-    return group.residuals - (P * group.information).trace();
-  }
-
-  /// Squares over redundancy, less the two by which the variance of what is estimated is larger
-  /// where its noise is found in as few numbers (Student's t). What fits exactly, or has little to
-  /// spare, says nothing about its own size: 0.
-  static double variance_of(const NoiseGroup& group, const Eigen::MatrixXd& P) {
-    constexpr double kLeastToSpare = 4.;
-    const double spare = redundancy(group, P);
-    return spare < kLeastToSpare || group.squares < 1e-12 ? 0. : group.squares / (spare - 2.);
-  }
-
-  /// What the residuals of the parity, of which there are few, and its batches, which are many, say
-  /// together; the residuals alone where chance does not let the two differ as much (CAL-17).
-  static double variance_of_parity(const Linearisation& at, const Eigen::MatrixXd& P) {
-    constexpr double kChance = 0.001, kNothingToSpare = 0.01;
-    const NoiseGroup& parity = at[index(ResidualKind::kParity)];
-    const Persistence batches = persistence(parity);
-    if (!(batches.dof > 0.) || !(batches.squares > 0.)) return variance_of(parity, P);
-    // Where the reference is off for long, so are the wheels from the estimate.
-    double expected = redundancy(parity, P);
-    const Eigen::MatrixXd PN = P * parity.information * P;
-    for (const ResidualKind kind : {ResidualKind::kYaw, ResidualKind::kPosition}) {
-      const NoiseGroup& group = at[index(kind)];
-      if (group.residuals == 0) continue;
-      const double more = std::max(0., persistence(group).ratio - 1.);
-      expected += more * PN.cwiseProduct(group.information).sum();
-    }
-    const double variance = batches.squares / batches.dof;
-    if (expected < kNothingToSpare) return variance;
-    const double most = variance * chi2_quantile(1. - kChance, expected);
-    if (parity.squares > most) return parity.squares / expected;
-    return (batches.squares + parity.squares) / (batches.dof + expected);
   }
 
   /// `white`: as if what is left did not persist.
