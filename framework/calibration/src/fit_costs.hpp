@@ -21,12 +21,14 @@ struct Prior {
   Eigen::MatrixXd whitening;  ///< its inverse
 
   Prior(const CalibrationRecording& first, const CalibrationOptions& options, const FitStart& start)
-      : x_WI(start.x_WI), sigma(start.sigma), drawn_sigma(start.sigma) {
+      : x_WI(start.x_WI),
+        sigma(start.sigma),
+        drawn_sigma(start.sigma),
+        extrinsics(options.extrinsics_x_m_y_m_yaw_rad) {
     const bool poses = first.motion.kind == ReferenceKind::kPoses;
     const bool estimates = poses && options.estimate_extrinsics;
     const double m = estimates ? options.prior_sigma_extrinsics_m : 0.;
     const double rad = estimates ? options.prior_sigma_extrinsics_rad : 0.;
-    extrinsics = options.extrinsics_x_m_y_m_yaw_rad;
     extrinsics_sigma = {m, m, rad};
     root.setIdentity(n_shared(), n_shared());
     // Where O is the reference body nothing is left to a gauge.

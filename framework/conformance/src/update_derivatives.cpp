@@ -318,7 +318,7 @@ class Comparison {
 /// The numbers of columns that were looked at.
 int check_on(const char* motion, const Subject& subject, Findings& findings) {
   const robot::Drive drive = robot::simulate_drive(motion, 2., false);
-  const auto run = [&](std::vector<Move> moves) {
+  const auto run = [&](const std::vector<Move>& moves) {
     std::vector<std::shared_ptr<Differenced>> runs;
     for (const Move& move : moves) {
       runs.push_back(std::make_shared<Differenced>(subject.make<Update>(), move));

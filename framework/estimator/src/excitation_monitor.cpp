@@ -150,7 +150,7 @@ void ExcitationMonitor::warn(std::int64_t t_ns, Degeneracy kind) {
   constexpr std::array<Words, kDegeneracies> kWords{{
       {"standing still", "cannot be learned", "drive"},
       {"no yaw rate", "cannot be learned", "turn"},
-      {"constant steering", "cannot be told apart", "steer while turning"},
+      {"constant steering or radius of turn", "cannot be told apart", "change it while turning"},
       {"constant speed and turn rate", "cannot be learned", "speed up, slow down or steer"},
       {"flat ground", "cannot be learned", "drive over slopes or hold them"},
   }};

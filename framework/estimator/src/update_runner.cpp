@@ -265,7 +265,7 @@ void UpdateRunner::tell(const Context& context, const Factor& factor) {
 template <class Factor>
 FactorResult UpdateRunner::apply(const Context& context, Factor& factor) {
   for (ExcitationMonitor& monitor : context.monitors) monitor.before(context.filter, factor);
-  FactorResult result;
+  FactorResult result{};
   if constexpr (std::is_same_v<Factor, InformationFactor>) {
     result = context.filter.apply(factor, sink_.added());
   } else {

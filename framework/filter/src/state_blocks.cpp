@@ -50,7 +50,7 @@ std::string fault_of(const BlockSpec& spec) {
   }
   for (std::size_t i = 0; i < spec.entries.size(); ++i) {
     const BlockEntry& entry = spec.entries[i];
-    if (const std::string fault = fault_of_entry(entry); !fault.empty()) return fault;
+    if (std::string fault = fault_of_entry(entry); !fault.empty()) return fault;
     const auto same = [&](const BlockEntry& other) { return other.name == entry.name; };
     if (std::any_of(spec.entries.begin(), spec.entries.begin() + static_cast<std::ptrdiff_t>(i),
                     same)) {
@@ -121,6 +121,7 @@ StateBlocks::StateBlocks(std::vector<BlockSpec> blocks, std::vector<RoomSpec> ro
       value_.resize(value_.size() + static_cast<std::size_t>(room.entries), 0.);
     }
   }
+  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): they are filled above.
   first_ = value_;
   views_.resize(offset_.size());
   room_.assign(offset_.size(), -1);

@@ -104,6 +104,31 @@ bool has_stuck_channel(const Findings& findings, const std::string& sensor) {
   });
 }
 
+/// The sensor whose fault, among all, a finding follows from; "" for none. `gyro`: that whose unit
+/// or axes are wrong; "" for none.
+std::string cause_of(const Finding& finding, const Findings& all, const std::string& imu,
+                     const std::string& gyro) {
+  const std::string& check = finding.check;
+  const std::string& sensor = finding.sensor;
+  const bool is_noise = check.starts_with("sigma_");
+  const auto follows = [&](Checks causes) {
+    return !is_one_of(check, causes) && is_fault_of(all, sensor, causes);
+  };
+  if (check == "steer offsets" && is_fault_of(all, sensor, kOrder)) return sensor;
+  if (sensor != imu && follows(kWheelCauses)) {
+    return is_of_stamps(check) && check != "clock" ? "" : sensor;
+  }
+  if (is_noise && is_fault_of(all, sensor, kNoNoise)) return sensor;
+  if (is_noise && is_fault_of(all, imu, kRate)) return imu;
+  if (is_noise && has_stuck_channel(all, sensor)) return sensor;
+  const bool compares = check == "parity" || check == "speed" || check == "clock";
+  if (compares && follows(kContradicted)) return sensor;
+  if (gyro.empty()) return "";
+  if (check == "clock" || check == "turns") return gyro;
+  const bool shows = sensor == gyro && check != "axes";
+  return shows && !is_one_of(check, kImuCauses) && !is_of_stamps(check) ? gyro : "";
+}
+
 void demote_consequences(const Recording& recording, Findings& findings) {
   const std::string imu =
       recording.imu_sensor.empty() ? "" : recording.label<ImuSample>(recording.imu_sensor);
@@ -133,34 +158,14 @@ void demote_consequences(const Recording& recording, Findings& findings) {
     }
   }
   const Findings all = findings;
-  const auto wrong = std::find_if(gyros.begin(), gyros.end(), [&](const std::string& gyro) {
-    return is_fault_of(all, gyro, kImuCauses);
+  const auto wrong = std::find_if(gyros.begin(), gyros.end(), [&](const std::string& one) {
+    return is_fault_of(all, one, kImuCauses);
   });
+  const std::string gyro = wrong != gyros.end() ? *wrong : "";
   for (Finding& finding : findings) {
     if (finding.severity != Severity::kFault) continue;
-    const std::string& sensor = finding.sensor;
-    const bool is_noise = finding.check.starts_with("sigma_");
-    const auto follows = [&](Checks causes) {
-      return !is_one_of(finding.check, causes) && is_fault_of(all, sensor, causes);
-    };
-    if (finding.check == "steer offsets" && is_fault_of(all, sensor, kOrder)) {
-      demote(finding, sensor);
-    } else if (sensor != imu && follows(kWheelCauses)) {
-      if (!is_of_stamps(finding.check) || finding.check == "clock") demote(finding, sensor);
-    } else if (is_noise && is_fault_of(all, sensor, kNoNoise)) {
-      demote(finding, sensor);
-    } else if (is_noise && is_fault_of(all, imu, kRate)) {
-      demote(finding, imu);
-    } else if (is_noise && has_stuck_channel(all, sensor)) {
-      demote(finding, sensor);
-    } else if (follows(kContradicted) && (finding.check == "parity" || finding.check == "speed" ||
-                                          finding.check == "clock")) {
-      demote(finding, sensor);
-    } else if (wrong != gyros.end() && (finding.check == "clock" || finding.check == "turns")) {
-      demote(finding, *wrong);
-    } else if (wrong != gyros.end() && sensor == *wrong && !is_one_of(finding.check, kImuCauses) &&
-               !is_of_stamps(finding.check) && finding.check != "axes") {
-      demote(finding, *wrong);
+    if (const std::string cause = cause_of(finding, all, imu, gyro); !cause.empty()) {
+      demote(finding, cause);
     }
   }
 }

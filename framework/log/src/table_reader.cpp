@@ -62,8 +62,8 @@ std::string fields_text(std::size_t n) {
 }  // namespace
 
 std::filesystem::path table_in(const std::filesystem::path& folder, const std::string& name) {
-  const std::filesystem::path plain = folder / name;
-  const std::filesystem::path packed = folder / (name + ".gz");
+  std::filesystem::path plain = folder / name;
+  std::filesystem::path packed = folder / (name + ".gz");
   std::error_code ignored;
   if (!std::filesystem::exists(packed, ignored)) return plain;
   if (!std::filesystem::exists(plain, ignored)) return packed;

@@ -54,8 +54,10 @@ std::vector<std::string> state_names(const ObservabilityMatrix& state, const Fil
       if (own >= 0) names[static_cast<std::size_t>(own)] = entries[i].name;
     }
   }
-  for (int i = 0; state.feature_column() >= 0 && i < 3; ++i) {
-    names[static_cast<std::size_t>(state.feature_column() + i)] = std::string("p_FinG_") + "xyz"[i];
+  if (int column = state.feature_column(); column >= 0) {
+    for (const char* axis : {"p_FinG_x", "p_FinG_y", "p_FinG_z"}) {
+      names[static_cast<std::size_t>(column++)] = axis;
+    }
   }
   return names;
 }

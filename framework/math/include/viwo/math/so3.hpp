@@ -18,7 +18,7 @@ inline Eigen::Matrix3d skew(const Eigen::Vector3d& a) {
 
 inline Eigen::Matrix3d exp_so3(const Eigen::Vector3d& phi) {
   const double t2 = phi.squaredNorm();
-  double a, b;  // sin(t)/t, (1 - cos(t))/t^2
+  double a = 0., b = 0.;  // sin(t)/t, (1 - cos(t))/t^2
   if (t2 < 1e-4) {
     a = 1. - t2 / 6. * (1. - t2 / 20. * (1. - t2 / 42.));
     b = 0.5 * (1. - t2 / 12. * (1. - t2 / 30. * (1. - t2 / 56.)));
@@ -53,7 +53,7 @@ inline Eigen::Vector3d log_so3(const Eigen::Matrix3d& R) {
 /// Jr(-phi).
 inline Eigen::Matrix3d right_jacobian_so3(const Eigen::Vector3d& phi) {
   const double t2 = phi.squaredNorm();
-  double b, c;  // (1 - cos(t))/t^2, (t - sin(t))/t^3
+  double b = 0., c = 0.;  // (1 - cos(t))/t^2, (t - sin(t))/t^3
   if (t2 < 1e-4) {
     b = 0.5 * (1. - t2 / 12. * (1. - t2 / 30.));
     c = 1. / 6. * (1. - t2 / 20. * (1. - t2 / 42.));
@@ -69,7 +69,7 @@ inline Eigen::Matrix3d right_jacobian_so3(const Eigen::Vector3d& phi) {
 /// Inverse of the right Jacobian: Log(Exp(phi) Exp(d)) = phi + Jr^-1(phi) d to first order.
 inline Eigen::Matrix3d right_jacobian_inverse_so3(const Eigen::Vector3d& phi) {
   const double t2 = phi.squaredNorm();
-  double c;  // 1/t^2 - (1 + cos(t)) / (2 t sin(t))
+  double c = 0.;  // 1/t^2 - (1 + cos(t)) / (2 t sin(t))
   if (t2 < 1e-3) {
     c = 1. / 12. * (1. + t2 / 60. * (1. + t2 / 42.));
   } else {
