@@ -1,7 +1,7 @@
 #!/bin/bash
 # on_fresh_machine.sh FOLDER: the packages in FOLDER, step by step, on a minimal Debian. As root.
 set -euo pipefail
-here=$(dirname "${BASH_SOURCE[0]}")
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 say() { echo "== $*"; }
 fail() { echo "FAILED: $*"; exit 1; }
 # says TEXT CODE COMMAND...: the command ends with the code, and the text is in what it prints.
