@@ -28,9 +28,22 @@ void ImageGroups::note_distance(const ImageSample& image) {
 void ImageGroups::begin_again() {
   last_ns_.fill(kNever);
   clocks_.fill(SetBackClock(kMostBehind));
+  first_ns_.reset();
   newest_ns_.reset();
   group_ns_.reset();
   ++n_begun_;
+}
+
+bool ImageGroups::is_silent(std::size_t camera, std::int64_t t_ns) const {
+  const std::int64_t last_ns = last_ns_[camera] != kNever ? last_ns_[camera] : *first_ns_;
+  return t_ns - last_ns > kSilentNs;
+}
+
+bool ImageGroups::is_complete(const ImageGroup& group, std::int64_t t_ns) const {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(n_cameras_); ++i) {
+    if (group.images[i].source == nullptr && !is_silent(i, t_ns)) return false;
+  }
+  return true;
 }
 
 std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& rejections) {
@@ -58,7 +71,14 @@ std::optional<ImageSample> ImageGroups::next_image(Sensor& input, Rejections& re
       rejections.add("clock of the images set back: they are taken from here on", where);
       begin_again();
     }
+    if (!first_ns_) first_ns_ = image->t_ns;
     std::int64_t& last_ns = last_ns_[camera];
+    if (group_ns_ && image->t_ns > last_ns && image->t_ns <= *group_ns_ &&
+        is_silent(camera, image->t_ns)) {
+      rejections.add("image of a camera that was silent: from here on it is waited for", where);
+      last_ns = image->t_ns;
+      continue;
+    }
     if (image->t_ns <= last_ns || (group_ns_ && image->t_ns <= *group_ns_) ||
         (newest_ns_ && image->t_ns < *newest_ns_ - tolerance_ns_)) {
       rejections.add("image whose stamp is not after the previous one", where);
@@ -80,7 +100,7 @@ bool ImageGroups::next(Sensor& input, Rejections& rejections, ImageGroup& out) {
   const std::int64_t begin_ns = image->t_ns;
   const int n_begun = n_begun_;
   std::int64_t newest_ns = begin_ns;
-  for (int count = 0; image; image = next_image(input, rejections)) {
+  for (; image; image = next_image(input, rejections)) {
     auto& slot = out.images[static_cast<std::size_t>(image->camera)];
     if (slot.source != nullptr || std::abs(image->t_ns - begin_ns) > tolerance_ns_) {
       ahead_ = std::move(image);
@@ -88,7 +108,7 @@ bool ImageGroups::next(Sensor& input, Rejections& rejections, ImageGroup& out) {
     }
     slot = {image->t_ns, std::move(image->source)};
     newest_ns = std::max(newest_ns, slot.t_ns);
-    if (++count == n_cameras_) break;
+    if (is_complete(out, begin_ns)) break;
   }
   // Behind a clock that is set back meanwhile the stamps of this group are of another time.
   if (n_begun == n_begun_) group_ns_ = newest_ns;

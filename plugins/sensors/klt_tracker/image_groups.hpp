@@ -29,7 +29,8 @@ struct ImageGroup {
 };
 
 /// Reads a sensor and gathers its images, in time order. A group is complete when it has an image
-/// of every camera, or when the next image is of another instant.
+/// of every camera, or when the next image is of another instant. A camera that is silent for long
+/// is not waited for: live, that would make each group late by one instant.
 class ImageGroups {
  public:
   ImageGroups(int n_cameras, std::int64_t tolerance_ns)
@@ -46,6 +47,7 @@ class ImageGroups {
 
  private:
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+  static constexpr std::int64_t kSilentNs = 2'000'000'000;
   /// Images of a camera that say that its clock was set back.
   static constexpr int kMostBehind = 3;
 
@@ -54,6 +56,9 @@ class ImageGroups {
   /// The next image of one of the cameras whose stamp can be.
   std::optional<ImageSample> next_image(Sensor& input, Rejections& rejections);
   void note_distance(const ImageSample& image);
+  /// Whether the camera is silent for long before an instant.
+  bool is_silent(std::size_t camera, std::int64_t t_ns) const;
+  bool is_complete(const ImageGroup& group, std::int64_t t_ns) const;
 
   int n_cameras_;
   std::int64_t tolerance_ns_;
@@ -62,7 +67,7 @@ class ImageGroups {
   std::array<SetBackClock, kMaxCameras> clocks_{
       SetBackClock(kMostBehind), SetBackClock(kMostBehind), SetBackClock(kMostBehind),
       SetBackClock(kMostBehind)};
-  std::optional<std::int64_t> newest_ns_;
+  std::optional<std::int64_t> first_ns_, newest_ns_;
   std::optional<std::int64_t> group_ns_;  ///< newest of the last group
   int n_begun_ = 0;                       ///< times that a clock was set back
   std::optional<std::int64_t> nearest_ns_;

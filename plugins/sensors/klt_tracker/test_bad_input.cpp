@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "image_groups.hpp"
 #include "test_drive.hpp"
 
 namespace viwo::klt {
@@ -46,6 +47,36 @@ TEST(KltTracker, CountsARightImageWithoutItsLeftOne) {
   EXPECT_EQ(count.count, 1);
   EXPECT_EQ(count.first, "camera 1 at 5.100000000 s");
   EXPECT_GT(common(played.of(0)[0], played.of(0)[1]), 170U);
+}
+
+TEST(ImageGroups, DoNotWaitForACameraThatIsSilentForLong) {
+  // GIVEN a camera 1 that is gone from 0.3 s to 2.7 s
+  std::vector<Measurement> images;
+  for (int i = 0; i < 30; ++i) {
+    for (int camera = 0; camera < (i < 3 || i > 27 ? 2 : 1); ++camera) {
+      images.emplace_back(sample_of(Image{}, camera, stamp_of(i)));
+    }
+  }
+  FakeInput input(std::move(images));
+  ImageGroups groups(2, kPeriodNs / 10);
+  Rejections rejections;
+  ImageGroup group;
+  for (int i = 0; i < 30; ++i) {
+    ASSERT_TRUE(groups.next(input, rejections, group)) << i;
+    EXPECT_EQ(group.images[0].t_ns, stamp_of(i));
+    EXPECT_EQ(group.images[1].source != nullptr, i < 3 || i == 29) << i;
+    // Up to 2 s of silence the next image is looked at, to see whether one of camera 1 comes.
+    const std::size_t ahead = i > 2 && i < 23 ? 1 : 0;
+    const auto of_groups = static_cast<std::size_t>(i + std::min(i + 1, 3) + 1);
+    if (i < 28) {
+      EXPECT_EQ(input.taken(), of_groups + ahead) << i;
+    }
+  }
+  EXPECT_FALSE(groups.next(input, rejections, group));
+  std::vector<RejectionCount> counts;
+  rejections.append_to(counts);
+  ASSERT_EQ(counts.size(), 1U);
+  EXPECT_EQ(counts.front().first, "camera 1 at 7.800000000 s");
 }
 
 TEST(KltTracker, LeavesTheStampOfAnImageAloneInTheClockOfItsCamera) {

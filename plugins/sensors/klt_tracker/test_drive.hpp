@@ -43,6 +43,7 @@ class FakeInput final : public Sensor {
     out = measurements_[next_++];
     return Status::kOk;
   }
+  std::size_t taken() const { return next_; }
 
  private:
   std::vector<Measurement> measurements_;
