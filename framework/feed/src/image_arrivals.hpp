@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <deque>
+#include <limits>
 #include <mutex>
 #include <utility>
 
@@ -20,10 +21,10 @@ class ImageArrivals {
     if (seen_.size() > kMost) seen_.pop_front();
   }
 
-  /// Since the arrival of the newest image of an epoch; 0 without one.
+  /// Since the arrival of the newest image of an epoch; NaN without one.
   double latency_s(std::int64_t t_ns) {
     const std::scoped_lock lock(mutex_);
-    double latency = 0.;
+    double latency = std::numeric_limits<double>::quiet_NaN();
     std::int64_t nearest = kMaxClockOffsetNs;
     for (const auto& [stamp, arrived] : seen_) {
       const std::int64_t off = std::abs(stamp - t_ns);

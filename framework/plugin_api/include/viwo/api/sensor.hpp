@@ -23,7 +23,7 @@ struct EstimateSample {
   /// Covariance, row after row, of [dtheta, dp, dv]: R_GtoI = Exp(-dtheta) R_GtoI_hat (dtheta in
   /// I), p = p_hat + dp and v = v_hat + dv in G.
   std::array<double, 81> covariance{};
-  double latency_s = 0.;  ///< from the arrival of the newest image to this estimate
+  double latency_s = 0.;  ///< from the arrival of the newest image to this estimate; or NaN
   std::vector<std::string> calibration_names;
   std::vector<double> calibration;  ///< estimates, of the same order
   std::vector<double> calibration_sigma;
