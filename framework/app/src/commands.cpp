@@ -10,6 +10,7 @@
 #include "estimate_output.hpp"
 #include "forecast_output.hpp"
 #include "interrupt.hpp"
+#include "live_output.hpp"
 #include "progress.hpp"
 #include "viwo/calibration/calibrate.hpp"
 #include "viwo/config/yaml.hpp"
@@ -26,7 +27,6 @@
 #include "viwo/plan/plan.hpp"
 #include "viwo/report/figures.hpp"
 #include "viwo/results/run_output.hpp"
-#include "viwo/results/run_stream.hpp"
 #include "viwo/run/simulate.hpp"
 #include "viwo/setup/configuration.hpp"
 #include "viwo/setup/input_files.hpp"
@@ -86,39 +86,6 @@ class Figures {
   bool wanted_;
   report::FigureFormat format_;
   std::filesystem::path folder_;
-};
-
-/// What a live run has beside others: results are on disk as they come, and what is wrong is said
-/// when it is seen.
-class LiveOutput {
- public:
-  LiveOutput(const RunSetup& setup, const std::filesystem::path& folder, RunHooks& hooks)
-      : stream_(begun(setup, folder)) {
-    hooks.on_epoch = [this, then = hooks.on_epoch](const RunResult& result) {
-      stream_.epoch(result);
-      if (then) then(result);
-    };
-    hooks.on_warning = [](double t_s, const std::string& text) {
-      std::cerr << "at " << significant(t_s, 6) << " s: " << text << std::endl;
-    };
-    std::cerr << setup.name << ": listening; ctrl-C ends the run and writes its results\n";
-  }
-  void finish(RunResult& result) {
-    const std::string failure = stream_.finish();
-    result.on_disk = failure.empty();
-    if (!failure.empty()) result.warnings.push_back(failure + "; what is there is thinned");
-  }
-
- private:
-  /// What is there of an earlier run goes before the first epoch, for this one may be killed.
-  static const std::filesystem::path& begun(const RunSetup& setup,
-                                            const std::filesystem::path& folder) {
-    log::remove_results(folder, kResultsOfRun);
-    write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
-    return folder;
-  }
-
-  RunStream stream_;
 };
 
 /// Whether the sensor of a section has a parameter `lockstep`. What is wrong with the section is
@@ -231,8 +198,11 @@ int run_command(const Arguments& arguments) {
   }
   const std::string picture_failure = pictures.finish(result);
   const std::string mcap_failure = mcap ? mcap->finish(result) : "";
+  const std::string said = describe(result);
+  // A live run cannot be made again: this is known of it, whatever becomes of its files.
+  if (data.is_live()) std::cout << said << std::flush;
   write_run(folder, setup, result);
-  std::cout << describe(result);
+  if (!data.is_live()) std::cout << said;
   if (forecast) std::cout << "forecast: " << forecast->text() << "\n";
   std::cout << "report: " << (folder / "report.html").string() << std::endl;
   figures.write(report_of(setup, result));

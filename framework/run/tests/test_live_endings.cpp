@@ -314,8 +314,10 @@ TEST(RunStream, SaysWhatCouldNotBeWrittenAndDoesNotEndTheRun) {
   hooks.on_epoch = [&](const RunResult& result) { files.epoch(result); };
   const RunResult live = robot.live(robot.measurements, hooks);
   EXPECT_EQ(live.status, RunStatus::kOk) << live.cause;
-  EXPECT_EQ(files.finish(),
-            "cannot write " + (folder / "timing.csv").string() + ": No space left on device");
+  const std::string why =
+      "cannot write " + (folder / "timing.csv").string() + ": No space left on device";
+  EXPECT_EQ(files.failure(), why) << "is known while it runs";
+  EXPECT_EQ(files.finish(), why);
 }
 
 TEST(BoundedSeries, KeepsPointsThatAreEvenlySpread) {

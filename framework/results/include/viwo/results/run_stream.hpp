@@ -35,6 +35,8 @@ class RunStream {
 
   /// The newest epoch of `result`. A disk that is full does not end the run: see failure().
   void epoch(const RunResult& result);
+  /// What could not be written up to now; "" for nothing.
+  const std::string& failure() const { return failure_; }
   /// Ends the files. What could not be written; "" for nothing.
   std::string finish();
 
