@@ -79,6 +79,10 @@ bool is_only_this_machine() {
         "the environment's ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: nobody would be found; LOCALHOST "
         "or SUBNET, or 'interfaces' that the parameters give");
   }
+  if (!range.empty() && range != "LOCALHOST" && range != "SUBNET" && range != "SYSTEM_DEFAULT") {
+    throw InputError("the environment's ROS_AUTOMATIC_DISCOVERY_RANGE is " + log::quoted(range) +
+                     ": expected LOCALHOST, SUBNET or SYSTEM_DEFAULT");
+  }
   return range == "LOCALHOST";
 }
 

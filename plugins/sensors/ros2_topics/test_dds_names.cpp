@@ -93,8 +93,12 @@ TEST_F(Settings, RefuseAnEnvironmentInWhichNobodyIsFound) {
   setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", 1);
   EXPECT_THAT(error_of({}), ::testing::StartsWith(
                                 "the environment's ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: nobody"));
-  setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET", 1);
-  EXPECT_EQ(error_of({}), "");
+  setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "localhost", 1);
+  EXPECT_THAT(error_of({}), ::testing::HasSubstr("expected LOCALHOST, SUBNET"));
+  for (const char* range : {"SUBNET", "SYSTEM_DEFAULT", ""}) {
+    setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", range, 1);
+    EXPECT_EQ(error_of({}), "") << range;
+  }
 }
 
 TEST_F(Settings, RefuseWhatIsNoAddress) {

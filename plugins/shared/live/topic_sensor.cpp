@@ -55,6 +55,16 @@ TopicSensor::TopicSensor(const LiveParams& params, const HostServices& services,
                                     "': set publish: false here, or another odometry_topic_out");
   }
   publishes_to_ = topic;
+  const std::string body = params.frames().body;
+  const bool is_base = body.ends_with("base_link") || body.ends_with("base_footprint");  // REP 105
+  const bool is_mounted =
+      !params.imu_frame.empty() || !params.p_IinB_m.isZero(0.) || !params.rpy_ItoB_rad.isZero(0.);
+  if (is_base && !is_mounted) {
+    services_.log(LogLevel::kWarning,
+                  "body_frame '" + body +
+                      "' is taken to be that of the IMU, whose pose is published as its: where the "
+                      "IMU sits in it is said by imu_frame, or by p_IinB_m and rpy_ItoB_rad");
+  }
 }
 
 TopicSensor::~TopicSensor() {
