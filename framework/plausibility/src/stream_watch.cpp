@@ -23,6 +23,7 @@ constexpr std::int64_t kEndNs = 2 * kSecondNs;
 constexpr std::int64_t kRestNs = 10 * kSecondNs;
 constexpr std::int64_t kMostSaid = 10;  ///< gaps that are told one by one
 constexpr const char* kLook = ": look at its cable, driver and bus";
+constexpr const char* kOrRejected = ", or at why all of it is rejected";
 
 void raise(std::int64_t& newest_ns, std::int64_t t_ns) { newest_ns = std::max(newest_ns, t_ns); }
 
@@ -180,7 +181,7 @@ void StreamWatch::find_silent_channels(std::int64_t now_ns, std::int64_t zero_ns
 void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, Findings& out) const {
   if (!has_begun_) {
     if (now_ns - zero_ns > kLongNs)
-      out.push_back({name_ + " none", name_ + ": no samples" + kLook});
+      out.push_back({name_ + " none", name_ + ": no samples" + kLook + kOrRejected});
     return;
   }
   find_held_up(out);
@@ -204,7 +205,8 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, const char
                            Findings& out) const {
   if (!has_begun_) {
     if (now_ns - zero_ns <= kEndNs) return;
-    out.push_back({name_ + " none", name_ + ": no samples in all of the " + of_what + kLook});
+    out.push_back(
+        {name_ + " none", name_ + ": no samples in all of the " + of_what + kLook + kOrRejected});
     return;
   }
   find_held_up(out);

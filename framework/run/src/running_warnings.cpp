@@ -43,8 +43,9 @@ void RunningWarnings::look_at_rejections(double now_s, const Estimator& estimato
     const Counts since{r.count - before.count, r.of - before.of};
     before = {r.count, r.of};
     if (since.count < kFewest || 5 * since.count < since.of) continue;
+    // Epochs that are lost late are counted in another second than the rest of theirs.
     left_out_.push_back(r.reason + " - " + std::to_string(since.count) + " of " +
-                        std::to_string(since.of) + " in the last second");
+                        std::to_string(std::max(since.of, since.count)) + " in the last second");
     say_once(r.reason, now_s, left_out_.back());
   }
 }

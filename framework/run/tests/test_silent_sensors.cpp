@@ -96,10 +96,10 @@ TEST(LiveRun, TellsThatTheWheelsNeverGaveASample) {
   robot.lose<EncoderSample>(-1., 100.);
   robot.run();
   EXPECT_THAT(robot.said, ElementsAre("encoders of device: no samples: look at its cable, driver "
-                                      "and bus"));
+                                      "and bus, or at why all of it is rejected"));
   EXPECT_THAT(robot.result.warnings,
               ::testing::Contains("encoders of device: no samples in all of the run: look at its "
-                                  "cable, driver and bus"));
+                                  "cable, driver and bus, or at why all of it is rejected"));
 }
 
 TEST(LiveRun, TellsTheDeviceWhichWheelIsLeftOutAndUntilWhen) {
