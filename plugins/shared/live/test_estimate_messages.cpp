@@ -175,6 +175,8 @@ TEST_F(EstimateMessages, DiagnosticsTellLatencyAndCalibration) {
   EXPECT_EQ(value_of(message, "sigma t_OtoI"), "2e-04");
   EXPECT_EQ(value_of(message, "sigma position [m]"), "0.3");
   EXPECT_EQ(value_of(message, "sigma velocity [m/s]"), "0");
+  estimate_.latency_s = std::numeric_limits<double>::quiet_NaN();  // without cameras
+  EXPECT_EQ(value_of(diagnostics_of(estimate_, {}), "latency_s"), "nothing of latency_s");
 }
 
 TEST_F(EstimateMessages, DiagnosticsWarnOfWhatIsOff) {
