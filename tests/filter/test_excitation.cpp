@@ -66,8 +66,7 @@ TEST(Excitation, NamesWhatAStraightLineACircleAndARestHide) {
                    kFlat, kSteady}));
   EXPECT_EQ(warnings(moving("circle", "uneven", short_run)),
             (Texts{"constant steering or radius of turn for 5 s: theta_ItoO_z, r_1..r_4, x_2..x_4, "
-                   "y_2..y_4, "
-                   "delta_o2..delta_o4 cannot be told apart - change it while turning",
+                   "y_2..y_4, delta_o2..delta_o4 cannot be told apart - change it while turning",
                    kSteady}));
   EXPECT_EQ(warnings(moving("stationary", "flat", short_run)),
             (Texts{"standing still for 5 s: theta_ItoO_x, theta_ItoO_y, theta_ItoO_z, p_IinO_x, "

@@ -22,9 +22,9 @@ const std::filesystem::path& begun(const RunSetup& setup, const std::filesystem:
 LiveOutput::LiveOutput(const RunSetup& setup, const std::filesystem::path& folder, RunHooks& hooks)
     : stream_(begun(setup, folder)) {
   hooks.on_epoch = [this, then = hooks.on_epoch](const RunResult& result) {
+    const bool was_written = stream_.failure().empty();
     stream_.epoch(result);
-    if (!told_ && !stream_.failure().empty()) {
-      told_ = true;
+    if (was_written && !stream_.failure().empty()) {
       std::cerr << stream_.failure() << "; the run goes on" << std::endl;
     }
     if (then) then(result);

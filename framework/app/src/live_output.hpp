@@ -20,7 +20,6 @@ class LiveOutput {
 
  private:
   RunStream stream_;
-  bool told_ = false;  ///< that something cannot be written
 };
 
 }  // namespace viwo::app

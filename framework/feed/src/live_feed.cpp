@@ -121,10 +121,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     const Filter& filter = estimator.filter();
     EstimateSample sample = estimate_sample(filter, piece, warnings);
     sample.latency_s = arrivals_of_images_.latency_s(filter.t_ns());
-    if (std::isfinite(sample.latency_s)) {
-      latency_ms_.add(1e3 * sample.latency_s);
-      has_latency_ = true;
-    }
+    if (std::isfinite(sample.latency_s)) latency_ms_.add(1e3 * sample.latency_s);
     for (const SensorStream& stream : live_) {
       guarded(stream.info, "estimate", [&] { stream.sensor->estimate(sample); });
     }
@@ -151,7 +148,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
       if (!has_ended(worker.stream.name)) continue;
       report.stages.emplace_back("sensor " + worker.stream.name, worker.ms_per_stamp.stage());
     }
-    if (has_latency_) {
+    if (!latency_ms_.is_empty()) {
       report.stages.emplace_back("latency from image to pose", latency_ms_.stage());
     }
     const auto add = [&](const std::string& name, const Sensor& sensor) {
@@ -370,7 +367,6 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   SampleGate gate_;  ///< of the reference
   ImageArrivals arrivals_of_images_;
   TimeStatistics latency_ms_;
-  bool has_latency_ = false;
   std::optional<Clock::time_point> interrupted_at_;
 
   std::mutex mutex_;

@@ -30,6 +30,7 @@ class TimeStatistics {
     ++n_;
     sample_.add(ms);
   }
+  bool is_empty() const { return n_ == 0; }
   StageTime stage() const {
     StageTime stage = stage_time(sample_.points());
     if (n_ > 0) stage.mean_ms = sum_ms_ / static_cast<double>(n_);
