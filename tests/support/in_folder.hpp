@@ -20,6 +20,9 @@ inline std::string text_of(const std::filesystem::path& file) {
 
 /// An empty folder of the running test's own, as tests run side by side; removed with the fixture.
 class InFolder : public ::testing::Test {
+ public:
+  ~InFolder() override { std::filesystem::remove_all(folder_); }
+
  protected:
   InFolder() {
     const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
@@ -28,10 +31,9 @@ class InFolder : public ::testing::Test {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }
-  ~InFolder() override { std::filesystem::remove_all(folder_); }
 
   std::filesystem::path write(const std::string& name, std::string_view text) const {
-    const std::filesystem::path file = folder_ / name;
+    std::filesystem::path file = folder_ / name;
     std::filesystem::create_directories(file.parent_path());
     std::ofstream stream(file, std::ios::binary);
     stream << text;

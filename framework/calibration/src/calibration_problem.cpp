@@ -5,18 +5,17 @@
 #include <cstdint>
 #include <cstdlib>
 #include <numbers>
-#include <span>
 #include <tuple>
 #include <vector>
 
 #include <Eigen/Dense>
 
+#include "holes.hpp"
 #include "recording_name.hpp"
 #include "viwo/math/chi2.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
-#include "viwo/wheel/drive_ranges.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -29,25 +28,6 @@ constexpr double kPathPiece_s = 0.05;
 constexpr double kBelievable = 0.999;
 /// Longest piece whose parity gradient is told.
 constexpr double kParityPiece_s = 1.;
-
-struct Hole {
-  std::int64_t begin_ns, end_ns;
-  double length_s() const { return seconds_between(begin_ns, end_ns); }
-};
-
-/// Where samples are missing, more than now and then one, and the wheels turn before or after.
-std::vector<Hole> holes_of(std::span<const EncoderSample> wheels) {
-  constexpr double kLeast_s = 0.2, kLeastCells = 2., kTurns_rad_per_s = 0.1;
-  std::vector<Hole> holes;
-  for (std::size_t i = 1; i < wheels.size(); ++i) {
-    const EncoderSample &before = wheels[i - 1], &after = wheels[i];
-    const Hole hole{before.end_ns, after.begin_ns};
-    const double cell_s = seconds_between(before.begin_ns, before.end_ns);
-    if (hole.length_s() <= std::max(kLeast_s, kLeastCells * cell_s)) continue;
-    if (std::max(fastest_of(before), fastest_of(after)) > kTurns_rad_per_s) holes.push_back(hole);
-  }
-  return holes;
-}
 
 PreintegrationOptions preintegration_of(const CalibrationRecording& recording,
                                         const CalibrationOptions& options) {
@@ -183,34 +163,15 @@ void RecordingProblem::compare_with_reference() {
                                " s (evaluation.reference_max_gap_s, of poses)");
   }
   stamps_ns_ = std::move(known_ns);
-  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
   for (std::size_t k = 1; k < ends.size(); ++k) {
-    motions_.push_back(between(ends[from_start ? 0 : k - 1], ends[k]));
+    motions_.push_back(between(ends[begin_of(k - 1)], ends[k]));
   }
 }
 
-/// What is bridged is no measurement: of wheels that turned, and of a gyro, which is integrated.
 void RecordingProblem::leave_out_holes() {
-  std::vector<Hole> holes = holes_of(recording_.data.wheels());
-  const MotionReference& motion = recording_.motion;
-  if (!holes.empty() && (motion.distance_m || motion.turn_rad)) {
-    const double at_s =
-        seconds_between(recording_.data.wheels().front().begin_ns, holes.front().begin_ns);
-    fail(recording_.label,
-         ": distance_m and turn_deg are of a whole drive, and the wheels turned unseen for " +
-             significant(holes.front().length_s(), 2) + " s, " + significant(at_s, 4) +
-             " s after the begin");
-  }
-  if (motion.kind == ReferenceKind::kGyro && !recording_.data.imu().empty()) {
-    const std::int64_t offset_ns = to_ns(motion.offset_s);
-    for (std::size_t i = 1; i < motion.poses.size(); ++i) {
-      const Hole hole{motion.poses[i - 1].t_ns - offset_ns, motion.poses[i].t_ns - offset_ns};
-      if (hole.length_s() > motion.max_gap_s) holes.push_back(hole);
-    }
-  }
-  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
+  const std::vector<Hole> holes = holes_of(recording_);
   for (std::size_t k = 0; k < weights_.size(); ++k) {
-    const std::int64_t begin_ns = stamps_ns_[from_start ? 0 : k], end_ns = stamps_ns_[k + 1];
+    const std::int64_t begin_ns = stamps_ns_[begin_of(k)], end_ns = stamps_ns_[k + 1];
     for (const Hole& hole : holes) {
       if (hole.begin_ns < end_ns && hole.end_ns > begin_ns) weights_[k] = 0.;
     }
@@ -238,7 +199,7 @@ void RecordingProblem::integrate(const CalibrationPoint& point) {
       }
     }
   });
-  if (options_.segments != calibration::Segments::kTrajectory) return;
+  if (!from_start()) return;
   for (std::size_t k = 1; k < segments_.size(); ++k) {
     piece_ = segments_[k - 1];
     append(piece_, segments_[k]);
@@ -259,10 +220,9 @@ void RecordingProblem::differentiate_by_clock(const CalibrationPoint& point) {
       after.push_back(piece_.g);
     }
   });
-  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
   by_clock_.resize(segments_.size());
   for (std::size_t k = 0; k < segments_.size(); ++k) {
-    const std::size_t begin = from_start ? 0 : k, end = k + 1;
+    const std::size_t begin = begin_of(k), end = k + 1;
     const Eigen::Vector3d& g = segments_[k].g;
     const Eigen::Vector3d back = between(before[end], Eigen::Vector3d::Zero());
     const Eigen::Vector3d later = compose(compose(before[begin], g), back);
@@ -300,8 +260,7 @@ void RecordingProblem::add_segment(int row, std::size_t k, const CalibrationPoin
   const Eigen::Vector3d whitening(1. / noise_.yaw_rad, 1. / noise_.position_m,
                                   1. / noise_.position_m);
   const MotionOfBody motion = motion_of_body(segments_[k].g, point.extrinsics);
-  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
-  const double duration_s = seconds_between(stamps_ns_[from_start ? 0 : k], stamps_ns_[k + 1]);
+  const double duration_s = seconds_between(stamps_ns_[begin_of(k)], stamps_ns_[k + 1]);
   Eigen::Vector3d error = motion.h - motions_[k];
   const bool gyro = recording_.motion.kind == ReferenceKind::kGyro;
   if (gyro) error[0] += point.gyro_bias_rad_per_s * duration_s;  // (CAL-10)
@@ -320,12 +279,11 @@ void RecordingProblem::add_segment(int row, std::size_t k, const CalibrationPoin
 }
 
 void RecordingProblem::add_turns(double gyro_bias_rad_per_s, TurnAgreement& out) const {
-  const bool from_start = options_.segments == calibration::Segments::kTrajectory;
   const bool gyro = recording_.motion.kind == ReferenceKind::kGyro;
   const double bias = gyro ? gyro_bias_rad_per_s : 0.;
   for (std::size_t k = 0; k < motions_.size(); ++k) {
     if (!is_compared(k)) continue;
-    const bool first = !from_start || k == 0;
+    const bool first = !from_start() || k == 0;
     const double duration_s = seconds_between(stamps_ns_[k], stamps_ns_[k + 1]);
     out.add(segments_[k].g[0] - (first ? 0. : segments_[k - 1].g[0]),
             motions_[k][0] - (first ? 0. : motions_[k - 1][0]) - bias * duration_s);

@@ -1,7 +1,8 @@
 // The least-squares problem of a batch calibration: residuals and Jacobians of one recording.
 #pragma once
 
-#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -80,6 +81,10 @@ class RecordingProblem {
   void evaluate(const CalibrationPoint& point, bool jacobian, RecordingResiduals& out);
 
  private:
+  /// All segments begin at the first one's.
+  bool from_start() const { return options_.segments == Segments::kTrajectory; }
+  /// Of a segment, in stamps_ns_.
+  std::size_t begin_of(std::size_t segment) const { return from_start() ? 0 : segment; }
   void cut(std::int64_t begin_ns, std::int64_t end_ns);
   void require_one_clock(std::int64_t begin_ns, std::int64_t end_ns) const;
   void compare_with_reference();

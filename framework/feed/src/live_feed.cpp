@@ -6,7 +6,6 @@
 // full waits. A sensor that works on images then gets too many of them, of which the oldest go, and
 // there is less to do; a sensor that still gets too much drops by itself, and counts.
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
@@ -17,22 +16,18 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "begin_thread.hpp"
-#include "channels.hpp"
 #include "has_next.hpp"
 #include "image_arrivals.hpp"
 #include "live_input.hpp"
-#include "sample_gate.hpp"
-#include "viwo/feed/bounded_series.hpp"
+#include "live_samples.hpp"
 #include "viwo/feed/estimate_sample.hpp"
 #include "viwo/feed/feed.hpp"
-#include "viwo/math/trajectory.hpp"
 
 namespace viwo {
 namespace {
@@ -56,7 +51,11 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
  public:
   LiveFeed(const RunSetup& setup, const RunData& data, const FeedHooks& hooks,
            Plausibility& plausibility)
-      : setup_(setup), hooks_(hooks), plausibility_(plausibility), live_(data.live) {
+      : setup_(setup),
+        hooks_(hooks),
+        plausibility_(plausibility),
+        live_(data.live),
+        samples_(setup, kMostReference) {
     for (const SensorStream& stream : data.streams) {
       workers_.push_back({stream, std::make_unique<LiveInput>(), {}});
       LiveInput& input = *workers_.back().input;
@@ -141,9 +140,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     const auto has_ended = [&](const std::string& name) {
       return std::find(left.begin(), left.end(), name) == left.end();
     };
-    report.reference = reference();
-    gate_.append_to(report.rejections);
-    if (!has_imu_) report.cause = kNothingCame;
+    samples_.finish(report);
     for (const Worker& worker : workers_) {
       if (!has_ended(worker.stream.name)) continue;
       report.stages.emplace_back("sensor " + worker.stream.name, worker.ms_per_stamp.stage());
@@ -183,21 +180,6 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   }
 
  private:
-  void add_to_reference(const StampedPose& pose) {
-    if (newest_of_reference_) reference_.add({*newest_of_reference_, pose});
-    newest_of_reference_ = pose;
-  }
-
-  Trajectory reference() const {
-    Trajectory poses;
-    for (const auto& pair : reference_.points()) {
-      for (const StampedPose& pose : pair) {
-        if (poses.empty() || pose.t_ns > poses.back().t_ns) poses.push_back(pose);
-      }
-    }
-    return poses;
-  }
-
   struct Arrival {
     const std::string* sensor = nullptr;
     Measurement measurement;
@@ -329,28 +311,11 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   }
 
   void give(const std::string& sensor, SampleView sample, Estimator& estimator) {
-    const auto* wheels = sample.get_if<EncoderSample>();
-    if (wheels != nullptr && checked_.insert(sensor).second) {
-      require_channels(setup_, sensor, *wheels);
-    }
+    samples_.note(sensor, sample);
     plausibility_.add(sensor, sample);
     setup_.routes.dispatch(sensor, sample.type(), [&](const Route& route) {
-      switch (route.consumer) {
-        case Consumer::kImu:
-          has_imu_ = true;
-          estimator.add(*sample.get_if<ImuSample>());
-          break;
-        case Consumer::kStream:
-          estimator.add(route.stream, sample);
-          break;
-        case Consumer::kReferencePoses:
-          if (gate_.accept(sensor, sample)) {
-            add_to_reference(stamped_pose(*sample.get_if<PoseSample>()));
-          }
-          break;
-        default:
-          break;
-      }
+      if (route.consumer == Consumer::kImu) estimator.add(*sample.get_if<ImuSample>());
+      if (route.consumer == Consumer::kStream) estimator.add(route.stream, sample);
     });
   }
 
@@ -359,12 +324,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
   Plausibility& plausibility_;  // neither
   const std::vector<SensorStream> live_;
   std::vector<Worker> workers_;
-  bool has_imu_ = false;
-  std::set<std::string> checked_;  ///< sensors whose encoder channels have been looked at
-  std::optional<StampedPose> newest_of_reference_;
-  /// Each with the one before: between two there is a pose to compare with, however few are kept.
-  BoundedSeries<std::array<StampedPose, 2>> reference_{kMostReference};
-  SampleGate gate_;  ///< of the reference
+  LiveSamples samples_;
   ImageArrivals arrivals_of_images_;
   TimeStatistics latency_ms_;
   std::optional<Clock::time_point> interrupted_at_;

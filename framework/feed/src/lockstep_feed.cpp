@@ -1,31 +1,33 @@
 // Live sensors that are played in step. What the estimator is given, and in which order, is what it
 // would be given of the same measurements recorded: see RecordedFeed.
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "channels.hpp"
 #include "in_order.hpp"
+#include "live_samples.hpp"
 #include "played_sensor.hpp"
-#include "sample_gate.hpp"
 #include "viwo/feed/estimate_sample.hpp"
 #include "viwo/feed/feed.hpp"
-#include "viwo/math/trajectory.hpp"
 
 namespace viwo {
 namespace {
+
+/// Poses of a reference that are kept: those of a recording would be, too.
+constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
 class LockstepFeed final : public Feed {
  public:
   LockstepFeed(const RunSetup& setup, const RunData& data, const FeedHooks& hooks,
                Plausibility& plausibility)
-      : setup_(setup), hooks_(hooks), plausibility_(plausibility) {
+      : setup_(setup), hooks_(hooks), plausibility_(plausibility), samples_(setup, kAll) {
     for (const SensorStream& stream : data.live) {
       played_.push_back(std::make_unique<PlayedSensor>(setup, stream, data.streams, hooks));
     }
@@ -59,9 +61,7 @@ class LockstepFeed final : public Feed {
     FeedReport report;
     stop();
     streams_->finish(report);
-    report.reference = reference_;
-    gate_.append_to(report.rejections);
-    if (!has_imu_) report.cause = kNothingCame;
+    samples_.finish(report);
     for (const auto& played : played_) {
       if (!played->not_stopped().empty()) report.warnings.push_back(played->not_stopped());
       std::vector<RejectionCount> all;
@@ -113,17 +113,7 @@ class LockstepFeed final : public Feed {
   }
 
   void give(const std::string& sensor, SampleView sample, Estimator& estimator) {
-    const auto* const wheels = sample.get_if<EncoderSample>();
-    if (wheels != nullptr && checked_.insert(sensor).second) {
-      require_channels(setup_, sensor, *wheels);
-    }
-    has_imu_ = has_imu_ || sample.get_if<ImuSample>() != nullptr;
-    setup_.routes.dispatch(sensor, sample.type(), [&](const Route& route) {
-      if (route.consumer != Consumer::kReferencePoses) return;
-      if (gate_.accept(sensor, sample)) {
-        reference_.push_back(stamped_pose(*sample.get_if<PoseSample>()));
-      }
-    });
+    samples_.note(sensor, sample);
     const EstimatorRoutes& routes = routes_of(sensor, sample.type());
     if (routes.routes.empty()) return;
     plausibility_.add(sensor, sample);
@@ -143,10 +133,7 @@ class LockstepFeed final : public Feed {
   std::unique_ptr<ReadAhead> streams_;
   std::deque<Given> instant_;
   std::deque<Known> known_;
-  std::set<std::string> checked_;  ///< sensors whose encoder channels have been looked at
-  Trajectory reference_;
-  SampleGate gate_;  ///< of the reference
-  bool has_imu_ = false;
+  LiveSamples samples_;
 };
 
 }  // namespace

@@ -37,7 +37,7 @@ std::unique_ptr<MeasurementQueue> make_queue(const LiveParams& params, Pace pace
 TopicSensor::TopicSensor(const LiveParams& params, const HostServices& services,
                          MakeFields make_fields, Pace pace)
     : services_(services),
-      options_(params),
+      options_(static_cast<const bag::TopicOptions&>(params)),
       make_fields_(make_fields),
       mounts_(params, services_),
       publish_(params.publish),

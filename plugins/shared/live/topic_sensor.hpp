@@ -26,6 +26,8 @@ class TopicSensor : public Sensor {
  public:
   using Clock = std::chrono::steady_clock;
 
+  ~TopicSensor() override;
+
   SampleTypes yields() const final { return bag::kinds_of(options_); }
   bool live() const final { return true; }
   void stop() final { queue_->end(); }
@@ -37,7 +39,6 @@ class TopicSensor : public Sensor {
   /// ParamError where another one publishes to the same topic.
   TopicSensor(const LiveParams& params, const HostServices& services, MakeFields make_fields,
               Pace pace = Pace::kLive);
-  ~TopicSensor() override;
 
   /// Why nothing will come any more, although nobody has said so; empty while it may.
   virtual std::string gone() const { return {}; }
