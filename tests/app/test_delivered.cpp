@@ -151,6 +151,15 @@ TEST_F(DeliveredTest, ExperimentWithTwoPairsOfCameras) {
   }
 }
 
+TEST_F(DeliveredTest, ExperimentWithRollingShutters) {
+  expect_done({"experiment", kConfigFolder + "experiments/rolling_shutter.yaml", "--seeds", "1",
+               "--out", "shutters", "--set", "sensors.simulator0.duration_s=1.5", "--set",
+               "sensors.images0.texture_size_px=512"});
+  const nlohmann::json variants = summary("shutters").at("variants");
+  EXPECT_EQ(variants.size(), 3U);
+  for (const auto& variant : variants) EXPECT_EQ(variant.at("runs"), 1);
+}
+
 TEST_F(DeliveredTest, ConfigurationForOpenVinsMeasurements) {
   const fs::path data = fs::path(VIWO_TEST_SHARED_DIR) / "data/openvins_sim";
   if (!fs::exists(data)) GTEST_SKIP() << "the measurements are not here";
@@ -253,38 +262,38 @@ TEST_F(DeliveredTest, AllConfigurationsAreTriedHere) {
       files.insert(fs::relative(entry.path(), kConfigFolder).string());
     }
   }
-  EXPECT_EQ(
-      files,
-      (std::set<std::string>{
-          "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
-          "calibrations/smoothed_swerve.yaml", "cameras/euroc.yaml", "cameras/kaist_urban.yaml",
-          "cameras/pinhole.yaml", "cameras/t265_like.yaml", "cameras/two_pairs.yaml",
-          "cluster/kubernetes.yaml", "experiments/calibrate_ackermann.yaml",
-          "experiments/calibrate_mecanum.yaml", "experiments/calibrate_skid_steer.yaml",
-          "experiments/calibrate_swerve.yaml", "experiments/contact_physics.yaml",
-          "experiments/drive_only_twist_full.yaml", "experiments/four_cameras.yaml",
-          "experiments/hybrid.yaml", "experiments/images.yaml", "experiments/long_runs.yaml",
-          "experiments/nominal_dead_reckoning.yaml", "experiments/openvins_cameras.yaml",
-          "experiments/paper_accuracy.yaml", "experiments/paper_exact.yaml",
-          "experiments/plane_and_gnss.yaml", "experiments/simulated_dead_reckoning.yaml",
-          "experiments/three_models.yaml",
-          // by the commands of docs/getting_started.md
-          "getting_started/frc.yaml", "getting_started/frc_calibration.yaml",
-          "getting_started/own_base.yaml", "getting_started/own_base_calibration.yaml",
-          "getting_started/own_base_demo.yaml", "getting_started/swerve_demo.yaml",
-          "getting_started/swerve_ros2.yaml", "getting_started/swerve_ros2_calibration.yaml",
-          "observability/ackermann.yaml", "observability/mecanum.yaml",
-          "observability/skid_steer.yaml", "observability/swerve.yaml",
-          "observability/degenerate_motions.yaml", "observability/differential.yaml",
-          "plans/swerve.yaml", "plans/swerve_calibration.yaml", "plans/swerve_drive.yaml",
-          "runs/comma2k19_car.yaml", "runs/euroc.yaml", "runs/euroc_board.yaml",
-          "runs/husky_gnss.yaml", "runs/frc_swerve.yaml", "runs/hybrid.yaml",
-          "runs/kaist_urban.yaml", "runs/openvins_sim.yaml", "runs/recording.yaml",
-          "runs/simulated_swerve.yaml", "runs/tum_vi.yaml", "runs/ucsd_skid_steer.yaml",
-          "runs/viwo_ackermann.yaml", "runs/viwo_bag.yaml", "runs/viwo_contact.yaml",
-          "runs/viwo_gnss.yaml", "runs/viwo_images.yaml", "runs/viwo_images_log.yaml",
-          "runs/viwo_live.yaml", "runs/viwo_live_ros2.yaml", "runs/viwo_log.yaml",
-          "runs/viwo_mecanum.yaml", "runs/viwo_skid_steer.yaml", "runs/viwo_swerve.yaml"}))
+  EXPECT_EQ(files,
+            (std::set<std::string>{
+                "calibrations/recordings.yaml", "calibrations/simulated_swerve.yaml",
+                "calibrations/smoothed_swerve.yaml", "cameras/euroc.yaml",
+                "cameras/kaist_urban.yaml", "cameras/pinhole.yaml", "cameras/rolling_shutter.yaml",
+                "cameras/t265_like.yaml", "cameras/two_pairs.yaml", "cluster/kubernetes.yaml",
+                "experiments/calibrate_ackermann.yaml", "experiments/calibrate_mecanum.yaml",
+                "experiments/calibrate_skid_steer.yaml", "experiments/calibrate_swerve.yaml",
+                "experiments/contact_physics.yaml", "experiments/drive_only_twist_full.yaml",
+                "experiments/four_cameras.yaml", "experiments/hybrid.yaml",
+                "experiments/images.yaml", "experiments/long_runs.yaml",
+                "experiments/nominal_dead_reckoning.yaml", "experiments/openvins_cameras.yaml",
+                "experiments/paper_accuracy.yaml", "experiments/paper_exact.yaml",
+                "experiments/plane_and_gnss.yaml", "experiments/rolling_shutter.yaml",
+                "experiments/simulated_dead_reckoning.yaml", "experiments/three_models.yaml",
+                // by the commands of docs/getting_started.md
+                "getting_started/frc.yaml", "getting_started/frc_calibration.yaml",
+                "getting_started/own_base.yaml", "getting_started/own_base_calibration.yaml",
+                "getting_started/own_base_demo.yaml", "getting_started/swerve_demo.yaml",
+                "getting_started/swerve_ros2.yaml", "getting_started/swerve_ros2_calibration.yaml",
+                "observability/ackermann.yaml", "observability/mecanum.yaml",
+                "observability/skid_steer.yaml", "observability/swerve.yaml",
+                "observability/degenerate_motions.yaml", "observability/differential.yaml",
+                "plans/swerve.yaml", "plans/swerve_calibration.yaml", "plans/swerve_drive.yaml",
+                "runs/comma2k19_car.yaml", "runs/euroc.yaml", "runs/euroc_board.yaml",
+                "runs/husky_gnss.yaml", "runs/frc_swerve.yaml", "runs/hybrid.yaml",
+                "runs/kaist_urban.yaml", "runs/openvins_sim.yaml", "runs/recording.yaml",
+                "runs/simulated_swerve.yaml", "runs/tum_vi.yaml", "runs/ucsd_skid_steer.yaml",
+                "runs/viwo_ackermann.yaml", "runs/viwo_bag.yaml", "runs/viwo_contact.yaml",
+                "runs/viwo_gnss.yaml", "runs/viwo_images.yaml", "runs/viwo_images_log.yaml",
+                "runs/viwo_live.yaml", "runs/viwo_live_ros2.yaml", "runs/viwo_log.yaml",
+                "runs/viwo_mecanum.yaml", "runs/viwo_skid_steer.yaml", "runs/viwo_swerve.yaml"}))
       << "name the new file in a test above";
 }
 

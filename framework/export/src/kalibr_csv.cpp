@@ -44,6 +44,9 @@ Node camera_node(const CameraView& camera, std::size_t index, const CameraView* 
   node.set("distortion_coeffs", list(camera.intrinsics.tail<4>()));
   node.set("distortion_model", Node::scalar_of(is_radtan ? "radtan" : "equidistant"));
   node.set("intrinsics", list(camera.intrinsics.head<4>()));
+  if (camera.line_delay_s > 0.) {
+    node.set("line_delay_nanoseconds", real_number(1e9 * camera.line_delay_s));
+  }
   Node resolution = Node::list_of();
   for (const int pixels : {camera.width_px, camera.height_px}) {
     resolution.items().push_back(Node::scalar_of(std::to_string(pixels)));

@@ -201,6 +201,7 @@ CameraView camera_of(const CalibrationFile& file, std::size_t index) {
   camera.p_IinC = values.segment<3>(3);
   camera.intrinsics = values.segment<8>(6);
   camera.t_CtoI_s = values[14];
+  camera.line_delay_s = model.line_delay_s;
   return camera;
 }
 

@@ -101,7 +101,7 @@ inline CalibrationFile with_rig(CalibrationFile file) {
       file.cameras.push_back({std::string(cam) + name, one * value, 1e-3, 0., ""});
     }
   }
-  file.camera_models = {{CameraDistortion::kEquidistant, 848, 800},
+  file.camera_models = {{CameraDistortion::kEquidistant, 848, 800, 2.5e-5},
                         {CameraDistortion::kRadtan, 752, 480}};
   return file;
 }

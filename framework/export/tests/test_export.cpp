@@ -256,6 +256,7 @@ TEST(Export, AsKalibrChainIsReadBackAsTheSameCameras) {
     EXPECT_EQ(camera.distortion, file.camera_models[i].distortion);
     EXPECT_EQ(camera.width_px, file.camera_models[i].width_px);
     EXPECT_EQ(camera.height_px, file.camera_models[i].height_px);
+    EXPECT_DOUBLE_EQ(camera.line_delay_s, file.camera_models[i].line_delay_s);
   }
 }
 

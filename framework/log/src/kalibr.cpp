@@ -227,6 +227,24 @@ void read_resolution(const Section& section, CameraView& camera) {
   camera.height_px = static_cast<int>((*size)[1]);
 }
 
+/// Kalibr's calibration of rolling shutters prints it; other programs read it under this name.
+void read_line_delay(const Section& section, CameraView& camera) {
+  constexpr double kSlowestReadout_s = 0.5;
+  const Node* const node = section.find("line_delay_nanoseconds");
+  if (node == nullptr) return;
+  const auto delay_ns = section.number(*node, "line_delay_nanoseconds");
+  if (!delay_ns) return;
+  const double delay_s = 1e-9 * *delay_ns;
+  if (delay_s >= 0. && delay_s * camera.height_px <= kSlowestReadout_s) {
+    camera.line_delay_s = delay_s;
+    return;
+  }
+  section.error(*node, "line_delay_nanoseconds",
+                delay_s < 0. ? number_text(*delay_ns) + " is negative"
+                             : number_text(*delay_ns) + " from row to row would be " +
+                                   number_text(delay_s * camera.height_px) + " s for an image");
+}
+
 CameraView read_camera(const Section& section) {
   CameraView camera;
   section.choice("camera_model", {"pinhole"});
@@ -238,6 +256,7 @@ CameraView read_camera(const Section& section) {
   if (const Node* shift = section.find("timeshift_cam_imu")) {
     if (const auto s = section.number(*shift, "timeshift_cam_imu")) camera.t_CtoI_s = *s;
   }
+  read_line_delay(section, camera);
   return camera;
 }
 

@@ -75,6 +75,23 @@ TEST_F(Kalibr, ReadsTheClockOfTheCamera) {
             "F:7:22  cam0.timeshift_cam_imu: 'soon' is not a number");
 }
 
+TEST_F(Kalibr, ReadsTheRowsOfARollingShutter) {
+  const std::string place = std::string("  T_cam_imu:\n") + kQuarter;
+  const auto with = [&](const std::string& delay) {
+    return camera(place + "  line_delay_nanoseconds: " + delay + "\n");
+  };
+  const CameraView rolling = read_kalibr_cameras(write("a.yaml", with("25000")))[0];
+  EXPECT_DOUBLE_EQ(rolling.line_delay_s, 25e-6);
+  EXPECT_DOUBLE_EQ(rolling.middle_s(), 239.5 * 25e-6);
+  EXPECT_NEAR(rolling.after_middle_s(0.), -rolling.middle_s(), 1e-18);
+  EXPECT_NEAR(rolling.after_middle_s(479.), rolling.middle_s(), 1e-18);
+  EXPECT_EQ(read_kalibr_cameras(write("b.yaml", camera(place)))[0].line_delay_s, 0.);
+  EXPECT_EQ(refusal(with("-1")), "F:7:27  cam0.line_delay_nanoseconds: -1 is negative");
+  EXPECT_EQ(refusal(with("25e6")),
+            "F:7:27  cam0.line_delay_nanoseconds: 2.5e+07 from row to row would be 12 s for an "
+            "image");
+}
+
 TEST_F(Kalibr, FollowsTheChainFromTheCameraBefore) {
   const auto cameras = read_kalibr_cameras(
       write("a.yaml", camera(std::string("  T_cam_imu:\n") + kQuarter) + "cam1:\n  T_cn_cnm1:\n" +

@@ -94,8 +94,9 @@ CameraBlocks declare_camera(Declarations& host, int index) {
   const std::size_t clocked = cameras[i].shares_clock ? 0 : i;
   const auto blocks = camera_blocks(i, cameras[i]);
   const BlockSpec clock = camera_blocks(clocked, cameras[clocked])[2];
-  return {host.block(blocks[0]), host.block(blocks[1]), host.block(clock),
-          cameras[i].camera.t_CtoI_s - cameras[clocked].camera.t_CtoI_s};
+  const double constant_s = cameras[i].camera.t_CtoI_s - cameras[clocked].camera.t_CtoI_s;
+  return {host.block(blocks[0]), host.block(blocks[1]), host.block(clock), constant_s,
+          constant_s + cameras[i].camera.middle_s()};
 }
 
 void CameraBlocks::read(const FilterView& filter, CameraView& camera) const {

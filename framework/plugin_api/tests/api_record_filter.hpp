@@ -46,6 +46,7 @@ inline void rig() {
   MEMBER(CameraView, R_ItoC);
   MEMBER(CameraView, p_IinC);
   MEMBER(CameraView, t_CtoI_s);
+  MEMBER(CameraView, line_delay_s);
   RECORD(CameraPrior);
   MEMBER(CameraPrior, camera);
   MEMBER(CameraPrior, sigma_extrinsics);
@@ -57,6 +58,7 @@ inline void rig() {
   MEMBER(CameraBlocks, intrinsics);
   MEMBER(CameraBlocks, clock);
   MEMBER(CameraBlocks, clock_constant_s);
+  MEMBER(CameraBlocks, middle_constant_s);
   RECORD(WheelsView);
   MEMBER(WheelsView, model);
   MEMBER(WheelsView, R_ItoO);

@@ -128,8 +128,8 @@ TEST_F(Registry, SearchesCommandLineThenEnvironmentThenInstallation) {
   EXPECT_EQ(folders[0], folder_);
   EXPECT_EQ(folders[1], "/env/a");
   EXPECT_EQ(folders[2], "/env/b");
-  EXPECT_EQ(folders[3],
-            fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "lib/viwo/plugins/v9");
+  EXPECT_EQ(folders[3], fs::read_symlink("/proc/self/exe").parent_path().parent_path() /
+                            "lib/viwo/plugins/v10");
   EXPECT_EQ(error_of([] { PluginRegistry::default_search_path({"/no/such"}); }),
             "--plugin-path /no/such: no such folder");
 }

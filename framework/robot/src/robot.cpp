@@ -169,7 +169,7 @@ class Neighbour final : public Update {
     host.stream({.type = &sample_type<FeatureSample>(),
                  .ends_epochs = true,
                  .optional = true,
-                 .clocks = {{blocks.clock_constant_s, blocks.clock}}});
+                 .clocks = {{blocks.middle_constant_s, blocks.clock}}});
   }
   void update(const FilterView& filter, const EpochData& /*data*/, FactorSink& sink) override {
     if (has_point_) return;

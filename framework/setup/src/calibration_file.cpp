@@ -62,6 +62,7 @@ struct EntryParams {
 struct CameraParams {
   CameraDistortion distortion_model = CameraDistortion::kRadtan;
   Eigen::Vector2d resolution{0., 0.};
+  double line_delay_nanoseconds = 0.;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(distortion_model),
@@ -69,6 +70,8 @@ struct CameraParams {
       {.required = true, .help = "as Kalibr calls it"});
     b(VIWO_PARAM(resolution),
       {.unit = "px", .min = 1., .max = 100'000., .required = true, .help = "width, height"});
+    b(VIWO_PARAM(line_delay_nanoseconds),
+      {.unit = "ns", .min = 0., .help = "from row to row; 0: a global shutter"});
   }
 };
 
@@ -173,9 +176,10 @@ void read_camera_models(const Node& root, CalibrationFile& file, Errors& errors)
     }
     const auto values = config::read_section<CameraParams>(entry.value, entry.key_mark,
                                                            "camera_models." + name, errors);
-    file.camera_models.push_back(
-        {values.distortion_model, static_cast<int>(std::lround(values.resolution[0])),
-         static_cast<int>(std::lround(values.resolution[1])), entry.key_mark});
+    file.camera_models.push_back({values.distortion_model,
+                                  static_cast<int>(std::lround(values.resolution[0])),
+                                  static_cast<int>(std::lround(values.resolution[1])),
+                                  1e-9 * values.line_delay_nanoseconds, entry.key_mark});
   }
 }
 
@@ -243,6 +247,9 @@ Node cameras_node(const std::vector<CalibratedCamera>& cameras) {
     node.set("distortion_model", Node::scalar_of(is_radtan ? "radtan" : "equidistant"));
     node.set("resolution",
              Node::list_of({number(cameras[i].width_px), number(cameras[i].height_px)}));
+    if (const double delay_s = cameras[i].line_delay_s; delay_s > 0.) {
+      node.set("line_delay_nanoseconds", number(1e9 * delay_s));
+    }
     section.set("cam" + std::to_string(i), node);
   }
   return section;

@@ -1,6 +1,7 @@
 #include "calibration_start.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -138,11 +139,13 @@ void CalibrationStart::take_camera(std::size_t index, CameraPrior& prior, Errors
   if (only_wheels_ || index >= file_.camera_models.size()) return;
   CameraView& camera = prior.camera;
   const CalibratedCamera& model = file_.camera_models[index];
+  const bool same_shutter = std::abs(model.line_delay_s - camera.line_delay_s) < 1e-9;
   if (model.distortion != camera.distortion || model.width_px != camera.width_px ||
-      model.height_px != camera.height_px) {
-    errors.add(model.mark, "cam" + std::to_string(index) +
-                               ": distortion_model or resolution is another than in cameras.kalibr "
-                               "of the run: is it the same camera?");
+      model.height_px != camera.height_px || !same_shutter) {
+    errors.add(model.mark,
+               "cam" + std::to_string(index) +
+                   ": distortion_model, resolution or line_delay_nanoseconds is another "
+                   "than in cameras.kalibr of the run: is it the same camera?");
     return;
   }
   const auto [extrinsics, numbers, clock] = camera_blocks(index, prior);

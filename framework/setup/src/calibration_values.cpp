@@ -109,7 +109,8 @@ void describe_rig(const RunSetup& setup, CalibrationFile& file) {
   const auto& cameras = setup.filter->cameras;
   for (std::size_t i = 0; i < cameras.size() && !file.cameras.empty(); ++i) {
     const CameraView& camera = cameras[i].camera;
-    file.camera_models.push_back({camera.distortion, camera.width_px, camera.height_px});
+    file.camera_models.push_back(
+        {camera.distortion, camera.width_px, camera.height_px, camera.line_delay_s});
     const CalibrationEntry* const clock = find(file.cameras, "cam0.t_CtoI");
     if (i == 0 || !cameras[i].shares_clock || clock == nullptr) continue;
     CalibrationEntry own = *clock;

@@ -32,6 +32,7 @@ std::string first_difference(const CameraView& a, const CameraView& b, std::size
                                     "z [m] of the IMU in"};
   for (int i = 0; i < 3; ++i) compare(kPlace[i], a.p_IinC[i], b.p_IinC[i]);
   compare("timeshift_cam_imu [s]", a.t_CtoI_s, b.t_CtoI_s);
+  compare("line_delay_nanoseconds", 1e9 * a.line_delay_s, 1e9 * b.line_delay_s);
   return text;
 }
 

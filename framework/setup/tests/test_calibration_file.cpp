@@ -64,13 +64,15 @@ TEST_F(CalibrationFileTest, ComesBackToTheBit) {
            "mount: {theta_ItoO_x: {estimate: 0.1, sigma: 0.3, nominal: 0.2, unit: rad}}\n"
            "clock: {t_OtoI: {estimate: 0.3333333333333333, sigma: 0}}\n"
            "cameras: {cam0.fx: {estimate: 300, sigma: 1}}\n"
-           "camera_models: {cam0: {distortion_model: equidistant, resolution: [640, 480]}}\n"
+           "camera_models: {cam0: {distortion_model: equidistant, resolution: [640, 480], "
+           "line_delay_nanoseconds: 20000}}\n"
            "correlations: {r_left: [], baseline: [-0.1], theta_ItoO_x: [0.3, 0.7]}\n");
   EXPECT_EQ(file.correlations.matrix(1, 2), 0.7);
   EXPECT_EQ(file.correlations.matrix(1, 0), -0.1);
   const std::string text = calibration_text(file, "a test");
   EXPECT_EQ(calibration_text(read(text), "a test"), text);
   EXPECT_EQ(read(text).clock[0].estimate, 0.3333333333333333);
+  EXPECT_DOUBLE_EQ(read(text).camera_models[0].line_delay_s, 2e-5);
   EXPECT_EQ(read(text).reasons[0], "a: b");
 }
 

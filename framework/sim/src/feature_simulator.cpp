@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <stdexcept>
 
@@ -22,6 +23,11 @@ constexpr std::int64_t kNotTracked = -1;
 /// Random pixels that are tried for one new landmark; a fisheye sees nothing in its corners.
 constexpr int kTries = 50;
 constexpr int kPlaces = 20;  ///< along the border of an image, for its largest angle
+/// Looks for the row of a rolling shutter that sees a point; each is nearer by a factor of ten.
+constexpr int kRowSteps = 8;
+
+/// Motion of the IMU, this long after the middle rows of the images are exposed.
+using ImuAfter = std::function<BodyMotion(double after_s)>;
 
 /// One camera at one instant.
 struct Eye {
@@ -71,9 +77,10 @@ class LandmarkField {
     }
   }
 
-  /// What all cameras see from a pose; ids are given.
-  const std::vector<Sighting>& look(const BodyMotion& imu) {
-    for (Eye& eye : eyes_) eye.move(imu);
+  /// What all cameras see of a motion; ids are given.
+  const std::vector<Sighting>& look(const ImuAfter& imu_after) {
+    imu_after_ = &imu_after;
+    for (Eye& eye : eyes_) eye.move(imu_after(0.));
     sightings_.clear();
     seen_.assign(eyes_.size(), 0);
     std::vector<std::size_t> others;
@@ -110,7 +117,17 @@ class LandmarkField {
     const double farthest = 1.5 * options_.landmark_max_m;
     if (distance2 < nearest * nearest || distance2 > farthest * farthest) return false;
     if (p_FinC.z() < eye.cos_max_angle * std::sqrt(distance2)) return false;
-    return project(*eye.camera, p_FinC, uv) && in_image(*eye.camera, uv);
+    return project(*eye.camera, p_FinC, uv) && in_image(*eye.camera, uv) &&
+           (eye.camera->line_delay_s == 0. || find_row(eye, p_FinG, uv));
+  }
+
+  /// The row that sees a point is the one that it is seen in (SIM-9).
+  bool find_row(Eye eye, const Vector3d& p_FinG, Vector2d& uv) const {
+    for (int i = 0; i < kRowSteps; ++i) {
+      eye.move((*imu_after_)(eye.camera->after_middle_s(uv.y())));
+      if (!project(*eye.camera, eye.R_GtoC * p_FinG + eye.p_GinC, uv)) return false;
+    }
+    return in_image(*eye.camera, uv);
   }
 
   int add_sightings(std::size_t i) {
@@ -165,6 +182,7 @@ class LandmarkField {
   const FeatureSimulation& options_;
   RandomStream stream_;
   std::vector<Eye> eyes_;
+  const ImuAfter* imu_after_ = nullptr;  ///< while it looks
   std::vector<Landmark> landmarks_;
   std::vector<Vector3d> p_FinG_by_id_;
   std::vector<Sighting> sightings_;
@@ -230,8 +248,11 @@ SimulatedFeatures simulate_features(const BodyTrajectory& trajectory, const Moun
       images[c].t_ns = camera_stamp_ns(cameras[c], options.start_ns + t_ns);
       images[c].camera = static_cast<int>(c);
     }
-    const BodyMotion imu = trajectory.imu(static_cast<double>(t_ns) * 1e-9, mounting);
-    for (const Sighting& sighting : field.look(imu)) {  // (SIM-9)
+    const ImuAfter imu_after = [&](double after_s) {
+      const double t_s = static_cast<double>(t_ns) * 1e-9 + after_s;
+      return trajectory.imu(std::clamp(t_s, trajectory.begin_s(), trajectory.end_s()), mounting);
+    };
+    for (const Sighting& sighting : field.look(imu_after)) {  // (SIM-9)
       Vector2d uv = sighting.uv;
       if (!errors[sighting.eye].disturb(uv)) continue;
       images[sighting.eye].points.push_back({field.id(sighting), uv.x(), uv.y()});

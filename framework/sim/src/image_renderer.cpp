@@ -11,6 +11,7 @@
 #include <Eigen/LU>
 
 #include "viwo/camera/camera_model.hpp"
+#include "viwo/math/so3.hpp"
 
 namespace viwo::sim {
 namespace {
@@ -159,19 +160,21 @@ class NormalTable {
 /// One image at work.
 class ImageRenderer::Painter {
  public:
-  Painter(const ImageRenderer& renderer, const CameraPose& pose)
+  explicit Painter(const ImageRenderer& renderer)
       : rays_(renderer.rays_),
         width_(renderer.width_px_),
         height_(renderer.height_px_),
-        R_CtoG_(pose.R_CtoG.cast<float>()),
-        room_(see(renderer.room_->room, pose.p_CinG.cast<float>())),
+        world_(*renderer.room_),
         grey_(rays_.size(), 0.F),
-        faces_(rays_.size(), kNothing) {
-    for (const Block& block : renderer.room_->blocks) {
-      blocks_.push_back(see(block, pose.p_CinG.cast<float>()));
-    }
-  }
+        faces_(rays_.size(), kNothing) {}
 
+  void move(const CameraPose& pose) {
+    const Vector3f p_CinG = pose.p_CinG.cast<float>();
+    R_CtoG_ = pose.R_CtoG.cast<float>();
+    room_ = see(world_.room, p_CinG);
+    blocks_.clear();
+    for (const Block& block : world_.blocks) blocks_.push_back(see(block, p_CinG));
+  }
   void paint(const Tile& tile);
   /// After all tiles have been painted.
   void smooth_edges(const Tile& tile);
@@ -182,7 +185,7 @@ class ImageRenderer::Painter {
 
   template <class Act>
   void each_pixel(const Tile& tile, const Act& act) const {
-    for (int v = tile.y; v < std::min(tile.y + kTile, height_); ++v) {
+    for (int v = tile.y; v < tile.y + tile.height; ++v) {
       for (int u = tile.x; u < std::min(tile.x + kTile, width_); ++u) {
         const auto i = static_cast<std::size_t>(v * width_ + u);
         if (rays_[i].angle > 0.F) act(u, v, i);
@@ -204,8 +207,9 @@ class ImageRenderer::Painter {
 
   const std::vector<Ray>& rays_;
   const int width_, height_;
-  const Matrix3f R_CtoG_;
-  const SeenBlock room_;
+  const TexturedRoom& world_;
+  Matrix3f R_CtoG_ = Matrix3f::Identity();
+  SeenBlock room_;
   std::vector<SeenBlock> blocks_;
   std::vector<const SeenBlock*> near_;  ///< what the rays of the tile at work may meet
   std::vector<float> grey_;
@@ -311,7 +315,10 @@ void ImageRenderer::Painter::smooth_edges(const Tile& tile) {
 
 ImageRenderer::ImageRenderer(const CameraView& camera, std::shared_ptr<const TexturedRoom> room,
                              double vignette)
-    : width_px_(camera.width_px), height_px_(camera.height_px), room_(std::move(room)) {
+    : camera_(camera),
+      width_px_(camera.width_px),
+      height_px_(camera.height_px),
+      room_(std::move(room)) {
   make_rays(camera, vignette);
   make_tiles();
 }
@@ -341,12 +348,14 @@ void ImageRenderer::make_rays(const CameraView& camera, double vignette) {
 }
 
 void ImageRenderer::make_tiles() {
-  for (int y = 0; y < height_px_; y += kTile) {
+  // The rows of a tile are exposed at once.
+  const int rows = camera_.line_delay_s > 0. ? 1 : kTile;
+  for (int y = 0; y < height_px_; y += rows) {
     for (int x = 0; x < width_px_; x += kTile) {
-      Tile tile{x, y};
+      Tile tile{x, y, std::min(rows, height_px_ - y)};
       Vector3f sum = Vector3f::Zero();
       const auto each = [&](const auto& act) {
-        for (int v = y; v < std::min(y + kTile, height_px_); ++v) {
+        for (int v = y; v < y + tile.height; ++v) {
           for (int u = x; u < std::min(x + kTile, width_px_); ++u) {
             const Ray& ray = rays_[static_cast<std::size_t>(v * width_px_ + u)];
             if (ray.angle > 0.F) act(Vector3f(ray.x, ray.y, ray.z), ray.angle);
@@ -368,10 +377,29 @@ void ImageRenderer::make_tiles() {
   }
 }
 
+CameraPose CameraPose::after(double dt_s) const {
+  CameraPose pose = *this;
+  pose.R_CtoG = R_CtoG * exp_so3(dt_s * w_CinC);
+  pose.p_CinG += dt_s * v_CinG;
+  return pose;
+}
+
+template <class Act>
+void ImageRenderer::each_tile(const CameraPose& pose, Painter& painter, const Act& act) const {
+  const bool rolling = camera_.line_delay_s > 0.;
+  int row = -1;
+  painter.move(pose);
+  for (const Tile& tile : tiles_) {
+    if (rolling && tile.y != row) painter.move(pose.after(camera_.after_middle_s(tile.y)));
+    row = tile.y;
+    act(tile);
+  }
+}
+
 void ImageRenderer::render(const CameraPose& pose, const Exposure& exposure, Image& out) const {
-  Painter painter(*this, pose);
-  for (const Tile& tile : tiles_) painter.paint(tile);
-  for (const Tile& tile : tiles_) painter.smooth_edges(tile);
+  Painter painter(*this);
+  each_tile(pose, painter, [&](const Tile& tile) { painter.paint(tile); });
+  each_tile(pose, painter, [&](const Tile& tile) { painter.smooth_edges(tile); });
   out.width_px = width_px_;
   out.height_px = height_px_;
   out.pixels.resize(rays_.size());

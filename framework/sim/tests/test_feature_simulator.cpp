@@ -107,6 +107,28 @@ TEST_P(EachCamera, PointsAreTheProjectionsOfTheirLandmarks) {
   }
 }
 
+TEST_P(EachCamera, EachRowOfARollingShutterHasItsOwnTime) {
+  auto cameras = stereo(GetParam());
+  for (CameraView& cam : cameras) cam.line_delay_s = 3e-5;
+  const auto features = simulate_features(trajectory(), kMounting, cameras, noiseless(), 4);
+  double most_off_px = 0.;
+  for (const FeatureSample& sample : features.samples) {
+    const CameraView& cam = cameras[static_cast<std::size_t>(sample.camera)];
+    // Stamps are those of the first row.
+    const auto seen_at = [&](double row, std::int64_t id) {
+      const std::int64_t t_ns = sample.t_ns + std::llround(3e4 * row);
+      return project_independently(cam, in_camera(features, cam, t_ns, id));
+    };
+    for (const FeaturePoint& point : sample.points) {
+      const Vector2d measured(point.u_px, point.v_px);
+      ASSERT_LT((measured - seen_at(point.v_px, point.id)).norm(), 1e-5);
+      const double middle = 0.5 * (cam.height_px - 1);
+      most_off_px = std::max(most_off_px, (measured - seen_at(middle, point.id)).norm());
+    }
+  }
+  EXPECT_GT(most_off_px, 2.);
+}
+
 TEST_P(EachCamera, ImagesAreFullAndTheirTimesFallBetweenImuSamples) {
   const auto cameras = stereo(GetParam());
   const auto features = simulate_features(trajectory(), kMounting, cameras, noiseless(), 4);

@@ -332,6 +332,35 @@ TEST(ImageRenderer, GivesTheSameBitsInEveryThread) {
   for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(alone[i].pixels, together[i].pixels) << i;
 }
 
+TEST(ImageRenderer, RowsOfARollingShutterAreThoseOfImagesOfTheirTimes) {
+  CameraView rolling = pinhole();
+  rolling.line_delay_s = 5e-5;
+  const ImageRenderer renderer(rolling, some_room()), global(pinhole(), some_room());
+  CameraPose pose = looking(0.2, {1., 0.1, 0.2});
+  Image image, other;
+  renderer.render(pose, {}, image);
+  global.render(pose, {}, other);
+  EXPECT_EQ(image.pixels, other.pixels) << "a camera that does not move";
+  pose.v_CinG = {0.5, 0.3, 0.};
+  pose.w_CinC = {0.2, 1., -0.3};
+  renderer.render(pose, {}, image);
+  EXPECT_NE(image.pixels, other.pixels);
+  for (const int row : {0, 60, 120, 200, 240}) {
+    const double t_s = 5e-5 * (row - 120.);
+    CameraPose then = pose;
+    then.p_CinG += t_s * pose.v_CinG;
+    const Vector3d turn = t_s * pose.w_CinC;
+    then.R_CtoG = pose.R_CtoG * Eigen::AngleAxisd(turn.norm(), turn.normalized());
+    if (row == 120) then = pose;
+    global.render(then, {}, other);
+    // Next to an edge its neighbours above and below are of other times.
+    int different = 0;
+    for (int u = 0; u < image.width_px; ++u)
+      different += grey_of(image, u, row) != grey_of(other, u, row);
+    EXPECT_LE(different, image.width_px / 50) << "row " << row;
+  }
+}
+
 TEST(ImageRenderer, PixelsWithoutARayAreBlack) {
   CameraView camera = fisheye();
   camera.intrinsics.tail<4>() << -0.2, 0., 0., 0.;  // folds back at 1.29 rad

@@ -181,8 +181,10 @@ bool VisualProblem::sight_row(const VisualEstimate& x, std::size_t i, const Star
   const CameraView camera = camera_at(x, sight.camera);
   const CameraPrior& prior = options_.cameras[sight.camera];
   const ImuState& key = x.keys[sight.key];
-  // The image was taken a little later than the key's stamp if the clock is off.
+  // The image was taken a little later than the key's stamp if the clock is off, and a row of a
+  // rolling shutter anyway.
   const double later_s =
+      sight.after_s +
       clock_sigma(sight.camera) * x.calibration[clock_column(sight.camera) - imu_columns()];
   const Vector3d rate = rate_at(sight.key) - key.gyro_bias;
   const Matrix3d R_GtoI = exp_so3(-later_s * rate) * key.R_GtoI;

@@ -6,6 +6,8 @@
 
 #include "viwo/camera/camera_model.hpp"
 #include "viwo/filter/propagation.hpp"
+#include "viwo/math/arrays.hpp"
+#include "viwo/math/so3.hpp"
 #include "viwo/math/stamp.hpp"
 
 namespace viwo {
@@ -21,7 +23,8 @@ constexpr std::string_view kTooFewImages = "fewer images than start_window_s ask
 
 std::int64_t imu_stamp(const FeatureSample& sample, std::span<const CameraPrior> cameras) {
   const auto camera = static_cast<std::size_t>(sample.camera);
-  return sample.t_ns + to_ns(cameras[camera].camera.t_CtoI_s);
+  const CameraView& view = cameras[camera].camera;
+  return sample.t_ns + to_ns(view.t_CtoI_s + view.middle_s());
 }
 
 /// Stamps of the images of the first camera that has any, from `begin_ns` to `end_ns`, thinned out
@@ -68,16 +71,30 @@ bool has_gap(std::span<const ImuSample> samples) {
   return false;
 }
 
+/// The next reading of the gyro, rad/s in I, biases included.
+Eigen::Vector3d rate_at(std::span<const ImuSample> imu, std::int64_t t_ns) {
+  const auto next = std::lower_bound(
+      imu.begin(), imu.end(), t_ns,
+      [](const ImuSample& sample, std::int64_t stamp) { return sample.t_ns < stamp; });
+  return to_vector(next == imu.end() ? imu.back().gyro_rad_per_s : next->gyro_rad_per_s);
+}
+
+/// Rays are turned from the rows of a rolling shutter to the middle one, by the rate `w_IinI`; how
+/// it moved is not known yet.
 void add_sights(const FeatureSample& sample, std::size_t key, const CameraView& camera,
-                std::map<std::int64_t, StartTrack>& by_id) {
+                const Eigen::Vector3d& w_IinI, std::map<std::int64_t, StartTrack>& by_id) {
+  const Eigen::Vector3d w_C = camera.R_ItoC * w_IinI;
   for (const FeaturePoint& point : sample.points) {
     const Eigen::Vector2d uv_px(point.u_px, point.v_px);
     if (!uv_px.allFinite()) continue;
-    const auto bearing = unproject(camera, uv_px);
+    auto bearing = unproject(camera, uv_px);
+    const double after_s = camera.after_middle_s(uv_px.y());
+    if (bearing && after_s != 0.) bearing = exp_so3(after_s * w_C) * *bearing;
     if (!bearing || bearing->z() < 0.1) continue;
     StartTrack& track = by_id[point.id];
     track.id = point.id;
-    track.sights.push_back({key, static_cast<std::size_t>(sample.camera), uv_px, *bearing});
+    track.sights.push_back(
+        {key, static_cast<std::size_t>(sample.camera), uv_px, *bearing, after_s});
   }
 }
 
@@ -121,7 +138,7 @@ std::string_view find_visual_window(std::span<const ImuSample> imu,
     const auto key = std::find_if(stamps.begin(), stamps.end(), near);
     if (key == stamps.end()) continue;
     add_sights(sample, static_cast<std::size_t>(key - stamps.begin()),
-               cameras[static_cast<std::size_t>(sample.camera)].camera, by_id);
+               cameras[static_cast<std::size_t>(sample.camera)].camera, rate_at(imu, t_ns), by_id);
   }
   for (auto& [id, track] : by_id) {
     if (shared_keys(track) >= kFewestSharedKeys) window.tracks.push_back(std::move(track));

@@ -17,7 +17,8 @@ struct StartSight {
   std::size_t key = 0;  ///< which of the images
   std::size_t camera = 0;
   Eigen::Vector2d uv_px = Eigen::Vector2d::Zero();
-  Eigen::Vector3d bearing = Eigen::Vector3d::Zero();  ///< unit vector in C
+  Eigen::Vector3d bearing = Eigen::Vector3d::Zero();  ///< unit vector in C, at the key
+  double after_s = 0.;                                ///< the key its row was exposed
 };
 
 /// A landmark: sights in the order of their images.

@@ -147,12 +147,18 @@ class Flight {
   }
 
   /// Without distortion.
-  void see(const CameraView& camera, double t, FeatureSample& image) {
+  void see(const CameraView& camera, double first_row_s, FeatureSample& image) {
     for (std::size_t i = 0; i < points_.size(); ++i) {
-      const Eigen::Vector3d p_I = R_ItoG(t).transpose() * (points_[i] - position(t));
-      const Eigen::Vector3d p_C = camera.R_ItoC * p_I + camera.p_IinC;
-      const double u = camera.intrinsics[0] * p_C.x() / p_C.z() + camera.intrinsics[2];
-      const double v = camera.intrinsics[1] * p_C.y() / p_C.z() + camera.intrinsics[3];
+      Eigen::Vector3d p_C;
+      double u = 0., v = 0.5 * camera.height_px;
+      // The row that sees a point is the one that it is seen in.
+      for (int k = 0; k < (camera.line_delay_s > 0. ? 10 : 1); ++k) {
+        const double t = first_row_s + v * camera.line_delay_s;
+        const Eigen::Vector3d p_I = R_ItoG(t).transpose() * (points_[i] - position(t));
+        p_C = camera.R_ItoC * p_I + camera.p_IinC;
+        u = camera.intrinsics[0] * p_C.x() / p_C.z() + camera.intrinsics[2];
+        v = camera.intrinsics[1] * p_C.y() / p_C.z() + camera.intrinsics[3];
+      }
       const double du = options_.sigma_px * normal(), dv = options_.sigma_px * normal();
       if (p_C.z() < 0.3 || u < 0. || v < 0. || u > camera.width_px || v > camera.height_px)
         continue;

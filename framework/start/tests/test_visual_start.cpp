@@ -99,13 +99,13 @@ struct Consistency {
   }
 };
 constexpr int kFlights = 60;
-Consistency fly(int n_cameras, const FlightOptions& flown, double covariance_scale = 1.,
-                double relative = 1.) {
-  const VisualStartOptions options = chained(with_cameras(n_cameras), relative);
+/// With `cameras`, which the start is `told` of.
+Consistency fly(const VisualStartOptions& cameras, const FlightOptions& flown,
+                double covariance_scale, const VisualStartOptions& told) {
   Consistency result;
   for (int seed = 0; seed < kFlights; ++seed) {
-    const Flight flight(options, flown, static_cast<std::uint64_t>(seed));
-    const auto attempt = start_from_images(flight.imu, flight.tracks, options);
+    const Flight flight(cameras, flown, static_cast<std::uint64_t>(seed));
+    const auto attempt = start_from_images(flight.imu, flight.tracks, told);
     if (!attempt.prior) continue;
     FlightError error = error_of(flight, *attempt.prior);
     error.P *= covariance_scale;
@@ -114,6 +114,11 @@ Consistency fly(int n_cameras, const FlightOptions& flown, double covariance_sca
   }
   result.nees /= result.starts;
   return result;
+}
+Consistency fly(int n_cameras, const FlightOptions& flown, double covariance_scale = 1.,
+                double relative = 1.) {
+  const VisualStartOptions options = chained(with_cameras(n_cameras), relative);
+  return fly(options, flown, covariance_scale, options);
 }
 
 TEST(VisualStart, IsConsistentWithItsCovarianceWithOneCamera) {
@@ -134,6 +139,21 @@ TEST(VisualStart, IsConsistentWithCamerasThatAreKnownToEachOther) {
   EXPECT_TRUE(found.holds()) << found.nees << " of 11";
   EXPECT_GT(found.starts, kFlights * 9 / 10);
   EXPECT_FALSE(fly(2, {.duration_s = 1.3}, 1., 0.1).holds()) << "cameras that are not";
+}
+
+TEST(VisualStart, IsConsistentThroughARollingShutterThatIsKnown) {
+  VisualStartOptions rolling = chained(with_cameras(1), 1.);
+  CameraView& camera = rolling.cameras.front().camera;
+  camera.line_delay_s = 3e-5;
+  const FlightOptions flown{.duration_s = 2.3};
+  const Consistency known = fly(rolling, flown, 1., rolling);
+  EXPECT_TRUE(known.holds()) << known.nees << " of 11";
+  EXPECT_GT(known.starts, kFlights * 9 / 10);
+  VisualStartOptions told = rolling;
+  told.cameras.front().camera.line_delay_s = 0.;
+  told.cameras.front().camera.t_CtoI_s += camera.middle_s();
+  const Consistency not_known = fly(rolling, flown, 1., told);
+  EXPECT_FALSE(not_known.holds()) << not_known.nees << " of 11";
 }
 
 TEST(VisualStart, ConsistencyCheckSeesCovariancesAndCalibrationsThatAreWrong) {

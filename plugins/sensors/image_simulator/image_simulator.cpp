@@ -14,6 +14,7 @@
 
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/sim/image_renderer.hpp"
 #include "viwo/sim/rig_simulator.hpp"
 #include "viwo/sim/textured_room.hpp"
@@ -24,6 +25,8 @@ namespace {
 
 /// What is left of the light in the dark.
 constexpr double kDarkGain = 0.01;
+/// A reading of the IMU is found within this time, whatever its rate.
+constexpr double kLeastAround_s = 0.01;
 
 struct Params : sim::TrueCameraParams {
   std::filesystem::path cameras;
@@ -163,13 +166,36 @@ Options::Options(const Params& params, const HostServices& services)
   }
 }
 
-/// (IMG-8)
-sim::CameraPose camera_pose(const StateSample& state, const CameraView& camera) {
+/// (IMG-8); `w_IinI`, rad/s, is for its motion (IMG-11).
+sim::CameraPose camera_pose(const StateSample& state, const CameraView& camera,
+                            const Eigen::Vector3d& w_IinI = Eigen::Vector3d::Zero()) {
   const Eigen::Matrix3d R_ItoG = to_quaternion(state.q_ItoG_xyzw).toRotationMatrix();
+  const Eigen::Vector3d p_CinI = -camera.R_ItoC.transpose() * camera.p_IinC;
   sim::CameraPose pose;
   pose.R_CtoG = R_ItoG * camera.R_ItoC.transpose();
   pose.p_CinG = to_vector(state.p_IinG_m) - pose.R_CtoG * camera.p_IinC;
+  pose.v_CinG = to_vector(state.v_IinG_m_per_s) + R_ItoG * w_IinI.cross(p_CinI);
+  pose.w_CinC = camera.R_ItoC * w_IinI;
   return pose;
+}
+
+/// Mean rate of turn of the IMU around a time, from readings that are `half_s` from it at most.
+Eigen::Vector3d rate_at(const StateSample& state, const std::vector<ImuSample>& imu,
+                        double half_s) {
+  const auto begin = std::lower_bound(
+      imu.begin(), imu.end(), state.t_ns - to_ns(half_s),
+      [](const ImuSample& sample, std::int64_t t_ns) { return sample.t_ns < t_ns; });
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int n = 0;
+  for (auto at = begin; at != imu.end() && at->t_ns <= state.t_ns + to_ns(half_s); ++at, ++n) {
+    sum += to_vector(at->gyro_rad_per_s);
+  }
+  if (n == 0) {
+    throw InputError(
+        "the input gives no IMU samples at its true states: images of a rolling shutter "
+        "(line_delay_nanoseconds of the cameras) need them");
+  }
+  return sum / n - to_vector(state.gyro_bias_rad_per_s);
 }
 
 /// An image that is made when it is read.
@@ -207,9 +233,14 @@ class ImageSimulator final : public Sensor {
   /// The room depends on the whole motion.
   void prepare(Sensor& input) {
     std::vector<StateSample> states;
+    std::vector<ImuSample> imu;
+    const bool rolling = std::ranges::any_of(
+        options_.cameras, [](const CameraView& camera) { return camera.line_delay_s > 0.; });
     Measurement measurement;
     while (input.next(measurement) == Status::kOk) {
       if (const auto* state = measurement.get_if<StateSample>()) states.push_back(*state);
+      const auto* reading = measurement.get_if<ImuSample>();
+      if (reading != nullptr && rolling) imu.push_back(*reading);
     }
     if (states.empty()) {
       throw InputError("the input gives no true states, which sensors simulator and asl_state do");
@@ -221,7 +252,7 @@ class ImageSimulator final : public Sensor {
     if (options_.skip_first) states.erase(states.begin());
     if (states.empty()) return;
     make_renderers(states);
-    for (const StateSample& state : states) add_images(state);
+    for (const StateSample& state : states) add_images(state, imu);
     sim::sort_by_time(samples_);  // clocks of cameras can differ
   }
 
@@ -255,7 +286,7 @@ class ImageSimulator final : public Sensor {
     }
   }
 
-  void add_images(const StateSample& state) {
+  void add_images(const StateSample& state, const std::vector<ImuSample>& imu) {
     const double t_s = seconds_between(first_ns_, state.t_ns);
     if (options_.dropped.contain(t_s)) return;
     sim::Exposure exposure;
@@ -266,10 +297,15 @@ class ImageSimulator final : public Sensor {
     for (std::size_t c = 0; c < renderers_.size(); ++c) {
       const CameraView& camera = options_.cameras[c];
       exposure.seed = noise_seed(c, state.t_ns);
+      sim::CameraPose pose = camera_pose(state, camera);
+      if (camera.line_delay_s > 0.) {
+        const double half_s = std::max(camera.middle_s(), kLeastAround_s);
+        pose = camera_pose(state, camera, rate_at(state, imu, half_s));
+      }
       const std::int64_t t_ns = sim::camera_stamp_ns(camera, state.t_ns);  // (IMG-10)
-      samples_.emplace_back(ImageSample{t_ns, static_cast<int>(c),
-                                        std::make_shared<const RenderedImage>(
-                                            renderers_[c], camera_pose(state, camera), exposure)});
+      samples_.emplace_back(
+          ImageSample{t_ns, static_cast<int>(c),
+                      std::make_shared<const RenderedImage>(renderers_[c], pose, exposure)});
     }
   }
 

@@ -80,15 +80,19 @@ bool CameraTracker::find(const Frame& from, const Frame& to, double dt_s, std::s
   return search(track.uv, options_.pyr_levels);
 }
 
-void CameraTracker::check_epipolar() {
+void CameraTracker::check_epipolar(double dt_s) {
   std::vector<std::size_t> which;
   std::vector<Eigen::Vector3d> before, after;
+  std::vector<double> rows_1, rows_2;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     if (status_[i] == 0) continue;
     which.push_back(i);
     before.push_back(tracks_[i].ray);
     after.push_back(rays_[i]);
+    rows_1.push_back(camera_.after_middle_s(tracks_[i].uv.y));
+    rows_2.push_back(camera_.after_middle_s(now_[i].y));
   }
+  if (camera_.line_delay_s > 0.) straighten(before, after, rows_1, rows_2, dt_s);
   const auto flags =
       epipolar_inliers(before, after, options_.ransac_threshold_px / focal_px_, seed_ + images_);
   for (std::size_t k = 0; k < which.size(); ++k) status_[which[k]] = flags[k];
@@ -124,7 +128,7 @@ void CameraTracker::follow(const Frame& from, const Frame& to, double dt_s) {
       status_[i] = find(from, to, dt_s, i) ? 1 : 0;
     }
   });
-  if (options_.ransac) check_epipolar();
+  if (options_.ransac) check_epipolar(dt_s);
   keep(dt_s);
 }
 

@@ -53,7 +53,7 @@ class CameraTracker {
  private:
   /// Where a point is in the next image, first near the predicted place; fills `now_` and `rays_`.
   bool find(const Frame& from, const Frame& to, double dt_s, std::size_t track);
-  void check_epipolar();
+  void check_epipolar(double dt_s);
   /// The tracks that are left, at their new places.
   void keep(double dt_s);
 

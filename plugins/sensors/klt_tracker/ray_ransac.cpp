@@ -164,6 +164,15 @@ std::array<std::size_t, kSample> draw(std::mt19937_64& random, std::size_t n) {
 
 }  // namespace
 
+void straighten(std::span<Eigen::Vector3d> rays_1, std::span<Eigen::Vector3d> rays_2,
+                std::span<const double> rows_1, std::span<const double> rows_2, double dt_s) {
+  const Eigen::Vector3d rate = log_so3(common_rotation(rays_1, rays_2)) / dt_s;
+  for (std::size_t i = 0; i < rays_1.size(); ++i) {
+    rays_1[i] = exp_so3(-rows_1[i] * rate) * rays_1[i];
+    rays_2[i] = exp_so3(-rows_2[i] * rate) * rays_2[i];
+  }
+}
+
 double epipolar_angle(const RelativeMotion& motion, const Eigen::Vector3d& ray_1,
                       const Eigen::Vector3d& ray_2) {
   const Eigen::Vector3d n = motion.t.cross(motion.R * ray_1);

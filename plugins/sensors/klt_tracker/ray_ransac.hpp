@@ -16,6 +16,12 @@ struct RelativeMotion {
   Eigen::Vector3d t = Eigen::Vector3d::UnitX();
 };
 
+/// Rays of two images, `dt_s` apart, whose rows were exposed one after the other, as the middle
+/// rows would have them if the camera only turned (KLT-12). `rows_1`, `rows_2`: how long after the
+/// middle row each was seen, s.
+void straighten(std::span<Eigen::Vector3d> rays_1, std::span<Eigen::Vector3d> rays_2,
+                std::span<const double> rows_1, std::span<const double> rows_2, double dt_s);
+
 /// By how much two unit rays miss a common point, rad: to first order, the angle of one of them to
 /// the epipolar plane of the other, also next to the epipole, where that plane is ill-defined.
 double epipolar_angle(const RelativeMotion& motion, const Eigen::Vector3d& ray_1,

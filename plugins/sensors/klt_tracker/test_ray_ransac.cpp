@@ -53,6 +53,31 @@ std::size_t count(const std::vector<std::uint8_t>& flags, std::size_t from, std:
 const Eigen::Matrix3d kTurn = exp_so3(Eigen::Vector3d(0.02, -0.06, 0.01));
 const Eigen::Vector3d kStep(0.03, -0.01, 0.05);
 
+TEST(RayRansac, RowsThatAreExposedOneAfterTheOtherFitOneMotionWhenStraightened) {
+  // GIVEN a camera that turns fast, and moves, and rows that take 25 ms
+  const Eigen::Vector3d rate(0.1, -1.5, 0.4), velocity(0.3, 0., 0.2);
+  constexpr double kPeriod_s = 0.05;
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> row_s(-0.0125, 0.0125);
+  const auto seen = [&](const Eigen::Vector3d& p, double t_s) {
+    return Eigen::Vector3d((exp_so3(t_s * rate) * p + t_s * velocity).normalized());
+  };
+  Pairs pairs =
+      make_pairs(Scene::kSphere, 200, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), 0.1, 3);
+  std::vector<double> rows_1, rows_2;
+  for (std::size_t i = 0; i < 200; ++i) {
+    const Eigen::Vector3d p = 3. * pairs.before[i];
+    rows_1.push_back(row_s(random));
+    rows_2.push_back(row_s(random));
+    pairs.before[i] = seen(p, rows_1[i]);
+    pairs.after[i] = seen(p, kPeriod_s + rows_2[i]);
+  }
+  // THEN few pairs agree on one motion as they are, and nearly all do as the middle rows see them
+  EXPECT_LT(count(epipolar_inliers(pairs.before, pairs.after, kThreshold, 1), 0, 200), 120U);
+  straighten(pairs.before, pairs.after, rows_1, rows_2, kPeriod_s);
+  EXPECT_GT(count(epipolar_inliers(pairs.before, pairs.after, kThreshold, 1), 0, 200), 190U);
+}
+
 TEST(RayRansac, AngleIsThatToTheEpipolarPlane) {
   // GIVEN a camera that moves along x, and a point straight ahead at the distance of the step
   RelativeMotion motion;

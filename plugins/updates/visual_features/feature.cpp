@@ -62,7 +62,9 @@ bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vect
                      const Eigen::Vector3d& p_FinG_fej, double inverse_sigma, LinearSight& row) {
   const WindowClone& clone = window.clone(sight.clone);
   const WindowCamera& camera = window.camera(sight.camera);
-  const CameraPose& pose = window.pose(sight.clone, sight.camera);
+  CameraPose own;
+  const CameraPose& pose =
+      window.pose(sight.clone, sight.camera, sight.observation->uv.y(), own);  // (VF-24)
   row.clone = sight.clone;
   row.column = clone.column;
   row.camera = sight.camera;
@@ -110,8 +112,9 @@ int Feature::collect(const TrackStore& tracks, int track, const Window& window) 
 
 FeatureStatus Feature::triangulate(const Window& window) {
   rays_.clear();
+  CameraPose own;
   for (const Sight& sight : sights_) {
-    const CameraPose& pose = window.pose(sight.clone, sight.camera);
+    const CameraPose& pose = window.pose(sight.clone, sight.camera, sight.observation->uv.y(), own);
     Ray& ray = rays_.emplace_back();
     ray.origin = pose.p_CinG;
     ray.direction.noalias() = pose.R_GtoC.transpose() * sight.observation->ray;

@@ -61,7 +61,8 @@ Eigen::Vector2d predicted(Scene& scene, const Window& window, const Sight& sight
   const std::size_t clone = clone_of(scene, window, sight);
   const auto camera = static_cast<std::size_t>(sight.camera);
   Eigen::Vector2d uv;
-  EXPECT_TRUE(scene.predict(clone, camera, scene.stamp_ns(clone, camera), p_FinG, uv));
+  EXPECT_TRUE(scene.predict(clone, camera, scene.stamp_ns(clone, camera), sight.observation->uv.y(),
+                            p_FinG, uv));
   return uv;
 }
 
@@ -155,6 +156,48 @@ TEST(Feature, JacobiansOfAnImageBesideItsCloneAreCentralDifferences) {
           {.n_clones = 5, .n_cameras = 2, .first_estimate_off = 0.01, .image_off_s = off_s}, seed);
     }
   }
+}
+
+TEST(Feature, JacobiansThroughARollingShutterAreCentralDifferences) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    for (const auto distortion : {CameraDistortion::kRadtan, CameraDistortion::kEquidistant}) {
+      check_jacobians({.n_clones = 5,
+                       .n_cameras = 2,
+                       .distortion = distortion,
+                       .calibrates = true,
+                       .first_estimate_off = 0.01,
+                       .image_off_s = 0.001,
+                       .line_delay_s = 5e-5},
+                      seed);
+    }
+  }
+}
+
+TEST(Feature, ARollingShutterMovesPointsAndIsTakenIntoAccount) {
+  const SceneOptions options{.n_clones = 8, .line_delay_s = 5e-5};
+  Random random(3);
+  Scene scene = testing::make_scene(options, 50, random);
+  random.seed(3);
+  Scene global = testing::make_scene({.n_clones = 8}, 50, random);
+  int seen = 0, off = 0;
+  for (const Eigen::Vector3d& landmark : scene.landmarks) {
+    Track track(scene, scene, landmark, 1., 0., random);
+    if (track.feature.sights().size() < 4) continue;
+    ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+    EXPECT_LT((track.feature.point() - landmark).norm(), 1e-8);
+    // The middle row is where a global shutter's image is.
+    for (std::size_t i = 0; i < scene.clones.size(); ++i) {
+      Eigen::Vector2d rolling, all_rows;
+      if (!scene.see(i, 0, landmark, rolling) || !global.see(i, 0, landmark, all_rows)) continue;
+      const double rows = rolling.y() - 0.5 * (scene.camera(0).height_px - 1);
+      const double moved_px = (rolling - all_rows).norm();
+      EXPECT_LT(moved_px, 0.1 * std::abs(rows) + 1e-9);
+      ++seen;
+      if (moved_px > 2.) ++off;
+    }
+  }
+  EXPECT_GT(seen, 100);
+  EXPECT_GT(off, seen / 10);
 }
 
 TEST(Feature, TriangulationRecoversExactPoints) {

@@ -195,7 +195,8 @@ struct Seen {
       while (at.clones[clone].slot != window.clone(sights[k].clone).slot) ++clone;
       const auto j = static_cast<std::size_t>(sights[k].camera);
       Eigen::Vector2d uv;
-      EXPECT_TRUE(at.predict(clone, j, at.stamp_ns(clone, j), p_FinG, uv));
+      EXPECT_TRUE(
+          at.predict(clone, j, at.stamp_ns(clone, j), sights[k].observation->uv.y(), p_FinG, uv));
       pixels.segment<2>(2 * static_cast<Eigen::Index>(k)) = uv;
     }
     return pixels;
@@ -218,6 +219,11 @@ struct Seen {
 const std::vector<SceneOptions> kScenes{
     {.n_clones = 5, .n_cameras = 2, .calibrates = true, .first_estimate_off = 0.005},
     {.n_clones = 4, .n_cameras = 1, .calibrates = true, .image_off_s = 0.001},
+    {.n_clones = 5,
+     .n_cameras = 2,
+     .calibrates = true,
+     .first_estimate_off = 0.005,
+     .line_delay_s = 5e-5},
     {.n_clones = 6,
      .n_cameras = 2,
      .distortion = CameraDistortion::kEquidistant,

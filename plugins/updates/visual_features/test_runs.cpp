@@ -44,6 +44,8 @@ struct RunOptions {
   int max_landmarks = 0;
   bool breaks_anchors = false;
   double wrong = 0.;  ///< calibration that starts wrong: times the sigmas below
+  double line_delay_s = 0.;
+  bool knows_shutter = true;
 };
 
 /// Takes from new anchors what depends on their clones.
@@ -78,7 +80,10 @@ class FilterRun {
  public:
   FilterRun(const sim::BodyTrajectory& trajectory, const RunOptions& options, std::uint64_t seed)
       : trajectory_(trajectory), options_(options), random_(seed) {
-    for (int j = 0; j < options.n_cameras; ++j) cameras_.push_back(nominal(j));
+    for (int j = 0; j < options.n_cameras; ++j) {
+      cameras_.push_back(nominal(j));
+      cameras_.back().line_delay_s = options.line_delay_s;
+    }
     std::vector<CameraPrior> priors = draw_priors();
     imu_ = sim::simulate_imu(trajectory, {}, imu_options(), seed);
     features_ = sim::simulate_features(trajectory, {}, cameras_, feature_options(), seed);
@@ -166,6 +171,10 @@ class FilterRun {
     const double late_s = options_.wrong * 0.005 * testing::normal(random_);
     for (std::size_t j = 0; j < cameras_.size(); ++j) {
       priors[j].camera = cameras_[j];
+      if (!options_.knows_shutter) {  // all rows are those of the middle one
+        priors[j].camera.t_CtoI_s += cameras_[j].middle_s();
+        priors[j].camera.line_delay_s = 0.;
+      }
       if (options_.wrong == 0.) continue;
       priors[j].sigma_extrinsics.setConstant(0.01);
       priors[j].sigma_intrinsics << 1., 1., 1., 1., 2e-3, 2e-3, 2e-4, 2e-4;
@@ -302,6 +311,15 @@ TEST(VisualRuns, CalibrationThatStartsWrongIsFoundConsistently) {
   EXPECT_EQ(inconsistency({.wrong = 1.}, 8), "");
   EXPECT_EQ(inconsistency({.n_cameras = 2, .wrong = 1.}, 8), "");
   EXPECT_EQ(inconsistency({.n_cameras = 2, .max_landmarks = 10, .wrong = 1.}, 8), "");
+}
+
+TEST(VisualRuns, RollingShuttersAreConsistentIfTheyAreKnown) {
+  RunOptions options{.line_delay_s = 5e-5};
+  EXPECT_EQ(inconsistency(options, 8), "");
+  options.knows_shutter = false;
+  EXPECT_NE(inconsistency(options, 8), "");
+  EXPECT_EQ(inconsistency({.n_cameras = 2, .wrong = 1., .line_delay_s = 5e-5}, 8), "");
+  EXPECT_EQ(inconsistency({.n_cameras = 2, .max_landmarks = 10, .line_delay_s = 5e-5}, 8), "");
 }
 
 TEST(VisualRuns, LandmarksInTheStateMakeTheEstimateBetter) {

@@ -66,6 +66,7 @@ struct SceneOptions {
   double first_estimate_off = 0.;  ///< rad, m, also of the calibration
   double sigma_theta = 0.005, sigma_p = 0.02;
   double image_off_s = 0.;  ///< images of camera j are (j + 1) times as late as their clones
+  double line_delay_s = 0.;
 };
 
 /// An estimate (or the truth) of a window, with landmarks. Columns: 15 of the IMU, extrinsics of
@@ -119,23 +120,31 @@ struct Scene : viwo::testing::UpdateHost {
 
   /// Stamp of the image of a clone, for the clock that was declared.
   std::int64_t stamp_ns(std::size_t clone, std::size_t j) {
-    const double offset_s = static_cast<double>(j + 1) * image_off_s;
-    return clones[clone].t_ns + std::llround(1e9 * (offset_s - rig().cameras()[j].camera.t_CtoI_s));
+    const CameraView& declared = rig().cameras()[j].camera;
+    const double offset_s =
+        static_cast<double>(j + 1) * image_off_s - declared.t_CtoI_s - declared.middle_s();
+    return clones[clone].t_ns + std::llround(1e9 * offset_s);
   }
 
-  /// Pixel of a landmark by the estimates, in an image with a stamp; false when there is none.
-  bool predict(std::size_t clone, std::size_t j, std::int64_t stamp_ns,
+  /// Pixel of a landmark by the estimates, in row `v_px` of an image with a stamp, where there is a
+  /// rolling shutter; false when there is none.
+  bool predict(std::size_t clone, std::size_t j, std::int64_t stamp_ns, double v_px,
                const Eigen::Vector3d& p_FinG, Eigen::Vector2d& uv) {
     const CameraView c = camera(j);
     const CloneState& at = clones[clone];
-    const double dt = seconds_between(at.t_ns, stamp_ns) + c.t_CtoI_s;
+    const double dt = seconds_between(at.t_ns, stamp_ns) + c.t_CtoI_s + v_px * c.line_delay_s;
     const Eigen::Vector3d v_IinI = at.R_GtoI_fej * at.v_IinG;  // kept in I
     const Eigen::Vector3d p_IinG = at.p_IinG + dt * (at.R_GtoI.transpose() * v_IinI);
     const Eigen::Matrix3d R_GtoI = exp_so3(-dt * at.w_IinI) * at.R_GtoI;
     return project(c, c.R_ItoC * (R_GtoI * (p_FinG - p_IinG)) + c.p_IinC, uv);
   }
   bool see(std::size_t clone, std::size_t j, const Eigen::Vector3d& p_FinG, Eigen::Vector2d& uv) {
-    return predict(clone, j, stamp_ns(clone, j), p_FinG, uv) && in_image(camera(j), uv);
+    uv.y() = 0.5 * camera(j).height_px;
+    // The row that sees it is the one that it is seen in.
+    for (int i = 0; i < 20; ++i) {
+      if (!predict(clone, j, stamp_ns(clone, j), uv.y(), p_FinG, uv)) return false;
+    }
+    return in_image(camera(j), uv);
   }
 };
 
@@ -165,6 +174,7 @@ inline std::vector<CameraPrior> make_cameras(const SceneOptions& options, Random
     prior.camera = make_camera(options.distortion);
     prior.camera.R_ItoC = exp_so3(0.05 * normal3(random));
     prior.camera.p_IinC = Eigen::Vector3d(-0.2 * j, 0., 0.) + 0.02 * normal3(random);
+    prior.camera.line_delay_s = options.line_delay_s;
     if (!options.calibrates) continue;
     prior.camera.t_CtoI_s = 0.01 + 0.002 * j;
     prior.sigma_extrinsics.setConstant(0.002);

@@ -68,7 +68,7 @@ void VisualFeatures::declare(Declarations& host) {
   blocks_.clear();
   for (int i = 0; i < images.per_instant; ++i) {
     const CameraBlocks& blocks = blocks_.emplace_back(declare_camera(host, i));
-    images.clocks.push_back({blocks.clock_constant_s, blocks.clock});
+    images.clocks.push_back({blocks.middle_constant_s, blocks.clock});
   }
   images_ = host.stream(images);
   if (params_.max_landmarks > 0) {

@@ -33,7 +33,7 @@ struct WindowClone {
   Eigen::Vector3d w_IinI, v_IinG;  ///< then, with what its epoch measured
 };
 
-/// A camera at the time of its image that belongs to a clone.
+/// A camera at the time of its image that belongs to a clone, or of one row of it.
 struct CameraPose {
   Eigen::Matrix3d R_GtoC, R_GtoC_fej;
   Eigen::Vector3d p_CinG, p_CinG_fej;
@@ -81,7 +81,13 @@ class Window {
   int clone_in_slot(int slot) const { return index_of_slot_[static_cast<std::size_t>(slot)]; }
   const WindowCamera& camera(int index) const { return cameras_[static_cast<std::size_t>(index)]; }
   int n_cameras() const { return static_cast<int>(cameras_.size()); }
-  const CameraPose& pose(int clone, int camera) const { return poses_[image_index(clone, camera)]; }
+  /// When row `v_px` was exposed. `own` is where that of a rolling shutter is made.
+  const CameraPose& pose(int clone, int camera, double v_px, CameraPose& own) const {
+    const CameraView& view = this->camera(camera).view;
+    if (view.line_delay_s == 0.) return poses_[image_index(clone, camera)];
+    own = make_pose(clone, camera, seconds_to_image(clone, camera) + view.after_middle_s(v_px));
+    return own;
+  }
 
   const FilterView& filter() const { return filter_; }
   /// Covariance of the factor's columns, all of it, in their order. Copied at the first call after
@@ -100,7 +106,7 @@ class Window {
   void set_clones();
   void set_cameras();
   void set_columns();
-  /// Time from a clone to an image of it.
+  /// Time from a clone to the middle row of an image of it.
   double seconds_to_image(int clone, int camera) const;
   CameraPose make_pose(int clone, int camera, double dt_s) const;
 

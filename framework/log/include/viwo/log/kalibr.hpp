@@ -13,7 +13,7 @@ namespace viwo::log {
 /// equidistant, intrinsics, distortion_coeffs, resolution, and the place on the IMU as T_cam_imu
 /// (p_C = T_cam_imu p_I), T_imu_cam, or T_cn_cnm1 after a camera whose place is known. Rotations
 /// may be off by 1e-3 (rounding in the file) and are made exact. timeshift_cam_imu [s] becomes
-/// t_CtoI_s.
+/// t_CtoI_s, line_delay_nanoseconds (of a rolling shutter, from row to row) line_delay_s.
 /// InputError with all that is wrong, one line "file:line:column  what" each.
 std::vector<CameraView> read_kalibr_cameras(const std::filesystem::path& file);
 

@@ -34,7 +34,14 @@ struct CameraView {
   Eigen::Matrix<double, 8, 1> intrinsics = Eigen::Matrix<double, 8, 1>::Zero();
   Eigen::Matrix3d R_ItoC = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_IinC = Eigen::Vector3d::Zero();
-  double t_CtoI_s = 0.;  ///< t_imu = t_camera + t_CtoI
+  double t_CtoI_s = 0.;  ///< t_imu = t_camera + t_CtoI, of the first row
+  /// From one row to the next one below; 0: a global shutter. Row v: t_imu = t_camera + t_CtoI +
+  /// v * line_delay.
+  double line_delay_s = 0.;
+
+  /// From the first row to the one in the middle, and from there to row `v_px`.
+  double middle_s() const { return 0.5 * line_delay_s * (height_px - 1); }
+  double after_middle_s(double v_px) const { return v_px * line_delay_s - middle_s(); }
 };
 
 /// A camera of the configuration with the prior of its calibration; zeros hold entries.
@@ -53,6 +60,8 @@ struct CameraBlocks {
   BlockId intrinsics;            ///< fx, fy, cx, cy, distortion
   BlockId clock;                 ///< t_CtoI of this camera or, if it shares its clock, of camera 0
   double clock_constant_s = 0.;  ///< what this camera's t_CtoI is more than the block's
+  /// The same of the middle row: the StreamSpec::Clock of its images, whose clones are there.
+  double middle_constant_s = 0.;
 
   /// `camera` with what is estimated.
   VIWO_API void read(const FilterView& filter, CameraView& camera) const;

@@ -30,6 +30,7 @@ struct CalibratedCamera {
   CameraDistortion distortion = CameraDistortion::kRadtan;
   int width_px = 0;
   int height_px = 0;
+  double line_delay_s = 0.;
   config::Mark mark = {};  ///< where it is written
 };
 

@@ -13,10 +13,14 @@
 
 namespace viwo::sim {
 
-/// Where a camera is.
+/// Where a camera is, and how it moves: that is for the rows of a rolling shutter.
 struct CameraPose {
   Eigen::Matrix3d R_CtoG = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_CinG = Eigen::Vector3d::Zero();
+  Eigen::Vector3d v_CinG = Eigen::Vector3d::Zero();  ///< m/s
+  Eigen::Vector3d w_CinC = Eigen::Vector3d::Zero();  ///< rad/s
+
+  CameraPose after(double dt_s) const;
 };
 
 /// What a sensor makes of the light.
@@ -35,7 +39,7 @@ class ImageRenderer {
 
   /// Every pixel is what its ray meets first, smoothed as Texture does it for the pixel's size;
   /// pixels that no direction projects to are black. The camera must be inside the room and outside
-  /// of all blocks. Memory of `out` is used again.
+  /// of all blocks. Memory of `out` is used again. `pose`: of the middle row (IMG-11).
   void render(const CameraPose& pose, const Exposure& exposure, Image& out) const;
 
  private:
@@ -46,7 +50,7 @@ class ImageRenderer {
   };
   /// Pixels that are looked at together, in a cone.
   struct Tile {
-    int x = 0, y = 0;  ///< first pixel
+    int x = 0, y = 0, height = 0;  ///< first pixel, rows
     Eigen::Vector3f axis = Eigen::Vector3f::UnitZ();
     float half_angle = 0.F;  ///< rad
   };
@@ -54,7 +58,11 @@ class ImageRenderer {
 
   void make_rays(const CameraView& camera, double vignette);
   void make_tiles();
+  /// Calls `act` for each tile, with the painter at the pose of its rows.
+  template <class Act>
+  void each_tile(const CameraPose& pose, Painter& painter, const Act& act) const;
 
+  CameraView camera_;
   int width_px_ = 0;
   int height_px_ = 0;
   std::shared_ptr<const TexturedRoom> room_;

@@ -62,7 +62,7 @@ std::vector<CameraView> true_cameras(const TrueCameraParams& params,
 /// .d1 .. .d4 and .t_CtoI.
 std::vector<CalibrationSample> camera_truth(std::span<const CameraView> cameras, std::int64_t t_ns);
 
-/// Stamp in the camera's own clock.
+/// Stamp in the camera's own clock of the image whose middle row is of that time.
 std::int64_t camera_stamp_ns(const CameraView& camera, std::int64_t t_imu_ns);
 
 }  // namespace viwo::sim

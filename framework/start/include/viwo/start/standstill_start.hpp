@@ -11,7 +11,7 @@
 namespace viwo {
 
 struct StandstillOptions : StartOptions {
-  std::vector<double> t_CtoI_s = {};  ///< by camera: t_imu = t_camera + t_CtoI
+  std::vector<double> t_CtoI_s = {};  ///< by camera, of the middle row: t_imu = t_camera + t_CtoI
   std::vector<double> t_OtoI_s = {};  ///< by wheel set, likewise
 };
 
