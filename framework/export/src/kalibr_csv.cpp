@@ -83,7 +83,8 @@ Exported to_kalibr(const Robot& robot) {
 Exported to_csv(const Robot& robot) {
   Lost lost(robot);
   lost.add("correlations");
-  if (!robot.cameras.empty()) lost.add("distortion models and resolutions of the cameras");
+  if (!robot.cameras.empty())
+    lost.add("distortion models, resolutions and shutters of the cameras");
   std::string text = head(robot, lost.texts(), "# ") + "name,value,sigma,unit\n";
   const CalibrationFile& file = *robot.file;
   for (const auto* entries :

@@ -15,6 +15,7 @@ namespace viwo {
 /// Of the last images. Threads of sensors note, the estimator's asks.
 class ImageArrivals {
  public:
+  /// `t_ns`: by the clock of the IMU.
   void note(std::int64_t t_ns) {
     const std::scoped_lock lock(mutex_);
     seen_.emplace_back(t_ns, Clock::now());
@@ -38,7 +39,7 @@ class ImageArrivals {
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kMost = 64;
-  /// Clocks of cameras are nearer to that of the IMU than this.
+  /// Clocks of cameras are nearer to what is configured of them than this.
   static constexpr std::int64_t kMaxClockOffsetNs = 50'000'000;
 
   std::mutex mutex_;

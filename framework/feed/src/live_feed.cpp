@@ -28,6 +28,7 @@
 #include "live_samples.hpp"
 #include "viwo/feed/estimate_sample.hpp"
 #include "viwo/feed/feed.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo {
 namespace {
@@ -239,7 +240,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     read(stream, [&](const Measurement& measurement) {
       const auto* image = measurement.get_if<ImageSample>();
       if (image == nullptr) return true;
-      arrivals_of_images_.note(image->t_ns);
+      arrivals_of_images_.note(imu_ns(*image));
       for (const Worker& worker : workers_) {
         if (worker.stream.input_name == stream.name) worker.input->push(*image);
       }
@@ -249,6 +250,14 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     for (const Worker& worker : workers_) {
       if (worker.stream.input_name == stream.name) worker.input->end();
     }
+  }
+
+  /// When an image was taken, by the clock of the IMU as far as it is configured.
+  std::int64_t imu_ns(const ImageSample& image) const {
+    const auto camera = static_cast<std::size_t>(image.camera);
+    if (!setup_.filter || camera >= setup_.filter->cameras.size()) return image.t_ns;
+    const CameraView& view = setup_.filter->cameras[camera].camera;
+    return image.t_ns + to_ns(view.t_CtoI_s + view.middle_s());
   }
 
   void work(Worker& worker) {

@@ -13,6 +13,7 @@
 #include "viwo/camera/camera_model.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/math/stamp.hpp"
 
 namespace viwo::series {
 namespace {
@@ -25,14 +26,19 @@ class TurnFinder {
   explicit TurnFinder(const CameraView& camera) : camera_(camera) {}
 
   void add(const FeatureSample& sample, CameraTurns& out) {
-    std::unordered_map<std::int64_t, Eigen::Vector3d> rays;
+    std::unordered_map<std::int64_t, Sight> rays;
     for (const FeaturePoint& point : sample.points) {
-      if (const auto ray = unproject(camera_, {point.u_px, point.v_px})) rays[point.id] = *ray;
+      if (const auto ray = unproject(camera_, {point.u_px, point.v_px})) {
+        rays[point.id] = {*ray, camera_.after_middle_s(point.v_px)};
+      }
     }
     std::vector<Pair> pairs;
-    for (const auto& [id, ray] : rays) {
+    double before_s = 0., now_s = 0.;  // of the rows of a rolling shutter, sums
+    for (const auto& [id, sight] : rays) {
       if (const auto before = rays_.find(id); before != rays_.end()) {
-        pairs.push_back({before->second, ray});
+        pairs.push_back({before->second.ray, sight.ray});
+        before_s += before->second.after_s;
+        now_s += sight.after_s;
       }
     }
     const double dt_s = seconds_between(t_ns_, sample.t_ns);
@@ -41,7 +47,8 @@ class TurnFinder {
       const auto n = static_cast<double>(pairs.size());
       // The points stand still: they turn in C against the camera.
       const Eigen::Matrix3d R = rotation(pairs);
-      out.turns.push_back({t_ns_, sample.t_ns, -log_so3(R) / dt_s});
+      out.turns.push_back({t_ns_ + to_ns(before_s / n), sample.t_ns + to_ns(now_s / n),
+                           -log_so3(R) / (dt_s + (now_s - before_s) / n)});
       out.points.push_back(n);
       // Further than what is near moves from image to image.
       constexpr double kFar = 0.25;
@@ -55,6 +62,10 @@ class TurnFinder {
   }
 
  private:
+  struct Sight {
+    Eigen::Vector3d ray;
+    double after_s;  ///< the middle row
+  };
   struct Pair {
     Eigen::Vector3d before, now;
   };
@@ -125,7 +136,7 @@ class TurnFinder {
 
   CameraView camera_;
   std::int64_t t_ns_ = 0;
-  std::unordered_map<std::int64_t, Eigen::Vector3d> rays_;
+  std::unordered_map<std::int64_t, Sight> rays_;
 };
 
 /// A sensor and its next measurement.

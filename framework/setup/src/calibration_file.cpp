@@ -71,7 +71,7 @@ struct CameraParams {
     b(VIWO_PARAM(resolution),
       {.unit = "px", .min = 1., .max = 100'000., .required = true, .help = "width, height"});
     b(VIWO_PARAM(line_delay_nanoseconds),
-      {.unit = "ns", .min = 0., .help = "from row to row; 0: a global shutter"});
+      {.unit = "ns", .min = 0., .max = 1e7, .help = "from row to row; 0: a global shutter"});
   }
 };
 

@@ -249,8 +249,11 @@ SimulatedFeatures simulate_features(const BodyTrajectory& trajectory, const Moun
       images[c].camera = static_cast<int>(c);
     }
     const ImuAfter imu_after = [&](double after_s) {
-      const double t_s = static_cast<double>(t_ns) * 1e-9 + after_s;
-      return trajectory.imu(std::clamp(t_s, trajectory.begin_s(), trajectory.end_s()), mounting);
+      const double middle_s = static_cast<double>(t_ns) * 1e-9;
+      if (after_s == 0.) return trajectory.imu(middle_s, mounting);
+      // Rows before the begin and behind the end are those of a body at rest.
+      const double t_s = std::clamp(middle_s + after_s, trajectory.begin_s(), trajectory.end_s());
+      return trajectory.imu(t_s, mounting);
     };
     for (const Sighting& sighting : field.look(imu_after)) {  // (SIM-9)
       Vector2d uv = sighting.uv;

@@ -126,7 +126,7 @@ TEST_P(EachCamera, EachRowOfARollingShutterHasItsOwnTime) {
       most_off_px = std::max(most_off_px, (measured - seen_at(middle, point.id)).norm());
     }
   }
-  EXPECT_GT(most_off_px, 2.);
+  EXPECT_GT(most_off_px, 1.);
 }
 
 TEST_P(EachCamera, ImagesAreFullAndTheirTimesFallBetweenImuSamples) {

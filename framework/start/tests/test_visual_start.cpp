@@ -154,6 +154,7 @@ TEST(VisualStart, IsConsistentThroughARollingShutterThatIsKnown) {
   told.cameras.front().camera.t_CtoI_s += camera.middle_s();
   const Consistency not_known = fly(rolling, flown, 1., told);
   EXPECT_FALSE(not_known.holds()) << not_known.nees << " of 11";
+  EXPECT_GT(not_known.starts, kFlights / 2);
 }
 
 TEST(VisualStart, ConsistencyCheckSeesCovariancesAndCalibrationsThatAreWrong) {

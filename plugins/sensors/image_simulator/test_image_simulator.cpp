@@ -112,6 +112,66 @@ TEST(ImageSimulator, ImagesStandAtTheStampsOfTheSimulatorsCameras) {
   }
 }
 
+/// A robot in motion, and its gyro; `after_s` moves it as it moves.
+std::vector<Measurement> in_motion(double after_s, bool with_gyro) {
+  const Eigen::Vector3d v(0.8, -0.3, 0.1), w(0.4, -0.2, 1.1), bias(0.02, -0.01, 0.03);
+  std::vector<Measurement> out = states(1);
+  out.erase(out.begin());  // the state only
+  StateSample state;
+  state.t_ns = 2'100'000'000;
+  const Eigen::Quaterniond q(Eigen::AngleAxisd(0.3, Eigen::Vector3d(0.1, 0.2, 1.).normalized()));
+  const Eigen::Vector3d turn = after_s * w;
+  const Eigen::Quaterniond turned =
+      q * Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
+  const Eigen::Vector3d p = Eigen::Vector3d(0.1, 0.05, 0.15) + after_s * v;
+  state.q_ItoG_xyzw = {turned.x(), turned.y(), turned.z(), turned.w()};
+  state.p_IinG_m = {p.x(), p.y(), p.z()};
+  state.v_IinG_m_per_s = {v.x(), v.y(), v.z()};
+  state.gyro_bias_rad_per_s = {bias.x(), bias.y(), bias.z()};
+  const Eigen::Vector3d gyro = w + bias;
+  for (int k = -4; with_gyro && k <= 0; ++k) {
+    out.emplace_back(ImuSample{state.t_ns + 5'000'000 * k, {gyro.x(), gyro.y(), gyro.z()}, {}});
+  }
+  out.emplace_back(state);
+  return out;
+}
+
+TEST(ImageSimulator, RowsOfARollingShutterAreSeenOneAfterTheOther) {
+  const std::string folder = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/cameras/";
+  const auto of = [&](const std::string& file) {
+    return "{type: image_simulator, texture_size_px: 256, boxes: 0, n_cameras: 2, sigma_grey: 0, "
+           "room_size_m: [8, 7], room_centre_m: [0, 0], cameras: " +
+           folder + file + "}";
+  };
+  const std::string rolling = of("rolling_shutter.yaml"), global = of("t265_like.yaml");
+  const auto images_of = images(rolling, in_motion(0., true));
+  ASSERT_EQ(images_of.size(), 2U);
+  for (std::size_t camera = 0; camera < 2; ++camera) {
+    EXPECT_EQ(images_of[camera].t_ns, 2'100'000'000 - 11'985'000);
+    const Image image = pixels_of(images_of[camera]);
+    for (const int row : {20, 399, 780}) {
+      const double after_s = 3e-5 * (row - 399.5);
+      const auto row_of = [&](double s) {
+        Image then = pixels_of(images(global, in_motion(s, true))[camera]);
+        const auto begin = then.pixels.begin() + std::ptrdiff_t{848} * row;
+        return std::vector<std::uint8_t>(begin, begin + 848);
+      };
+      const auto begin = image.pixels.begin() + std::ptrdiff_t{848} * row;
+      const std::vector<std::uint8_t> seen(begin, begin + 848);
+      const auto difference = [&](const std::vector<std::uint8_t>& other) {
+        double sum = 0.;
+        for (std::size_t u = 0; u < seen.size(); ++u) sum += std::abs(double(seen[u]) - other[u]);
+        return sum / static_cast<double>(seen.size());
+      };
+      EXPECT_LT(difference(row_of(after_s)), 0.5) << "row " << row;
+      if (row != 399) EXPECT_GT(difference(row_of(-after_s)), 3.) << "row " << row;
+    }
+  }
+  EXPECT_EQ(refusal(rolling, in_motion(0., false)),
+            "the input gives no IMU samples at its true states: images of a rolling shutter "
+            "(line_delay_nanoseconds of the cameras) need them");
+}
+
 TEST(ImageSimulator, TheFirstStateHasImagesOnlyIfAskedFor) {
   EXPECT_EQ(images(config(""), states(4)).size(), 3U);
   EXPECT_EQ(images(config("n_cameras: 2"), states(4)).size(), 6U);

@@ -43,13 +43,17 @@ std::vector<CameraView> read_cameras(const Params& params) {
   cameras.resize(asked > 0 ? asked : std::min<std::size_t>(cameras.size(), kMaxCameras));
   for (std::size_t i = 1; params.stereo && i < cameras.size(); i += 2) {
     const std::string names = "cam" + std::to_string(i - 1) + " and cam" + std::to_string(i);
-    const double shift_s = std::abs(cameras[i].t_CtoI_s - cameras[i - 1].t_CtoI_s);
+    const CameraView &left = cameras[i - 1], &right = cameras[i];
+    // Of the first rows and of the last ones.
+    const double first_s = right.t_CtoI_s - left.t_CtoI_s;
+    const double last_s = first_s + 2. * (right.middle_s() - left.middle_s());
+    const double shift_s = std::max(std::abs(first_s), std::abs(last_s));
     if (shift_s > params.max_camera_dt_s) {
       throw ParamError("max_camera_dt_s", "timeshift_cam_imu of " + names + " differ by " +
                                               std::to_string(shift_s) + " s in " + file +
-                                              ": images of a pair must be taken at the same time");
+                                              " (line_delay_nanoseconds counted): " +
+                                              "images of a pair must be taken at the same time");
     }
-    const CameraView &left = cameras[i - 1], &right = cameras[i];
     const Eigen::Vector3d p_LinR =
         right.p_IinC - right.R_ItoC * left.R_ItoC.transpose() * left.p_IinC;
     if (p_LinR.norm() < kMinBaseline) {
