@@ -244,12 +244,12 @@ TEST_F(Registry, RefusesALibraryWithoutARecord) {
 }
 
 TEST_F(Registry, RefusesAnotherApiInTheRecord) {
-  const std::string version = std::to_string(kApiVersion);
-  EXPECT_EQ(reason(doctored("{api=" + version + ";", "{api=0;")),
+  const std::string version = std::to_string(kApiVersion), other(version.size(), '9');
+  EXPECT_EQ(reason(doctored("{api=" + version + ";", "{api=" + other + ";")),
             "is built differently from this host\n"
             "  api: host " +
-                version +
-                ", plugin 0\n"
+                version + ", plugin " + other +
+                "\n"
                 "  -> it is for another version of the plugin API: rebuild it against this viwo");
 }
 
