@@ -73,7 +73,7 @@ std::string class_name(const std::string& name) {
 
 fs::path template_folder() {
   std::error_code error;
-  const fs::path folder = installation_prefix() / "share/viwo/templates";
+  fs::path folder = installation_prefix() / "share/viwo/templates";
   if (!fs::is_directory(folder, error)) {
     throw InputError("viwo plugins new: no templates in " + folder.string() +
                      " - they come with the Debian package viwo-dev");

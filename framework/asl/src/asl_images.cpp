@@ -109,7 +109,7 @@ class CameraTable {
 
 fs::path image_name(const TableReader& table, std::size_t column) {
   if (table.text(column).empty()) table.fail(column, "is empty");
-  const fs::path name = table.text(column);
+  fs::path name = table.text(column);
   if (name.is_absolute() || std::find(name.begin(), name.end(), "..") != name.end()) {
     table.fail(column, quoted(table.text(column)) + " leads out of the folder of the images");
   }

@@ -149,7 +149,7 @@ CalibrationSetup read_calibration_setup(const std::filesystem::path& path,
   errors.throw_if_any();
   CalibrationSetup setup;
   setup.name = params.calibration;
-  setup.options = params;
+  setup.options = static_cast<const CalibrationOptions&>(params);
   setup.plugins = &plugins;
   if (setup.options.segment_s > 0. && setup.options.segments == Segments::kAuto) {
     setup.options.segments = Segments::kLength;

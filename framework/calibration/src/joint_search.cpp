@@ -59,6 +59,7 @@ std::vector<TurningSample> pick_samples(const CalibrationSetup& setup,
 /// What the rows leave when the turn of the base is known and its velocity is not: for TinySolver.
 class SearchCost {
  public:
+  // NOLINTBEGIN(readability-identifier-naming): as TinySolver calls them.
   using Scalar = double;
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = Eigen::Dynamic };
 
@@ -80,6 +81,7 @@ class SearchCost {
   int NumResiduals() const {
     return static_cast<int>(samples_.size()) * model_.n_rows() + NumParameters();
   }
+  // NOLINTEND(readability-identifier-naming)
 
   bool operator()(const double* parameters, double* residuals, double* jacobian) const {
     const Intrinsics x = Eigen::Map<const Eigen::VectorXd>(parameters, NumParameters());

@@ -1,8 +1,9 @@
 #include "bench.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 
 #include <Eigen/QR>
 
@@ -27,8 +28,8 @@ bool same(const Matrix& a, const Matrix& b) {
   return a.rows() == b.rows() && a.cols() == b.cols() && [&] {
     for (Eigen::Index j = 0; j < a.cols(); ++j) {
       for (Eigen::Index i = 0; i < a.rows(); ++i) {
-        const double left = a(i, j), right = b(i, j);
-        if (std::memcmp(&left, &right, sizeof(double)) != 0) return false;
+        const auto bits = [](double value) { return std::bit_cast<std::uint64_t>(value); };
+        if (bits(a(i, j)) != bits(b(i, j))) return false;
       }
     }
     return true;

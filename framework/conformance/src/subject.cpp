@@ -51,7 +51,7 @@ Node made_up(const ParamSpec& spec, int n) {
     for (int j = 0; j < count; ++j) node.items().push_back(Node::scalar_of(item(j)));
     return node;
   };
-  const std::string choice = spec.choices.empty() ? "a" : config::choices_of(spec).front();
+  std::string choice = spec.choices.empty() ? "a" : config::choices_of(spec).front();
   switch (spec.type) {
     case ParamType::kBool:
       return Node::scalar_of("true");
