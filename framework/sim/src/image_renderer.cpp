@@ -412,9 +412,9 @@ void ImageRenderer::render(const CameraPose& pose, const Exposure& exposure, Ima
     // Every pixel takes its draw, whether it has a ray or not (IMG-7).
     bits = i % 5 == 0 ? random() : bits >> NormalTable::kBits;
     const float value = gain * painter.grey()[i] + sigma * kNormal[bits];
-    out.pixels[i] = rays_[i].angle > 0.F
-                        ? static_cast<std::uint8_t>(std::clamp(value, 0.F, 255.F) + 0.5F)
-                        : std::uint8_t{0};
+    // NOLINTNEXTLINE(bugprone-incorrect-roundings): it is positive
+    const auto grey = static_cast<std::uint8_t>(std::clamp(value, 0.F, 255.F) + 0.5F);
+    out.pixels[i] = rays_[i].angle > 0.F ? grey : std::uint8_t{0};
   }
 }
 
