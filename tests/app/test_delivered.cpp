@@ -139,30 +139,36 @@ TEST_F(DeliveredTest, ConfigurationsWithTyres) {
   for (const auto& variant : variants) EXPECT_EQ(variant.at("runs"), 1);
 }
 
-TEST_F(DeliveredTest, ExperimentWithTwoPairsOfCameras) {
-  expect_done({"experiment", kConfigFolder + "experiments/four_cameras.yaml", "--seeds", "1",
-               "--out", "cameras", "--set", "sensors.simulator0.duration_s=1.5", "--set",
-               "sensors.images0.texture_size_px=512"});
-  const nlohmann::json variants = summary("cameras").at("variants");
+/// Experiments on rendered images, for a second and a half.
+class DeliveredWithImagesTest : public DeliveredTest {
+ protected:
+  nlohmann::json variants_of(const std::string& experiment) {
+    expect_done({"experiment", kConfigFolder + "experiments/" + experiment + ".yaml", "--seeds",
+                 "1", "--out", experiment, "--set", "sensors.simulator0.duration_s=1.5", "--set",
+                 "sensors.images0.texture_size_px=512"});
+    return summary(experiment).at("variants");
+  }
+  static double mean(const nlohmann::json& variant, const char* metric) {
+    return variant.at("metrics").at(metric).at("mean").get<double>();
+  }
+};
+
+TEST_F(DeliveredWithImagesTest, TwoPairsOfCameras) {
+  const nlohmann::json variants = variants_of("four_cameras");
   EXPECT_EQ(variants.size(), 2U);
   for (const auto& variant : variants) {
     EXPECT_EQ(variant.at("runs"), 1);
-    EXPECT_LT(variant.at("metrics").at("ate_m").at("mean").get<double>(), 0.01);
+    EXPECT_LT(mean(variant, "ate_m"), 0.01);
   }
 }
 
-TEST_F(DeliveredTest, ExperimentWithRollingShutters) {
-  expect_done({"experiment", kConfigFolder + "experiments/rolling_shutter.yaml", "--seeds", "1",
-               "--out", "shutters", "--set", "sensors.simulator0.duration_s=1.5", "--set",
-               "sensors.images0.texture_size_px=512"});
-  const nlohmann::json variants = summary("shutters").at("variants");
+TEST_F(DeliveredWithImagesTest, RollingShutters) {
+  const nlohmann::json variants = variants_of("rolling_shutter");
   ASSERT_EQ(variants.size(), 3U);
-  const auto mean = [&](const char* variant, const char* metric) {
-    return variants.at(variant).at("metrics").at(metric).at("mean").get<double>();
-  };
-  EXPECT_LT(mean("rolling", "ate_m"), 1.2 * mean("global", "ate_m"));
-  EXPECT_LT(mean("rolling", "nees_relative"), 1.2 * mean("global", "nees_relative"));
-  EXPECT_GT(mean("not_known", "nees_relative"), 3. * mean("global", "nees_relative"));
+  const auto &global = variants.at("global"), &rolling = variants.at("rolling");
+  EXPECT_LT(mean(rolling, "ate_m"), 1.2 * mean(global, "ate_m"));
+  EXPECT_LT(mean(rolling, "nees_relative"), 1.2 * mean(global, "nees_relative"));
+  EXPECT_GT(mean(variants.at("not_known"), "nees_relative"), 3. * mean(global, "nees_relative"));
 }
 
 TEST_F(DeliveredTest, ConfigurationForOpenVinsMeasurements) {

@@ -257,7 +257,7 @@ class LiveFeed final : public std::enable_shared_from_this<LiveFeed> {
     const auto camera = static_cast<std::size_t>(image.camera);
     if (!setup_.filter || camera >= setup_.filter->cameras.size()) return image.t_ns;
     const CameraView& view = setup_.filter->cameras[camera].camera;
-    return image.t_ns + to_ns(view.t_CtoI_s + view.middle_s());
+    return image.t_ns + to_ns(view.image_offset_s());
   }
 
   void work(Worker& worker) {

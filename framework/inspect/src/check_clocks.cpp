@@ -257,7 +257,7 @@ void check_camera_clocks(const Recording& recording, Findings& out) {
     }
     check_tracks(recording, camera, label, out);
     const auto turns = shifted(rotated(camera.turns, prior.camera.R_ItoC.transpose()),
-                               prior.camera.t_CtoI_s + prior.camera.middle_s());
+                               prior.camera.image_offset_s());
     const RateGrid a(span.begin_ns, span.end_ns, gyro), b(span.begin_ns, span.end_ns, turns);
     const auto R = rotation_between(a, b);
     const double angle = R ? log_so3(*R).norm() * 180. / std::numbers::pi : NAN;

@@ -61,7 +61,7 @@ Initializer from_standstill(const Estimator& estimator, const FilterSetup& setup
   for (std::size_t i = 0; i < setup.wheels.size(); ++i) wheels.push_back(estimator.extra(i));
   StandstillOptions options{start_options(setup)};
   for (const CameraPrior& camera : setup.cameras) {
-    options.t_CtoI_s.push_back(camera.camera.t_CtoI_s + camera.camera.middle_s());
+    options.t_CtoI_s.push_back(camera.camera.image_offset_s());
   }
   for (const auto& set : setup.wheels) options.t_OtoI_s.push_back(set.prior.wheels.t_OtoI_s);
   std::optional<StreamId> tracks;

@@ -10,6 +10,7 @@
 
 #include <Eigen/LU>
 
+#include "normal_table.hpp"
 #include "viwo/camera/camera_model.hpp"
 #include "viwo/math/so3.hpp"
 
@@ -122,39 +123,6 @@ constexpr std::array<std::array<float, 2>, 8> kEdgeSamples{{{-0.6875F, 0.0625F},
                                                             {0.4375F, 0.1875F},
                                                             {0.6875F, -0.0625F}}};
 
-/// Quantiles of the standard normal distribution, scaled to unit variance: fast noise.
-class NormalTable {
- public:
-  static constexpr int kBits = 12;
-  NormalTable() {
-    double sum = 0.;
-    for (std::size_t i = 0; i < values_.size(); ++i) {
-      const double x =
-          quantile((static_cast<double>(i) + 0.5) / static_cast<double>(values_.size()));
-      values_[i] = static_cast<float>(x);
-      sum += x * x;
-    }
-    const auto scale = static_cast<float>(std::sqrt(static_cast<double>(values_.size()) / sum));
-    for (float& value : values_) value *= scale;
-  }
-  float operator[](std::uint64_t bits) const { return values_[bits & (values_.size() - 1)]; }
-
- private:
-  static double quantile(double p) {
-    double x = 0.;
-    for (int i = 0; i < 100; ++i) {  // Newton's method
-      const double error = 0.5 * std::erfc(-x / std::sqrt(2.)) - p;
-      const double slope = std::exp(-0.5 * x * x) / std::sqrt(2. * M_PI);
-      const double step = std::clamp(error / slope, -0.5, 0.5);
-      x -= step;
-      if (std::abs(step) < 1e-12) break;
-    }
-    return x;
-  }
-
-  std::array<float, std::size_t{1} << kBits> values_{};
-};
-
 }  // namespace
 
 /// One image at work.
@@ -162,8 +130,8 @@ class ImageRenderer::Painter {
  public:
   explicit Painter(const ImageRenderer& renderer)
       : rays_(renderer.rays_),
-        width_(renderer.width_px_),
-        height_(renderer.height_px_),
+        width_(renderer.camera_.width_px),
+        height_(renderer.camera_.height_px),
         world_(*renderer.room_),
         grey_(rays_.size(), 0.F),
         faces_(rays_.size(), kNothing) {}
@@ -315,24 +283,22 @@ void ImageRenderer::Painter::smooth_edges(const Tile& tile) {
 
 ImageRenderer::ImageRenderer(const CameraView& camera, std::shared_ptr<const TexturedRoom> room,
                              double vignette)
-    : camera_(camera),
-      width_px_(camera.width_px),
-      height_px_(camera.height_px),
-      room_(std::move(room)) {
-  make_rays(camera, vignette);
+    : camera_(camera), room_(std::move(room)) {
+  make_rays(vignette);
   make_tiles();
 }
 
-void ImageRenderer::make_rays(const CameraView& camera, double vignette) {
-  const Vector2d middle(0.5 * (width_px_ - 1), 0.5 * (height_px_ - 1));
-  rays_.resize(static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_));
+void ImageRenderer::make_rays(double vignette) {
+  const Vector2d middle(0.5 * (camera_.width_px - 1), 0.5 * (camera_.height_px - 1));
+  rays_.resize(static_cast<std::size_t>(camera_.width_px) *
+               static_cast<std::size_t>(camera_.height_px));
   std::size_t i = 0;
-  for (int v = 0; v < height_px_; ++v) {
-    for (int u = 0; u < width_px_; ++u, ++i) {
-      const std::optional<Vector3d> ray = unproject(camera, Vector2d(u, v));
+  for (int v = 0; v < camera_.height_px; ++v) {
+    for (int u = 0; u < camera_.width_px; ++u, ++i) {
+      const std::optional<Vector3d> ray = unproject(camera_, Vector2d(u, v));
       Vector2d uv;
       PixelJacobian J;
-      if (!ray || !project(camera, *ray, uv, J)) continue;
+      if (!ray || !project(camera_, *ray, uv, J)) continue;
       // The pixel's larger extent: over the smaller singular value of J, whose third, along the
       // ray, is zero.
       const Eigen::Matrix2d JJ = J * J.transpose();
@@ -350,14 +316,14 @@ void ImageRenderer::make_rays(const CameraView& camera, double vignette) {
 void ImageRenderer::make_tiles() {
   // The rows of a tile are exposed at once.
   const int rows = camera_.line_delay_s > 0. ? 1 : kTile;
-  for (int y = 0; y < height_px_; y += rows) {
-    for (int x = 0; x < width_px_; x += kTile) {
-      Tile tile{x, y, std::min(rows, height_px_ - y)};
+  for (int y = 0; y < camera_.height_px; y += rows) {
+    for (int x = 0; x < camera_.width_px; x += kTile) {
+      Tile tile{x, y, std::min(rows, camera_.height_px - y)};
       Vector3f sum = Vector3f::Zero();
       const auto each = [&](const auto& act) {
         for (int v = y; v < y + tile.height; ++v) {
-          for (int u = x; u < std::min(x + kTile, width_px_); ++u) {
-            const Ray& ray = rays_[static_cast<std::size_t>(v * width_px_ + u)];
+          for (int u = x; u < std::min(x + kTile, camera_.width_px); ++u) {
+            const Ray& ray = rays_[static_cast<std::size_t>(v * camera_.width_px + u)];
             if (ray.angle > 0.F) act(Vector3f(ray.x, ray.y, ray.z), ray.angle);
           }
         }
@@ -400,8 +366,8 @@ void ImageRenderer::render(const CameraPose& pose, const Exposure& exposure, Ima
   Painter painter(*this);
   each_tile(pose, painter, [&](const Tile& tile) { painter.paint(tile); });
   each_tile(pose, painter, [&](const Tile& tile) { painter.smooth_edges(tile); });
-  out.width_px = width_px_;
-  out.height_px = height_px_;
+  out.width_px = camera_.width_px;
+  out.height_px = camera_.height_px;
   out.pixels.resize(rays_.size());
   static const NormalTable kNormal;
   std::mt19937_64 random(exposure.seed);

@@ -72,7 +72,7 @@ std::vector<CalibrationSample> camera_truth(std::span<const CameraView> cameras,
 }
 
 std::int64_t camera_stamp_ns(const CameraView& camera, std::int64_t t_imu_ns) {
-  return t_imu_ns - to_ns(camera.t_CtoI_s + camera.middle_s());
+  return t_imu_ns - to_ns(camera.image_offset_s());
 }
 
 }  // namespace viwo::sim

@@ -24,7 +24,7 @@ constexpr std::string_view kTooFewImages = "fewer images than start_window_s ask
 std::int64_t imu_stamp(const FeatureSample& sample, std::span<const CameraPrior> cameras) {
   const auto camera = static_cast<std::size_t>(sample.camera);
   const CameraView& view = cameras[camera].camera;
-  return sample.t_ns + to_ns(view.t_CtoI_s + view.middle_s());
+  return sample.t_ns + to_ns(view.image_offset_s());
 }
 
 /// Stamps of the images of the first camera that has any, from `begin_ns` to `end_ns`, thinned out

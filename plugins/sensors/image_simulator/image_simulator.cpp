@@ -297,15 +297,15 @@ class ImageSimulator final : public Sensor {
     for (std::size_t c = 0; c < renderers_.size(); ++c) {
       const CameraView& camera = options_.cameras[c];
       exposure.seed = noise_seed(c, state.t_ns);
-      sim::CameraPose pose = camera_pose(state, camera);
+      Eigen::Vector3d w_IinI = Eigen::Vector3d::Zero();
       if (camera.line_delay_s > 0.) {
-        const double half_s = std::max(camera.middle_s(), kLeastAround_s);
-        pose = camera_pose(state, camera, rate_at(state, imu, half_s));
+        w_IinI = rate_at(state, imu, std::max(camera.middle_s(), kLeastAround_s));
       }
       const std::int64_t t_ns = sim::camera_stamp_ns(camera, state.t_ns);  // (IMG-10)
       samples_.emplace_back(
           ImageSample{t_ns, static_cast<int>(c),
-                      std::make_shared<const RenderedImage>(renderers_[c], pose, exposure)});
+                      std::make_shared<const RenderedImage>(
+                          renderers_[c], camera_pose(state, camera, w_IinI), exposure)});
     }
   }
 

@@ -133,7 +133,7 @@ void Window::set_columns() {
 
 std::optional<int> Window::take_image(int camera, std::int64_t stamp_ns) {
   const CameraView& view = cameras_[static_cast<std::size_t>(camera)].view;
-  const double offset_s = view.t_CtoI_s + view.middle_s();
+  const double offset_s = view.image_offset_s();
   if (!std::isfinite(offset_s)) return std::nullopt;
   const std::int64_t t_ns = stamp_ns + to_ns(offset_s);
   const WindowClone* nearest = nullptr;
@@ -153,8 +153,8 @@ double Window::seconds_to_image(int clone, int camera) const {
   const WindowClone& at = this->clone(clone);
   const ImageStamp& stamp = stamps_[image_index(at.slot, camera)];
   if (stamp.clone_ns != at.t_ns) return 0.;
-  const CameraView& view = this->camera(camera).view;
-  const double dt_s = seconds_between(at.t_ns, stamp.stamp_ns) + view.t_CtoI_s + view.middle_s();
+  const double dt_s =
+      seconds_between(at.t_ns, stamp.stamp_ns) + this->camera(camera).view.image_offset_s();
   return std::abs(dt_s) < kStampResolutionS ? 0. : dt_s;
 }
 

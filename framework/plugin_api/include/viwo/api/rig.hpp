@@ -42,6 +42,8 @@ struct CameraView {
   /// From the first row to the one in the middle, and from there to row `v_px`.
   double middle_s() const { return 0.5 * line_delay_s * (height_px - 1); }
   double after_middle_s(double v_px) const { return v_px * line_delay_s - middle_s(); }
+  /// What is to be added to a stamp for the time of the middle row, where the image stands for.
+  double image_offset_s() const { return t_CtoI_s + middle_s(); }
 };
 
 /// A camera of the configuration with the prior of its calibration; zeros hold entries.

@@ -56,15 +56,13 @@ class ImageRenderer {
   };
   class Painter;
 
-  void make_rays(const CameraView& camera, double vignette);
+  void make_rays(double vignette);
   void make_tiles();
   /// Calls `act` for each tile, with the painter at the pose of its rows.
   template <class Act>
   void each_tile(const CameraPose& pose, Painter& painter, const Act& act) const;
 
   CameraView camera_;
-  int width_px_ = 0;
-  int height_px_ = 0;
   std::shared_ptr<const TexturedRoom> room_;
   std::vector<Ray> rays_;
   std::vector<Tile> tiles_;
