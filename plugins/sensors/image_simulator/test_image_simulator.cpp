@@ -164,7 +164,9 @@ TEST(ImageSimulator, RowsOfARollingShutterAreSeenOneAfterTheOther) {
         return sum / static_cast<double>(seen.size());
       };
       EXPECT_LT(difference(row_of(after_s)), 0.5) << "row " << row;
-      if (row != 399) EXPECT_GT(difference(row_of(-after_s)), 3.) << "row " << row;
+      if (row != 399) {  // 15 µs from the middle: nothing is told apart
+        EXPECT_GT(difference(row_of(-after_s)), 3.) << "row " << row;
+      }
     }
   }
   EXPECT_EQ(refusal(rolling, in_motion(0., false)),
