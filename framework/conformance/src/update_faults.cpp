@@ -1,7 +1,9 @@
 #include "update_faults.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include <Eigen/Eigenvalues>
 
@@ -9,6 +11,49 @@
 #include "viwo/estimator/factor_fit.hpp"
 
 namespace viwo::conformance {
+namespace {
+
+/// A NaN that no computation gives.
+constexpr std::uint64_t kUntouched = 0x7ff8'5a5a'5a5a'5a5a;
+
+template <class Matrix>
+void mark(Matrix& matrix) {
+  matrix.resize(Matrix::MaxRowsAtCompileTime, Matrix::MaxColsAtCompileTime);
+  matrix.setConstant(std::bit_cast<double>(kUntouched));
+  matrix.resize(0, Matrix::ColsAtCompileTime == 1 ? 1 : 0);
+}
+
+/// Whether the storage behind the last entry is written to; entries are packed.
+template <class Matrix>
+bool is_overrun(const Matrix& matrix) {
+  const double* const rest = matrix.data() + matrix.size();
+  return std::any_of(rest, matrix.data() + Matrix::MaxSizeAtCompileTime, [](double entry) {
+    return std::bit_cast<std::uint64_t>(entry) != kUntouched;
+  });
+}
+
+}  // namespace
+
+void clear_and_mark(FactorSink& sink, int max_residual_factors) {
+  sink.clear();
+  for (int i = 0; i < max_residual_factors; ++i) {
+    ResidualFactor& factor = sink.add_residual();
+    mark(factor.H);
+    mark(factor.residual);
+    mark(factor.R);
+  }
+  sink.clear();
+}
+
+std::string overrun_of(const ResidualFactor& factor) {
+  const std::string sizes = " - set_rows(" + std::to_string(factor.residual.size()) + "), for " +
+                            std::to_string(factor.columns.size()) +
+                            " columns, has made room for no more";
+  if (is_overrun(factor.residual)) return "residual is written to behind its last row" + sizes;
+  if (is_overrun(factor.R)) return "R is written to behind its last entry" + sizes;
+  if (is_overrun(factor.H)) return "H is written to behind its last column" + sizes;
+  return "";
+}
 
 std::string fault_of(const ResidualFactor& factor, int state_size, bool numbers_matter) {
   if (std::string misfit = misfit_of(factor, state_size); !misfit.empty()) return misfit;

@@ -11,6 +11,11 @@ namespace viwo::conformance {
 std::string fault_of(const ResidualFactor& factor, int state_size, bool numbers_matter);
 std::string fault_of(const InformationFactor& factor, int state_size, bool numbers_matter);
 
+/// An empty sink, with marks in the storage of all residual factors that it has room for: by them
+/// overrun_of() tells what is written outside of the sizes given to set_rows().
+void clear_and_mark(FactorSink& sink, int max_residual_factors);
+std::string overrun_of(const ResidualFactor& factor);
+
 /// A new block: the information factor of its call must tell it.
 std::string fault_of(const AddedBlock& block, const FilterView& filter, const FactorSink& sink,
                      bool numbers_matter);

@@ -75,7 +75,7 @@ void Watch::update(const FilterView& filter, const EpochData& given, FactorSink&
   for (FactorSink::FreeBlocks& room : sink_.rooms()) {
     if (options_.full_rooms && room.free != nullptr) room.free = &kNone;
   }
-  sink_.clear();
+  clear_and_mark(sink_, kMaxFactors);
   const Remedies remedies{" - leave out what cannot be used, and count it in rejections()", ""};
   if (!returns("update()", remedies, [&] { plugin_.object->update(filter, data, sink_); })) return;
   Digest digest;
@@ -99,7 +99,8 @@ bool Watch::check(const FilterView& filter) {
   int i = 0;
   for (const ResidualFactor& factor : sink_.residuals()) {
     const std::string what = "residual factor " + std::to_string(i++);
-    good = report(what, fault_of(factor, filter.size, numbers_matter)) && good;
+    good = report(what, overrun_of(factor)) &&
+           report(what, fault_of(factor, filter.size, numbers_matter)) && good;
   }
   if (const InformationFactor* factor = sink_.information();
       factor != nullptr && factor->columns.size() > 0) {

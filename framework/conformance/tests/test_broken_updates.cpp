@@ -131,6 +131,15 @@ TEST(BrokenUpdate, JacobiansThatTheResidualDoesNotFollow) {
                 end);
 }
 
+TEST(BrokenUpdate, WhatIsWrittenBesideTheFactor) {
+  const std::string sizes = " - set_rows(2), for 4 columns, has made room for no more";
+  EXPECT_EQ(
+      update_failures("more_rows"),
+      "start: residual factor 0 of epoch 1: residual is written to behind its last row" + sizes);
+  EXPECT_EQ(update_failures("more_columns"),
+            "start: residual factor 0 of epoch 1: H is written to behind its last column" + sizes);
+}
+
 TEST(BrokenUpdate, ANoiseThatIsNotSymmetric) {
   EXPECT_EQ(update_failures("asymmetric"),
             "start: residual factor 0 of epoch 1: R is not symmetric (by up to 0.001)");
