@@ -205,8 +205,9 @@ void StreamWatch::findings(std::int64_t now_ns, std::int64_t zero_ns, const char
                            Findings& out) const {
   if (!has_begun_) {
     if (now_ns - zero_ns <= kEndNs) return;
-    out.push_back(
-        {name_ + " none", name_ + ": no samples in all of the " + of_what + kLook + kOrRejected});
+    out.push_back({.key = name_ + " none",
+                   .text = name_ + ": no samples in all of the " + of_what + kLook + kOrRejected,
+                   .is_doubt = true});
     return;
   }
   find_held_up(out);

@@ -97,9 +97,9 @@ TEST(LiveRun, TellsThatTheWheelsNeverGaveASample) {
   robot.run();
   EXPECT_THAT(robot.said, ElementsAre("encoders of device: no samples: look at its cable, driver "
                                       "and bus, or at why all of it is rejected"));
-  EXPECT_THAT(robot.result.warnings,
-              ::testing::Contains("encoders of device: no samples in all of the run: look at its "
-                                  "cable, driver and bus, or at why all of it is rejected"));
+  EXPECT_THAT(robot.result.doubts,
+              ElementsAre("encoders of device: no samples in all of the run: look at its "
+                          "cable, driver and bus, or at why all of it is rejected"));
 }
 
 TEST(LiveRun, TellsTheDeviceWhichWheelIsLeftOutAndUntilWhen) {
