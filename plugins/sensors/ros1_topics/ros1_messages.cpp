@@ -73,7 +73,9 @@ msg::DiagnosticArray diagnostics_message(const live::Diagnostics& diagnostics) {
   msg::DiagnosticStatus status;
   status.name = live::Diagnostics::kName;
   status.hardware_id = live::Diagnostics::kHardware;
-  status.level = diagnostics.warns ? msg::DiagnosticStatus::WARN : msg::DiagnosticStatus::OK;
+  status.level = diagnostics.fails   ? msg::DiagnosticStatus::ERROR
+                 : diagnostics.warns ? msg::DiagnosticStatus::WARN
+                                     : msg::DiagnosticStatus::OK;
   status.message = diagnostics.message;
   for (const auto& [key, value] : diagnostics.values) {
     msg::KeyValue& pair = status.values.emplace_back();
@@ -83,6 +85,15 @@ msg::DiagnosticArray diagnostics_message(const live::Diagnostics& diagnostics) {
   msg::DiagnosticArray message;
   message.header.stamp = time_of(diagnostics.t_ns);
   message.status.push_back(status);
+  return message;
+}
+
+msg::JointState calibration_message(const EstimateSample& estimate) {
+  msg::JointState message;
+  message.header.stamp = time_of(estimate.t_ns);
+  message.name.assign(estimate.calibration_names.begin(), estimate.calibration_names.end());
+  message.position.assign(estimate.calibration.begin(), estimate.calibration.end());
+  message.effort.assign(estimate.calibration_sigma.begin(), estimate.calibration_sigma.end());
   return message;
 }
 

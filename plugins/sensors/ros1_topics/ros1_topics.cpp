@@ -97,12 +97,15 @@ class Ros1Topics final : public live::TopicSensor {
     return ros::ok() ? std::string() : "ROS has shut this node down";
   }
 
-  void publish(const live::Odometry* odometry, const live::Path* path,
-               const live::Diagnostics& diagnostics) override {
+  void publish(const live::Outgoing& out) override {
+    const live::Odometry* const odometry = out.odometry;
     if (odometry != nullptr) odometry_.publish(odometry_message(*odometry));
     if (tf_ && odometry != nullptr) tf_.publish(tf_message(*odometry));
-    if (path_ && path != nullptr) path_.publish(path_message(*path, odometry->world));
-    diagnostics_.publish(diagnostics_message(diagnostics));
+    if (path_ && out.path != nullptr) path_.publish(path_message(*out.path, odometry->world));
+    if (calibration_ && out.calibration != nullptr) {
+      calibration_.publish(calibration_message(*out.calibration));
+    }
+    diagnostics_.publish(diagnostics_message(out.diagnostics));
   }
 
   void subscribe() {
@@ -136,6 +139,9 @@ class Ros1Topics final : public live::TopicSensor {
     if (params.publish_tf) tf_ = node_->advertise<msg::TFMessage>("/tf", 10);
     if (!params.path_topic_out.empty()) {
       path_ = node_->advertise<msg::Path>(params.path_topic_out, 1);
+    }
+    if (!params.calibration_topic_out.empty()) {
+      calibration_ = node_->advertise<msg::JointState>(params.calibration_topic_out, 10);
     }
     diagnostics_ = node_->advertise<msg::DiagnosticArray>("/diagnostics", 10);
   }
@@ -195,7 +201,7 @@ class Ros1Topics final : public live::TopicSensor {
   std::unique_ptr<ros::NodeHandle> node_;
   std::vector<ros::Subscriber> subscribers_;
   ros::Subscriber tf_static_;
-  ros::Publisher odometry_, path_, tf_, diagnostics_;
+  ros::Publisher odometry_, path_, tf_, calibration_, diagnostics_;
   ros::WallTimer watch_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 };

@@ -78,6 +78,25 @@ TEST(Ros1Messages, DiagnosticsAreOneStatus) {
   EXPECT_EQ(message.status[0].values[0].value, "0.0255");
   diagnostics.warns = false;
   EXPECT_EQ(diagnostics_message(diagnostics).status[0].level, msg::DiagnosticStatus::OK);
+  diagnostics.fails = true;
+  EXPECT_EQ(diagnostics_message(diagnostics).status[0].level, msg::DiagnosticStatus::ERROR);
+}
+
+TEST(Ros1Messages, CalibrationIsAJointOfEachParameter) {
+  EstimateSample estimate;
+  estimate.t_ns = 1'000'000'007;
+  estimate.calibration_names = {"r_1", "t_OtoI"};
+  estimate.calibration = {0.0255, 0.005};
+  estimate.calibration_sigma = {0.00025, 0.001};
+  const msg::JointState message = calibration_message(estimate);
+  EXPECT_EQ(message.header.stamp.nsec, 7U);
+  ASSERT_EQ(message.name.size(), 2U);
+  EXPECT_EQ(message.name[1], "t_OtoI");
+  EXPECT_EQ(std::vector<double>(message.position.begin(), message.position.end()),
+            estimate.calibration);
+  EXPECT_EQ(std::vector<double>(message.effort.begin(), message.effort.end()),
+            estimate.calibration_sigma);
+  EXPECT_TRUE(message.velocity.empty());
 }
 
 }  // namespace

@@ -95,8 +95,12 @@ DdsSettings DdsParams::settings() const {
   DdsSettings settings;
   settings.domain = domain_id < 0 ? domain_of_environment() : static_cast<std::uint32_t>(domain_id);
   settings.interfaces = interfaces;
-  if (interfaces.empty() && is_only_this_machine()) settings.interfaces = {"127.0.0.1"};
   settings.peers = peers;
+  if (interfaces.empty() && is_only_this_machine()) {
+    settings.interfaces = {"127.0.0.1"};
+    settings.peers.emplace_back(
+        "127.0.0.1");  // loopback may have no multicast, and ROS 2 uses none
+  }
   return settings;
 }
 

@@ -30,7 +30,9 @@ struct DdsParams {
            "the environment has ROS_LOCALHOST_ONLY=1 or "
            "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"});
     b(VIWO_PARAM(peers),
-      {.help = "addresses (IPv4) of machines that are asked for topics, instead of by multicast"});
+      {.help =
+           "addresses (IPv4) of machines that are asked for topics, instead of by multicast; this "
+           "machine itself where it is to be the only one"});
   }
   /// With what the environment says. ParamError, or InputError for what is wrong there.
   DdsSettings settings() const;

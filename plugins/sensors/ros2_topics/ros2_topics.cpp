@@ -101,18 +101,26 @@ class Ros2Topics final : public live::TopicSensor {
     odometry_ = &writer(params.odometry_topic_out, "nav_msgs/Odometry", 10);
     if (params.publish_tf) tf_ = &writer("/tf", "tf2_msgs/TFMessage", 100);
     if (!params.path_topic_out.empty()) path_ = &writer(params.path_topic_out, "nav_msgs/Path", 1);
+    if (!params.calibration_topic_out.empty()) {
+      calibration_ = &writer(params.calibration_topic_out, "sensor_msgs/JointState", 10);
+    }
     diagnostics_ = &writer("/diagnostics", "diagnostic_msgs/DiagnosticArray", 10);
   }
   dds::DataWriter& writer(const std::string& topic, const std::string& type, int most) {
     return node_.make_writer(dds_topic(topic), dds_type(type), most);
   }
 
-  void publish(const live::Odometry* odometry, const live::Path* path,
-               const live::Diagnostics& diagnostics) override {
+  void publish(const live::Outgoing& out) override {
+    const live::Odometry* const odometry = out.odometry;
     if (odometry != nullptr) write(*odometry_, odometry_message(*odometry));
     if (tf_ != nullptr && odometry != nullptr) write(*tf_, tf_message(*odometry));
-    if (path_ != nullptr && path != nullptr) write(*path_, path_message(*path, odometry->world));
-    write(*diagnostics_, diagnostics_message(diagnostics));
+    if (path_ != nullptr && out.path != nullptr) {
+      write(*path_, path_message(*out.path, odometry->world));
+    }
+    if (calibration_ != nullptr && out.calibration != nullptr) {
+      write(*calibration_, calibration_message(*out.calibration));
+    }
+    write(*diagnostics_, diagnostics_message(out.diagnostics));
   }
 
   void ask_for_mounts(const Params& params) {
@@ -321,6 +329,7 @@ class Ros2Topics final : public live::TopicSensor {
   dds::DataWriter* odometry_ = nullptr;
   dds::DataWriter* tf_ = nullptr;
   dds::DataWriter* path_ = nullptr;
+  dds::DataWriter* calibration_ = nullptr;
   dds::DataWriter* diagnostics_ = nullptr;
   std::thread thread_;
 };

@@ -73,11 +73,15 @@ TEST_F(Settings, StayOnThisMachineWhereTheEnvironmentSaysSo) {
   EXPECT_TRUE(DdsParams().settings().interfaces.empty());
   setenv("ROS_LOCALHOST_ONLY", "0", 1);
   EXPECT_TRUE(DdsParams().settings().interfaces.empty());
+  EXPECT_TRUE(DdsParams().settings().peers.empty());
+  const std::vector<std::string> loopback{"127.0.0.1"};
   setenv("ROS_LOCALHOST_ONLY", "1", 1);
-  EXPECT_EQ(DdsParams().settings().interfaces, std::vector<std::string>{"127.0.0.1"});
+  EXPECT_EQ(DdsParams().settings().interfaces, loopback);
+  EXPECT_EQ(DdsParams().settings().peers, loopback) << "by addresses, without multicast";
   unsetenv("ROS_LOCALHOST_ONLY");
   setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST", 1);
-  EXPECT_EQ(DdsParams().settings().interfaces, std::vector<std::string>{"127.0.0.1"});
+  EXPECT_EQ(DdsParams().settings().interfaces, loopback);
+  EXPECT_EQ(DdsParams().settings().peers, loopback);
 }
 
 TEST_F(Settings, OfTheParametersWinOverTheEnvironment) {

@@ -74,6 +74,7 @@ Odometry odometry_of(const EstimateSample& estimate, const OutputFrames& frames,
 }
 
 Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health) {
+  Diagnostics message;
   std::string trouble;
   const auto warn = [&trouble](const std::string& text) {
     trouble += (trouble.empty() ? "" : "; ") + text;
@@ -87,9 +88,9 @@ Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health)
   if (!std::all_of(estimate.covariance.begin(), estimate.covariance.end(), is_finite) ||
       !std::all_of(estimate.p_IinG_m.begin(), estimate.p_IinG_m.end(), is_finite)) {
     warn("the estimate is not finite");
+    message.fails = true;
   }
   for (const std::string& text : estimate.warnings) warn(text);
-  Diagnostics message;
   message.t_ns = estimate.t_ns;
   message.warns = !trouble.empty();
   message.message = trouble.empty() ? "ok" : trouble;

@@ -60,7 +60,7 @@ struct Diagnostics {
   static constexpr const char* kHardware = "viwo";
   std::int64_t t_ns = 0;
   bool warns = false;
-  bool fails = false;  ///< the run has failed or diverged
+  bool fails = false;  ///< there is no estimate, or none that can be used, where there was one
   std::string message;
   std::vector<std::pair<std::string, std::string>> values;
 };

@@ -21,10 +21,13 @@ void LiveParams::bind(ParamBinder& b) {
      .max = 10000.,
      .help = "images that are held until they are taken; then the oldest are dropped"});
   b(VIWO_PARAM(publish),
-    {.help = "whether the estimate is published: odometry, path, tf and diagnostics"});
+    {.help = "whether the estimate is published: odometry, path, tf, calibration and diagnostics"});
   b(VIWO_PARAM(odometry_topic_out), {.help = "nav_msgs/Odometry"});
   b(VIWO_PARAM(path_topic_out),
     {.help = "nav_msgs/Path: the way so far, a pose each half second; empty: not published"});
+  b(VIWO_PARAM(calibration_topic_out),
+    {.help = "sensor_msgs/JointState: name, value (position) and sigma (effort) of each parameter "
+             "that is calibrated; empty: not published"});
   b(VIWO_PARAM(publish_tf), {.help = "whether the pose is on /tf, too"});
   b(VIWO_PARAM(world_frame), {.help = "frame of the poses"});
   b(VIWO_PARAM(body_frame), {.help = "frame whose pose is published"});
@@ -101,11 +104,13 @@ const LiveParams& LiveParams::checked(std::string (*why_no_name)(const std::stri
   check_topic("gnss_topic", gnss_topic);
   check_name("odometry_topic_out", odometry_topic_out);
   if (!path_topic_out.empty()) check_name("path_topic_out", path_topic_out);
+  if (!calibration_topic_out.empty()) check_name("calibration_topic_out", calibration_topic_out);
   if (publish) {
     if (publish_tf) seen.insert("tf");
     seen.insert("diagnostics");
     check_once("odometry_topic_out", odometry_topic_out);
     check_once("path_topic_out", path_topic_out);
+    check_once("calibration_topic_out", calibration_topic_out);
   }
   if (!description_topic.empty()) check_name("description_topic", description_topic);
   return *this;

@@ -18,6 +18,7 @@ struct LiveParams : bag::TopicOptions {
   bool publish = true;
   std::string odometry_topic_out = "viwo/odometry";
   std::string path_topic_out = "viwo/path";
+  std::string calibration_topic_out = "viwo/calibration";
   bool publish_tf = true;
   std::string world_frame = "odom";
   std::string body_frame = "imu";

@@ -116,8 +116,10 @@ void TopicSensor::estimate(const EstimateSample& estimate) {
   std::vector<RejectionCount> rejected;
   const Health health = health_now(trouble, rejected);
   const bool is_new = odometry && path_.add(odometry->pose, estimate.piece);
-  publish(odometry ? &*odometry : nullptr, is_new ? &path_ : nullptr,
-          diagnostics_of(estimate, health));
+  publish({.diagnostics = diagnostics_of(estimate, health),
+           .odometry = odometry ? &*odometry : nullptr,
+           .path = is_new ? &path_ : nullptr,
+           .calibration = estimate.calibration_names.empty() ? nullptr : &estimate});
 }
 
 Health TopicSensor::health_now(const std::string& trouble,
@@ -142,11 +144,14 @@ void TopicSensor::watch() {
   const auto without = Clock::now() - last;
   if (!publish_ || steps_ != nullptr || without < kNoEstimate) return;
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(without).count();
-  const std::string how_long = last != begin_ ? "for " + std::to_string(seconds) + " s" : "yet";
+  const bool is_lost = last != begin_;
+  const std::string how_long = is_lost ? "for " + std::to_string(seconds) + " s" : "yet";
   const std::int64_t t_ns = intake_.newest_ns().value_or(0);  // of the robot's clock, or of none
   std::vector<RejectionCount> rejected;
   const Health health = health_now("", rejected);
-  publish(nullptr, nullptr, diagnostics_without_estimate(t_ns, how_long, health, rejected));
+  Diagnostics without_one = diagnostics_without_estimate(t_ns, how_long, health, rejected);
+  without_one.fails = is_lost;
+  publish({.diagnostics = without_one});
 }
 
 void TopicSensor::end(LogLevel level, const std::string& why) {

@@ -22,6 +22,14 @@
 
 namespace viwo::live {
 
+/// What goes out at once; null: not now.
+struct Outgoing {
+  const Diagnostics& diagnostics;
+  const Odometry* odometry = nullptr;  ///< null while nothing says where the body is
+  const Path* path = nullptr;          ///< null likewise, and where it is the same as before
+  const EstimateSample* calibration = nullptr;  ///< null where nothing is calibrated
+};
+
 class TopicSensor : public Sensor {
  public:
   using Clock = std::chrono::steady_clock;
@@ -42,10 +50,7 @@ class TopicSensor : public Sensor {
 
   /// Why nothing will come any more, although nobody has said so; empty while it may.
   virtual std::string gone() const { return {}; }
-  /// `odometry`: null while nothing says where the body is; `path`: likewise, and where it is the
-  /// same as before.
-  virtual void publish(const Odometry* odometry, const Path* path,
-                       const Diagnostics& diagnostics) = 0;
+  virtual void publish(const Outgoing& out) = 0;
 
   /// Ends the sensor, and says why.
   void end(LogLevel level, const std::string& why);

@@ -9,8 +9,11 @@
 //   ros2_node mount DOMAIN Z      once, latched: on /tf_static where a plate is on base_link, on
 //                                 /robot_description where imu_link is on the plate, Z m above it;
 //                                 until SIGTERM
-//   ros2_node record DOMAIN FILE  viwo/odometry, viwo/path, /tf and /diagnostics, a line each,
-//                                 until SIGTERM
+//   ros2_node poses DOMAIN N      where a robot is, N times at 200 Hz, in each message that says
+//   so:
+//                                 /pose, /amcl_pose, /odom and /fix
+//   ros2_node record DOMAIN FILE  viwo/odometry, viwo/path, viwo/calibration, /tf and /diagnostics,
+//                                 a line each, until SIGTERM
 //   ros2_node endpoints DOMAIN FILE   readers and writers of others, a line each: which of them,
 //                                 topic, type, user data; until SIGTERM
 //   ros2_node play DOMAIN BAG     a ROS 2 bag in its own time, best effort
@@ -78,6 +81,51 @@ int publish(dds_entity_t node, int n) {
   return 0;
 }
 
+template <class Pose>
+void set_pose(Pose& pose, double x) {
+  pose.position = {x, 2., 3.};
+  pose.orientation = {0., 0., 0.6, 0.8};
+}
+
+int publish_poses(dds_entity_t node, int n) {
+  const Writer pose(node, geometry_msgs_msg_dds__PoseStamped__desc, "/pose", Delivery::kBestEffort);
+  const Writer amcl(node, geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc, "/amcl_pose",
+                    Delivery::kKeepAll);
+  const Writer odometry(node, nav_msgs_msg_dds__Odometry__desc, "/odom", Delivery::kBestEffort);
+  const Writer fixes(node, sensor_msgs_msg_dds__NavSatFix__desc, "/fix", Delivery::kBestEffort);
+  for (const Writer* writer : {&pose, &amcl, &odometry, &fixes}) writer->wait_for_reader();
+  dds_sleepfor(DDS_MSECS(200));  // the other side is to know it, too
+  std::string base = "base_link";
+  for (int k = 0; k < n; ++k) {
+    const std::int64_t t_ns = kStart + k * (kSecond / 200);
+    geometry_msgs_msg_dds__PoseStamped_ stamped{};
+    set_header(stamped.header, t_ns);
+    set_pose(stamped.pose, k);
+    pose.write(&stamped);
+    geometry_msgs_msg_dds__PoseWithCovarianceStamped_ with_covariance{};
+    set_header(with_covariance.header, t_ns);
+    set_pose(with_covariance.pose.pose, 100. + k);
+    amcl.write(&with_covariance);
+    nav_msgs_msg_dds__Odometry_ moving{};
+    set_header(moving.header, t_ns);
+    moving.child_frame_id = base.data();
+    set_pose(moving.pose.pose, 200. + k);
+    odometry.write(&moving);
+    sensor_msgs_msg_dds__NavSatFix_ fix{};
+    set_header(fix.header, t_ns);
+    fix.status.service = 1;
+    fix.latitude = 45.;
+    fix.longitude = 15. + 1e-6 * k;
+    fix.altitude = 100.;
+    for (const int i : {0, 4, 8}) fix.position_covariance[i] = 0.25;
+    fix.position_covariance_type = 2;  // the diagonal is known
+    fixes.write(&fix);
+    dds_sleepfor(DDS_MSECS(5));
+  }
+  dds_sleepfor(DDS_MSECS(500));
+  return 0;
+}
+
 int publish_wrong(dds_entity_t node, int n) {
   const Writer pose(node, geometry_msgs_msg_dds__PoseStamped__desc, "/imu0", Delivery::kBestEffort);
   const Writer joints(node, sensor_msgs_msg_dds__JointState__desc, "/joint_states",
@@ -130,7 +178,17 @@ int record(dds_entity_t node, const std::string& file) {
   const Reader<tf2_msgs_msg_dds__TFMessage_> tf(node, tf2_msgs_msg_dds__TFMessage__desc, "/tf");
   const Reader<diagnostic_msgs_msg_dds__DiagnosticArray_> diagnostics(
       node, diagnostic_msgs_msg_dds__DiagnosticArray__desc, "/diagnostics");
+  const Reader<sensor_msgs_msg_dds__JointState_> calibration(
+      node, sensor_msgs_msg_dds__JointState__desc, "/viwo/calibration");
   while (!terminated) {
+    calibration.read([&out](const auto& m) {
+      out << "calibration " << stamp_of(m.header);
+      for (std::uint32_t i = 0; i < m.name._length; ++i) {
+        out << " " << m.name._buffer[i] << "=" << m.position._buffer[i] << " sigma "
+            << m.effort._buffer[i];
+      }
+      out << "\n";
+    });
     odometry.read([&out](const auto& m) {
       const auto& p = m.pose.pose.position;
       out << "odometry " << stamp_of(m.header) << " " << m.header.frame_id << " "
@@ -232,6 +290,7 @@ int run(const std::string& mode, int domain, const std::string& what) {
   int code = 2;
   if (mode == "publish") code = publish(node, std::stoi(what));
   if (mode == "wrong") code = publish_wrong(node, std::stoi(what));
+  if (mode == "poses") code = publish_poses(node, std::stoi(what));
   if (mode == "mount") code = publish_mount(node, what);
   if (mode == "record") code = record(node, what);
   if (mode == "endpoints") code = record_endpoints(node, what);
@@ -246,8 +305,8 @@ int run(const std::string& mode, int domain, const std::string& what) {
 
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::cerr
-        << "ros2_node publish|wrong|mount|record|endpoints|play|step|lossy DOMAIN N|Z|FILE|BAG\n";
+    std::cerr << "ros2_node publish|wrong|poses|mount|record|endpoints|play|step|lossy DOMAIN "
+                 "N|Z|FILE|BAG\n";
     return 2;
   }
   std::signal(SIGTERM, [](int) { terminated = true; });

@@ -1,5 +1,6 @@
 // The sensor ros2_topics with another DDS on loopback.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <regex>
 #include <string>
@@ -73,6 +74,8 @@ class Ros2Topics : public testing::DdsTest {
     std::vector<ImuSample> imu;
     std::vector<EncoderSample> encoders;
     std::vector<ImageSample> images;
+    std::vector<PoseSample> poses;
+    std::vector<GnssSample> fixes;
   };
   static Given all_of(Sensor& sensor) {
     Given given;
@@ -81,6 +84,8 @@ class Ros2Topics : public testing::DdsTest {
       if (const auto* i = measurement.get_if<ImuSample>()) given.imu.push_back(*i);
       if (const auto* e = measurement.get_if<EncoderSample>()) given.encoders.push_back(*e);
       if (const auto* p = measurement.get_if<ImageSample>()) given.images.push_back(*p);
+      if (const auto* p = measurement.get_if<PoseSample>()) given.poses.push_back(*p);
+      if (const auto* f = measurement.get_if<GnssSample>()) given.fixes.push_back(*f);
     }
     return given;
   }
@@ -117,6 +122,52 @@ TEST_F(Ros2Topics, GivesAllThatIsPublishedInOrderAndEndsWhenNothingComes) {
     EXPECT_EQ(image.pixels, std::vector<std::uint8_t>(32, level));
   }
   EXPECT_THAT(testing::rejections_of(*sensor), ::testing::IsEmpty());
+}
+
+TEST_F(Ros2Topics, HearsWhereTheRobotIsInEachMessageThatSaysSo) {
+  const std::string rest = ", publish: false, idle_timeout_s: 4";
+  const auto pose = make(", pose_topic: /pose" + rest);
+  const auto amcl = make(", pose_topic: /amcl_pose" + rest);
+  const auto odometry = make(", odometry_topic: /odom" + rest);
+  const auto fixes = make(", gnss_topic: /fix" + rest);
+  Child publisher(dds_->node("poses", "40"), dds_->file("publisher.log"));
+  EXPECT_EQ(publisher.wait(30s), 0) << dds_->text_of("publisher.log");
+  double first_x = 0.;
+  for (const auto& sensor : {pose, amcl, odometry}) {
+    const auto poses = all_of(*sensor).poses;
+    ASSERT_EQ(poses.size(), 40U) << first_x << said().all() << dds_->text_of("publisher.log");
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      EXPECT_EQ(poses[k].t_ns, kStart + static_cast<std::int64_t>(k) * kPeriod);
+      EXPECT_EQ(poses[k].p_BinW_m, (std::array{first_x + static_cast<double>(k), 2., 3.}));
+      EXPECT_EQ(poses[k].q_BtoW_xyzw, (std::array{0., 0., 0.6, 0.8}));
+    }
+    first_x += 100.;
+  }
+  const auto fixed = all_of(*fixes).fixes;
+  ASSERT_EQ(fixed.size(), 40U) << said().all();
+  for (std::size_t k = 0; k < fixed.size(); ++k) {
+    EXPECT_EQ(fixed[k].t_ns, kStart + static_cast<std::int64_t>(k) * kPeriod);
+    EXPECT_EQ(fixed[k].latitude_deg, 45.);
+    EXPECT_EQ(fixed[k].longitude_deg, 15. + 1e-6 * static_cast<double>(k));
+    EXPECT_EQ(fixed[k].altitude_m, 100.);
+    EXPECT_EQ(fixed[k].covariance_ENU_m2, (std::array{0.25, 0., 0., 0., 0.25, 0., 0., 0., 0.25}));
+  }
+}
+
+TEST_F(Ros2Topics, IsWhereTheEnvironmentOfRos2SaysAndHearsThisMachineByAddressesAlone) {
+  setenv("ROS_DOMAIN_ID", dds_->domain().c_str(), 1);
+  const std::string all = std::string(kAllTopics) + ", publish: false, idle_timeout_s: 4";
+  for (const char* only : {"ROS_LOCALHOST_ONLY=1", "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"}) {
+    const std::string text(only);
+    const std::string name = text.substr(0, text.find('='));
+    setenv(name.c_str(), text.substr(text.find('=') + 1).c_str(), 1);
+    const auto sensor = make_sensor("ros2_topics", all);
+    Child publisher(dds_->node("publish", "40"), dds_->file("publisher.log"));
+    EXPECT_EQ(publisher.wait(30s), 0) << only << dds_->text_of("publisher.log");
+    EXPECT_EQ(all_of(*sensor).imu.size(), 40U) << only << said().all();
+    unsetenv(name.c_str());
+  }
+  unsetenv("ROS_DOMAIN_ID");
 }
 
 TEST_F(Ros2Topics, GoesOnWithAPublisherThatLeavesAndReturns) {
@@ -198,6 +249,8 @@ TEST_F(Ros2Topics, RefusesParametersThatContradictEachOther) {
               HasSubstr("sensor.odometry_topic_out: 'viwo/odometry' is wanted twice"));
   EXPECT_THAT(error_of(", imu_topic: /i, path_topic_out: /tf"),
               HasSubstr("sensor.path_topic_out: '/tf' is wanted twice"));
+  EXPECT_THAT(error_of(", imu_topic: /i, calibration_topic_out: /viwo/path"),
+              HasSubstr("sensor.calibration_topic_out: '/viwo/path' is wanted twice"));
   EXPECT_THAT(error_of(", imu_topic: /i, body_frame: /odom"),
               HasSubstr("sensor.body_frame: 'odom' is the world_frame, too"));
   const auto first = make(", imu_topic: /i");
@@ -219,14 +272,19 @@ TEST_F(Ros2Topics, PublishesTheEstimate) {
   estimate.calibration = {0.0255};
   estimate.calibration_sigma = {0.25};
   // The warning last, which has a clock of its own: nothing comes on /imu0.
-  const std::string heard =
-      publish_until_heard(*sensor, estimate, {"odometry ", "tf ", "path ", " level 1 "});
+  const std::string heard = publish_until_heard(
+      *sensor, estimate, {"odometry ", "tf ", "path ", "calibration ", " level 1 "});
   EXPECT_THAT(heard, ContainsRegex("odometry 170000000[0-9]+ map base_link 0.5 2 3 0.25 0.25"))
       << dds_->text_of("recorder.log");
   EXPECT_THAT(heard, ContainsRegex("tf 170000000[0-9]+ map base_link 0.5"));
   EXPECT_THAT(heard, ContainsRegex("path map [0-9]+ 0.5"));
   EXPECT_THAT(heard, ContainsRegex("diagnostics 170000000[0-9]+ level 1 latency_s=0.0125 "));
   EXPECT_THAT(heard, HasSubstr(" r_1=0.0255 sigma r_1=0.25"));
+  EXPECT_THAT(heard, ContainsRegex("calibration 170000000[0-9]+ r_1=0.02549999[0-9]+ sigma 0.25"));
+  EXPECT_THAT(heard, ::testing::Not(HasSubstr(" level 2 ")));
+  EXPECT_TRUE(wait_until([] {
+    return dds_->text_of("heard.txt").find(" level 2 ") != std::string::npos;
+  })) << "an error where there was an estimate, and is none any more";
 }
 
 TEST_F(Ros2Topics, SaysTheHashesOfItsTypes) {
@@ -239,6 +297,7 @@ TEST_F(Ros2Topics, SaysTheHashesOfItsTypes) {
       "writer rt/viwo/odometry nav_msgs::msg::dds_::Odometry_ "
       "typehash=RIHS01_3cc97dc7fb75[0-9a-f]+;\n",
       "writer rt/viwo/path nav_msgs::msg::dds_::Path_ typehash=RIHS01_1957a5bb3cee[0-9a-f]+;\n",
+      "writer rt/viwo/calibration sensor_msgs::msg::dds_::JointState_ typehash=RIHS01_[0-9a-f]+;\n",
       "writer rt/tf tf2_msgs::msg::dds_::TFMessage_ typehash=RIHS01_e369d0f05a23[0-9a-f]+;\n",
       "writer rt/diagnostics diagnostic_msgs::msg::dds_::DiagnosticArray_ "
       "typehash=RIHS01_5a8a36efb05f[0-9a-f]+;\n",
