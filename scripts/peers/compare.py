@@ -333,8 +333,9 @@ def rows_of(arguments):
         yield Row(f'{name}, 1000 points, 100 offered', data.exports(cameras, 1000)[:1], cameras, points=1000)
     for cameras, name in ((1, 'mono'), (2, 'stereo')):
         yield Row(f'{name}, cameras calibrated', data.exports(cameras, 250), cameras, calibrate=True)
-    for cameras, name in ((1, 'mono'), (2, 'stereo')):
-        yield Row(f'{name}, 25 landmarks', data.exports(cameras, 250), cameras, landmarks=25)
+    for landmarks in (25, 50):
+        for cameras, name in ((1, 'mono'), (2, 'stereo')):
+            yield Row(f'{name}, {landmarks} landmarks', data.exports(cameras, 250), cameras, landmarks=landmarks)
     for cameras, name in ((1, 'mono'), (2, 'stereo')):
         yield Row(f'{name}, 30 clones', data.exports(cameras, 250)[:1], cameras, clones=30)
     if not arguments.no_images:

@@ -47,6 +47,17 @@ for plugin in ros1_bag ros1_topics ros2_bag ros2_topics klt_tracker; do
   grep -q "  $plugin  " plugins.txt || fail "no $plugin"
 done
 viwo run $configs/viwo_images.yaml --set sensors.simulator0.duration_s=3 --out images
+viwo simulate $configs/viwo_images.yaml --set sensors.simulator0.duration_s=3 --out log
+for version in 1 2; do
+  bag=robot$version$([ $version = 2 ] || echo .bag)
+  viwo_bag log "$bag"
+  viwo run $configs/viwo_bag.yaml --set "placeholders.bag=$PWD/$bag" \
+    --set sensors.bag0.type=ros${version}_bag --mcap run.mcap --out from_ros$version
+  test -s run.mcap && grep -q '"status": *"ok"' from_ros$version/summary.json || fail "ROS $version"
+done
+cmp from_ros1/trajectory.tum from_ros2/trajectory.tum || fail "ROS 1 and ROS 2 differ"
+ROS_LOCALHOST_ONLY=1 says "nothing has come: no IMU sample arrived" 1 viwo run \
+  $configs/viwo_live_ros2.yaml --set sensors.ros0.idle_timeout_s=2 --out live
 says "viwo-show" 1 viwo run $configs/viwo_swerve.yaml --set sensors.simulator0.duration_s=3 \
   --video tracks.mp4 --out video
 
