@@ -17,6 +17,9 @@
 //   ros2_node endpoints DOMAIN FILE   readers and writers of others, a line each: which of them,
 //                                 topic, type, user data; until SIGTERM
 //   ros2_node play DOMAIN BAG     a ROS 2 bag in its own time, best effort
+//   ros2_node timed DOMAIN BAG    the same, and prints the milliseconds from when the images of an
+//                                 instant were given to DDS to when it has brought viwo/odometry, a
+//                                 line for each pose
 //   ros2_node step DOMAIN BAG     as fast as it is taken: reliable, keeping all
 //   ros2_node lossy DOMAIN BAG    as fast as possible on a lossy line: reliable, keeping one
 //   message
@@ -28,10 +31,13 @@
 #include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <variant>
 #include <vector>
 
 #include <dds/dds.h>
@@ -248,7 +254,50 @@ int record_endpoints(dds_entity_t node, const std::string& file) {
   return 0;
 }
 
-int play(dds_entity_t node, const std::string& file, Delivery delivery) {
+/// How long poses take from their images, as the robot sees it.
+class Stopwatch {
+ public:
+  explicit Stopwatch(dds_entity_t node)
+      : odometry_(node, nav_msgs_msg_dds__Odometry__desc, "/viwo/odometry") {
+    odometry_.on_data([](dds_entity_t, void* self) { static_cast<Stopwatch*>(self)->hear(); },
+                      this);
+  }
+  ~Stopwatch() { odometry_.on_data(nullptr, nullptr); }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+  /// An image of this stamp goes out; of several the last one counts.
+  void send(std::int64_t t_ns) {
+    const std::scoped_lock lock(mutex_);
+    sent_[t_ns] = Clock::now();
+  }
+  void print() {
+    const std::scoped_lock lock(mutex_);
+    for (const double ms : latency_ms_) std::cout << ms << "\n";
+  }
+
+ private:
+  /// The stamp of a pose is that of its images but for the clock of the cameras.
+  static constexpr std::int64_t kMostClockOffset = 10'000'000;
+
+  void hear() {
+    const auto now = Clock::now();
+    const std::scoped_lock lock(mutex_);
+    odometry_.read([&](const auto& m) {
+      const auto image = sent_.lower_bound(stamp_of(m.header) - kMostClockOffset);
+      if (image == sent_.end() || image->first > stamp_of(m.header) + kMostClockOffset) return;
+      latency_ms_.push_back(std::chrono::duration<double, std::milli>(now - image->second).count());
+    });
+  }
+
+  std::mutex mutex_;
+  std::map<std::int64_t, Clock::time_point> sent_;
+  std::vector<double> latency_ms_;
+  Reader<nav_msgs_msg_dds__Odometry_> odometry_;
+};
+
+int play(dds_entity_t node, const std::string& file, Delivery delivery,
+         Stopwatch* stopwatch = nullptr) {
   const RobotBag robot(file);
   std::vector<std::unique_ptr<Writer>> writers;
   for (const RobotBag::Topic& topic : robot.topics()) {
@@ -262,6 +311,8 @@ int play(dds_entity_t node, const std::string& file, Delivery delivery) {
     if (delivery == Delivery::kBestEffort) {
       std::this_thread::sleep_until(begin + std::chrono::nanoseconds(since_begin_ns));
     }
+    const auto* const picture = std::get_if<Picture>(&message);
+    if (picture != nullptr && stopwatch != nullptr) stopwatch->send(picture->head.t_ns);
     write(*writers[topic], message);
   });
   if (delivery == Delivery::kBestEffort) {
@@ -270,6 +321,13 @@ int play(dds_entity_t node, const std::string& file, Delivery delivery) {
     for (const auto& writer : writers) writer->wait_until_all_is_taken();
   }
   return 0;
+}
+
+int play_timed(dds_entity_t node, const std::string& file) {
+  Stopwatch stopwatch(node);
+  const int code = play(node, file, Delivery::kBestEffort, &stopwatch);
+  stopwatch.print();
+  return code;
 }
 
 /// One packet of twenty is lost on the way out.
@@ -295,6 +353,7 @@ int run(const std::string& mode, int domain, const std::string& what) {
   if (mode == "record") code = record(node, what);
   if (mode == "endpoints") code = record_endpoints(node, what);
   if (mode == "play") code = play(node, what, Delivery::kBestEffort);
+  if (mode == "timed") code = play_timed(node, what);
   if (mode == "step") code = play(node, what, Delivery::kKeepAll);
   if (mode == "lossy") code = play(node, what, Delivery::kKeepOne);
   dds_delete(node);
@@ -305,8 +364,9 @@ int run(const std::string& mode, int domain, const std::string& what) {
 
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::cerr << "ros2_node publish|wrong|poses|mount|record|endpoints|play|step|lossy DOMAIN "
-                 "N|Z|FILE|BAG\n";
+    std::cerr
+        << "ros2_node publish|wrong|poses|mount|record|endpoints|play|timed|step|lossy DOMAIN "
+           "N|Z|FILE|BAG\n";
     return 2;
   }
   std::signal(SIGTERM, [](int) { terminated = true; });

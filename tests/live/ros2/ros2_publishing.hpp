@@ -149,6 +149,13 @@ class Reader {
       : reader_(dds_create_reader(participant, topic, nullptr, nullptr)) {
     require(reader_, "reader of a topic that is built in");
   }
+  /// Called with `argument`, in a thread of DDS, when there is something to read; null: no more.
+  void on_data(void (*call)(dds_entity_t reader, void* argument), void* argument) const {
+    dds_listener_t* const listener = dds_create_listener(argument);
+    dds_lset_data_available(listener, call);
+    require(dds_set_listener(reader_, listener), "listener");
+    dds_delete_listener(listener);
+  }
   template <class Take>
   void read(const Take& take) const {
     void* sample[1] = {nullptr};

@@ -1,5 +1,6 @@
-"""The hashes of message types that ros2_topics says, made here of the definitions as ROS 2 makes them (REP
-2016): SHA-256 of a description in JSON, without constants, defaults and comments.
+"""The hashes of message types that ros2_topics says, made here of the definitions that are written into
+files, as ROS 2 makes them (REP 2016): SHA-256 of a description in JSON, without constants, defaults and
+comments. A definition that is not that of ROS 2 has another hash.
 
   test_type_hashes.py SOURCES
 """
@@ -10,51 +11,24 @@ import re
 import sys
 import unittest
 
-DEFINITIONS = {
-    'builtin_interfaces/Time': 'int32 sec, uint32 nanosec',
-    'diagnostic_msgs/DiagnosticArray':
-        'std_msgs/Header header, diagnostic_msgs/DiagnosticStatus[] status',
-    'diagnostic_msgs/DiagnosticStatus':
-        'byte level, string name, string message, string hardware_id, diagnostic_msgs/KeyValue[] values',
-    'diagnostic_msgs/KeyValue': 'string key, string value',
-    'geometry_msgs/Point': 'float64 x, float64 y, float64 z',
-    'geometry_msgs/Pose': 'geometry_msgs/Point position, geometry_msgs/Quaternion orientation',
-    'geometry_msgs/PoseStamped': 'std_msgs/Header header, geometry_msgs/Pose pose',
-    'geometry_msgs/PoseWithCovariance': 'geometry_msgs/Pose pose, float64[36] covariance',
+# What is heard and not written into files; all other definitions are those of the files.
+ONLY_HEARD = {
     'geometry_msgs/PoseWithCovarianceStamped':
         'std_msgs/Header header, geometry_msgs/PoseWithCovariance pose',
-    'geometry_msgs/Quaternion': 'float64 x, float64 y, float64 z, float64 w',
-    'geometry_msgs/Transform': 'geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation',
-    'geometry_msgs/TransformStamped':
-        'std_msgs/Header header, string child_frame_id, geometry_msgs/Transform transform',
-    'geometry_msgs/Twist': 'geometry_msgs/Vector3 linear, geometry_msgs/Vector3 angular',
-    'geometry_msgs/TwistWithCovariance': 'geometry_msgs/Twist twist, float64[36] covariance',
-    'geometry_msgs/Vector3': 'float64 x, float64 y, float64 z',
-    'nav_msgs/Odometry':
-        'std_msgs/Header header, string child_frame_id, geometry_msgs/PoseWithCovariance pose, '
-        'geometry_msgs/TwistWithCovariance twist',
-    'nav_msgs/Path': 'std_msgs/Header header, geometry_msgs/PoseStamped[] poses',
     'sensor_msgs/CompressedImage': 'std_msgs/Header header, string format, uint8[] data',
-    'sensor_msgs/Image':
-        'std_msgs/Header header, uint32 height, uint32 width, string encoding, uint8 is_bigendian, '
-        'uint32 step, uint8[] data',
-    'sensor_msgs/Imu':
-        'std_msgs/Header header, geometry_msgs/Quaternion orientation, '
-        'float64[9] orientation_covariance, geometry_msgs/Vector3 angular_velocity, '
-        'float64[9] angular_velocity_covariance, geometry_msgs/Vector3 linear_acceleration, '
-        'float64[9] linear_acceleration_covariance',
-    'sensor_msgs/JointState':
-        'std_msgs/Header header, string[] name, float64[] position, float64[] velocity, '
-        'float64[] effort',
-    'sensor_msgs/NavSatFix':
-        'std_msgs/Header header, sensor_msgs/NavSatStatus status, float64 latitude, '
-        'float64 longitude, float64 altitude, float64[9] position_covariance, '
-        'uint8 position_covariance_type',
-    'sensor_msgs/NavSatStatus': 'int8 status, uint16 service',
-    'std_msgs/Header': 'builtin_interfaces/Time stamp, string frame_id',
     'std_msgs/String': 'string data',
-    'tf2_msgs/TFMessage': 'geometry_msgs/TransformStamped[] transforms',
 }
+
+
+def read_definitions(sources):
+    """Fields of each type, 'KIND NAME, KIND NAME, ...', without constants and defaults."""
+    text = pathlib.Path(sources, 'plugins/sensors/ros2_bag/ros2_definitions.cpp').read_text()
+    found = re.findall(r'\{"(\w+/\w+)",\s*((?:"[^"]*\\n"\s*)+),', text)
+    fields = {name: ''.join(re.findall(r'"([^"]*)"', parts)).split('\\n') for name, parts in found}
+    return {name: ', '.join(' '.join(line.split()[:2]) for line in lines if line and '=' not in line)
+            for name, lines in fields.items()} | ONLY_HEARD
+
+
 NESTED = 1
 NUMBERS = {'int8': 2, 'uint8': 3, 'uint16': 5, 'int32': 6, 'uint32': 7, 'float64': 11, 'byte': 16,
            'string': 17}
@@ -109,4 +83,5 @@ class TypeHashes(unittest.TestCase):
 
 if __name__ == '__main__':
     SOURCES = sys.argv.pop(1)
+    DEFINITIONS = read_definitions(SOURCES)
     unittest.main()
