@@ -97,9 +97,9 @@ DdsSettings DdsParams::settings() const {
   settings.interfaces = interfaces;
   settings.peers = peers;
   if (interfaces.empty() && is_only_this_machine()) {
+    // Loopback may have no multicast, and ROS 2 uses none there.
     settings.interfaces = {"127.0.0.1"};
-    settings.peers.emplace_back(
-        "127.0.0.1");  // loopback may have no multicast, and ROS 2 uses none
+    settings.peers.emplace_back("127.0.0.1");
   }
   return settings;
 }

@@ -60,7 +60,8 @@ struct Diagnostics {
   static constexpr const char* kHardware = "viwo";
   std::int64_t t_ns = 0;
   bool warns = false;
-  bool fails = false;  ///< there is no estimate, or none that can be used, where there was one
+  /// There is no estimate where there was one, or none that can be used; or the run has failed.
+  bool fails = false;
   std::string message;
   std::vector<std::pair<std::string, std::string>> values;
 };
