@@ -16,7 +16,7 @@ inline std::filesystem::path broken(const std::string& kind, const std::string& 
 
 /// The checks that fail, "CHECK: what it says" each; of more than one failure the first.
 inline std::string failures_of(const std::string& kind, const std::string& defect,
-                               Options options = {}) {
+                               const Options& options = {}) {
   std::string text;
   for (const CheckResult& check : check_plugin(broken(kind, defect), options).checks) {
     if (check.passed()) continue;

@@ -252,7 +252,7 @@ std::string write_chain(const std::vector<CalibrationSample>& truth) {
   for (const CalibrationSample& sample : truth) value[sample.name] = sample.value;
   const Eigen::Matrix3d R = exp_so3({value.at("cam0.theta_ItoC_x"), value.at("cam0.theta_ItoC_y"),
                                      value.at("cam0.theta_ItoC_z")});
-  const std::string file = ::testing::TempDir() + "/viwo_image_simulator_truth.yaml";
+  std::string file = ::testing::TempDir() + "/viwo_image_simulator_truth.yaml";
   std::ofstream out(file);
   out.precision(17);
   out << "cam0:\n  camera_model: pinhole\n  intrinsics: [" << value.at("cam0.fx") << ", "
