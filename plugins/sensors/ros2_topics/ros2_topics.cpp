@@ -284,7 +284,8 @@ class Ros2Topics final : public live::TopicSensor {
 
   /// By the numbers that publishers give their messages.
   void count_lost(std::size_t i, const dds::SampleInfo& info) {
-    const std::int64_t number = info.sample_identity.sequence_number().to64long();
+    const auto number =
+        static_cast<std::int64_t>(info.sample_identity.sequence_number().to64long());
     const auto [last, is_first] =
         inlets_[i].last.try_emplace(info.sample_identity.writer_guid(), number);
     const std::int64_t lost = is_first ? 0 : number - last->second - 1;

@@ -293,24 +293,24 @@ TEST_F(Ros2Topics, SaysTheHashesOfItsTypes) {
       make(std::string(kAllTopics) + ", imu_frame: imu_link, body_frame: base_link");
   Child publisher(dds_->node("publish", "200"), dds_->file("publisher.log"));
   Child listing(dds_->node("endpoints", dds_->file("endpoints.txt")), dds_->file("listing.log"));
-  const std::vector<std::string> all{
-      "writer rt/viwo/odometry nav_msgs::msg::dds_::Odometry_ "
-      "typehash=RIHS01_3cc97dc7fb75[0-9a-f]+;\n",
-      "writer rt/viwo/path nav_msgs::msg::dds_::Path_ typehash=RIHS01_1957a5bb3cee[0-9a-f]+;\n",
-      "writer rt/viwo/calibration sensor_msgs::msg::dds_::JointState_ typehash=RIHS01_[0-9a-f]+;\n",
-      "writer rt/tf tf2_msgs::msg::dds_::TFMessage_ typehash=RIHS01_e369d0f05a23[0-9a-f]+;\n",
-      "writer rt/diagnostics diagnostic_msgs::msg::dds_::DiagnosticArray_ "
-      "typehash=RIHS01_5a8a36efb05f[0-9a-f]+;\n",
-      "reader rt/tf_static tf2_msgs::msg::dds_::TFMessage_ "
-      "typehash=RIHS01_e369d0f05a23[0-9a-f]+;\n",
-      "reader rt/robot_description std_msgs::msg::dds_::String_ "
-      "typehash=RIHS01_df668c740482[0-9a-f]+;\n",
-      "reader rt/imu0 sensor_msgs::msg::dds_::Imu_ typehash=RIHS01_7d9a00ff1310[0-9a-f]+;\n"};
-  for (const std::string& one : all) {
-    const std::regex line(one);
+  struct Endpoint {
+    std::string what, type, hash;  ///< hash: its begin
+  };
+  for (const Endpoint& one : std::vector<Endpoint>{
+           {"writer rt/viwo/odometry", "nav_msgs::msg::dds_::Odometry_", "3cc97dc7fb75"},
+           {"writer rt/viwo/path", "nav_msgs::msg::dds_::Path_", "1957a5bb3cee"},
+           {"writer rt/viwo/calibration", "sensor_msgs::msg::dds_::JointState_", "a13ee3a330e3"},
+           {"writer rt/tf", "tf2_msgs::msg::dds_::TFMessage_", "e369d0f05a23"},
+           {"writer rt/diagnostics", "diagnostic_msgs::msg::dds_::DiagnosticArray_",
+            "5a8a36efb05f"},
+           {"reader rt/tf_static", "tf2_msgs::msg::dds_::TFMessage_", "e369d0f05a23"},
+           {"reader rt/robot_description", "std_msgs::msg::dds_::String_", "df668c740482"},
+           {"reader rt/imu0", "sensor_msgs::msg::dds_::Imu_", "7d9a00ff1310"}}) {
+    const std::regex line(one.what + " " + one.type + " typehash=RIHS01_" + one.hash +
+                          "[0-9a-f]+;\n");
     EXPECT_TRUE(wait_until([&line] {
       return std::regex_search(dds_->text_of("endpoints.txt"), line);
-    })) << one
+    })) << one.what
         << dds_->text_of("endpoints.txt") << dds_->text_of("listing.log")
         << dds_->text_of("publisher.log");
   }
