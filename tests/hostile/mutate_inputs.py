@@ -227,7 +227,9 @@ def png(inputs):
 
 
 def plugin(inputs):
-    whole = next(inputs.bin.parent.glob('lib/viwo/plugins/*/libviwo_kinematics_differential.so'))
+    # A build folder may have plugins of earlier versions, too.
+    whole = max(inputs.bin.parent.glob('lib/viwo/plugins/*/libviwo_kinematics_differential.so'),
+                key=os.path.getmtime)
     file = inputs.work / whole.name
     shutil.copy(whole, file)
     return [inputs.viwo, 'plugins', 'check', file], [file]
