@@ -115,14 +115,15 @@ Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health)
   return message;
 }
 
-Diagnostics diagnostics_without_estimate(std::int64_t t_ns, const std::string& how_long,
+Diagnostics diagnostics_without_estimate(std::int64_t t_ns, std::optional<std::int64_t> lost_s,
                                          const Health& health,
                                          const std::vector<RejectionCount>& rejected) {
   constexpr std::size_t kMostCauses = 3;
   Diagnostics message;
   message.t_ns = t_ns;
   message.warns = true;
-  message.message = "no estimate " + how_long;
+  message.fails = lost_s.has_value();
+  message.message = "no estimate " + (lost_s ? "for " + std::to_string(*lost_s) + " s" : "yet");
   if (!health.trouble.empty()) message.message += "; " + health.trouble;
   for (const std::string& topic : health.silent_topics) {
     message.message += "; nothing on topic '" + topic + "'";

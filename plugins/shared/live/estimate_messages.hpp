@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -69,9 +70,10 @@ struct Diagnostics {
 /// Latency, calibration with its sigmas, and a warning when something is off.
 Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health);
 
-/// While there is no estimate: a warning that says so, for how long ("yet", "for 3 s"), and what
-/// may be the cause. `rejected`: what was dropped so far.
-Diagnostics diagnostics_without_estimate(std::int64_t t_ns, const std::string& how_long,
+/// While there is no estimate, for `lost_s` where there was one: a warning before the first one and
+/// an error afterwards, that say so, and what may be the cause. `rejected`: what was dropped so
+/// far.
+Diagnostics diagnostics_without_estimate(std::int64_t t_ns, std::optional<std::int64_t> lost_s,
                                          const Health& health,
                                          const std::vector<RejectionCount>& rejected);
 

@@ -143,15 +143,12 @@ void TopicSensor::watch() {
   const Clock::time_point last = last_estimate_;
   const auto without = Clock::now() - last;
   if (!publish_ || steps_ != nullptr || without < kNoEstimate) return;
-  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(without).count();
-  const bool is_lost = last != begin_;
-  const std::string how_long = is_lost ? "for " + std::to_string(seconds) + " s" : "yet";
+  std::optional<std::int64_t> lost_s;
+  if (last != begin_) lost_s = std::chrono::duration_cast<std::chrono::seconds>(without).count();
   const std::int64_t t_ns = intake_.newest_ns().value_or(0);  // of the robot's clock, or of none
   std::vector<RejectionCount> rejected;
   const Health health = health_now("", rejected);
-  Diagnostics without_one = diagnostics_without_estimate(t_ns, how_long, health, rejected);
-  without_one.fails = is_lost;
-  publish({.diagnostics = without_one});
+  publish({.diagnostics = diagnostics_without_estimate(t_ns, lost_s, health, rejected)});
 }
 
 void TopicSensor::end(LogLevel level, const std::string& why) {

@@ -5,6 +5,7 @@
 #include <regex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -157,15 +158,14 @@ TEST_F(Ros2Topics, HearsWhereTheRobotIsInEachMessageThatSaysSo) {
 TEST_F(Ros2Topics, IsWhereTheEnvironmentOfRos2SaysAndHearsThisMachineByAddressesAlone) {
   setenv("ROS_DOMAIN_ID", dds_->domain().c_str(), 1);
   const std::string all = std::string(kAllTopics) + ", publish: false, idle_timeout_s: 4";
-  for (const char* only : {"ROS_LOCALHOST_ONLY=1", "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"}) {
-    const std::string text(only);
-    const std::string name = text.substr(0, text.find('='));
-    setenv(name.c_str(), text.substr(text.find('=') + 1).c_str(), 1);
+  for (const auto& [name, value] :
+       {std::pair{"ROS_LOCALHOST_ONLY", "1"}, {"ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"}}) {
+    setenv(name, value, 1);
     const auto sensor = make_sensor("ros2_topics", all);
     Child publisher(dds_->node("publish", "40"), dds_->file("publisher.log"));
-    EXPECT_EQ(publisher.wait(30s), 0) << only << dds_->text_of("publisher.log");
-    EXPECT_EQ(all_of(*sensor).imu.size(), 40U) << only << said().all();
-    unsetenv(name.c_str());
+    EXPECT_EQ(publisher.wait(30s), 0) << name << dds_->text_of("publisher.log");
+    EXPECT_EQ(all_of(*sensor).imu.size(), 40U) << name << said().all();
+    unsetenv(name);
   }
   unsetenv("ROS_DOMAIN_ID");
 }
