@@ -102,7 +102,7 @@ TableReader::TableReader(const std::filesystem::path& file, const TableLayout& l
     }
   }
   if (has_row_) {
-    take_apart(line);
+    split_fields(line);
   } else {
     split(line, separator_, true, fields_);
   }
@@ -112,7 +112,7 @@ TableReader::TableReader(const std::filesystem::path& file, const TableLayout& l
   }
 }
 
-void TableReader::take_apart(std::string_view row) {
+void TableReader::split_fields(std::string_view row) {
   if (decimal_comma_) {
     with_points_ = with_points(row);
     row = with_points_;
@@ -196,7 +196,7 @@ bool TableReader::next() {
     do {
       if (!reader_.next(line)) return false;
     } while (trim(line).empty());
-    take_apart(line);
+    split_fields(line);
   }
   if (reader_.unterminated() && (fields_.size() < columns_.size() ||
                                  (fields_.size() == columns_.size() && is_begun(fields_.back())))) {

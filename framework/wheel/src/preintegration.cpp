@@ -134,7 +134,7 @@ Preintegrator::Preintegrator(std::shared_ptr<const WheelModel> model,
 bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64_t begin_ns,
                               std::int64_t end_ns, PreintegratedPose& out) {
   out.reset(solver_.model().n_intrinsics());
-  of_parity_ = 0.;
+  parity_samples_ = 0.;
   begin_at(begin_ns);
   const auto after_begin = [&](const EncoderSample& sample) { return sample.end_ns <= begin_ns; };
   const auto first = std::partition_point(samples.begin(), samples.end(), after_begin);
@@ -183,7 +183,7 @@ bool Preintegrator::integrate(std::span<const EncoderSample> samples, std::int64
     reached_ns = to_ns;
   }
   if (reached_ns < end_ns && k > 0 && k < samples.size()) bridge_hole(k, end_ns);
-  out.parity.of_noise *= of_parity_;
+  out.parity.of_noise *= parity_samples_;
   reached_ns_ = reached_ns;
   return covered && reached_ns >= end_ns;
 }
@@ -249,8 +249,8 @@ void Preintegrator::add_piece(const EncoderSample& y, double dt, PieceNoise nois
     }
     if (options_.parity && dof > 0 && noise.parity > 0.) {
       // One sample stands for all: where it matters the motion is much the same all the time.
-      if (of_parity_ == 0.) solver_.add_parity_of_noise(parity, 1., out.parity);
-      of_parity_ += noise.parity;
+      if (parity_samples_ == 0.) solver_.add_parity_of_noise(parity, out.parity);
+      parity_samples_ += noise.parity;
       solver_.add_parity(parity, noise.parity, out.parity);
       // What is seen of a cut sample is as noisy as its piece; what it tells is told once.
       out.parity.dof += noise.parity * (noise.variance - 1.) * dof;

@@ -35,7 +35,7 @@ void TwistSolver::add_parity(const Parity& parity, double weight, ParityInformat
 }
 
 /// (W-17): three twists that are as large as the noise is.
-void TwistSolver::add_parity_of_noise(const Parity& parity, double weight, ParityInformation& out) {
+void TwistSolver::add_parity_of_noise(const Parity& parity, ParityInformation& out) {
   const Fit& fit = parity.fit_;
   const Eigen::Matrix3d P = fit.M_inv.topRows<3>();
   if (!moves(fit.xi, P)) return;
@@ -48,7 +48,7 @@ void TwistSolver::add_parity_of_noise(const Parity& parity, double weight, Parit
     with_block_size(model_->description().noise_block, [&](auto size) {
       constexpr int kSize = decltype(size)::value;
       weigh_jacobian<kSize>();
-      add_information<kSize>(fit, weight, out.of_noise, no_eta);
+      add_information<kSize>(fit, 1., out.of_noise, no_eta);
     });
   }
 }

@@ -15,8 +15,6 @@ namespace viwo::wheel_odometry {
 /// what the estimate does by chance, would be told by how it moved.
 class HiddenTurn {
  public:
-  void start() { *this = {}; }
-
   /// An interval in which O turned for sure.
   void add_turn() { ++turns_; }
 

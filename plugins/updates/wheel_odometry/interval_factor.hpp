@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "ground_tilt.hpp"
+#include "hidden_turn.hpp"
 #include "instrument.hpp"
 #include "interval.hpp"
 #include "small_turn.hpp"
@@ -20,6 +21,7 @@ using Jacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kM
 struct Memory {
   GroundTilt tilt;
   SmallTurn turn;
+  HiddenTurn hidden;
 };
 
 /// A factor at a point.

@@ -9,7 +9,6 @@
 #include "clock_rate.hpp"
 #include "encoder_intervals.hpp"
 #include "encoders.hpp"
-#include "hidden_turn.hpp"
 #include "interval_factor.hpp"
 #include "intrinsic_curvature.hpp"
 #include "viwo/api/plugin.hpp"
@@ -68,11 +67,10 @@ class WheelOdometry final : public Update {
 
   void start(const UpdateSetup& /*setup*/) override {
     noise_.reset();
-    memory_ = {GroundTilt(params_.motion_sigmas), SmallTurn(params_.motion_sigmas)};
+    memory_ = {GroundTilt(params_.motion_sigmas), SmallTurn(params_.motion_sigmas), {}};
     checked_.start(wheel_model_of(blocks_), params_.wheel_check_probability);
     instrument_.emplace(wheel_model_of(blocks_), options_);
     curvature_.start(wheel_model_of(blocks_), options_);
-    hidden_turn_.start();
   }
 
   void update(const FilterView& filter, const EpochData& data, FactorSink& sink) override {
@@ -103,7 +101,7 @@ class WheelOdometry final : public Update {
     ResidualFactor& factor = sink.add_residual();
     interval.states = add_states(wheels, filter.P(), first, last, factor.columns);
     const auto n = interval.states.n_intrinsics();
-    if (n > 0) interval.by_yaw = hidden_turn_.at(instrument_->model(), wheels.x_WI);
+    if (n > 0) interval.by_yaw = memory_.hidden.at(instrument_->model(), wheels.x_WI);
     if (params_.second_order_noise) {
       interval.curvature_noise =
           curvature_.noise(readings.samples, readings.begin_ns, readings.end_ns, wheels.x_WI,
@@ -116,7 +114,7 @@ class WheelOdometry final : public Update {
     const double yaw = found.pose.g[0];
     const double duration_s = found.pose.duration_s;
     const double yaw_variance = found.factor.R(0, 0) + found.factor.lasting[0];
-    if (!is_noise(yaw, yaw_variance, params_.motion_sigmas)) hidden_turn_.add_turn();
+    if (!is_noise(yaw, yaw_variance, params_.motion_sigmas)) memory_.hidden.add_turn();
     const double bias_variance =
         filter.P().diagonal().segment<3>(kGyroBiasColumn).mean();  // rad^2/s^2
     memory_.tilt.add(duration_s, yaw, found.factor.tilt, model.tilt_variance(found.at),
@@ -193,7 +191,6 @@ class WheelOdometry final : public Update {
   Tally bridged_{"interval left out: too long without believable encoder samples"};
   std::optional<Instrument> instrument_;
   IntrinsicCurvature curvature_;
-  HiddenTurn hidden_turn_;
   Memory memory_;
 };
 

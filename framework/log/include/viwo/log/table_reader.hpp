@@ -102,7 +102,7 @@ class TableReader {
 
   void check_columns() const;
   /// Of a row, to fields_.
-  void take_apart(std::string_view row);
+  void split_fields(std::string_view row);
   /// The line behind `skip` others; without the '#' before a header.
   std::string_view first_line(int skip);
 

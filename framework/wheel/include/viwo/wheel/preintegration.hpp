@@ -84,7 +84,7 @@ class Preintegrator {
 
   PreintegrationOptions options_;
   TwistSolver solver_;
-  double of_parity_ = 0.;  // samples of this interval whose parity is told
+  double parity_samples_ = 0.;  // samples of this interval whose parity is told
   double parity_gate_ = 0.;
   int parity_gate_dof_ = 0;
   std::array<TwistSolution, 2> solutions_;  // of this sample, and the last one that passed

@@ -96,8 +96,8 @@ class TwistSolver {
   /// Adds `weight` times the parity of the sample last solved. The Jacobian is that at the fitted
   /// signal (W-9).
   void add_parity(const Parity& parity, double weight, ParityInformation& out);
-  /// Adds `weight` times what the noise of its twist is expected to have in its information.
-  void add_parity_of_noise(const Parity& parity, double weight, ParityInformation& out);
+  /// Adds what the noise of its twist is expected to have in its information.
+  void add_parity_of_noise(const Parity& parity, ParityInformation& out);
 
  private:
   // What has three entries gets a fourth lane, so that it is one register; the lane holds zero or
