@@ -109,6 +109,17 @@ double contradiction(const CalibrationResult& result) {
   return moved > 0. ? std::sqrt(left / moved) : 0.;
 }
 
+/// Wheels of which each could do without the others, and that agree to the last digit.
+bool are_setpoints(const CalibrationResult& result) {
+  const auto is_one = [](const CalibrationRecording& recording) {
+    const ModelDescription& model = recording.setup.model->description();
+    return model.n_rows > 3 && !has_copies(recording.data.wheels(), model.n_drive);
+  };
+  const auto& recordings = result.setup->recordings;
+  return std::all_of(recordings.begin(), recordings.end(), is_one) &&
+         contradiction(result) < kExactly;
+}
+
 /// A drive that gives one number all the time while another turns.
 void judge_channels(CalibrationResult& result) {
   constexpr double kTurns_rad_per_s = 0.1;
@@ -153,6 +164,10 @@ void judge_wheels(CalibrationResult& result) {
         "calibrated, the wheels still contradict each other by " + significant(100. * part, 2) +
         " % of their speed: drives or steerings that are exchanged or reversed, units, gears, or "
         "wheels that are elsewhere");
+    return;
+  }
+  if (are_setpoints(result)) {
+    result.doubts.push_back(std::string("the wheels agree ") + kSetpoints);
     return;
   }
   const double scale = result.all.noise.parity_scale;

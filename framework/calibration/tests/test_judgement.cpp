@@ -5,6 +5,7 @@
 #include "joint_search.hpp"
 #include "judgement.hpp"
 #include "message_of.hpp"
+#include "setpoints.hpp"
 #include "unknown_swerve.hpp"
 
 namespace viwo {
@@ -114,6 +115,15 @@ TEST(Judgement, DoubtsASteeringThatJumps) {
   };
   EXPECT_THAT(jumps_by(0.2), Contains(HasSubstr("steer_1 is contradicted by all others in")));
   EXPECT_THAT(jumps_by(0.), IsEmpty());
+}
+
+/// The geometry that they have is the one that was configured: they would confirm it.
+TEST(Judgement, DoubtsWhatAProgramCommanded) {
+  const std::string right = testing::kPlaces + "radius_m: 0.0255";
+  CalibrationSetup setup = testing::gyro_setup(right, right, 1);
+  testing::change_wheels(
+      setup, [](EncoderSample& sample) { testing::make_setpoints(sample, 0.1125, 0.0255); });
+  EXPECT_THAT(calibrate(setup).doubts, Contains(HasSubstr("the wheels agree exactly")));
 }
 
 TEST(Judgement, DoubtsADistanceThatTheWheelsContradict) {

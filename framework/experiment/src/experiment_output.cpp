@@ -73,7 +73,9 @@ json calibration_json(const ExperimentResult& result, std::size_t variant, const
                            {"rmse", number_or_null(c.rmse)},
                            {"mean_sigma", number_or_null(c.mean_sigma)},
                            {"prior_sigma", number_or_null(c.prior_sigma)},
+                           {"mean_error_sigmas", number_or_null(c.mean_error)},
                            {"nees", number_or_null(c.nees)},
+                           {"nees_bounds", {c.nees_bounds.low, c.nees_bounds.high}},
                            {"widened_nees", number_or_null(c.widened_nees)}};
   }
   return calibration;

@@ -113,7 +113,7 @@ std::optional<Plot> nees_plot(const ExperimentResult& result, std::size_t record
   Plot plot{"Consistency of the pose (NEES)", "time [s]", "mean NEES"};
   plot.half_width = true;
   plot.height_px = kMapHeight;
-  int most_runs = 0;
+  int least_runs = 0, most_runs = 0;
   double most = 0., least = kNan;
   for (std::size_t v = 0; v < result.setup.variants.size(); ++v) {
     int runs = 0;
@@ -123,16 +123,19 @@ std::optional<Plot> nees_plot(const ExperimentResult& result, std::size_t record
                         static_cast<double>(series.y.size());
     most = std::max(most, mean);
     least = std::isfinite(least) ? std::min(least, mean) : mean;
+    least_runs = least_runs == 0 ? runs : std::min(least_runs, runs);
     most_runs = std::max(most_runs, runs);
     plot.series.push_back(std::move(series));
   }
   if (plot.series.empty()) return std::nullopt;
-  const eval::NeesBounds bounds = eval::mean_nees_bounds(kPoseDof, most_runs, kConfidence);
+  const eval::NeesBounds bounds = eval::mean_nees_bounds(kPoseDof, least_runs, kConfidence);
   plot.log_y = most > kLogarithmicFrom * std::min(least, static_cast<double>(kPoseDof));
   plot.lines = {{ReferenceLine::Direction::kHorizontal, bounds.low, ""},
                 {ReferenceLine::Direction::kHorizontal, bounds.high, "95 %"}};
   plot.caption =
-      "Mean over " + std::to_string(most_runs) + (most_runs == 1 ? " run" : " runs") +
+      "Mean over " +
+      (least_runs < most_runs ? std::to_string(least_runs) + " to " : std::string()) +
+      std::to_string(most_runs) + (most_runs == 1 ? " run" : " runs") +
       ". A consistent filter has 6 and is between the dashed lines for 95 % of the time.";
   return plot;
 }

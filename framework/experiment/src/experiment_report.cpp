@@ -206,8 +206,7 @@ void add_calibration_by(const ExperimentResult& result, const std::string& label
       for (const CalibrationFamily& family : families) {
         const auto column = std::find(names.begin(), names.end(), family.name) - names.begin();
         row[2 + static_cast<std::size_t>(column)] =
-            unbroken(compact(100. * family.left, 3) + " % (" +
-                     nees_text(family.nees, family.widened_nees) + ")");
+            unbroken(compact(100. * family.left, 3) + " % (" + nees_text(family) + ")");
       }
       table.rows.push_back(std::move(row));
     }
@@ -216,7 +215,7 @@ void add_calibration_by(const ExperimentResult& result, const std::string& label
   table.columns = {{label}, {"variant"}};
   for (const std::string& name : names) table.columns.push_back({name});
   for (std::vector<Cell>& row : table.rows) row.resize(table.columns.size(), "-");
-  table.caption = "Calibration by " + label + ": rmse at the end / prior sigma (NEES" + kWidened +
+  table.caption = "Calibration by " + label + ": rmse at the end / prior sigma (" + kNees +
                   "), of the runs that are ok";
   section.blocks.emplace_back(std::move(table));
 }
@@ -225,9 +224,8 @@ void add_calibration_by(const ExperimentResult& result, const std::string& label
 void add_calibration_table(const ExperimentResult& result, const Group& all, Section& section) {
   Table table;
   table.caption =
-      std::string(
-          "Calibration at the end: root mean square error over the runs that are ok (NEES") +
-      kWidened + ")";
+      std::string("Calibration at the end: root mean square error over the runs that are ok (") +
+      kNees + ")";
   table.columns = {{"parameter"}, {"prior sigma"}};
   std::vector<std::string> names;
   std::vector<std::vector<CalibrationStatistics>> columns;
@@ -261,8 +259,8 @@ void add_calibration_table(const ExperimentResult& result, const Group& all, Sec
       }
       const bool is_other = std::abs(c->prior_sigma - prior_sigma) > 1e-6 * prior_sigma;
       row.emplace_back(
-          unbroken(compact(unit->scale * c->rmse, 3) + " (" + nees_text(c->nees, c->widened_nees) +
-                   ")" + (is_other ? ", prior " + compact(unit->scale * c->prior_sigma, 3) : "")));
+          unbroken(compact(unit->scale * c->rmse, 3) + " (" + nees_text(*c) + ")" +
+                   (is_other ? ", prior " + compact(unit->scale * c->prior_sigma, 3) : "")));
     }
     table.rows.push_back(std::move(row));
   }

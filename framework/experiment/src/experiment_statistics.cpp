@@ -154,6 +154,7 @@ std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult
       if (at == all.end()) at = all.insert(all.end(), {track.name});
       const double e = track.final_error, sigma = track.sigma.back();
       const double normalised = e * e / (sigma * sigma);
+      at->mean_error += e / sigma;
       ++at->runs;
       at->rmse += e * e;
       at->mean_sigma += sigma;
@@ -166,8 +167,10 @@ std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult
     c.rmse = std::sqrt(c.rmse / c.runs);
     c.mean_sigma /= c.runs;
     c.prior_sigma /= c.runs;
+    c.mean_error /= c.runs;
     c.nees /= c.runs;
     c.widened_nees /= c.runs;
+    c.nees_bounds = eval::mean_nees_bounds(1, c.runs, kBoundsConfidence);
   }
   return all;
 }
@@ -199,6 +202,7 @@ std::vector<CalibrationFamily> calibration_families(const ExperimentResult& resu
     families[i].left += c.rmse * c.rmse / (c.prior_sigma * c.prior_sigma);
     families[i].nees += c.nees;
     families[i].widened_nees += c.widened_nees;
+    families[i].is_consistent &= c.is_consistent();
     ++counts[i];
   }
   for (std::size_t i = 0; i < families.size(); ++i) {
@@ -215,8 +219,17 @@ std::string compact(double value, int digits) {
   return whole ? std::to_string(std::llround(value)) : significant(value, digits);
 }
 
-std::string nees_text(double nees, double widened_nees) {
-  return compact(nees, 2) + (widened_nees < nees ? " / " + compact(widened_nees, 2) : "");
+static std::string nees_text(double nees, double widened_nees, bool is_consistent) {
+  return compact(nees, 2) + (is_consistent ? "" : "!") +
+         (widened_nees < nees ? " / " + compact(widened_nees, 2) : "");
+}
+
+std::string nees_text(const CalibrationStatistics& of) {
+  return nees_text(of.nees, of.widened_nees, of.is_consistent());
+}
+
+std::string nees_text(const CalibrationFamily& of) {
+  return nees_text(of.nees, of.widened_nees, of.is_consistent);
 }
 
 RealtimeFactors realtime_factors(const ExperimentResult& result) {

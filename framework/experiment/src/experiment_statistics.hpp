@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "viwo/eval/consistency.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/results/metrics.hpp"
@@ -14,7 +15,8 @@
 namespace viwo::experiment {
 
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-inline constexpr double kConfidence = 0.95;  ///< of the intervals of paired differences
+inline constexpr double kConfidence = 0.95;        ///< of the intervals of paired differences
+inline constexpr double kBoundsConfidence = 0.99;  ///< of the bounds of a parameter's NEES
 
 /// Path lengths [m] that relative pose errors of any run were evaluated over.
 std::set<double> segment_lengths_m(const ExperimentResult& result);
@@ -63,8 +65,11 @@ struct CalibrationStatistics {
   std::string name;
   int runs = 0;
   double rmse = 0., mean_sigma = 0., prior_sigma = 0.;
-  double nees = 0.;          ///< mean squared normalised error
-  double widened_nees = 0.;  ///< likewise, by sigmas times their scatter (F-42)
+  double mean_error = 0.;        ///< mean normalised error: of a biased estimate not zero
+  double nees = 0.;              ///< mean squared normalised error
+  double widened_nees = 0.;      ///< likewise, by sigmas times their scatter (F-42)
+  eval::NeesBounds nees_bounds;  ///< of a consistent one in kBoundsConfidence of all experiments
+  bool is_consistent() const { return nees >= nees_bounds.low && nees <= nees_bounds.high; }
 };
 std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,
                                                           std::size_t variant, const Group& group);
@@ -74,6 +79,7 @@ struct CalibrationFamily {
   std::string name;
   double left = 0.;                     ///< root mean square of rmse / prior sigma
   double nees = 0., widened_nees = 0.;  ///< means
+  bool is_consistent = true;            ///< each of its parameters
 };
 std::vector<CalibrationFamily> calibration_families(const ExperimentResult& result,
                                                     std::size_t variant, const Group& group);
@@ -82,11 +88,15 @@ std::vector<CalibrationFamily> calibration_families(const ExperimentResult& resu
 std::string compact(double value, int digits);
 
 /// What nees_text() says, for captions.
-inline constexpr const char* kWidened =
-    ", 1 is consistent; behind a slash that of sigmas times their scatter";
+inline constexpr const char* kNees =
+    "NEES, 1 is consistent, ! is outside of the bounds of 99 %; behind a slash that of sigmas "
+    "times "
+    "their scatter";
 
-/// "2.4"; "54 / 2.3" where sigmas that are widened by their scatter make it smaller.
-std::string nees_text(double nees, double widened_nees);
+/// "2.4"; "54! / 2.3" where it is not consistent, and sigmas that are widened by their scatter make
+/// it smaller.
+std::string nees_text(const CalibrationStatistics& of);
+std::string nees_text(const CalibrationFamily& of);
 
 /// Names of the parameters that some of the runs estimated, in order of appearance.
 std::vector<std::string> estimated(const ExperimentResult& result,

@@ -88,7 +88,7 @@ void add_calibration_by_group(const ExperimentResult& result, const std::vector<
       std::vector<std::string> names;
       for (const CalibrationFamily& family : families) names.push_back(family.name);
       if (names != shown) {
-        out << "\ncalibration: rmse at the end, % of the prior sigma (NEES" << kWidened << ")\n"
+        out << "\ncalibration: rmse at the end, % of the prior sigma (" << kNees << ")\n"
             << padded("", width);
         for (const std::string& name : names) out << right(name, 18);
         out << "\n";
@@ -98,9 +98,7 @@ void add_calibration_by_group(const ExperimentResult& result, const std::vector<
       named = true;
       out << padded("  " + result.setup.variants[v].name, width);
       for (const CalibrationFamily& family : families) {
-        out << right(compact(100. * family.left, 3) + " (" +
-                         nees_text(family.nees, family.widened_nees) + ")",
-                     18);
+        out << right(compact(100. * family.left, 3) + " (" + nees_text(family) + ")", 18);
       }
       out << "\n";
     }
@@ -112,12 +110,12 @@ void add_calibration(const ExperimentResult& result, const Group& all, std::ostr
     const auto statistics = calibration_statistics(result, v, all);
     if (statistics.empty()) continue;
     out << "\ncalibration of " << result.setup.variants[v].name
-        << ": rmse at the end (part of the prior sigma; NEES" << kWidened << ")\n";
+        << ": rmse at the end (part of the prior sigma; " << kNees << ")\n";
     std::size_t column = 0;
     for (const CalibrationStatistics& c : statistics) {
       const std::string text = "  " + c.name + " " + significant(c.rmse, 3) + " (" +
                                significant(100. * c.rmse / c.prior_sigma, 3) + " %; " +
-                               nees_text(c.nees, c.widened_nees) + ")";
+                               nees_text(c) + ")";
       out << padded(text, std::max<std::size_t>(42, text.size() + 1));
       if (++column % 3 == 0) out << "\n";
     }

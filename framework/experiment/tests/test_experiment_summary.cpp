@@ -156,8 +156,31 @@ TEST_F(Summary, SaysWhatErrorsOfCalibrationAreBySigmasThatAreWidenedByTheirScatt
   const auto r = summary_of(result)["variants"]["a"]["calibration"]["r_1"];
   EXPECT_DOUBLE_EQ(r["nees"], 20.);
   EXPECT_DOUBLE_EQ(r["widened_nees"], 3.125);
-  EXPECT_THAT(describe(result), HasSubstr("44.7 (20 / 3.1)"));
-  EXPECT_THAT(text_of(folder_ / "out" / "report.html"), HasSubstr("(20\u00a0/\u00a03.1)"));
+  EXPECT_THAT(describe(result), HasSubstr("44.7 (20! / 3.1)"));
+  EXPECT_THAT(text_of(folder_ / "out" / "report.html"), HasSubstr("(20!\u00a0/\u00a03.1)"));
+}
+
+/// Chi-square of two runs: 0.01003 to 10.597.
+TEST_F(Summary, SaysWhichParametersAreBiasedOrNotConsistent) {
+  ExperimentResult result = with_errors({1., 2.});
+  const double errors[3][2] = {{2., 2.2}, {3., -2.}, {0.05, -0.05}};  // in sigmas, of two runs
+  for (std::size_t i = 0; i < 2; ++i) {
+    RunResult& run = result.runs[i].result;
+    run.updates = {{"parity", {8, 9}, {}, {}, {}}};
+    for (std::size_t k = 0; k < 3; ++k) {
+      run.calibration.push_back(
+          {"r_" + std::to_string(k), "m", {0., 0.}, {10., 0.5}, 0., 0.5 * errors[k][i], 1.});
+    }
+  }
+  const auto calibration = summary_of(result)["variants"]["a"]["calibration"];
+  EXPECT_NEAR(calibration["r_0"]["nees_bounds"][0], 0.01003 / 2., 1e-5);
+  EXPECT_NEAR(calibration["r_0"]["nees_bounds"][1], 10.597 / 2., 1e-3);
+  EXPECT_DOUBLE_EQ(calibration["r_0"]["mean_error_sigmas"], 2.1);
+  EXPECT_DOUBLE_EQ(calibration["r_1"]["mean_error_sigmas"], 0.5);
+  const std::string table = describe(result);
+  EXPECT_THAT(table, HasSubstr("r_0 1.05 (10.5 %; 4.4)"));
+  EXPECT_THAT(table, HasSubstr("r_1 1.27 (12.7 %; 6.5!)"));
+  EXPECT_THAT(table, HasSubstr("r_2 0.025 (0.25 %; 0.0025!)"));
 }
 
 TEST_F(Summary, CountsRunsThatAreNotToBeTrusted) {

@@ -6,6 +6,7 @@
 #include "checks.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/wheel/contradicted_channels.hpp"
+#include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 #include "viwo/wheel/wheel_noise.hpp"
 #include "wheel_calibration.hpp"
@@ -131,14 +132,19 @@ Parity parity_of(const Wheels& wheels, const Intrinsics& x_WI) {
           n_refused / static_cast<double>(wheels.samples.size())};
 }
 
-void check_parity(const Parity& parity, const std::string& label, Findings& out) {
+void check_parity(const Parity& parity, const Wheels& wheels, const std::string& label,
+                  Findings& out) {
   Finding finding{label,
                   Severity::kFits,
                   "parity",
                   "rows disagree by " + significant(1e3 * parity.rms, 2) + " mm/s at " +
                       significant(parity.speed, 2) + " m/s of the wheels",
                   {{"parity residual", parity.rms, "m/s"}, {"speed", parity.speed, "m/s"}}};
-  if (parity.is_gross()) {
+  if (parity.rms < kExactly * parity.speed &&
+      !has_copies(wheels.samples, wheels.model->description().n_drive)) {
+    finding.severity = Severity::kFault;
+    finding.what = std::string("the wheels agree ") + kSetpoints;
+  } else if (parity.is_gross()) {
     finding.severity = Severity::kFault;
     if (!std::isfinite(parity.rms) || parity.refused > 0.5) {
       finding.what = "the kinematic model makes no motion of " +
@@ -229,11 +235,11 @@ void check_wheels(const Recording& recording, Findings& out) {
     if (wheels.samples.empty() || wheels.model->n_rows() <= 3) continue;
     const std::optional<Calibration> calibration = calibrated(wheels);
     if (!calibration) {
-      check_parity(parity_of(wheels, wheels.prior.wheels.x_WI), label, out);
+      check_parity(parity_of(wheels, wheels.prior.wheels.x_WI), wheels, label, out);
       continue;
     }
     const Parity parity = parity_of(wheels, calibration->x_WI);
-    check_parity(parity, label, out);
+    check_parity(parity, wheels, label, out);
     check_intrinsics(wheels, *calibration, label, out);
     const std::size_t before = out.size();
     const Wheels left = check_liars(recording, wheels, *calibration, label, out);

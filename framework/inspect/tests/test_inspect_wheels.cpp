@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "inspected.hpp"
+#include "setpoints.hpp"
 
 namespace viwo::inspect {
 namespace {
@@ -60,6 +61,23 @@ TEST(InspectWheels, TellsASteeringThatNeverChanges) {
                 HasSubstr("steer_1 reads 0.03 rad all the time"))
         << robot;
   }
+}
+
+TEST(InspectWheels, TellsWhatAProgramCommandedInPlaceOfReadings) {
+  const Inspection commanded = with_wheels(simulated("viwo_swerve"), [](EncoderSample& s) {
+    testing::make_setpoints(s, 0.1125, 0.0255);
+  });
+  EXPECT_THAT(faults_of(commanded), Contains("wheels0 parity"));
+  EXPECT_THAT(finding_of(commanded, "wheels0", "parity").what, HasSubstr("setpoints"));
+}
+
+/// Two sides, each read once for two wheels.
+TEST(InspectWheels, TakesCopiesOfAReadingForWhatTheyAre) {
+  const Inspection copies = with_wheels(simulated("viwo_swerve"), [](EncoderSample& s) {
+    s.drive_rad_per_s.fill(s.drive_rad_per_s[0]);
+    s.steer_rad.fill(s.steer_rad[0]);
+  });
+  EXPECT_EQ(finding_of(copies, "wheels0", "parity").severity, Severity::kFits);
 }
 
 TEST(InspectWheels, TellsThatTheSteeringIsReadLate) {

@@ -1,10 +1,12 @@
-// What the drives read over a recording, to see one that is not connected, or not read.
+// What the drives read over a recording, to see one that is not connected, or not read, and what no
+// encoder read.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "viwo/api/measurement.hpp"
@@ -62,5 +64,29 @@ class DriveRanges {
   };
   std::vector<Range> ranges_;
 };
+
+/// Rows of wheels that roll on a floor never agree to this part of their speed: encoders have steps
+/// and floors are not flat. What a program commands does, and so do copies of one reading.
+inline constexpr double kExactly = 1e-4;
+
+inline constexpr const char* kSetpoints =
+    "exactly, as no wheels do: what the program commanded (setpoints, targets) in place of what "
+    "the "
+    "encoders read, or a simulation without noise; of the robot it tells nothing";
+
+/// Whether two drives read the same all the time.
+inline bool has_copies(std::span<const EncoderSample> samples, int n_drive) {
+  const auto n = static_cast<std::size_t>(n_drive);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t k = i + 1; k < n; ++k) {
+      if (std::all_of(samples.begin(), samples.end(), [&](const EncoderSample& sample) {
+            return sample.drive_rad_per_s[i] == sample.drive_rad_per_s[k];
+          })) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
 
 }  // namespace viwo
