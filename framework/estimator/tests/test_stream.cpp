@@ -334,5 +334,21 @@ TEST(Rejections, AddUpOverThePartsOfARunWithOutOfHowMany) {
   EXPECT_EQ(all.counts()[0].first, "t = 1.0 s");
 }
 
+/// Names and types in messages are of the sender.
+TEST(Rejections, HaveABoundWhateverTextsOthersSend) {
+  Rejections all;
+  const std::string longer(10 * Rejections::kLongestReason, 'a');
+  int told = 0;
+  for (int i = 0; i < 10'000; ++i) told += all.add("no joint " + std::to_string(i), 0) ? 1 : 0;
+  EXPECT_EQ(told, static_cast<int>(Rejections::kMostReasons));
+  EXPECT_FALSE(all.add(longer, 0));
+  ASSERT_EQ(all.counts().size(), Rejections::kMostReasons + 1);
+  EXPECT_EQ(all.counts().back().count, 10'001 - static_cast<int>(Rejections::kMostReasons));
+  Rejections few;
+  EXPECT_TRUE(few.add(longer, 0));
+  EXPECT_FALSE(few.add(longer, 0));
+  EXPECT_EQ(few.counts()[0].reason.size(), Rejections::kLongestReason);
+}
+
 }  // namespace
 }  // namespace viwo

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -20,7 +21,7 @@ constexpr std::uint64_t kMostPixels = 1ULL << 25, kLongestSide = 1ULL << 15;
 constexpr std::uint64_t kMostBytes = 1ULL << 28;
 
 /// What a few bytes ask for is known before a pixel is decoded.
-void check_header(std::span<const std::uint8_t> bytes, const std::string& name) {
+ImageSize size_of(std::span<const std::uint8_t> bytes, const std::string& name) {
   const auto size = image_size(bytes);
   if (!size) {
     throw InputError(name + ": is no PNG, JPEG, BMP, PGM or PPM, or its header is damaged");
@@ -28,7 +29,7 @@ void check_header(std::span<const std::uint8_t> bytes, const std::string& name) 
   const auto [width, height] = *size;
   if (width > 0 && height > 0 && width <= kLongestSide && height <= kLongestSide &&
       width * height <= kMostPixels) {
-    return;
+    return *size;
   }
   throw InputError(name + ": an image of " + std::to_string(width) + " x " +
                    std::to_string(height) + " pixels, at most " +
@@ -53,14 +54,16 @@ void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, 
   if (bytes.empty()) throw InputError(name + ": the image is empty");
   const bool is_png = begins(bytes, "\x89PNG");
   if (is_png && lacks_its_end(bytes)) throw InputError(name + ": the image is cut short");
-  check_header(bytes, name);
+  const ImageSize size = size_of(bytes, name);
   if (begins(bytes, "\xff\xd8")) {
-    decode_jpeg(bytes, name, out);
+    decode_jpeg(bytes, size, name, out);
     return;
   }
 #if VIWO_HAS_LIBDEFLATE
   if (is_png && decode_grey_png(bytes, out)) return;
 #endif
+  std::vector<std::uint8_t> pixels_alone;
+  if (is_png) bytes = pixels_alone = without_texts(bytes);
   const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1,
                     const_cast<std::uint8_t*>(bytes.data()));
   cv::Mat grey;

@@ -27,7 +27,8 @@ std::optional<ImageSize> png_size(Bytes bytes) {
   return ImageSize{big_endian(bytes.subspan(16, 4)), big_endian(bytes.subspan(20, 4))};
 }
 
-/// In the first segment that begins a frame.
+/// In the first segment that begins a frame. libjpeg looks on behind what is no segment, and is
+/// asked for the same size (decode_jpeg()).
 std::optional<ImageSize> jpeg_size(Bytes bytes) {
   constexpr std::uint8_t kTables = 0xc4, kExtension = 0xc8, kArithmetic = 0xcc, kScan = 0xda;
   std::size_t at = 2;
@@ -99,6 +100,31 @@ std::optional<ImageSize> image_size(Bytes bytes) {
     if (begins(bytes, magic)) return netpbm_size(bytes);
   }
   return std::nullopt;
+}
+
+std::vector<std::uint8_t> without_texts(Bytes png) {
+  constexpr std::size_t kMagic = 8, kAround = 12;  // length, type and checksum of a chunk
+  std::vector<std::uint8_t> out;
+  const auto take = [&](std::size_t n) {
+    out.insert(out.end(), png.begin(), png.begin() + static_cast<std::ptrdiff_t>(n));
+    png = png.subspan(n);
+  };
+  take(std::min(kMagic, png.size()));
+  while (png.size() >= kAround) {
+    const std::uint64_t length = big_endian(png.first(4));
+    if (length > png.size() - kAround) break;
+    const std::size_t size = kAround + static_cast<std::size_t>(length);
+    const Bytes type = png.subspan(4);
+    const bool is_text = begins(type, "tEXt") || begins(type, "zTXt") || begins(type, "iTXt") ||
+                         begins(type, "sPLT");
+    if (is_text) {
+      png = png.subspan(size);
+    } else {
+      take(size);
+    }
+  }
+  take(png.size());
+  return out;
 }
 
 }  // namespace viwo

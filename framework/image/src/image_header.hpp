@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace viwo {
 
@@ -18,5 +19,9 @@ bool begins(std::span<const std::uint8_t> bytes, std::string_view magic);
 
 /// Of a PNG, JPEG, BMP, PGM or PPM; nothing for other formats, and for a header that is broken.
 std::optional<ImageSize> image_size(std::span<const std::uint8_t> bytes);
+
+/// A PNG without its texts and palettes that are proposed: libpng decompresses each, up to 8 MB of
+/// a few KB, and keeps them all.
+std::vector<std::uint8_t> without_texts(std::span<const std::uint8_t> png);
 
 }  // namespace viwo

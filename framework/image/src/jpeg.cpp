@@ -55,13 +55,17 @@ class JpegDecoder {
 
   /// False with `message()`. Has no objects of C++ but what the caller owns: libjpeg is C and
   /// leaves by longjmp.
-  bool decode(std::span<const std::uint8_t> bytes, Image& out) {
+  bool decode(std::span<const std::uint8_t> bytes, ImageSize size, Image& out) {
     if (setjmp(failed_) != 0) return false;  // NOLINT(cert-err52-cpp): as libjpeg is made for
     jpeg_create_decompress(&info_);
     info_.progress = &progress_;
     info_.mem->max_memory_to_use = kMostKept;
     jpeg_mem_src(&info_, bytes.data(), static_cast<unsigned long>(bytes.size()));
     jpeg_read_header(&info_, TRUE);
+    if (info_.image_width != size.width_px || info_.image_height != size.height_px) {
+      std::snprintf(message_.data(), message_.size(), "has a damaged header");
+      return false;
+    }
     info_.out_color_space = JCS_GRAYSCALE;
     jpeg_start_decompress(&info_);
     const std::size_t width = info_.output_width;
@@ -100,9 +104,10 @@ class JpegDecoder {
 
 }  // namespace
 
-void decode_jpeg(std::span<const std::uint8_t> bytes, const std::string& name, Image& out) {
+void decode_jpeg(std::span<const std::uint8_t> bytes, ImageSize size, const std::string& name,
+                 Image& out) {
   JpegDecoder decoder;
-  if (!decoder.decode(bytes, out)) throw InputError(name + ": " + decoder.message());
+  if (!decoder.decode(bytes, size, out)) throw InputError(name + ": " + decoder.message());
 }
 
 }  // namespace viwo

@@ -88,13 +88,17 @@ std::size_t utf8_size(std::string_view text) {
   return size;
 }
 
-/// "a, b, c"; of a long list the nearest to `name`, and how many more there are.
+/// "a, b, c"; of a long list the nearest to `name`, and how many more there are. Names are those of
+/// a file: of a long one the beginning counts.
 std::string list_of(const std::vector<std::string>& candidates, std::string_view name) {
   constexpr std::size_t kLongest = 500;  // an error of a plugin has room for 1000
+  constexpr std::size_t kLongestName = 200;
   std::size_t size = 0;
   for (const std::string& candidate : candidates) size += candidate.size() + 2;
+  name = name.substr(0, kLongestName);
   std::vector<std::pair<double, std::string_view>> ranked;
-  for (const std::string& candidate : candidates) {
+  for (const std::string& whole : candidates) {
+    const std::string_view candidate = std::string_view(whole).substr(0, kLongestName);
     const double longer =
         static_cast<double>(std::max({candidate.size(), name.size(), std::size_t{1}}));
     const auto off =

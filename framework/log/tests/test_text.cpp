@@ -168,6 +168,8 @@ TEST(Suggestions, OfManyNamesBeginWithTheNearestAndEndAtAWholeName) {
   EXPECT_EQ(text.find(" - there are: /Robot/Drive/GyroYaw, joystick_axis_0, "), 0U) << text;
   EXPECT_LT(text.size(), 550U);
   EXPECT_EQ(text.substr(text.rfind(',')), ", ... (73 more)");
+  // A hostile file has names as long as itself.
+  EXPECT_LT(did_you_mean("/Drive/Gyro", {std::string(20'000'000, 'a'), "b"}).size(), 250U);
 }
 
 TEST(Texts, ShowBytesThatAreNoTextAsTheirNumbers) {

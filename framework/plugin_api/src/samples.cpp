@@ -8,10 +8,13 @@ SampleBuffer::~SampleBuffer() = default;
 std::string stamp_text(std::int64_t t_ns) { return "stamp " + std::to_string(t_ns) + " ns"; }
 
 RejectionCount* Rejections::find(std::string_view reason) {
+  reason = reason.substr(0, kLongestReason);
   for (RejectionCount& known : counts_) {
     if (known.reason == reason) return &known;
   }
-  return nullptr;
+  if (counts_.size() < kMostReasons) return nullptr;
+  if (counts_.size() == kMostReasons) counts_.push_back({"for other reasons", 0, "not listed"});
+  return &counts_.back();
 }
 
 }  // namespace viwo

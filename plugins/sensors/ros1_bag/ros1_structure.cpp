@@ -29,6 +29,8 @@ constexpr std::uint64_t kMostChunk = 128U << 20, kFreeBytes = 64U << 20, kMostRa
 /// Bytes that bz2 may give, if a chunk is decompressed whenever the next message is in another one;
 /// lz4 is that much faster.
 constexpr std::uint64_t kFreeWork = 512ULL << 20, kMostRepeated = 16, kLz4IsFaster = 16;
+/// How much longer than its file a bag becomes: more of it counts as often as it is there.
+constexpr std::uint64_t kUsualRatio = 10;
 
 std::uint32_t u32_at(std::string_view bytes) {
   std::uint32_t value = 0;  // little endian, as all that rosbag_storage runs on
@@ -143,14 +145,18 @@ class Structure {
     return record;
   }
 
-  /// roscpp believes the lengths of fields, whatever there is behind them.
+  /// roscpp believes the lengths of fields, whatever there is behind them, and of two fields of one
+  /// name the last, where field() finds the first.
   void check_fields(std::string_view rest, std::uint64_t record_begin) const {
+    std::set<std::string_view> names;
     while (!rest.empty()) {
-      if (rest.size() < 4 || u32_at(rest) > rest.size() - 4 ||
-          rest.substr(4, u32_at(rest)).find('=') == std::string_view::npos) {
+      const bool is_whole = rest.size() >= 4 && u32_at(rest) <= rest.size() - 4;
+      const std::string_view item = is_whole ? rest.substr(4, u32_at(rest)) : std::string_view();
+      if (item.find('=') == std::string_view::npos ||
+          !names.insert(item.substr(0, item.find('='))).second) {
         fail(record_begin, "the header of a record is wrong");
       }
-      rest.remove_prefix(4 + u32_at(rest));
+      rest.remove_prefix(4 + item.size());
     }
   }
 
@@ -297,7 +303,8 @@ class Structure {
     for (std::size_t i = 1; i < entries_.size(); ++i) {
       if (entries_[i].chunk != entries_[i - 1].chunk) work += work_of_[entries_[i].chunk];
     }
-    if (work <= kFreeWork + kMostRepeated * whole_bytes_) return;
+    const std::uint64_t usual = std::min(whole_bytes_, kUsualRatio * size_);
+    if (work <= kFreeWork + kMostRepeated * usual) return;
     throw InputError(file_ + "  has messages whose chunks alternate, so that " +
                      std::to_string(work >> 20U) +
                      " MiB would be decompressed - `rosbag "
@@ -321,8 +328,9 @@ class Structure {
       if (!is_compressed_) continue;
       const auto seconds = u32_at(std::string_view(data).substr(i));
       const auto nanoseconds = u32_at(std::string_view(data).substr(i + 4));
-      entries_.push_back({std::uint64_t{seconds} << 32U | nanoseconds,
-                          static_cast<std::uint32_t>(work_of_.size() - 1)});
+      entries_.push_back(
+          {std::uint64_t{seconds} * 1'000'000'000 + nanoseconds,  // as ros::Time has it
+           static_cast<std::uint32_t>(work_of_.size() - 1)});
     }
   }
 

@@ -217,6 +217,10 @@ TEST_F(Ros1Bag, RefusesWhatRosWouldBelieveBeyondTheEndOfARecord) {
   content.replace(content.rfind("message_definition=") - 4, 4, raw(std::uint32_t{900'000}));
   std::ofstream(file(), std::ios::binary) << content;
   EXPECT_THAT(error_of(section(kAll)), HasSubstr("the header of a record is wrong"));
+  content = whole;  // two fields of one name, of which roscpp takes the last
+  content.replace(content.find("ver="), 4, "op=\x04");
+  std::ofstream(file(), std::ios::binary) << content;
+  EXPECT_THAT(error_of(section(kAll)), HasSubstr("the header of a record is wrong"));
   content = whole;
   const auto place = content.find("index_pos=") + 10;
   content[place] = static_cast<char>(content[place] ^ 1);
@@ -245,20 +249,33 @@ TEST_F(Ros1Bag, RefusesChunksThatTakeMoreThanARecordingDoes) {
 }
 
 TEST_F(Ros1Bag, RefusesMessagesThatAlternateBetweenLargeChunks) {
+  const auto time_of = [](int k) { return kStart + (k < 500 ? 2 * k : 2 * (k - 500) + 1) * kMs; };
   {
     Ros1Writer out(file(), "bz2", 10'000'000);
     constexpr std::uint32_t kSide = 141;  // 20 kB
     for (int k = 0; k < 1000; ++k) {
-      const std::int64_t t_ns = kStart + (k < 500 ? 2 * k : 2 * (k - 500) + 1) * kMs;
+      const std::int64_t t_ns = time_of(k);
       out.write_image(
           "/cam0", {t_ns, t_ns},
           {kSide, kSide, "mono8", false, kSide, std::vector<std::uint8_t>(kSide * kSide)});
     }
     out.close();
   }
-  EXPECT_THAT(error_of(section("image_topics: [/cam0]")),
-              HasSubstr(" MiB would be decompressed - `rosbag decompress " + file() +
-                        "` makes it quick to read"));
+  const auto refused = HasSubstr(" MiB would be decompressed - `rosbag decompress " + file() +
+                                 "` makes it quick to read");
+  EXPECT_THAT(error_of(section("image_topics: [/cam0]")), refused);
+  // The same times, the later chunk's a second less and so many nanoseconds more.
+  std::string content = read();
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  const auto stamp = [](std::int64_t s, std::int64_t ns) {
+    return raw(static_cast<std::uint32_t>(s)) + raw(static_cast<std::uint32_t>(ns));
+  };
+  for (int k = 500; k < 1000; ++k) {
+    const std::int64_t s = time_of(k) / kSecond, ns = time_of(k) % kSecond;
+    content.replace(content.rfind(stamp(s, ns)), 8, stamp(s - 1, ns + kSecond));
+  }
+  std::ofstream(file(), std::ios::binary) << content;
+  EXPECT_THAT(error_of(section("image_topics: [/cam0]")), refused);
 }
 
 TEST_F(Ros1Bag, RefusesAnIndexThatNamesAMessageAgainAndAgain) {

@@ -129,8 +129,15 @@ ImuSample read_imu(FieldReader& in) {
 Joints read_joints(FieldReader& in) {
   Joints joints;
   joints.t_ns = in.header();
-  joints.names.resize(in.count(sizeof(std::uint32_t)));
-  for (std::string& name : joints.names) name = in.text();
+  // A text takes more memory than its four bytes of a message.
+  constexpr std::size_t kMostNames = 10'000, kLongestName = 1000;
+  const std::size_t n = in.count(sizeof(std::uint32_t));
+  if (n > kMostNames) throw BrokenMessage("it has more than 10000 joints");
+  joints.names.resize(n);
+  for (std::string& name : joints.names) {
+    name = in.text();
+    if (name.size() > kLongestName) throw BrokenMessage("a joint has a name of over 1000 bytes");
+  }
   joints.positions = read_numbers(in);
   joints.velocities = read_numbers(in);
   return joints;

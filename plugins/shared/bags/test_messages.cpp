@@ -1,5 +1,10 @@
-// Pixels of all encodings, against values by hand.
+// Pixels of all encodings, against values by hand; messages that take more than they are.
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -27,6 +32,35 @@ ImageHead head(const std::string& encoding, std::uint32_t width_px, std::uint32_
 
 std::string error_of(const ImageHead& bad, const Bytes& pixels) {
   return testing::error_of<BrokenMessage>([&] { grey(bad, pixels); });
+}
+
+/// A list of `count` texts, all the same, and no numbers.
+class Names final : public FieldReader {
+ public:
+  Names(std::uint32_t count, std::size_t size) : count_(count), name_(size, 'a') {}
+  std::int64_t stamp() override { return 1; }
+  std::uint8_t u8() override { return 0; }
+  std::uint16_t u16() override { return 0; }
+  std::uint32_t u32() override { return std::exchange(count_, 0); }
+  double f64() override { return 0.; }
+  std::string_view text() override { return name_; }
+  std::span<const std::uint8_t> bytes() override { return {}; }
+  std::size_t left() const override { return 1'000'000'000; }
+
+ private:
+  std::uint32_t count_;
+  std::string name_;
+};
+
+TEST(ReadJoints, RefusesMoreAndLongerNamesThanARobotHas) {
+  const auto error = [](std::uint32_t count, std::size_t size) {
+    Names names(count, size);
+    return testing::error_of<BrokenMessage>([&] { read_joints(names); });
+  };
+  EXPECT_EQ(error(200'000'000, 0), "it has more than 10000 joints");
+  EXPECT_EQ(error(1, 1001), "a joint has a name of over 1000 bytes");
+  Names names(10'000, 1000);
+  EXPECT_EQ(read_joints(names).names.size(), 10'000U);
 }
 
 TEST(ToGrey, LeavesOutThePaddingOfRows) {

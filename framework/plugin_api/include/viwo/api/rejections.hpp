@@ -1,6 +1,7 @@
 // Counting what is not used: never silently.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -22,9 +23,14 @@ struct RejectionCount {
 VIWO_API std::string stamp_text(std::int64_t t_ns);
 
 /// Counts by reason, in the order of their first times. Allocates for a reason that is new only.
+/// Texts of others, as in messages, may be part of a reason: beyond kMostReasons all that are new
+/// are one, and of each kLongestReason bytes are kept.
 class VIWO_API Rejections {
  public:
-  /// True for a reason that is new. `where` gives the text of the place, asked for then only.
+  static constexpr std::size_t kMostReasons = 200, kLongestReason = 1000;
+
+  /// True for a reason that is new, and is not one too many. `where` gives the text of the place,
+  /// asked for then only.
   template <class Where>
   requires requires(const Where& where) { std::string(where()); }
   bool add(std::string_view reason, const Where& where, std::int64_t count = 1) {
@@ -32,7 +38,7 @@ class VIWO_API Rejections {
       known->count += count;
       return false;
     }
-    counts_.push_back({std::string(reason), count, where()});
+    counts_.push_back({std::string(reason.substr(0, kLongestReason)), count, where()});
     return true;
   }
   /// The place is a stamp.
@@ -52,6 +58,7 @@ class VIWO_API Rejections {
   }
 
  private:
+  /// The last one where there are too many to have one of its own.
   RejectionCount* find(std::string_view reason);
 
   std::vector<RejectionCount> counts_;

@@ -1,0 +1,114 @@
+// A few bytes that ask for a great deal of memory.
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <zlib.h>
+
+#include "message_of.hpp"
+#include "peak_memory.hpp"
+#include "viwo/image/image_file.hpp"
+
+namespace viwo {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// `bytes` with a number of four bytes put in, most significant byte first.
+Bytes with_number(Bytes bytes, std::size_t at, std::uint32_t value) {
+  for (std::size_t i = 0; i < 4; ++i)
+    bytes[at + i] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
+  return bytes;
+}
+
+TEST(ImageHeader, TheSizeIsReadBeforeThePixels) {
+  Image image;
+  const auto refusal = [&image](const Bytes& bytes) {
+    return testing::error_of([&] { decode_image(bytes, "a", image); });
+  };
+  const std::string most = " pixels, at most 32 Mi are read";
+  const cv::Mat grey(20, 30, CV_8UC1, cv::Scalar(90));
+  Bytes bytes;
+  cv::imencode(".png", grey, bytes);
+  // A wrong check sum of the header: who looks further says something else.
+  EXPECT_EQ(refusal(with_number(with_number(bytes, 16, 32767), 20, 32767)),
+            "a: an image of 32767 x 32767" + most);
+  EXPECT_EQ(refusal(with_number(bytes, 16, 0xffffffff)), "a: an image of 4294967295 x 20" + most);
+  EXPECT_EQ(refusal(with_number(bytes, 20, 0)), "a: an image of 30 x 0" + most);
+  cv::imencode(".jpg", grey, bytes);
+  const Bytes begin_of_frame{0xff, 0xc0};
+  const auto frame =
+      std::search(bytes.begin(), bytes.end(), begin_of_frame.begin(), begin_of_frame.end());
+  ASSERT_NE(frame, bytes.end());
+  EXPECT_EQ(
+      refusal(with_number(bytes, static_cast<std::size_t>(frame - bytes.begin()) + 5, 0xff00ff01)),
+      "a: an image of 65281 x 65280" + most);
+  cv::imencode(".bmp", grey, bytes);
+  EXPECT_EQ(refusal(with_number(bytes, 18, 0x000000ff)), "a: an image of 4278190080 x 20" + most);
+  cv::imencode(".pgm", grey, bytes);
+  const std::string pgm = "P5\n# 1 2\n 30000\n30000 255\n";
+  EXPECT_EQ(refusal({pgm.begin(), pgm.end()}), "a: an image of 30000 x 30000" + most);
+}
+
+/// libjpeg skips the bytes FF 00 and goes on with what is behind them; who takes them for a segment
+/// skips that.
+TEST(ImageHeader, AJpegHasTheSizeThatLibjpegFinds) {
+  const cv::Mat grey(20, 30, CV_8UC1, cv::Scalar(90));
+  Bytes small;
+  cv::imencode(".jpg", grey, small);
+  const Bytes begin_of_frame{0xff, 0xc0};
+  const auto frame =
+      std::search(small.begin(), small.end(), begin_of_frame.begin(), begin_of_frame.end());
+  ASSERT_NE(frame, small.end());
+  const Bytes large =
+      with_number(small, static_cast<std::size_t>(frame - small.begin()) + 5, 0xff00ff00);
+  const std::size_t hidden = large.size();
+  ASSERT_LT(hidden, 0xffffU);
+  Bytes bytes{0xff,
+              0xd8,
+              0xff,
+              0x00,
+              static_cast<std::uint8_t>(hidden >> 8U),
+              static_cast<std::uint8_t>(hidden)};
+  bytes.insert(bytes.end(), large.begin() + 2, large.end());
+  bytes.insert(bytes.end(), small.begin() + 2, small.end());
+  Image image;
+  EXPECT_EQ(testing::error_of([&] { decode_image(bytes, "a", image); }), "a: has a damaged header");
+}
+
+/// Eight megabytes each.
+TEST(ImageHeader, TextsOfAPngAreNotRead) {
+  Bytes zeros(8'000'000), text(compressBound(zeros.size()));
+  uLongf size = text.size();
+  compress(text.data(), &size, zeros.data(), zeros.size());
+  text.resize(size);
+  Bytes chunk(4);
+  const std::string_view begin("zTXta\0\0", 7);
+  chunk.insert(chunk.end(), begin.begin(), begin.end());
+  chunk.insert(chunk.end(), text.begin(), text.end());
+  const std::size_t typed = chunk.size() - 4;
+  const auto sum = static_cast<std::uint32_t>(crc32(0, chunk.data() + 4, static_cast<uInt>(typed)));
+  chunk = with_number(chunk, 0, static_cast<std::uint32_t>(typed - 4));
+  chunk.resize(chunk.size() + 4);
+  chunk = with_number(chunk, chunk.size() - 4, sum);
+
+  const cv::Mat colours(20, 30, CV_8UC3, cv::Scalar(10, 200, 90));
+  Bytes png;
+  cv::imencode(".png", colours, png);
+  Image expected, image;
+  decode_image(png, "a", expected);
+  constexpr std::ptrdiff_t kHead = 8 + 25;  // the magic, IHDR
+  for (int i = 0; i < 60; ++i) png.insert(png.begin() + kHead, chunk.begin(), chunk.end());
+  const long before_mb = testing::peak_mb();
+  decode_image(png, "a", image);
+  EXPECT_EQ(image.pixels, expected.pixels);
+  EXPECT_LT(testing::peak_mb() - before_mb, 50);
+}
+
+}  // namespace
+}  // namespace viwo
