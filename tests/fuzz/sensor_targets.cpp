@@ -22,7 +22,7 @@ struct Reader {
 // Bad rows are counted, and all that is left is played.
 #define ALL "max_rejected_fraction: 1"
 #define TABLES "framework/log/src/table_reader.cpp framework/log/src/text_reader.cpp "
-#define ASL TABLES "framework/log/src/asl_reader.cpp plugins/sensors/"
+#define ASL TABLES "framework/asl/src/asl_reader.cpp plugins/sensors/"
 #define TOPICS                                                                       \
   "imu_topic: /imu0, image_topics: [/cam0/image_raw], joint_topic: /joint_states, "  \
   "drive_joints: [drive_1, drive_2], steer_joints: [steer_1], pose_topic: /poses0, " \
@@ -43,7 +43,7 @@ constexpr Reader kReaders[] = {
     {"asl_calibration", "data.csv", "{type: asl_calibration, path: FILE, " ALL "}",
      ASL "asl_calibration"},
     {"asl_images", "cam0/data.csv", "{type: asl_images, path: FOLDER/.., " ALL "}",
-     TABLES "framework/log/src/asl_images.cpp plugins/sensors/asl_images"},
+     TABLES "framework/asl/src/asl_images.cpp plugins/sensors/asl_images"},
     {"gz", "data.csv.gz", "{type: asl_imu, path: FILE, " ALL "}",
      TABLES "framework/log/src/byte_reader.cpp"},
     {"csv_table", "table.csv",

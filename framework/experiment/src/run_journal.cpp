@@ -56,20 +56,21 @@ std::optional<std::string> bytes_of(const fs::path& file) {
   return std::string{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-/// Takes everything but what lies too deep: the parser needs a part of the stack for each level.
+/// Takes everything but what lies too deep, for the parser needs a part of the stack for each
+/// level, and more values than a run has: one of a byte becomes 16.
 class Levels : public nlohmann::json_sax<nlohmann::json> {
  public:
-  bool null() override { return true; }
-  bool boolean(bool /*value*/) override { return true; }
-  bool number_integer(number_integer_t /*value*/) override { return true; }
-  bool number_unsigned(number_unsigned_t /*value*/) override { return true; }
-  bool number_float(number_float_t /*value*/, const string_t& /*text*/) override { return true; }
-  bool string(string_t& /*value*/) override { return true; }
-  bool binary(binary_t& /*value*/) override { return true; }
-  bool start_object(std::size_t /*size*/) override { return ++levels_ <= kMost; }
-  bool key(string_t& /*value*/) override { return true; }
+  bool null() override { return add(); }
+  bool boolean(bool /*value*/) override { return add(); }
+  bool number_integer(number_integer_t /*value*/) override { return add(); }
+  bool number_unsigned(number_unsigned_t /*value*/) override { return add(); }
+  bool number_float(number_float_t /*value*/, const string_t& /*text*/) override { return add(); }
+  bool string(string_t& /*value*/) override { return add(); }
+  bool binary(binary_t& /*value*/) override { return add(); }
+  bool start_object(std::size_t /*size*/) override { return add() && ++levels_ <= kMost; }
+  bool key(string_t& /*value*/) override { return add(); }
   bool end_object() override { return --levels_ >= 0; }
-  bool start_array(std::size_t /*size*/) override { return ++levels_ <= kMost; }
+  bool start_array(std::size_t /*size*/) override { return add() && ++levels_ <= kMost; }
   bool end_array() override { return --levels_ >= 0; }
   bool parse_error(std::size_t /*at*/, const std::string& /*token*/,
                    const nlohmann::json::exception& /*what*/) override {
@@ -77,8 +78,12 @@ class Levels : public nlohmann::json_sax<nlohmann::json> {
   }
 
  private:
-  static constexpr int kMost = 32;  ///< a record has less than ten
+  bool add() { return ++values_ <= kMostValues; }
+
+  static constexpr int kMost = 32;                        ///< a record has less than ten
+  static constexpr std::int64_t kMostValues = 8'000'000;  ///< days of epochs
   int levels_ = 0;
+  std::int64_t values_ = 0;
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "checksum.hpp"
 #include "experiment_file.hpp"
 #include "message_of.hpp"
+#include "peak_memory.hpp"
 #include "run_journal.hpp"
 #include "viwo/results/run_record.hpp"
 #include "viwo/run/thin.hpp"
@@ -215,13 +216,18 @@ TEST_F(Journal, TakesNothingFromWhatIsNoFileOrTooDeep) {
   EXPECT_FALSE(journal.read(kKey));
   EXPECT_EQ(journal.size(), 0);
   fs::remove(file);
+  const auto is_read = [&](std::string bytes) {
+    const std::uint32_t crc = crc_of(bytes);
+    for (int i = 0; i < 4; ++i) bytes += static_cast<char>((crc >> (8 * i)) & 0xff);
+    std::ofstream(file, std::ios::binary) << bytes;
+    return journal.read(kKey).has_value();
+  };
   // 200000 arrays, each in the one before.
-  std::string deep(200'000, '\x81');
-  deep += '\0';
-  const std::uint32_t crc = crc_of(deep);
-  for (int i = 0; i < 4; ++i) deep += static_cast<char>((crc >> (8 * i)) & 0xff);
-  std::ofstream(file, std::ios::binary) << deep;
-  EXPECT_FALSE(journal.read(kKey));
+  EXPECT_FALSE(is_read(std::string(200'000, '\x81') + '\0'));
+  // An array of 60 million nulls, a byte each.
+  const long before_mb = testing::peak_mb();
+  EXPECT_FALSE(is_read("\x9f" + std::string(60'000'000, '\xf6') + "\xff"));
+  EXPECT_LT(testing::peak_mb() - before_mb, 500);
 }
 
 TEST_F(Journal, LeavesWhatIsNotItsOwnAlone) {

@@ -56,6 +56,12 @@ void check_elf(const std::filesystem::path& file, const std::string& bytes) {
                  bytes.size())) {
     throw PluginRefused(file, truncated);
   }
+  // Linkers write a dozen; each is looked through for every search path.
+  constexpr std::size_t kMostSegments = 64;
+  if (header.e_phnum > kMostSegments) {
+    throw PluginRefused(file, "is damaged: it has " + std::to_string(header.e_phnum) +
+                                  " segments - copy or build it again");
+  }
   std::uint64_t loaded = 0;
   for (const elf::Segment& segment : elf::segments(bytes)) {
     if (segment.p_type != PT_LOAD) continue;

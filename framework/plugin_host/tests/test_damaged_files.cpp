@@ -64,6 +64,13 @@ TEST_F(DamagedFile, IsRefusedForOneBitInItsCode) {
   EXPECT_EQ(refusal(bytes), kDamaged);
 }
 
+TEST_F(DamagedFile, IsRefusedForMoreSegmentsThanALinkerWrites) {
+  std::string bytes = text_of(kMoody);
+  constexpr std::size_t kNumberOfSegments = 56;  // in the header of an ELF file of 64 bits
+  bytes[kNumberOfSegments] = 65;
+  EXPECT_EQ(refusal(bytes), "is damaged: it has 65 segments - copy or build it again");
+}
+
 TEST_F(DamagedFile, IsRefusedForAnotherDigest) {
   std::string bytes = text_of(kMoody);
   const std::size_t at = bytes.find(";digest=") + 8;

@@ -12,6 +12,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "in_folder.hpp"
@@ -88,6 +89,17 @@ TEST_F(VideoFileTest, HasEveryPictureAtTheRateOfTheRun) {
     }
   }
   EXPECT_EQ(files(), 2U) << "nothing else is left";
+}
+
+TEST_F(VideoFileTest, DoesNotWriteThroughALinkNorIntoAPipe) {
+  const fs::path mine = folder_ / "mine", part = folder_ / "a.part.mp4";
+  std::ofstream(mine) << "of somebody";
+  fs::create_symlink(mine, part);
+  write_video(folder_ / "a.mp4", 3, 0.1);
+  EXPECT_EQ(fs::file_size(mine), 11U);
+  ASSERT_EQ(::mkfifo(part.c_str(), 0600), 0);
+  write_video(folder_ / "a.mp4", 3, 0.1);
+  EXPECT_EQ(read(folder_ / "a.mp4").means.size(), 3U);
 }
 
 TEST_F(VideoFileTest, MayBeShorterThanTheRateNeeds) {

@@ -55,10 +55,15 @@ Bytes Writer::head(const std::string& library) {
 Writer::Writer(const std::string& file, Compression compression, std::size_t chunk_bytes,
                const std::string& library)
     : file_(file),
-      fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)),
+      // A pipe that nobody reads is an error, not something to wait for.
+      fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK, 0666)),
       compression_(compression),
       chunk_bytes_(chunk_bytes) {
-  if (fd_ < 0) fail(std::strerror(errno));
+  if (fd_ < 0 || ::fcntl(fd_, F_SETFL, 0) != 0) {
+    const std::string why = std::strerror(errno);
+    if (fd_ >= 0) ::close(fd_);
+    fail(why);
+  }
   try {
     put(Buffer().raw(head(library)));
   } catch (...) {

@@ -64,7 +64,7 @@ bool Pick::decode(std::string_view payload, std::vector<double>& out) const {
   const bool fits = many == Many::kOne   ? payload.size() == element
                     : many == Many::kAny ? element > 0 && payload.size() % element == 0
                                          : payload.size() >= element;
-  if (!fits) return false;
+  if (!fits || (many == Many::kAny && payload.size() / element > kMostElements)) return false;
   do {
     if (payload.size() < element) break;
     for (const Field& field : fields) out.push_back(field.read(payload));

@@ -19,6 +19,9 @@ struct Pick {
   /// How many elements a payload has: one, any number, or one and whatever stands behind it.
   enum class Many : std::uint8_t { kOne, kAny, kOneAndMore } many = Many::kOne;
 
+  /// Robots have fewer modules. Of a payload of a byte each a megabyte would become 8 of numbers.
+  static constexpr std::size_t kMostElements = 64;
+
   /// Appends the numbers of all elements; false for a payload of another size.
   bool decode(std::string_view payload, std::vector<double>& out) const;
 };

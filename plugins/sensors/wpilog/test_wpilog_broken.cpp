@@ -1,6 +1,7 @@
 // Logs and parameters that are wrong: clear errors, counted rejections, and never more than that.
 #include <random>
 
+#include "peak_memory.hpp"
 #include "test_fixture.hpp"
 
 namespace viwo::wpilog {
@@ -184,6 +185,19 @@ TEST_F(WpiLog, SaysWhatIsWrongWithItsParameters) {
   EXPECT_THAT(error(kDrive + ", stride: 2"), HasSubstr("needs drive_input: angle"));
   EXPECT_THAT(error("module_entries: [/m], drive_unit: rad"),
               HasSubstr("sensor.module_entries: 9 modules, at most 8 are possible"));
+}
+
+/// A byte of each would become a number of eight.
+TEST_F(WpiLog, RecordsOfMoreElementsThanARobotHasModulesAreNotDecoded) {
+  Writer out;
+  out.add("/.schema/struct:M", "structschema", 0, "bool speed; A angle");
+  out.add("/.schema/struct:A", "structschema", 0, "bool value");
+  for (int k = 0; k < 60; ++k) {
+    out.add("/m", "struct:M[]", 20 * k * kMs, std::string(1'000'000, '\1'));
+  }
+  const long before_mb = testing::peak_mb();
+  EXPECT_THAT(error_of(log(out.bytes, "module_entries: [/m], drive_unit: rad")), Not(IsEmpty()));
+  EXPECT_LT(testing::peak_mb() - before_mb, 400);
 }
 
 TEST_F(WpiLog, WhateverBytesThereAreTheyAreReadOrRefused) {

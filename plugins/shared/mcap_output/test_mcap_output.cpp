@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include "in_folder.hpp"
 #include "mcap_output.hpp"
@@ -112,6 +113,9 @@ TEST_F(McapOutputTest, WritesOverARunButNotOverARecordingOrAText) {
     EXPECT_THAT(refused(file), ::testing::HasSubstr("was not written by --mcap"));
     EXPECT_EQ(std::filesystem::file_size(file), before);
   }
+  const auto pipe = folder_ / "pipe.mcap";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THAT(refused(pipe), ::testing::HasSubstr("cannot be written: No such device"));
 }
 
 TEST_F(McapOutputTest, EndsWithWhatWasWarnedOfSinceTheLastEpoch) {

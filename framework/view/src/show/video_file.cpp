@@ -71,6 +71,9 @@ class VideoFile::Writer {
  public:
   Writer(const fs::path& file, double rate_hz, const cv::Size& size) {
     const Silence silence;
+    // What is there is not written into: it may be a link, or a pipe that nobody reads.
+    std::error_code ignored;
+    fs::remove(file, ignored);
     video_.open(file.string(), codec_of(file), rate_hz, size);
   }
   bool opened() const { return video_.isOpened(); }
