@@ -158,9 +158,11 @@ void RecordingProblem::compare_with_reference() {
     }
   }
   if (ends.size() < 2) {
-    fail(recording_.label, ": at all ends of segments the reference has gaps of more than " +
-                               significant(recording_.motion.max_gap_s, 3) +
-                               " s (evaluation.reference_max_gap_s, of poses)");
+    const bool is_gyro = recording_.motion.kind == ReferenceKind::kGyro;
+    fail(recording_.label,
+         ": at all ends of segments the " + std::string(is_gyro ? "gyro" : "reference") +
+             " has gaps of more than " + significant(recording_.motion.max_gap_s, 3) + " s" +
+             (is_gyro ? "" : " (evaluation.reference_max_gap_s)"));
   }
   stamps_ns_ = std::move(known_ns);
   for (std::size_t k = 1; k < ends.size(); ++k) {

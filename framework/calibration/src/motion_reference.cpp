@@ -1,5 +1,6 @@
 #include "motion_reference.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numbers>
@@ -8,6 +9,8 @@
 
 #include "recording_name.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/heading_jumps.hpp"
+#include "viwo/math/median.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -77,12 +80,30 @@ Trajectory yaw_of_gyro(std::span<const ImuSample> imu) {
   return out;
 }
 
-Trajectory yaw_of_headings(std::span<const HeadingSample> headings) {
+Trajectory yaw_of_headings(std::span<const HeadingSample> headings, double gap_s) {
+  const std::vector<std::size_t> jumps = heading_jumps(headings);
   Trajectory out;
   out.reserve(headings.size());
-  for (const HeadingSample& heading : headings)
-    out.push_back(turned(heading.t_ns, heading.yaw_rad));
+  auto jump = jumps.begin();
+  for (std::size_t i = 0; i < headings.size(); ++i) {
+    if (jump != jumps.end() && *jump == i) ++jump;
+    const bool is_behind_jump =
+        jump != jumps.begin() &&
+        seconds_between(headings[*(jump - 1) - 1].t_ns, headings[i].t_ns) <= gap_s;
+    if (!is_behind_jump) out.push_back(turned(headings[i].t_ns, headings[i].yaw_rad));
+  }
   return out;
+}
+
+/// `usual_s`, or more where the samples are further apart all the time.
+template <class SampleType>
+static double longest_gap_s(std::span<const SampleType> samples, double usual_s) {
+  constexpr double kPeriods = 2.5;
+  std::vector<double> periods_s;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    periods_s.push_back(seconds_between(samples[i - 1].t_ns, samples[i].t_ns));
+  }
+  return periods_s.empty() ? usual_s : std::max(usual_s, kPeriods * upper_median(periods_s));
 }
 
 MotionReference motion_reference(const Recording& label, const RunSetup& setup, const RunData& data,
@@ -105,10 +126,15 @@ MotionReference motion_reference(const Recording& label, const RunSetup& setup, 
     out.max_gap_s = setup.evaluation.max_reference_gap_s;
   } else if (out.kind == ReferenceKind::kGyro) {
     if (!has_gyro) fail(label, " has no gyro to calibrate against");
-    out.poses = data.imu().empty() ? yaw_of_headings(data.headings()) : yaw_of_gyro(data.imu());
     out.offset_s = setup.t_OtoI_s;
     // Headings are often logged where they change only.
-    out.max_gap_s = data.imu().empty() ? 0.5 : 0.1;
+    if (data.imu().empty()) {
+      out.max_gap_s = longest_gap_s(data.headings(), 0.5);
+      out.poses = yaw_of_headings(data.headings(), out.max_gap_s);
+    } else {
+      out.max_gap_s = longest_gap_s(data.imu(), 0.1);
+      out.poses = yaw_of_gyro(data.imu());
+    }
   }
   out.distance_m = number_of(label, "distance_m", "a distance in metres above 0", false);
   out.turn_rad = number_of(label, "turn_deg", "an angle in degrees", true);

@@ -7,6 +7,7 @@
 #include "simulated.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/se2.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/testing/jacobian.hpp"
 
 namespace viwo {
@@ -21,7 +22,7 @@ CalibrationRecording recording(const std::vector<std::string>& assignments = {},
   CalibrationRecording recording;
   recording.setup = read_run(testing::simulated("icr_sweep", assignments), testing::registry());
   recording.data = collect(recording.setup);
-  recording.motion = motion_reference(recording.label, recording.setup, recording.data, kind);
+  recording.motion = motion_reference({"gyro", {}}, recording.setup, recording.data, kind);
   return recording;
 }
 
@@ -185,12 +186,43 @@ TEST(YawOfHeadings, CountsTurnsThatWrap) {
                    wrap_angle(0.1 * static_cast<double>(i))};
   }
   CalibrationRecording recording = with_gyro();
-  recording.motion.poses = yaw_of_headings(headings);
+  recording.motion.poses = yaw_of_headings(headings, 0.5);
   CalibrationOptions options;
   options.segments = Segments::kWhole;
   const RecordingProblem problem(recording, options);
   ASSERT_EQ(problem.motions().size(), 1u);
   EXPECT_NEAR(problem.motions()[0][0], 10. * problem.duration_s(), 0.05);
+}
+
+/// A driver sets it to zero before the match; what turned meanwhile is not known.
+TEST(YawOfHeadings, HaveAGapWhereTheyAreSetToAnotherValue) {
+  std::vector<HeadingSample> headings(300);
+  for (std::size_t i = 0; i < headings.size(); ++i) {
+    headings[i] = {static_cast<std::int64_t>(i) * 10'000'000,
+                   0.03 * static_cast<double>(i) - (i < 100 ? 0. : 2.)};
+  }
+  const Trajectory yaw_of = yaw_of_headings(headings, 0.5);
+  const auto at = [&](double t_s) { return interpolate(yaw_of, to_ns(t_s), 0.5); };
+  EXPECT_TRUE(at(0.98) && at(1.55));
+  for (const double t_s : {1., 1.2, 1.48}) EXPECT_FALSE(at(t_s)) << t_s;
+  EXPECT_NEAR(yaw(*at(1.55)), wrap_angle(0.03 * 155. - 2.), 1e-9);
+  // In degrees it is fast all the time.
+  for (HeadingSample& heading : headings) heading.yaw_rad *= 180. / M_PI;
+  for (std::size_t i = 100; i < 300; ++i) headings[i].yaw_rad += 2. * 180. / M_PI;
+  EXPECT_EQ(yaw_of_headings(headings, 0.5).size(), headings.size());
+}
+
+/// A tenth of a second is a hole of an IMU at 200 Hz, not of one at 8 Hz.
+TEST(MotionReferenceOfAGyro, HasGapsByItsOwnRate) {
+  CalibrationRecording recording = with_gyro();
+  EXPECT_EQ(recording.motion.max_gap_s, 0.1);
+  const auto imu = recording.data.imu();
+  std::vector<ImuSample> slow;
+  for (std::size_t i = 0; i < imu.size(); i += 25) slow.push_back(imu[i]);
+  recording.data.recorded.set("simulator0", slow);
+  const MotionReference motion =
+      motion_reference({"gyro", {}}, recording.setup, recording.data, ReferenceKind::kGyro);
+  EXPECT_NEAR(motion.max_gap_s, 2.5 * 0.125, 1e-6);
 }
 
 TEST(YawOfGyro, IsTheIntegralOfTheTurn) {

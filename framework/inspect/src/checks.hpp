@@ -29,6 +29,8 @@ double contradiction_of(const series::Wheels& wheels, const Intrinsics& x_WI);
 void check_still_channels(const series::Recording& recording, Findings& out);
 /// Wheels that the others contradict, noises against the configuration.
 void check_wheels(const series::Recording& recording, Findings& out);
+/// Headings that were set to another value on the way.
+void check_headings(const series::Recording& recording, Findings& out);
 /// Angles of drives that begin anew after a turn, rates that no wheel has, zeros in their place.
 void check_turns(const series::Recording& recording, Findings& out);
 /// Signs, gears and order of the channels: by what the wheels contradict each other, and by the

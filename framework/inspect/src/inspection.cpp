@@ -204,6 +204,7 @@ Inspection inspect(RunSetup& setup) {
   check_imu_noise(recording, findings);
   check_still_channels(recording, findings);
   check_wheels(recording, findings);
+  check_headings(recording, findings);
   check_turns(recording, findings);
   check_order(recording, findings);
   check_slip(recording, findings);

@@ -117,6 +117,14 @@ TEST(InspectHeadings, TellsThatTheyAreStuck) {
   EXPECT_THAT(finding_of(stuck, "headings0", "rate").what, HasSubstr("it is stuck"));
 }
 
+TEST(InspectHeadings, TellsThatSomebodySetThemToZero) {
+  const Inspection zeroed = with_heading("viwo_swerve", [](HeadingSample& s) {
+    if (s.t_ns > 10'000'000'000) s.yaw_rad -= 1.;
+  });
+  EXPECT_THAT(faults_of(zeroed), IsEmpty());
+  EXPECT_THAT(finding_of(zeroed, "headings0", "jumps").what, HasSubstr("it jumps by -57"));
+}
+
 TEST(InspectHeadings, TellsTheirSignAndWhatLooksTheSame) {
   const Inspection reversed =
       with_heading("viwo_swerve", [](HeadingSample& s) { s.yaw_rad *= -1.; });
