@@ -142,6 +142,7 @@ void PoseUnitParams::bind(ParamBinder& b) {
     {{"m", LengthUnit::kMetre}, {"cm", LengthUnit::kCentimetre}, {"mm", LengthUnit::kMillimetre}},
     {.help = "of positions"});
   b(VIWO_PARAM(yaw_unit), kAngleUnits, {.help = "of a yaw"});
+  b(VIWO_PARAM(heading_scale), {.help = "of the heading by a gyro: -1 where it counts clockwise"});
 }
 
 double PoseUnitParams::position_factor() const {

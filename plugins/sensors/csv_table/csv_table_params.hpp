@@ -96,6 +96,7 @@ struct Params : LayoutParams,
   std::vector<std::string> position_columns;
   std::vector<std::string> quaternion_columns;
   std::string yaw_column;
+  std::string yaw_rate_column;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(path), {.required = true, .help = "the table, plain or gzipped"});
@@ -111,6 +112,9 @@ struct Params : LayoutParams,
       {.help = "Hamilton quaternion of the body in the world: x, y, z, w"});
     b(VIWO_PARAM(yaw_column),
       {.help = "in place of a quaternion; alone it is the heading by a gyro"});
+    b(VIWO_PARAM(yaw_rate_column),
+      {.help =
+           "rate of a gyro of the yaw alone (gyro_unit, gyro_scale), of which a heading is made"});
     PoseUnitParams::bind(b);
     log::LimitParams::bind(b);
   }
@@ -118,7 +122,8 @@ struct Params : LayoutParams,
   bool has_wheels() const { return !drive_columns.empty(); }
   bool has_imu() const { return !gyro_columns.empty(); }
   bool has_poses() const { return !position_columns.empty(); }
-  bool has_heading() const { return !has_poses() && !yaw_column.empty(); }
+  bool has_yaw_as_heading() const { return !has_poses() && !yaw_column.empty(); }
+  bool has_heading() const { return has_yaw_as_heading() || !yaw_rate_column.empty(); }
 
   /// ParamError for parameters that contradict each other.
   void check() const {
@@ -139,13 +144,16 @@ struct Params : LayoutParams,
     if (!quaternion_columns.empty() && !yaw_column.empty()) {
       throw ParamError("yaw_column", "quaternion_columns say the yaw already");
     }
+    if (has_yaw_as_heading() && !yaw_rate_column.empty()) {
+      throw ParamError("yaw_rate_column", "yaw_column says the heading already");
+    }
     if (!has_poses() && !quaternion_columns.empty()) {
       throw ParamError("quaternion_columns", "a pose needs position_columns");
     }
     if (!has_wheels() && !has_imu() && !has_poses() && !has_heading()) {
       throw ParamError("path",
                        "nothing to read: give drive_columns, or gyro_columns and accel_columns, or "
-                       "position_columns, or yaw_column");
+                       "position_columns, or yaw_column, or yaw_rate_column");
     }
   }
 };

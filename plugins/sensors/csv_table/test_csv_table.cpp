@@ -180,6 +180,22 @@ TEST_F(CsvTable, AYawAloneIsAHeading) {
   EXPECT_NEAR(samples[1].yaw_rad, 370. * M_PI / 180., 1e-12);
 }
 
+/// A cheap gyro has one axis, and gives its rate; this one clockwise, in degrees.
+TEST_F(CsvTable, AYawRateAloneIsAHeading) {
+  const std::string rest =
+      "time_column: t, time_unit: s, gyro_unit: deg, heading_scale: -1, max_rejected_fraction: 0.5";
+  const auto samples = play_only<HeadingSample>(table(
+      "t,r [deg/s]\n0,-90\n0.2,-90\n0.2,1e6\n0.4,nan\n0.5,-180\n", rest + ", yaw_rate_column: 2"));
+  ASSERT_EQ(samples.size(), 3U);
+  EXPECT_EQ(samples[0].yaw_rad, 0.);
+  EXPECT_NEAR(samples[1].yaw_rad, 0.2 * M_PI / 2., 1e-12);
+  EXPECT_NEAR(samples[2].yaw_rad, (0.2 + 0.3 * 1.5) * M_PI / 2., 1e-12);
+  EXPECT_THAT(error_of(table("t,r,h\n0,1,1\n", rest + ", yaw_rate_column: r, yaw_column: h")),
+              HasSubstr("yaw_rate_column: yaw_column says the heading already"));
+  EXPECT_THAT(error_of(table("t,r [rad/s]\n0,1\n0.1,1\n", rest + ", yaw_rate_column: 2")),
+              HasSubstr("gyro_unit: the header says"));
+}
+
 TEST_F(CsvTable, ColumnsAreFoundByNumberInTablesWithoutAHeaderAndWithBlanks) {
   const std::string rest = "time_column: 1, time_unit: s, drive_columns: [4, 2], ";
   const auto samples =

@@ -53,7 +53,9 @@ struct Params : WheelParams, log::ImuUnitParams, log::PoseUnitParams, log::Limit
   std::vector<std::string> accel_entries;
   std::vector<std::string> pose_entries;
   std::string heading_entry;
-  double heading_scale = 1.;
+  enum class HeadingUnit { kAsYaw, kRadian, kDegree, kTurn };
+  HeadingUnit heading_unit = HeadingUnit::kAsYaw;
+  std::string yaw_rate_entry;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(path), {.required = true, .help = "the log, plain or gzipped"});
@@ -67,9 +69,17 @@ struct Params : WheelParams, log::ImuUnitParams, log::PoseUnitParams, log::Limit
            "poses of the robot on the field: one entry (Pose2d, Pose3d, numbers x, y, yaw or x, "
            "y, z, qw, qx, qy, qz), or three of numbers x, y, yaw"});
     b(VIWO_PARAM(heading_entry),
-      {.help = "how the robot is turned by its gyro: a number (yaw_unit), Rotation2d or "
-               "Rotation3d"});
-    b(VIWO_PARAM(heading_scale), {.help = "-1 for a gyro that counts clockwise"});
+      {.help = "how the robot is turned by its gyro: a number, Rotation2d or Rotation3d"});
+    b(VIWO_PARAM(heading_unit),
+      {{"yaw_unit", HeadingUnit::kAsYaw},
+       {"rad", HeadingUnit::kRadian},
+       {"deg", HeadingUnit::kDegree},
+       {"turn", HeadingUnit::kTurn}},
+      {.help =
+           "of a heading that is a number or a Rotation2d; yaw_unit: that of poses of numbers"});
+    b(VIWO_PARAM(yaw_rate_entry),
+      {.help =
+           "in place of a heading: the rate of a gyro of the yaw alone (gyro_unit, gyro_scale)"});
     PoseUnitParams::bind(b);
     log::LimitParams::bind(b);
   }
@@ -77,7 +87,9 @@ struct Params : WheelParams, log::ImuUnitParams, log::PoseUnitParams, log::Limit
   bool has_wheels() const { return !module_entries.empty() || !drive_entries.empty(); }
   bool has_imu() const { return !gyro_entries.empty(); }
   bool has_poses() const { return !pose_entries.empty(); }
-  bool has_heading() const { return !heading_entry.empty(); }
+  bool has_heading() const { return !heading_entry.empty() || !yaw_rate_entry.empty(); }
+  /// Radians in what a heading is in.
+  double heading_factor() const;
 
   /// ParamError for parameters that contradict each other.
   void check() const;

@@ -13,6 +13,7 @@
 #include "viwo/log/cells.hpp"
 #include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/log/yaw_of_rate.hpp"
 
 namespace viwo::wpilog {
 namespace {
@@ -245,10 +246,25 @@ log::HeadingRecording read_headings(const Contents& contents, const Params& para
                    [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
                      const bool is_number = numbers.size() == 1;
                      const double yaw_rad =
-                         is_number ? params.yaw_factor() * numbers[0] : yaw_of(numbers);
+                         is_number ? params.heading_factor() * numbers[0] : yaw_of(numbers);
                      const HeadingSample heading{t_ns, params.heading_scale * yaw_rad};
                      if (const char* const why = heading.fault()) return order.reject(why, where);
                      if (!is_number && !is_unit(numbers)) return order.reject(log::kNotUnit, where);
+                     if (order.accept(t_ns, where)) samples.push_back(heading);
+                   });
+  return finish(contents, order, std::move(samples));
+}
+
+log::HeadingRecording read_yaw_rates(const Contents& contents, const Params& params) {
+  const auto sources = number_sources(contents, "yaw_rate_entry", {params.yaw_rate_entry});
+  const double factor = params.heading_scale * params.gyro_factor();
+  StampOrder order(params.limits());
+  std::vector<HeadingSample> samples;
+  log::YawOfRate yaw;
+  for_each_reading(contents, sources, {nullptr, 0, params.max_rejected_fraction}, order,
+                   [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
+                     const HeadingSample heading = yaw.add(t_ns, factor * numbers[0]);
+                     if (const char* const why = heading.fault()) return order.reject(why, where);
                      if (order.accept(t_ns, where)) samples.push_back(heading);
                    });
   return finish(contents, order, std::move(samples));
@@ -331,7 +347,12 @@ log::Recording<Measurement> read_samples(const Params& params) {
   log::Recording<Measurement> out;
   contents.rejections().append_to(out.rejections);
   if (params.has_poses()) log::append(out, read_poses(contents, params), "poses");
-  if (params.has_heading()) log::append(out, read_headings(contents, params), "headings");
+  if (!params.heading_entry.empty()) {
+    log::append(out, read_headings(contents, params), "headings");
+  }
+  if (!params.yaw_rate_entry.empty()) {
+    log::append(out, read_yaw_rates(contents, params), "headings");
+  }
   if (params.has_imu()) log::append(out, read_imu(contents, params), "IMU");
   if (params.has_wheels()) log::append(out, read_wheels(contents, params), "wheels");
   log::sort_by_time(out);

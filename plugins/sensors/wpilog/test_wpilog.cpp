@@ -225,6 +225,31 @@ TEST_F(WpiLog, AGyroInDegreesLeavesThePosesOfTheProgramInRad) {
   }
 }
 
+TEST_F(WpiLog, AHeadingMayBeInAnotherUnitThanPosesOfNumbers) {
+  Writer out;
+  out.geometry();
+  out.add("/turn", "struct:Rotation2d", 0, numbers({M_PI / 2.}));
+  out.add("/limelight", "double[]", 0, numbers({1., 2., 90.}));
+  const auto samples =
+      play(*make_sensor(log(out.bytes,
+                            "pose_entries: [/limelight], yaw_unit: deg, heading_entry: /turn, "
+                            "heading_unit: rad")));
+  ASSERT_EQ(samples.size(), 2U);
+  EXPECT_NEAR(only<HeadingSample>(samples).at(0).yaw_rad, M_PI / 2., 1e-12);
+  EXPECT_NEAR(only<PoseSample>(samples).at(0).q_BtoW_xyzw[2], std::sqrt(0.5), 1e-12);
+}
+
+TEST_F(WpiLog, AYawRateAloneIsAHeading) {
+  Writer out;
+  for (int k = 0; k < 3; ++k) out.add("/rate", "double", 100 * k * kMs, number(90. * k));
+  const auto samples =
+      play_only<HeadingSample>(log(out.bytes, "yaw_rate_entry: /rate, gyro_unit: deg"));
+  ASSERT_EQ(samples.size(), 3U);
+  EXPECT_NEAR(samples[2].yaw_rad, 0.2 * M_PI / 2., 1e-12);
+  EXPECT_THAT(error_of(log(out.bytes, "yaw_rate_entry: /rate, heading_entry: /rate")),
+              HasSubstr("heading_entry says the heading already"));
+}
+
 TEST_F(WpiLog, AFullImuIsOneAndComesInTheOrderOfTime) {
   Writer out;
   for (int k = 0; k < 2; ++k) {

@@ -51,6 +51,7 @@ struct PoseUnitParams {
   enum class LengthUnit : std::uint8_t { kMetre, kCentimetre, kMillimetre };
   LengthUnit position_unit = LengthUnit::kMetre;
   AngleUnit yaw_unit = AngleUnit::kRadian;
+  double heading_scale = 1.;
 
   void bind(ParamBinder& b);
 
