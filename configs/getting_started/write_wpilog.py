@@ -10,6 +10,8 @@ import struct
 import sys
 
 WHEEL_RADIUS_M = 0.051
+# Front left, front right, back left, back right, of front left and on counterclockwise.
+ORDER_OF_WPILIB = (0, 3, 1, 2)
 MODULES, YAW, SCHEMA_ROTATION, SCHEMA_MODULE = 1, 2, 3, 4
 
 
@@ -39,7 +41,7 @@ def main():
     records = []
     for t_us, values in rows(folder / "wheels0" / "data.csv"):
         n = len(values) // 2
-        states = b"".join(struct.pack("<dd", WHEEL_RADIUS_M * values[i], values[n + i]) for i in range(n))
+        states = b"".join(struct.pack("<dd", WHEEL_RADIUS_M * values[i], values[n + i]) for i in ORDER_OF_WPILIB)
         records.append((t_us, record(MODULES, t_us, states)))
     yaw = 0.0
     before = None
