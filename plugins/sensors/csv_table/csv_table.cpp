@@ -145,10 +145,16 @@ log::EncoderRecording read_wheels(const Params& params) {
   reading.n_steer = static_cast<int>(steers.size());
   auto all = drives;
   all.insert(all.end(), steers.begin(), steers.end());
+  const bool are_increments = params.drive_input == Params::Drive::kIncrement;
+  std::array<double, kMaxDrives> angle_rad{};
   table.read(all, collector, [&](std::int64_t t_ns) {
     reading.t_ns = t_ns;
     for (std::size_t i = 0; i < drives.size(); ++i) {
       reading.drive[i] = drive_factor * table.number(drives[i]);
+      // One that is no number is counted, and is no part of the sum.
+      if (are_increments && std::isfinite(reading.drive[i])) {
+        reading.drive[i] = angle_rad[i] += reading.drive[i];
+      }
     }
     for (std::size_t i = 0; i < steers.size(); ++i) {
       reading.steer_rad[i] = steer_factor * table.number(steers[i]);

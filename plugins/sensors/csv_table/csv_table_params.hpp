@@ -69,19 +69,22 @@ struct TimeParams {
 struct WheelParams : log::EncoderUnitParams, log::StrideParams, log::JointParams {
   std::vector<std::string> drive_columns;
   std::vector<std::string> steer_columns;
-  enum class Drive { kRate, kAngle };
+  enum class Drive { kRate, kAngle, kIncrement };
   Drive drive_input = Drive::kRate;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(drive_columns), {.help = "drives, in the order of the wheels"});
     b(VIWO_PARAM(steer_columns), {.help = "steering angles, in the order of the wheels"});
-    b(VIWO_PARAM(drive_input), {{"rate", Drive::kRate}, {"angle", Drive::kAngle}},
-      {.help = "drives are rates, or multi-turn angles (metres: a way rolled)"});
+    b(VIWO_PARAM(drive_input),
+      {{"rate", Drive::kRate}, {"angle", Drive::kAngle}, {"increment", Drive::kIncrement}},
+      {.help = "drives are rates, or multi-turn angles (metres: a way rolled), or what an angle "
+               "grew by since the row before"});
     EncoderUnitParams::bind(b);
     StrideParams::bind(b);
     JointParams::bind(b);
   }
-  bool is_angle() const { return drive_input == Drive::kAngle; }
+  /// As what it is read; increments are added up.
+  bool is_angle() const { return drive_input != Drive::kRate; }
 };
 
 struct Params : LayoutParams,

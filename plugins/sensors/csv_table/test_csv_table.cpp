@@ -180,6 +180,20 @@ TEST_F(CsvTable, AYawAloneIsAHeading) {
   EXPECT_NEAR(samples[1].yaw_rad, 370. * M_PI / 180., 1e-12);
 }
 
+/// Ticks since the row before, as small boards send them.
+TEST_F(CsvTable, DrivesMayBeIncrements) {
+  const auto samples = play_only<EncoderSample>(
+      table("t,l,r\n0,7,7\n0.1,10,20\n0.2,nan,1\n0.3,10,20\n0.4,-5,0\n",
+            "time_column: t, time_unit: s, drive_columns: [l, r], drive_input: increment, "
+            "drive_unit: count, drive_counts_per_turn: 100, max_rejected_fraction: 0.5, "
+            "max_gap_s: 0.5"));
+  ASSERT_EQ(samples.size(), 3U);
+  const double count = 2. * M_PI / 100.;
+  EXPECT_NEAR(samples[0].drive_rad_per_s[0], 10. * count / 0.1, 1e-9);
+  EXPECT_NEAR(samples[1].drive_rad_per_s[1], 21. * count / 0.2, 1e-9);
+  EXPECT_NEAR(samples[2].drive_rad_per_s[0], -5. * count / 0.1, 1e-9);
+}
+
 /// A cheap gyro has one axis, and gives its rate; this one clockwise, in degrees.
 TEST_F(CsvTable, AYawRateAloneIsAHeading) {
   const std::string rest =

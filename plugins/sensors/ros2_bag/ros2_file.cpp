@@ -33,6 +33,17 @@ std::string text_at(const config::Node& section, std::string_view key) {
   return value != nullptr && value->is_scalar() ? value->scalar() : "";
 }
 
+/// What `unzstd` makes of a file beside it.
+fs::path decompressed(const fs::path& file) {
+  if (file.extension() != ".zstd") return file;
+  fs::path whole = file;
+  whole.replace_extension();
+  std::error_code ignored;
+  if (fs::exists(whole, ignored)) return whole;
+  throw InputError(file.string() + "  is compressed as a whole: `unzstd " + file.string() +
+                   "` makes what is read, beside it");
+}
+
 /// The files that metadata.yaml lists.
 std::vector<fs::path> files_of(const fs::path& folder, const fs::path& metadata) {
   const config::Node root = config::load_file(metadata);
@@ -44,8 +55,10 @@ std::vector<fs::path> files_of(const fs::path& folder, const fs::path& metadata)
   if (storage != "sqlite3" && storage != "mcap") {
     throw InputError(folder.string() + "  is stored as '" + storage + "'" + kRemedy);
   }
+  // Whole files are read when somebody has decompressed them.
   const std::string compression = text_at(*info, "compression_format");
-  if (!compression.empty()) {
+  const bool are_files = compression == "zstd" && text_at(*info, "compression_mode") == "FILE";
+  if (!compression.empty() && !are_files) {
     throw InputError(folder.string() + "  is compressed (" + compression + ")" + kRemedy);
   }
   std::vector<fs::path> files;
@@ -54,6 +67,7 @@ std::vector<fs::path> files_of(const fs::path& folder, const fs::path& metadata)
       if (!file.is_scalar()) config::fail(file.mark(), "the name of a file must be a single value");
       // Early versions write the folder, too.
       files.push_back(folder / fs::path(file.scalar()).filename());
+      if (are_files) files.back() = decompressed(files.back());
       const bool is_twice =
           std::find(files.begin(), files.end() - 1, files.back()) != files.end() - 1;
       if (is_twice) config::fail(file.mark(), log::quoted(file.scalar()) + " is listed twice");
@@ -67,7 +81,8 @@ std::vector<fs::path> files_of(const fs::path& path) {
   std::error_code ignored;
   if (!fs::is_directory(path, ignored)) {
     const std::string extension = path.extension().string();
-    if (extension == ".zstd" || extension == ".lz4") {
+    if (extension == ".zstd" && fs::exists(path, ignored)) return {decompressed(path)};
+    if (extension == ".lz4") {
       throw InputError(path.string() + "  is a file " + extension + kRemedy);
     }
     if (extension == ".bag" && fs::exists(path, ignored)) {

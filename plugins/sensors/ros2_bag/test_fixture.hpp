@@ -151,10 +151,11 @@ class Ros2Bag : public testing::InFolder {
   }
 
   void write_metadata(const std::string& storage, const std::string& compression,
-                      const std::string& files) const {
+                      const std::string& files, const std::string& mode = "") const {
     std::ofstream(folder_ / "metadata.yaml")
         << "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: " << storage
-        << "\n  compression_format: \"" << compression << "\"\n  compression_mode: \"\"\n"
+        << "\n  compression_format: \"" << compression << "\"\n  compression_mode: \"" << mode
+        << "\"\n"
         << "  relative_file_paths: " << files << "\n";
   }
 

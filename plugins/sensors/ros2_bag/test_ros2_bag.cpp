@@ -103,6 +103,18 @@ TEST_F(Ros2Bag, PlaysTheFilesOfAFolderOneAfterTheOther) {
   EXPECT_EQ(play_only<ImuSample>(section("imu_topic: /imu0", "")).size(), 20U);
 }
 
+/// `ros2 bag record --compression-mode file`, then `unzstd *.zstd`.
+TEST_F(Ros2Bag, ReadsWholeFilesThatWereDecompressedBesideTheirCompressedOnes) {
+  write_drive();
+  write_metadata("sqlite3", "zstd", "[bag_0.db3.zstd]", "FILE");
+  EXPECT_EQ(play_only<ImuSample>(section("imu_topic: /imu0", "")).size(), 20U);
+  std::ofstream(folder_ / "bag_0.db3.zstd") << "compressed";
+  EXPECT_EQ(play_only<ImuSample>(section("imu_topic: /imu0", "bag_0.db3.zstd")).size(), 20U);
+  write_metadata("sqlite3", "zstd", "[bag_1.db3.zstd]", "FILE");
+  EXPECT_THAT(error_of(section(kAll, "")),
+              HasSubstr("is compressed as a whole: `unzstd " + file("bag_1.db3.zstd")));
+}
+
 TEST_F(Ros2Bag, RefusesWhatItCannotRead) {
   write_drive();
   const std::string remedy =
@@ -118,7 +130,7 @@ TEST_F(Ros2Bag, RefusesWhatItCannotRead) {
   std::ofstream(folder_ / "metadata.yaml") << "a: [1\n";
   EXPECT_THAT(error_of(section(kAll, "")),
               HasSubstr(file("metadata.yaml") + ":2:1  not valid YAML: "));
-  EXPECT_THAT(error_of(section(kAll, "bag_0.db3.zstd")), HasSubstr("is a file .zstd" + remedy));
+  EXPECT_THAT(error_of(section(kAll, "bag_0.db3.lz4")), HasSubstr("is a file .lz4" + remedy));
   std::ofstream(file("robot.bag")) << "#ROSBAG V2.0\n";
   EXPECT_THAT(error_of(section(kAll, "robot.bag")), HasSubstr("did you mean type: ros1_bag?"));
   fs::create_directories(folder_ / "none");
