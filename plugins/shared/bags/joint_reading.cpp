@@ -1,7 +1,6 @@
 #include "joint_reading.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -11,42 +10,75 @@ namespace {
 
 using What = MissingJoint::What;
 
+/// A joint that has not come in so many messages for each joint does not come any more.
+constexpr std::size_t kLongestWait = 20;
+
 /// names.size() for a joint that is not there.
 std::size_t place_of(const std::string& joint, const std::vector<std::string>& names) {
   return static_cast<std::size_t>(std::find(names.begin(), names.end(), joint) - names.begin());
 }
 
-/// Takes the values of the joints `wanted`, all of which are there.
-template <std::size_t N>
-std::optional<MissingJoint> pick(const Joints& joints, const std::vector<std::string>& wanted,
-                                 What what, std::array<double, N>& to) {
-  const auto& from = what == What::kPosition ? joints.positions : joints.velocities;
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    const std::size_t place = place_of(wanted[i], joints.names);
-    if (place >= from.size()) return MissingJoint{what, wanted[i]};
-    to[i] = from[place];
+}  // namespace
+
+JointReadings::JointReadings(const TopicOptions& options)
+    : n_drive_(static_cast<int>(options.drive_joints.size())) {
+  const What drive = options.drive_is_angle() ? What::kPosition : What::kVelocity;
+  for (const std::string& joint : options.drive_joints) wanted_.push_back({joint, drive});
+  for (const std::string& joint : options.steer_joints) {
+    wanted_.push_back({joint, What::kPosition});
   }
+}
+
+void JointReadings::restart() {
+  for (Wanted& joint : wanted_) joint.is_known = joint.is_new = false;
+  parts_ = 0;
+}
+
+std::optional<MissingJoint> JointReadings::add(const Joints& joints, log::EncoderReading& out) {
+  std::optional<MissingJoint> missing;
+  std::size_t found = 0;
+  for (Wanted& joint : wanted_) {
+    const std::size_t place = place_of(joint.name, joints.names);
+    if (place == joints.names.size()) {
+      if (!missing || missing->what != What::kJoint) missing = {What::kJoint, joint.name};
+      continue;
+    }
+    const auto& values = joint.value == What::kPosition ? joints.positions : joints.velocities;
+    if (place >= values.size()) {
+      if (!missing) missing = {joint.value, joint.name};
+      continue;
+    }
+    ++found;
+    joint.last = values[place];
+    joint.is_known = joint.is_new = true;
+  }
+  const auto is_known = [](const Wanted& joint) { return joint.is_known; };
+  const auto is_new = [](const Wanted& joint) { return joint.is_new; };
+  if (missing) {
+    // Not of one that has other joints, or whose rest nobody has seen so far.
+    if (missing->what != What::kJoint || found == 0 ||
+        !std::all_of(wanted_.begin(), wanted_.end(), is_known)) {
+      return missing;
+    }
+    if (!std::all_of(wanted_.begin(), wanted_.end(), is_new)) {
+      if (++parts_ <= kLongestWait * wanted_.size()) missing->what = What::kRest;
+      return missing;
+    }
+  }
+  fill(joints.t_ns, out);
   return std::nullopt;
 }
 
-}  // namespace
-
-std::optional<MissingJoint> joint_reading(const Joints& joints, const TopicOptions& options,
-                                          log::EncoderReading& out) {
-  for (const auto* wanted : {&options.drive_joints, &options.steer_joints}) {
-    for (const std::string& joint : *wanted) {
-      if (place_of(joint, joints.names) == joints.names.size()) {
-        return MissingJoint{What::kJoint, joint};
-      }
-    }
+void JointReadings::fill(std::int64_t t_ns, log::EncoderReading& out) {
+  out.t_ns = t_ns;
+  out.n_drive = n_drive_;
+  out.n_steer = static_cast<int>(wanted_.size()) - n_drive_;
+  const auto n_drive = static_cast<std::size_t>(n_drive_);
+  for (std::size_t i = 0; i < wanted_.size(); ++i) {
+    (i < n_drive ? out.drive[i] : out.steer_rad[i - n_drive]) = wanted_[i].last;
+    wanted_[i].is_new = false;
   }
-  out.t_ns = joints.t_ns;
-  out.n_drive = static_cast<int>(options.drive_joints.size());
-  out.n_steer = static_cast<int>(options.steer_joints.size());
-  const What drive = options.drive_is_angle() ? What::kPosition : What::kVelocity;
-  auto missing = pick(joints, options.drive_joints, drive, out.drive);
-  if (!missing) missing = pick(joints, options.steer_joints, What::kPosition, out.steer_rad);
-  return missing;
+  parts_ = 0;
 }
 
 std::string not_finite(const log::EncoderReading& reading, const TopicOptions& options) {

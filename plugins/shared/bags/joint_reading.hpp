@@ -1,9 +1,11 @@
-// From a message with joints of a robot to a reading of its wheels.
+// From messages with joints of a robot to readings of its wheels.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "messages.hpp"
 #include "topic_options.hpp"
@@ -11,17 +13,41 @@
 
 namespace viwo::bag {
 
-/// What a message does not have.
+/// What a message does not have. kRest: it has some of the joints, and the others come in messages
+/// of their own.
 struct MissingJoint {
-  enum class What : std::uint8_t { kJoint, kPosition, kVelocity };
+  enum class What : std::uint8_t { kJoint, kPosition, kVelocity, kRest };
   What what;
   std::string joint;  ///< the first one
 };
 
-/// Fills `out` with the joints of `options`, in their order; a joint that is not there is found
-/// before values that are not.
-std::optional<MissingJoint> joint_reading(const Joints& joints, const TopicOptions& options,
-                                          log::EncoderReading& out);
+/// Joints may come all in one message, or in several: one for each module, drives and steering
+/// apart. Then a reading is there when each has come since the last one, with the values that came
+/// last, and with the stamp of the message that completes it.
+class JointReadings {
+ public:
+  explicit JointReadings(const TopicOptions& options);
+
+  /// Fills `out` with the joints of the options, in their order; a joint that is not there is found
+  /// before values that are not.
+  std::optional<MissingJoint> add(const Joints& joints, log::EncoderReading& out);
+  /// As if none had come.
+  void restart();
+
+ private:
+  struct Wanted {
+    std::string name;
+    MissingJoint::What value;  ///< kPosition or kVelocity
+    double last = 0.;
+    bool is_known = false, is_new = false;
+  };
+
+  void fill(std::int64_t t_ns, log::EncoderReading& out);
+
+  std::vector<Wanted> wanted_;  ///< drives, then steerings
+  int n_drive_;
+  std::size_t parts_ = 0;  ///< messages since the last reading
+};
 
 /// "velocity of joint 'left' that is not finite": the first of a reading that has one.
 std::string not_finite(const log::EncoderReading& reading, const TopicOptions& options);

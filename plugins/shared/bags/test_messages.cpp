@@ -9,6 +9,7 @@
 
 #include <gmock/gmock.h>
 
+#include "joint_reading.hpp"
 #include "message_of.hpp"
 #include "messages.hpp"
 
@@ -61,6 +62,54 @@ TEST(ReadJoints, RefusesMoreAndLongerNamesThanARobotHas) {
   EXPECT_EQ(error(1, 1001), "a joint has a name of over 1000 bytes");
   Names names(10'000, 1000);
   EXPECT_EQ(read_joints(names).names.size(), 10'000U);
+}
+
+/// One drive and one steering, as one message or as two.
+class JointReadingsTest : public ::testing::Test {
+ protected:
+  static TopicOptions options() {
+    TopicOptions out;
+    out.drive_joints = {"drive"};
+    out.steer_joints = {"steer"};
+    return out;
+  }
+  /// "1.5 0.2 at 3", "rest", or what is missing.
+  std::string take(std::int64_t t_ns, const std::vector<std::string>& names, double velocity,
+                   double position) {
+    Joints joints;
+    joints.t_ns = t_ns;
+    joints.names = names;
+    joints.velocities.assign(names.size(), velocity);
+    joints.positions.assign(names.size(), position);
+    log::EncoderReading reading;
+    if (const auto missing = readings_.add(joints, reading)) {
+      return missing->what == MissingJoint::What::kRest ? "rest" : "no " + missing->joint;
+    }
+    return std::to_string(static_cast<int>(reading.drive[0])) + " " +
+           std::to_string(static_cast<int>(reading.steer_rad[0])) + " at " +
+           std::to_string(reading.t_ns);
+  }
+
+  JointReadings readings_{options()};
+};
+
+TEST_F(JointReadingsTest, AreOfOneMessageOrOfSeveral) {
+  EXPECT_EQ(take(1, {"steer", "arm", "drive"}, 7., 8.), "7 8 at 1");
+  EXPECT_EQ(take(2, {"drive"}, 1., 0.), "rest");
+  EXPECT_EQ(take(3, {"drive"}, 2., 0.), "rest") << "faster than the steering";
+  EXPECT_EQ(take(4, {"steer"}, 0., 3.), "2 3 at 4");
+  EXPECT_EQ(take(5, {"steer"}, 0., 4.), "rest");
+  EXPECT_EQ(take(6, {"drive"}, 5., 0.), "5 4 at 6");
+}
+
+TEST_F(JointReadingsTest, SayWhatDoesNotCome) {
+  EXPECT_EQ(take(1, {"drive"}, 1., 0.), "no steer") << "nobody has seen it";
+  EXPECT_EQ(take(2, {"arm"}, 1., 0.), "no drive");
+  EXPECT_EQ(take(3, {"steer"}, 0., 1.), "1 1 at 3");
+  for (int k = 0; k < 40; ++k) EXPECT_EQ(take(4 + k, {"drive"}, 1., 0.), "rest");
+  EXPECT_EQ(take(50, {"drive"}, 1., 0.), "no steer") << "it came once, and comes no more";
+  readings_.restart();
+  EXPECT_EQ(take(51, {"drive"}, 1., 0.), "no steer");
 }
 
 TEST(ToGrey, LeavesOutThePaddingOfRows) {

@@ -27,6 +27,8 @@ const char* reason_of(MissingJoint::What missing) {
       return "message without the positions of the joints";
     case MissingJoint::What::kVelocity:
       return "message without the velocities of the joints";
+    case MissingJoint::What::kRest:
+      break;  // no reason to reject it
   }
   return "";
 }
@@ -118,12 +120,13 @@ class JointReader final : public TopicReader {
       : TopicReader(options, options.joint_topic),
         options_(options),
         kind_(kind),
+        parts_(options),
         joints_(options.joint_map()) {}
 
   void take(FieldReader& in, const Message& message) override {
     Joints joints = kind_ == Kind::kOdometry ? read_twist(in) : read_joints(in);
     log::EncoderReading reading;
-    const auto missing = joint_reading(joints, options_, reading);
+    const auto missing = parts_.add(joints, reading);
     if (!missing || missing->what != MissingJoint::What::kJoint) any_has_all_ = true;
     if (joints.names != names_) {
       names_ = std::move(joints.names);
@@ -132,11 +135,12 @@ class JointReader final : public TopicReader {
         if (std::find(known_.begin(), known_.end(), name) == known_.end()) known_.push_back(name);
       }
     }
+    if (missing && missing->what == MissingJoint::What::kRest) return;
     if (missing) return filter_.reject(reason_of(missing->what), message);
     if (log::why_rejected(reading) != nullptr) {
       return filter_.reject(not_finite(reading, options_), message);
     }
-    reading.t_ns = stamp(joints.t_ns, message);
+    reading.t_ns = stamp(reading.t_ns, message);
     if (!filter_.accept(reading.t_ns, message)) return;
     if (const char* const why = joints_.convert(reading)) return filter_.reject_last(why, message);
     readings_.push_back(reading);
@@ -171,6 +175,7 @@ class JointReader final : public TopicReader {
 
   BagOptions options_;
   Kind kind_;
+  JointReadings parts_;
   log::JointMap joints_;
   std::vector<std::string> names_;  ///< of the last message
   std::vector<std::string> known_;  ///< of all messages

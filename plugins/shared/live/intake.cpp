@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "bag_image.hpp"
-#include "joint_reading.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/log/recording.hpp"
 #include "viwo/log/stamp_filter.hpp"
@@ -78,6 +77,7 @@ Intake::Intake(const bag::TopicOptions& options, const HostServices& services,
       make_fields_(make_fields),
       pace_(pace),
       topics_(wanted_topics(options)),
+      parts_(options),
       joints_(options.joint_map()),
       cells_(options.drive_is_angle(), options.max_gap_s),
       log_cells_(options.drive_is_angle(), options.max_gap_s),
@@ -174,7 +174,8 @@ void Intake::take_fix(std::size_t topic, const std::optional<GnssSample>& fix) {
 
 void Intake::take_joints(std::size_t topic, const bag::Joints& joints) {
   log::EncoderReading reading;
-  if (const auto missing = bag::joint_reading(joints, options_, reading)) {
+  if (const auto missing = parts_.add(joints, reading)) {
+    if (missing->what == bag::MissingJoint::What::kRest) return;
     return drop(topic, reason_of(*missing, joints), joints.t_ns);
   }
   if (log::why_rejected(reading) != nullptr) {
@@ -230,6 +231,7 @@ void Intake::begin_again(std::size_t topic) {
   state.jump = jump_of(topics_[topic]);
   const Kind kind = topics_[topic].kinds.front();
   if (kind == Kind::kJoints) {
+    parts_.restart();
     joints_.restart();
     cells_ = LiveCells(options_.drive_is_angle(), options_.max_gap_s);
   }

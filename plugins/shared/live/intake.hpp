@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bag.hpp"
+#include "joint_reading.hpp"
 #include "live_cells.hpp"
 #include "live_queue.hpp"
 #include "messages.hpp"
@@ -100,6 +101,7 @@ class Intake {
 
   mutable std::mutex mutex_;
   std::vector<State> states_;
+  bag::JointReadings parts_;
   log::JointMap joints_;
   LiveCells cells_;
   LogCells log_cells_;  ///< instead, in step
