@@ -79,8 +79,14 @@ std::string wander_text(const WheelWander& wander) {
            " prior sigmas of the intrinsics, for " + time_s +
            " s: slip, or a model that is not of this base, and nothing that a filter can follow";
   }
-  return "the intrinsics wander by " + sigma + " prior sigmas, for " + time_s +
-         " s: wheels.intrinsics_wander=" + sigma + ", wheels.intrinsics_wander_time_s=" + time_s +
+  // A decay that is slower than what is compared is seen as none: its time is that of a fit's end.
+  const double longest_s = wander.lag_s.back();
+  const bool is_slow = wander.time_s > longest_s;
+  return "the intrinsics wander by " + sigma + " prior sigmas, for " +
+         (is_slow ? "longer than the " + significant(longest_s, 2) +
+                        " s that are compared, so that how long is not known"
+                  : time_s + " s") +
+         ": wheels.intrinsics_wander=" + sigma + ", wheels.intrinsics_wander_time_s=" + time_s +
          " in a filter";
 }
 

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "calibration_text.hpp"
 #include "simulated_calibration.hpp"
 #include "told.hpp"
 #include "viwo/eval/consistency.hpp"
@@ -224,6 +225,17 @@ TEST(Calibrate, FindsHowTheWheelsWander) {
   EXPECT_NEAR(wanders.sigma, 0.5, 0.1);
   EXPECT_NEAR(wanders.time_s, 1., 0.5);
   EXPECT_LT(found({}).sigma, 0.05);
+}
+
+TEST(Calibrate, DoesNotTellATimeOfWanderBeyondWhatItCompares) {
+  WheelWander wander;
+  wander.sigma = 0.5;
+  wander.time_s = 2.;
+  wander.lag_s = {0.2, 10.};
+  EXPECT_NE(wander_text(wander).find("0.5 prior sigmas, for 2 s: "), std::string::npos);
+  wander.time_s = 39.5;
+  EXPECT_NE(wander_text(wander).find("for longer than the 10 s that are compared"),
+            std::string::npos);
 }
 
 }  // namespace
