@@ -2,8 +2,8 @@
 """mutate_inputs.py BIN SOURCE WORK [--count N] [--formats A,B]: the whole program on broken inputs.
 
 Small recordings of every format that is read, and a plugin's file, N mutations of each (200). Each
-run must end with exit code 0, 1 or 2, say why where it is not 0, and stay within 20 s of CPU and
-512 MB. Formats whose programs or sensors are not built are left out, and said.
+run must end with exit code 0, 1 or 2, say why where it is not 0, and stay within 20 s of CPU, two
+minutes and 512 MB. Formats whose programs or sensors are not built are left out, and said.
 """
 
 import argparse
@@ -17,9 +17,11 @@ import sqlite3
 import struct
 import subprocess
 import sys
+import threading
 
 MOST_MB = 512
 MOST_CPU_S = 20
+MOST_WALL_S = 120  # of one that waits for something
 # Beside these the last line of defence: no mutation may even ask for more.
 MOST_ADDRESSES = 4 << 30
 
@@ -226,6 +228,18 @@ def png(inputs):
             sorted(copy.rglob('*.png')) + sorted(copy.glob('cam*/data.csv')))
 
 
+def calibration(inputs):
+    """What a run has found, and another one starts from."""
+    log = inputs.source / 'configs/runs/viwo_log.yaml'
+    found = inputs.whole / 'found'
+    from_log = [inputs.viwo, 'run', log, '--set', f'placeholders.log={inputs.log}']
+    run(from_log + ['--out', found], stderr=subprocess.DEVNULL)
+    file = inputs.work / 'calibration.yaml'
+    shutil.copy(found / 'calibration.yaml', file)
+    return from_log + ['--set', f'kinematics.calibration={file}', '--out',
+                       inputs.work / 'out/calibration'], [file]
+
+
 def plugin(inputs):
     # A build folder may have plugins of earlier versions, too.
     whole = max(inputs.bin.parent.glob('lib/viwo/plugins/*/libviwo_kinematics_differential.so'),
@@ -236,7 +250,7 @@ def plugin(inputs):
 
 
 FORMATS = {f.__name__: f for f in (asl, gz, csv_table, ros_text, kalibr, tum, ros1, mcap, sqlite,
-                                   wpilog, png, plugin)}
+                                   wpilog, png, calibration, plugin)}
 
 
 def mutated(whole, rng):
@@ -284,7 +298,10 @@ def observe(command, errors_file):
     with open(errors_file, 'wb') as errors:
         child = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL,
                                  stderr=errors, stdin=subprocess.DEVNULL, preexec_fn=limit)
+        watch = threading.Timer(MOST_WALL_S, child.kill)
+        watch.start()
         _, status, usage = os.wait4(child.pid, 0)
+        watch.cancel()
     child.returncode = os.waitstatus_to_exitcode(status)
     return child.returncode, usage.ru_maxrss / 1024, usage.ru_utime + usage.ru_stime
 
