@@ -10,10 +10,11 @@
 #include "viwo/log/joints.hpp"
 #include "viwo/sim/drive_params.hpp"
 #include "viwo/sim/rig_simulator.hpp"
+#include "viwo/sim/true_mount.hpp"
 
 namespace viwo::contact {
 
-struct Params : log::JointParams, sim::DriveParams, sim::RigParams {
+struct Params : log::JointParams, sim::DriveParams, sim::RigParams, sim::TrueMountParams {
   std::string base;
   std::vector<double> x_m;
   std::vector<double> y_m;
@@ -85,6 +86,7 @@ struct Params : log::JointParams, sim::DriveParams, sim::RigParams {
       {.unit = "m", .min = 0., .help = "the true places of swerve wheels differ by draws of this"});
     b(VIWO_PARAM(sigma_true_steer_offset_rad),
       {.unit = "rad", .min = 0., .help = "the true steering offsets differ by draws of this"});
+    sim::TrueMountParams::bind(b);
     b(VIWO_PARAM(controller_knows),
       {.choices = "truth|nominal",
        .help = "what the wheels are commanded with: the true base, or what stands here"});

@@ -111,10 +111,11 @@ std::vector<EncoderSample> encoders(const Params& params, const sim::BodyTraject
   return out;
 }
 
-log::Recording<Measurement> simulate(const Params& params, const HostServices& services) {
+log::Recording<Measurement> simulate(Params params, const HostServices& services) {
   const std::int64_t start_ns = params.start_ns;
   const Vehicle vehicle = vehicle_from(params, services);
-  const sim::RigSimulation rig = sim::rig_from(params, params.duration_s, start_ns, services);
+  sim::RigSimulation rig = sim::rig_from(params, params.duration_s, start_ns, services);
+  if (!services.exact) params.draw(services.seed, rig.mounting, params.t_OtoI_s);
   const sim::BodyTrajectory trajectory = drive(params, vehicle, sim::rig_end_s(rig));
   ContactSolver solver(vehicle.truth, vehicle.controller, vehicle.physics);
 

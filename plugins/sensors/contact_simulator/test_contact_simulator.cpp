@@ -152,6 +152,20 @@ TEST(ContactSimulator, TruthIsWhatTheWheelsRollWithUnderTheirLoad) {
   EXPECT_NE(drawn.at("delta_o3"), 0.);
 }
 
+/// As in `simulator`, and the wheels are late by what is told as the truth.
+TEST(ContactSimulator, DrawsTheMountAndTheClock) {
+  const std::string rest =
+      "duration_s: 3, noise: false, true_sigma_p_IinO_m: [0.1, 0.1, 0.1], "
+      "true_sigma_R_ItoO_rad: [0.1, 0.1, 0.1], true_sigma_t_OtoI_s: 0.05";
+  const auto as_configured = truth_of(play(*make_sensor(section("duration_s: 3, noise: false"))));
+  const auto drawn = truth_of(play(*make_sensor(section(rest))));
+  const auto exact = truth_of(play(*make_sensor(section(rest), 1, true)));
+  for (const char* name : {"p_IinO_x", "p_IinO_z", "R_ItoO_x", "t_OtoI"}) {
+    EXPECT_GT(std::abs(drawn.at(name) - as_configured.at(name)), 1e-4) << name;
+    EXPECT_EQ(exact.at(name), as_configured.at(name)) << name;
+  }
+}
+
 TEST(ContactSimulator, IsExactWhenThatIsAskedForWhateverItsParametersSay) {
   const std::string rest = "duration_s: 3, sigma_true_radius_m: 1e-4, controller_knows: nominal";
   const auto sensor = make_sensor(section(rest), 1, true);

@@ -9,13 +9,12 @@
 #include "pose_simulator.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/log/recording.hpp"
-#include "viwo/math/so3.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/drive_params.hpp"
 #include "viwo/sim/encoder_params.hpp"
-#include "viwo/sim/random.hpp"
 #include "viwo/sim/rig_simulator.hpp"
 #include "viwo/sim/true_cameras.hpp"
+#include "viwo/sim/true_mount.hpp"
 
 namespace viwo {
 namespace {
@@ -28,11 +27,13 @@ double sliding_of(const sim::DriveParams& drive) {
   return kSliding * std::max(1., acceleration / kUsual_m_per_s2);
 }
 
-struct Params : sim::EncoderParams, log::JointParams, sim::DriveParams, PoseParams, sim::RigParams {
+struct Params : sim::EncoderParams,
+                log::JointParams,
+                sim::DriveParams,
+                PoseParams,
+                sim::RigParams,
+                sim::TrueMountParams {
   NestedKinematics robot;
-  Eigen::Vector3d true_sigma_p_IinO_m{0., 0., 0.};
-  Eigen::Vector3d true_sigma_R_ItoO_rad{0., 0., 0.};
-  double true_sigma_t_OtoI_s = 0.;
   std::string wheel_set;
   bool wheels = true;
   double wheel_rate_hz = 100.;
@@ -41,11 +42,7 @@ struct Params : sim::EncoderParams, log::JointParams, sim::DriveParams, PosePara
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(robot),
       {.required = true, .help = "the base: its nominal intrinsics and its noise"});
-    b(VIWO_PARAM(true_sigma_p_IinO_m),
-      {.unit = "m", .help = "the true mount is p_IinO_m + a draw of these sigmas"});
-    b(VIWO_PARAM(true_sigma_R_ItoO_rad), {.unit = "rad", .help = "and turned by a draw of these"});
-    b(VIWO_PARAM(true_sigma_t_OtoI_s),
-      {.unit = "s", .min = 0., .help = "the true clock is t_OtoI_s + a draw of this sigma"});
+    sim::TrueMountParams::bind(b);
     b(VIWO_PARAM(wheel_set),
       {.help = "for a second simulator, the wheel set (wheel_sets.NAME) that it stands for: "
                "its truth is told as NAME.r_1 and so on, true states are left to the first"});
@@ -61,20 +58,6 @@ struct Params : sim::EncoderParams, log::JointParams, sim::DriveParams, PosePara
     sim::RigParams::bind(b);
   }
 };
-
-/// What is written, moved by a draw: the truth that nobody knows.
-void draw_mount(const Params& params, std::uint64_t seed, sim::Mounting& mounting,
-                double& t_OtoI_s) {
-  sim::RandomStream random(seed, sim::Stream::kTrueMount);
-  const auto draw = [&](const Eigen::Vector3d& sigma) {
-    Eigen::Vector3d out;
-    for (int i = 0; i < 3; ++i) out[i] = sigma[i] * random.gaussian();
-    return out;
-  };
-  mounting.p_IinO += draw(params.true_sigma_p_IinO_m);
-  mounting.R_ItoO = exp_so3(draw(params.true_sigma_R_ItoO_rad)) * mounting.R_ItoO;
-  t_OtoI_s += params.true_sigma_t_OtoI_s * random.gaussian();
-}
 
 std::vector<CalibrationSample> calibration_truth(const ModelDescription& robot,
                                                  const Intrinsics& x_WI,
@@ -106,7 +89,7 @@ log::Recording<Measurement> simulate(const Params& params, const HostServices& s
   if (services.exact) {
     wheels.make_exact();
   } else {
-    draw_mount(params, services.seed, rig.mounting, wheels.time_offset_s);
+    params.draw(services.seed, rig.mounting, wheels.time_offset_s);
   }
   const sim::BodyTrajectory trajectory =
       sim::drive_from(params, sim::rig_end_s(rig), std::abs(wheels.time_offset_s));
