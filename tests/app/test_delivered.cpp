@@ -78,6 +78,8 @@ TEST_F(DeliveredTest, ConfigurationsOfTheFilter) {
   expect_done({"experiment", kConfigFolder + "experiments/paper_exact.yaml", "--seeds", "1",
                "--out", "exact", "--set", "sensors.simulator0.duration_s=2"});
   EXPECT_EQ(summary("exact").at("variants").at("drive_only").at("runs"), 6);
+  expect_done({"experiment", kConfigFolder + "experiments/far_from_nominal.yaml", "--seeds", "1",
+               "--out", "far", "--set", "sensors.simulator0.duration_s=5"});
   expect_done({"experiment", kConfigFolder + "experiments/long_runs.yaml", "--seeds", "1", "--out",
                "long", "--set", "sensors.simulator0.duration_s=5"});
   EXPECT_TRUE(summary("long").at("by").at("motion").contains("mixed"));
@@ -282,8 +284,8 @@ TEST_F(DeliveredTest, AllConfigurationsAreTriedHere) {
                 "experiments/calibrate_ackermann.yaml", "experiments/calibrate_mecanum.yaml",
                 "experiments/calibrate_skid_steer.yaml", "experiments/calibrate_swerve.yaml",
                 "experiments/contact_physics.yaml", "experiments/drive_only_twist_full.yaml",
-                "experiments/four_cameras.yaml", "experiments/hybrid.yaml",
-                "experiments/images.yaml", "experiments/long_runs.yaml",
+                "experiments/far_from_nominal.yaml", "experiments/four_cameras.yaml",
+                "experiments/hybrid.yaml", "experiments/images.yaml", "experiments/long_runs.yaml",
                 "experiments/nominal_dead_reckoning.yaml", "experiments/openvins_cameras.yaml",
                 "experiments/paper_accuracy.yaml", "experiments/paper_exact.yaml",
                 "experiments/plane_and_gnss.yaml", "experiments/rolling_shutter.yaml",

@@ -160,7 +160,7 @@ TEST(ContactSimulator, DrawsTheMountAndTheClock) {
   const auto as_configured = truth_of(play(*make_sensor(section("duration_s: 3, noise: false"))));
   const auto drawn = truth_of(play(*make_sensor(section(rest))));
   const auto exact = truth_of(play(*make_sensor(section(rest), 1, true)));
-  for (const char* name : {"p_IinO_x", "p_IinO_z", "R_ItoO_x", "t_OtoI"}) {
+  for (const char* name : {"p_IinO_x", "p_IinO_z", "theta_ItoO_x", "t_OtoI"}) {
     EXPECT_GT(std::abs(drawn.at(name) - as_configured.at(name)), 1e-4) << name;
     EXPECT_EQ(exact.at(name), as_configured.at(name)) << name;
   }
