@@ -11,6 +11,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import zlib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -151,6 +152,16 @@ def library(build):
     return header + struct.pack("<IIQQQQQQ", 1, 5, 0, 0, 0, size, size, 4096) + record
 
 
+def colour_png():
+    """Two pixels, and a text."""
+    out = b"\x89PNG\r\n\x1a\n"
+    for kind, data in ((b"IHDR", struct.pack(">IIBBBBB", 2, 1, 8, 2, 0, 0, 0)),
+                       (b"zTXt", b"a\0\0" + zlib.compress(b"text")),
+                       (b"IDAT", zlib.compress(bytes([0, 1, 2, 3, 200, 100, 50]))), (b"IEND", b"")):
+        out += struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    return out
+
+
 def main():
     if len(sys.argv) != 3 or sys.argv[1] == "--help":
         sys.exit(__doc__)
@@ -239,6 +250,9 @@ def main():
          "  accelerometer_noise_density: 1e-3\n  accelerometer_random_walk: 1e-4\n")
     seed("image", "png", png)
     seed("image", "pgm", b"P5 3 2 255\n" + bytes(6))
+    seed("image", "colour_png", colour_png())
+    for name in ("grey", "progressive"):  # by cjpeg -quality 50
+        seed("image", f"{name}_jpg", (FILES / f"{name}.jpg").read_bytes())
     seed("yaml", "all", "a: &x {b: [1, 'two', \"t\\u00e9\\n\"], c: ~}\n<<: *x\nd: |\n  text\n  more\ne: !!str 1\nf: - 1\n"
          .replace("f: - 1\n", "f:\n  - 1\n  - {g: *x}\n"))
     for name in ("robot", "camera"):  # to simulate takes longer than to read
