@@ -13,6 +13,7 @@ import pathlib
 import random
 import resource
 import shutil
+import signal
 import sqlite3
 import struct
 import subprocess
@@ -298,7 +299,7 @@ def observe(command, errors_file):
     with open(errors_file, 'wb') as errors:
         child = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL,
                                  stderr=errors, stdin=subprocess.DEVNULL, preexec_fn=limit)
-        watch = threading.Timer(MOST_WALL_S, child.kill)
+        watch = threading.Timer(MOST_WALL_S, os.kill, (child.pid, signal.SIGKILL))
         watch.start()
         _, status, usage = os.wait4(child.pid, 0)
         watch.cancel()

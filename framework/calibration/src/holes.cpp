@@ -5,6 +5,7 @@
 #include <span>
 
 #include "recording_name.hpp"
+#include "viwo/math/heading_jumps.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/wheel/drive_ranges.hpp"
@@ -39,8 +40,15 @@ std::vector<Hole> holes_of(const CalibrationRecording& recording) {
              significant(holes.front().length_s(), 2) + " s, " + significant(at_s, 4) +
              " s after the begin");
   }
-  if (motion.kind != ReferenceKind::kGyro || recording.data.imu().empty()) return holes;
+  if (motion.kind != ReferenceKind::kGyro) return holes;
   const std::int64_t offset_ns = to_ns(motion.offset_s);
+  if (recording.data.imu().empty()) {  // it integrates for itself, but for where it is set
+    const auto headings = recording.data.headings();
+    for (const std::size_t i : heading_jumps(headings)) {
+      holes.push_back({headings[i - 1].t_ns - offset_ns, headings[i].t_ns - offset_ns});
+    }
+    return holes;
+  }
   for (std::size_t i = 1; i < motion.poses.size(); ++i) {
     const Hole hole{motion.poses[i - 1].t_ns - offset_ns, motion.poses[i].t_ns - offset_ns};
     if (hole.length_s() > motion.max_gap_s) holes.push_back(hole);

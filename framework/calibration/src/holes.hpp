@@ -14,7 +14,8 @@ struct Hole {
   double length_s() const { return seconds_between(begin_ns, end_ns); }
 };
 
-/// What is bridged is no measurement: of wheels that turned, and of a gyro, which is integrated.
+/// What is bridged is no measurement: of wheels that turned, and of a gyro, which is integrated or
+/// was set to another value.
 /// InputError for holes of the wheels in a drive that was measured by hand.
 std::vector<Hole> holes_of(const CalibrationRecording& recording);
 

@@ -109,15 +109,14 @@ double contradiction(const CalibrationResult& result) {
   return moved > 0. ? std::sqrt(left / moved) : 0.;
 }
 
-/// Wheels of which each could do without the others, and that agree to the last digit.
-bool are_setpoints(const CalibrationResult& result) {
+/// Wheels that could contradict each other, and do by `part` of their speed: not at all.
+bool are_setpoints(const CalibrationResult& result, double part) {
   const auto is_one = [](const CalibrationRecording& recording) {
     const ModelDescription& model = recording.setup.model->description();
     return model.n_rows > 3 && !has_copies(recording.data.wheels(), model.n_drive);
   };
   const auto& recordings = result.setup->recordings;
-  return std::all_of(recordings.begin(), recordings.end(), is_one) &&
-         contradiction(result) < kExactly;
+  return std::all_of(recordings.begin(), recordings.end(), is_one) && part < kExactly;
 }
 
 /// A drive that gives one number all the time while another turns.
@@ -166,7 +165,7 @@ void judge_wheels(CalibrationResult& result) {
         "wheels that are elsewhere");
     return;
   }
-  if (are_setpoints(result)) {
+  if (are_setpoints(result, part)) {
     result.doubts.push_back(std::string("the wheels agree ") + kSetpoints);
     return;
   }

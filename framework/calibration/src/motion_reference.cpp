@@ -9,7 +9,6 @@
 
 #include "recording_name.hpp"
 #include "viwo/math/arrays.hpp"
-#include "viwo/math/heading_jumps.hpp"
 #include "viwo/math/median.hpp"
 
 namespace viwo::calibration {
@@ -80,18 +79,11 @@ Trajectory yaw_of_gyro(std::span<const ImuSample> imu) {
   return out;
 }
 
-Trajectory yaw_of_headings(std::span<const HeadingSample> headings, double gap_s) {
-  const std::vector<std::size_t> jumps = heading_jumps(headings);
+Trajectory yaw_of_headings(std::span<const HeadingSample> headings) {
   Trajectory out;
   out.reserve(headings.size());
-  auto jump = jumps.begin();
-  for (std::size_t i = 0; i < headings.size(); ++i) {
-    if (jump != jumps.end() && *jump == i) ++jump;
-    const bool is_behind_jump =
-        jump != jumps.begin() &&
-        seconds_between(headings[*(jump - 1) - 1].t_ns, headings[i].t_ns) <= gap_s;
-    if (!is_behind_jump) out.push_back(turned(headings[i].t_ns, headings[i].yaw_rad));
-  }
+  for (const HeadingSample& heading : headings)
+    out.push_back(turned(heading.t_ns, heading.yaw_rad));
   return out;
 }
 
@@ -130,7 +122,7 @@ MotionReference motion_reference(const Recording& label, const RunSetup& setup, 
     // Headings are often logged where they change only.
     if (data.imu().empty()) {
       out.max_gap_s = longest_gap_s(data.headings(), 0.5);
-      out.poses = yaw_of_headings(data.headings(), out.max_gap_s);
+      out.poses = yaw_of_headings(data.headings());
     } else {
       out.max_gap_s = longest_gap_s(data.imu(), 0.1);
       out.poses = yaw_of_gyro(data.imu());

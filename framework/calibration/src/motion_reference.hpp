@@ -15,9 +15,8 @@ Eigen::Vector3d turning_axis(std::span<const ImuSample> imu);
 /// Yaw of I by its gyro, bias and all, from zero; positions are zero.
 Trajectory yaw_of_gyro(std::span<const ImuSample> imu);
 
-/// The same of a gyro that integrates for itself. Where somebody set it to another value it has a
-/// gap of more than `gap_s`.
-Trajectory yaw_of_headings(std::span<const HeadingSample> headings, double gap_s);
+/// The same of a gyro that integrates for itself.
+Trajectory yaw_of_headings(std::span<const HeadingSample> headings);
 
 /// The reference of a recording. Throws InputError when there is none of the kind, or when the
 /// labels distance_m or turn_deg are no such numbers.

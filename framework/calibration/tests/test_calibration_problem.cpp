@@ -6,6 +6,7 @@
 #include "motion_reference.hpp"
 #include "simulated.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/heading_jumps.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/testing/jacobian.hpp"
@@ -186,7 +187,7 @@ TEST(YawOfHeadings, CountsTurnsThatWrap) {
                    wrap_angle(0.1 * static_cast<double>(i))};
   }
   CalibrationRecording recording = with_gyro();
-  recording.motion.poses = yaw_of_headings(headings, 0.5);
+  recording.motion.poses = yaw_of_headings(headings);
   CalibrationOptions options;
   options.segments = Segments::kWhole;
   const RecordingProblem problem(recording, options);
@@ -195,21 +196,44 @@ TEST(YawOfHeadings, CountsTurnsThatWrap) {
 }
 
 /// A driver sets it to zero before the match; what turned meanwhile is not known.
-TEST(YawOfHeadings, HaveAGapWhereTheyAreSetToAnotherValue) {
-  std::vector<HeadingSample> headings(300);
-  for (std::size_t i = 0; i < headings.size(); ++i) {
-    headings[i] = {static_cast<std::int64_t>(i) * 10'000'000,
-                   0.03 * static_cast<double>(i) - (i < 100 ? 0. : 2.)};
+TEST(RecordingProblem, LeavesOutWhereAHeadingIsSetToAnotherValue) {
+  const auto with_holes = [](const auto& set) {
+    CalibrationRecording recording = with_gyro();
+    std::vector<HeadingSample> headings;
+    for (const StampedPose& pose : recording.motion.poses) {
+      headings.push_back({pose.t_ns, yaw(pose)});
+      set(headings.back());
+    }
+    recording.data.recorded.set("simulator0", std::vector<ImuSample>());
+    recording.data.recorded.set("simulator0", headings);
+    recording.motion =
+        motion_reference({"headings", {}}, recording.setup, recording.data, ReferenceKind::kGyro);
+    CalibrationOptions options;
+    options.segments = Segments::kLength;
+    options.segment_s = 1.;
+    return RecordingProblem(recording, options).n_with_holes();
+  };
+  EXPECT_EQ(with_holes([](HeadingSample&) {}), 0);
+  const auto later = [](double by_rad) {
+    return [by_rad](HeadingSample& heading) {
+      if (heading.t_ns > 4'500'000'000) heading.yaw_rad += by_rad;
+    };
+  };
+  EXPECT_EQ(with_holes(later(-2.)), 1);
+  EXPECT_EQ(with_holes(later(0.05)), 0) << "as a base turns in ten milliseconds";
+  EXPECT_EQ(with_holes([](HeadingSample& heading) { heading.yaw_rad *= 180. / M_PI; }), 0);
+}
+
+TEST(HeadingJumps, AreToldAfterAPauseAndNotOfStampsThatComeInPairs) {
+  std::vector<HeadingSample> headings;
+  for (int i = 0; i < 300; ++i) {
+    const std::int64_t pause_ns = i < 100 ? 0 : 5'000'000'000;
+    headings.push_back({20'000'000LL * i + pause_ns, 0.02 * i - (i < 100 ? 0. : 1.)});
   }
-  const Trajectory yaw_of = yaw_of_headings(headings, 0.5);
-  const auto at = [&](double t_s) { return interpolate(yaw_of, to_ns(t_s), 0.5); };
-  EXPECT_TRUE(at(0.98) && at(1.55));
-  for (const double t_s : {1., 1.2, 1.48}) EXPECT_FALSE(at(t_s)) << t_s;
-  EXPECT_NEAR(yaw(*at(1.55)), wrap_angle(0.03 * 155. - 2.), 1e-9);
-  // In degrees it is fast all the time.
-  for (HeadingSample& heading : headings) heading.yaw_rad *= 180. / M_PI;
-  for (std::size_t i = 100; i < 300; ++i) headings[i].yaw_rad += 2. * 180. / M_PI;
-  EXPECT_EQ(yaw_of_headings(headings, 0.5).size(), headings.size());
+  EXPECT_EQ(heading_jumps(headings), std::vector<std::size_t>{100});
+  for (std::size_t i = 1; i < 300; i += 2) headings[i].t_ns = headings[i - 1].t_ns + 1'000'000;
+  for (std::size_t i = 100; i < 300; ++i) headings[i].yaw_rad += 1.;
+  EXPECT_TRUE(heading_jumps(headings).empty());
 }
 
 /// A tenth of a second is a hole of an IMU at 200 Hz, not of one at 8 Hz.

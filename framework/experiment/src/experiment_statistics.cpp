@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "viwo/math/significant.hpp"
@@ -144,6 +145,7 @@ std::vector<std::string> estimated(const ExperimentResult& result,
 std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,
                                                           std::size_t variant, const Group& group) {
   std::vector<CalibrationStatistics> all;
+  std::vector<std::set<std::uint64_t>> seeds;  // of each
   for (const ExperimentRun& run : result.runs) {
     if (run.variant != variant || !group.passes(run)) continue;
     if (run.result.status != RunStatus::kOk) continue;
@@ -151,7 +153,11 @@ std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult
       if (!is_estimated(run.result, track) || !std::isfinite(track.final_error)) continue;
       auto at =
           std::find_if(all.begin(), all.end(), [&](const auto& c) { return c.name == track.name; });
-      if (at == all.end()) at = all.insert(all.end(), {track.name});
+      if (at == all.end()) {
+        at = all.insert(all.end(), {track.name});
+        seeds.emplace_back();
+      }
+      seeds[static_cast<std::size_t>(at - all.begin())].insert(run.seed);
       const double e = track.final_error, sigma = track.sigma.back();
       const double normalised = e * e / (sigma * sigma);
       at->mean_error += e / sigma;
@@ -163,14 +169,16 @@ std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult
       at->widened_nees += normalised / (track.scatter * track.scatter);
     }
   }
-  for (CalibrationStatistics& c : all) {
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    CalibrationStatistics& c = all[i];
     c.rmse = std::sqrt(c.rmse / c.runs);
     c.mean_sigma /= c.runs;
     c.prior_sigma /= c.runs;
     c.mean_error /= c.runs;
     c.nees /= c.runs;
     c.widened_nees /= c.runs;
-    c.nees_bounds = eval::mean_nees_bounds(1, c.runs, kBoundsConfidence);
+    // A seed draws one robot for all motions.
+    c.nees_bounds = eval::mean_nees_bounds(1, static_cast<int>(seeds[i].size()), kBoundsConfidence);
   }
   return all;
 }

@@ -65,10 +65,10 @@ struct CalibrationStatistics {
   std::string name;
   int runs = 0;
   double rmse = 0., mean_sigma = 0., prior_sigma = 0.;
-  double mean_error = 0.;        ///< mean normalised error: of a biased estimate not zero
-  double nees = 0.;              ///< mean squared normalised error
-  double widened_nees = 0.;      ///< likewise, by sigmas times their scatter (F-42)
-  eval::NeesBounds nees_bounds;  ///< of a consistent one in kBoundsConfidence of all experiments
+  double mean_error = 0.;          ///< mean normalised error: of a biased estimate not zero
+  double nees = 0.;                ///< mean squared normalised error
+  double widened_nees = 0.;        ///< likewise, by sigmas times their scatter (F-42)
+  eval::NeesBounds nees_bounds{};  ///< of a consistent one in kBoundsConfidence of all experiments
   bool is_consistent() const { return nees >= nees_bounds.low && nees <= nees_bounds.high; }
 };
 std::vector<CalibrationStatistics> calibration_statistics(const ExperimentResult& result,

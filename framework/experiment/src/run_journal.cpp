@@ -56,8 +56,8 @@ std::optional<std::string> bytes_of(const fs::path& file) {
   return std::string{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-/// Takes everything but what lies too deep, for the parser needs a part of the stack for each
-/// level, and more values than a run has: one of a byte becomes 16.
+/// Takes everything but what lies too deep, and more values than a run has: for each level the
+/// parser needs a part of the stack, for each value, which may be a byte, 16 bytes.
 class Levels : public nlohmann::json_sax<nlohmann::json> {
  public:
   bool null() override { return add(); }

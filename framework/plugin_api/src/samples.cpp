@@ -13,7 +13,11 @@ RejectionCount* Rejections::find(std::string_view reason) {
     if (known.reason == reason) return &known;
   }
   if (counts_.size() < kMostReasons) return nullptr;
-  if (counts_.size() == kMostReasons) counts_.push_back({"for other reasons", 0, "not listed"});
+  constexpr std::string_view kOthers = "for other reasons";
+  if (reason != kOthers) {  // it may be there already, of a part of a run
+    if (RejectionCount* const others = find(kOthers)) return others;
+  }
+  counts_.push_back({std::string(kOthers), 0, "not listed"});
   return &counts_.back();
 }
 

@@ -147,15 +147,18 @@ log::EncoderRecording read_wheels(const Params& params) {
   all.insert(all.end(), steers.begin(), steers.end());
   const bool are_increments = params.drive_input == Params::Drive::kIncrement;
   std::array<double, kMaxDrives> angle_rad{};
+  bool is_lost = false;  // what a wheel turned since the last reading
   table.read(all, collector, [&](std::int64_t t_ns) {
     reading.t_ns = t_ns;
+    reading.is_start = are_increments && is_lost;
+    is_lost = true;  // if one of them cannot be read
     for (std::size_t i = 0; i < drives.size(); ++i) {
       reading.drive[i] = drive_factor * table.number(drives[i]);
-      // One that is no number is counted, and is no part of the sum.
-      if (are_increments && std::isfinite(reading.drive[i])) {
-        reading.drive[i] = angle_rad[i] += reading.drive[i];
-      }
+      if (are_increments) reading.drive[i] = angle_rad[i] += reading.drive[i];
     }
+    is_lost = !std::all_of(reading.drive.begin(), reading.drive.begin() + reading.n_drive,
+                           [](double angle) { return std::isfinite(angle); });
+    if (is_lost) angle_rad.fill(0.);
     for (std::size_t i = 0; i < steers.size(); ++i) {
       reading.steer_rad[i] = steer_factor * table.number(steers[i]);
     }
@@ -228,11 +231,12 @@ log::HeadingRecording read_yaw_rates(const Params& params) {
                      params.gyro_scale != 1.);
   const double factor = params.heading_scale * params.gyro_factor();
   log::HeadingCollector collector(params.limits());
-  log::YawOfRate yaw;
   table.read({rate}, collector, [&](std::int64_t t_ns) {
-    collector.add(yaw.add(t_ns, factor * table.number(rate)), table.at());
+    collector.add({t_ns, factor * table.number(rate)}, table.at());
   });
-  return collector.finish(table.at());
+  log::HeadingRecording out = collector.finish(table.at());
+  log::integrate_yaw(params.max_gap_s, out.samples);
+  return out;
 }
 
 SampleTypes kinds_of(const Params& params) {

@@ -183,27 +183,32 @@ TEST_F(CsvTable, AYawAloneIsAHeading) {
 /// Ticks since the row before, as small boards send them.
 TEST_F(CsvTable, DrivesMayBeIncrements) {
   const auto samples = play_only<EncoderSample>(
-      table("t,l,r\n0,7,7\n0.1,10,20\n0.2,nan,1\n0.3,10,20\n0.4,-5,0\n",
+      table("t,l,r\n0,7,7\n0.1,10,20\n0.2,nan,1\n0.3,10,20\n0.4,-5,1\n0.5,x,2\n0.6,1,1\n0.7,2,4\n",
             "time_column: t, time_unit: s, drive_columns: [l, r], drive_input: increment, "
             "drive_unit: count, drive_counts_per_turn: 100, max_rejected_fraction: 0.5, "
             "max_gap_s: 0.5"));
+  // None over a row whose ticks are lost.
   ASSERT_EQ(samples.size(), 3U);
   const double count = 2. * M_PI / 100.;
   EXPECT_NEAR(samples[0].drive_rad_per_s[0], 10. * count / 0.1, 1e-9);
-  EXPECT_NEAR(samples[1].drive_rad_per_s[1], 21. * count / 0.2, 1e-9);
-  EXPECT_NEAR(samples[2].drive_rad_per_s[0], -5. * count / 0.1, 1e-9);
+  EXPECT_NEAR(samples[1].drive_rad_per_s[0], -5. * count / 0.1, 1e-9);
+  EXPECT_NEAR(samples[1].drive_rad_per_s[1], 1. * count / 0.1, 1e-9);
+  EXPECT_NEAR(samples[2].drive_rad_per_s[1], 4. * count / 0.1, 1e-9);
 }
 
 /// A cheap gyro has one axis, and gives its rate; this one clockwise, in degrees.
 TEST_F(CsvTable, AYawRateAloneIsAHeading) {
   const std::string rest =
       "time_column: t, time_unit: s, gyro_unit: deg, heading_scale: -1, max_rejected_fraction: 0.5";
-  const auto samples = play_only<HeadingSample>(table(
-      "t,r [deg/s]\n0,-90\n0.2,-90\n0.2,1e6\n0.4,nan\n0.5,-180\n", rest + ", yaw_rate_column: 2"));
-  ASSERT_EQ(samples.size(), 3U);
+  const auto samples = play_only<HeadingSample>(
+      table("t,r [deg/s]\n0,-90\n0.2,-90\n0.2,1e6\n0.4,nan\n0.5,-180\n1e9,0\n0.6,-180\n",
+            rest + ", yaw_rate_column: 2"));
+  // Of what was accepted; over the gap the rate is what it was.
+  ASSERT_EQ(samples.size(), 4U);
   EXPECT_EQ(samples[0].yaw_rad, 0.);
   EXPECT_NEAR(samples[1].yaw_rad, 0.2 * M_PI / 2., 1e-12);
-  EXPECT_NEAR(samples[2].yaw_rad, (0.2 + 0.3 * 1.5) * M_PI / 2., 1e-12);
+  EXPECT_NEAR(samples[2].yaw_rad, 0.5 * M_PI / 2., 1e-12);
+  EXPECT_NEAR(samples[3].yaw_rad, 0.7 * M_PI / 2., 1e-12);
   EXPECT_THAT(error_of(table("t,r,h\n0,1,1\n", rest + ", yaw_rate_column: r, yaw_column: h")),
               HasSubstr("yaw_rate_column: yaw_column says the heading already"));
   EXPECT_THAT(error_of(table("t,r [rad/s]\n0,1\n0.1,1\n", rest + ", yaw_rate_column: 2")),

@@ -40,6 +40,7 @@ fs::path decompressed(const fs::path& file) {
   whole.replace_extension();
   std::error_code ignored;
   if (fs::exists(whole, ignored)) return whole;
+  if (!fs::exists(file, ignored)) return file;  // who opens it says so
   throw InputError(file.string() + "  is compressed as a whole: `unzstd " + file.string() +
                    "` makes what is read, beside it");
 }

@@ -111,6 +111,8 @@ TEST_F(Ros2Bag, ReadsWholeFilesThatWereDecompressedBesideTheirCompressedOnes) {
   std::ofstream(folder_ / "bag_0.db3.zstd") << "compressed";
   EXPECT_EQ(play_only<ImuSample>(section("imu_topic: /imu0", "bag_0.db3.zstd")).size(), 20U);
   write_metadata("sqlite3", "zstd", "[bag_1.db3.zstd]", "FILE");
+  EXPECT_THAT(error_of(section(kAll, "")), HasSubstr("No such file or directory"));
+  std::ofstream(folder_ / "bag_1.db3.zstd") << "compressed";
   EXPECT_THAT(error_of(section(kAll, "")),
               HasSubstr("is compressed as a whole: `unzstd " + file("bag_1.db3.zstd")));
 }

@@ -260,13 +260,13 @@ log::HeadingRecording read_yaw_rates(const Contents& contents, const Params& par
   const double factor = params.heading_scale * params.gyro_factor();
   StampOrder order(params.limits());
   std::vector<HeadingSample> samples;
-  log::YawOfRate yaw;
   for_each_reading(contents, sources, {nullptr, 0, params.max_rejected_fraction}, order,
                    [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
-                     const HeadingSample heading = yaw.add(t_ns, factor * numbers[0]);
+                     const HeadingSample heading{t_ns, factor * numbers[0]};
                      if (const char* const why = heading.fault()) return order.reject(why, where);
                      if (order.accept(t_ns, where)) samples.push_back(heading);
                    });
+  log::integrate_yaw(params.max_gap_s, samples);
   return finish(contents, order, std::move(samples));
 }
 

@@ -246,6 +246,15 @@ TEST_F(WpiLog, AYawRateAloneIsAHeading) {
       play_only<HeadingSample>(log(out.bytes, "yaw_rate_entry: /rate, gyro_unit: deg"));
   ASSERT_EQ(samples.size(), 3U);
   EXPECT_NEAR(samples[2].yaw_rad, 0.2 * M_PI / 2., 1e-12);
+  // Written when it changes: it stood for ten seconds.
+  Writer rest;
+  rest.add("/rate", "double", 0, number(0.));
+  rest.add("/rate", "double", 10'000 * kMs, number(90.));
+  rest.add("/rate", "double", 10'020 * kMs, number(90.));
+  EXPECT_NEAR(play_only<HeadingSample>(log(rest.bytes, "yaw_rate_entry: /rate, gyro_unit: deg"))
+                  .back()
+                  .yaw_rad,
+              0.02 * M_PI / 2., 1e-12);
   EXPECT_THAT(error_of(log(out.bytes, "yaw_rate_entry: /rate, heading_entry: /rate")),
               HasSubstr("heading_entry says the heading already"));
 }

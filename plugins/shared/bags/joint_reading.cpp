@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <vector>
 
 namespace viwo::bag {
@@ -21,7 +22,7 @@ std::size_t place_of(const std::string& joint, const std::vector<std::string>& n
 }  // namespace
 
 JointReadings::JointReadings(const TopicOptions& options)
-    : n_drive_(static_cast<int>(options.drive_joints.size())) {
+    : n_drive_(static_cast<int>(options.drive_joints.size())), max_gap_s_(options.max_gap_s) {
   const What drive = options.drive_is_angle() ? What::kPosition : What::kVelocity;
   for (const std::string& joint : options.drive_joints) wanted_.push_back({joint, drive});
   for (const std::string& joint : options.steer_joints) {
@@ -37,7 +38,9 @@ void JointReadings::restart() {
 std::optional<MissingJoint> JointReadings::add(const Joints& joints, log::EncoderReading& out) {
   std::optional<MissingJoint> missing;
   std::size_t found = 0;
+  bool is_again = false;
   for (Wanted& joint : wanted_) {
+    if (std::abs(seconds_between(joint.t_ns, joints.t_ns)) > max_gap_s_) joint.is_new = false;
     const std::size_t place = place_of(joint.name, joints.names);
     if (place == joints.names.size()) {
       if (!missing || missing->what != What::kJoint) missing = {What::kJoint, joint.name};
@@ -49,7 +52,9 @@ std::optional<MissingJoint> JointReadings::add(const Joints& joints, log::Encode
       continue;
     }
     ++found;
+    is_again = is_again || joint.is_new;
     joint.last = values[place];
+    joint.t_ns = joints.t_ns;
     joint.is_known = joint.is_new = true;
   }
   const auto is_known = [](const Wanted& joint) { return joint.is_known; };
@@ -61,7 +66,9 @@ std::optional<MissingJoint> JointReadings::add(const Joints& joints, log::Encode
       return missing;
     }
     if (!std::all_of(wanted_.begin(), wanted_.end(), is_new)) {
-      if (++parts_ <= kLongestWait * wanted_.size()) missing->what = What::kRest;
+      if (++parts_ <= kLongestWait * wanted_.size()) {
+        missing->what = is_again ? What::kAgain : What::kRest;
+      }
       return missing;
     }
   }

@@ -14,16 +14,19 @@
 namespace viwo::bag {
 
 /// What a message does not have. kRest: it has some of the joints, and the others come in messages
-/// of their own.
+/// of their own. kAgain: likewise, and with it joints came anew before the others had come.
 struct MissingJoint {
-  enum class What : std::uint8_t { kJoint, kPosition, kVelocity, kRest };
+  enum class What : std::uint8_t { kJoint, kPosition, kVelocity, kRest, kAgain };
   What what;
   std::string joint;  ///< the first one
 };
 
+/// Of what kAgain leaves out.
+inline constexpr const char* kJointsCameAgain = "joints that came anew before the others had come";
+
 /// Joints may come all in one message, or in several: one for each module, drives and steering
 /// apart. Then a reading is there when each has come since the last one, with the values that came
-/// last, and with the stamp of the message that completes it.
+/// last, none of them older than a gap, and with the stamp of the message that completes it.
 class JointReadings {
  public:
   explicit JointReadings(const TopicOptions& options);
@@ -39,6 +42,7 @@ class JointReadings {
     std::string name;
     MissingJoint::What value;  ///< kPosition or kVelocity
     double last = 0.;
+    std::int64_t t_ns = 0;
     bool is_known = false, is_new = false;
   };
 
@@ -46,6 +50,7 @@ class JointReadings {
 
   std::vector<Wanted> wanted_;  ///< drives, then steerings
   int n_drive_;
+  double max_gap_s_;
   std::size_t parts_ = 0;  ///< messages since the last reading
 };
 

@@ -83,7 +83,9 @@ class JointReadingsTest : public ::testing::Test {
     joints.positions.assign(names.size(), position);
     log::EncoderReading reading;
     if (const auto missing = readings_.add(joints, reading)) {
-      return missing->what == MissingJoint::What::kRest ? "rest" : "no " + missing->joint;
+      return missing->what == MissingJoint::What::kRest    ? "rest"
+             : missing->what == MissingJoint::What::kAgain ? "again"
+                                                           : "no " + missing->joint;
     }
     return std::to_string(static_cast<int>(reading.drive[0])) + " " +
            std::to_string(static_cast<int>(reading.steer_rad[0])) + " at " +
@@ -96,7 +98,7 @@ class JointReadingsTest : public ::testing::Test {
 TEST_F(JointReadingsTest, AreOfOneMessageOrOfSeveral) {
   EXPECT_EQ(take(1, {"steer", "arm", "drive"}, 7., 8.), "7 8 at 1");
   EXPECT_EQ(take(2, {"drive"}, 1., 0.), "rest");
-  EXPECT_EQ(take(3, {"drive"}, 2., 0.), "rest") << "faster than the steering";
+  EXPECT_EQ(take(3, {"drive"}, 2., 0.), "again") << "faster than the steering";
   EXPECT_EQ(take(4, {"steer"}, 0., 3.), "2 3 at 4");
   EXPECT_EQ(take(5, {"steer"}, 0., 4.), "rest");
   EXPECT_EQ(take(6, {"drive"}, 5., 0.), "5 4 at 6");
@@ -106,8 +108,13 @@ TEST_F(JointReadingsTest, SayWhatDoesNotCome) {
   EXPECT_EQ(take(1, {"drive"}, 1., 0.), "no steer") << "nobody has seen it";
   EXPECT_EQ(take(2, {"arm"}, 1., 0.), "no drive");
   EXPECT_EQ(take(3, {"steer"}, 0., 1.), "1 1 at 3");
-  for (int k = 0; k < 40; ++k) EXPECT_EQ(take(4 + k, {"drive"}, 1., 0.), "rest");
+  EXPECT_EQ(take(4, {"drive"}, 1., 0.), "rest");
+  for (int k = 1; k < 40; ++k) EXPECT_EQ(take(4 + k, {"drive"}, 1., 0.), "again");
   EXPECT_EQ(take(50, {"drive"}, 1., 0.), "no steer") << "it came once, and comes no more";
+  // A drive from before a pause is of no use to a steering after it.
+  constexpr std::int64_t kLater = 10'000'000'000;
+  EXPECT_EQ(take(kLater, {"steer"}, 0., 1.), "rest");
+  EXPECT_EQ(take(kLater + 1, {"drive"}, 5., 0.), "5 1 at 10000000001");
   readings_.restart();
   EXPECT_EQ(take(51, {"drive"}, 1., 0.), "no steer");
 }

@@ -28,6 +28,7 @@ const char* reason_of(MissingJoint::What missing) {
     case MissingJoint::What::kVelocity:
       return "message without the velocities of the joints";
     case MissingJoint::What::kRest:
+    case MissingJoint::What::kAgain:
       break;  // no reason to reject it
   }
   return "";
@@ -136,6 +137,9 @@ class JointReader final : public TopicReader {
       }
     }
     if (missing && missing->what == MissingJoint::What::kRest) return;
+    if (missing && missing->what == MissingJoint::What::kAgain) {
+      return filter_.leave_out(kJointsCameAgain, message);
+    }
     if (missing) return filter_.reject(reason_of(missing->what), message);
     if (log::why_rejected(reading) != nullptr) {
       return filter_.reject(not_finite(reading, options_), message);

@@ -176,6 +176,9 @@ void Intake::take_joints(std::size_t topic, const bag::Joints& joints) {
   log::EncoderReading reading;
   if (const auto missing = parts_.add(joints, reading)) {
     if (missing->what == bag::MissingJoint::What::kRest) return;
+    if (missing->what == bag::MissingJoint::What::kAgain) {
+      return count(topic, bag::kJointsCameAgain, joints.t_ns, "the newest ones are taken");
+    }
     return drop(topic, reason_of(*missing, joints), joints.t_ns);
   }
   if (log::why_rejected(reading) != nullptr) {

@@ -1,37 +1,27 @@
 // A heading of a gyro that gives the rate of the yaw alone.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
-#include <limits>
+#include <cstddef>
+#include <vector>
 
 #include "viwo/api/measurement.hpp"
 
 namespace viwo::log {
 
-/// The integral of a yaw rate, from zero, by the trapezoidal rule. Over a gap it goes on as if the
-/// rate had been that at its ends: who uses headings knows the gap by their stamps.
-class YawOfRate {
- public:
-  /// Heading at a reading; NaN where it is not finite, and no integral over one that is not later
-  /// than the last.
-  HeadingSample add(std::int64_t t_ns, double rate_rad_per_s) {
-    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-    if (!std::isfinite(rate_rad_per_s)) return {t_ns, kNaN};
-    if (has_last_ && t_ns <= last_ns_) return {t_ns, yaw_rad_};
-    if (has_last_) {
-      yaw_rad_ += 0.5 * (last_rad_per_s_ + rate_rad_per_s) * seconds_between(last_ns_, t_ns);
+/// Makes headings of samples that hold rates [rad/s] in their place: the integral from zero, by the
+/// trapezoidal rule; over a spacing longer than `max_gap_s` the rate stays what it was, as in a log
+/// of what changes.
+inline void integrate_yaw(double max_gap_s, std::vector<HeadingSample>& samples) {
+  double yaw_rad = 0., rate_before = 0.;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double rate = samples[i].yaw_rad;
+    if (i > 0) {
+      const double dt_s = seconds_between(samples[i - 1].t_ns, samples[i].t_ns);
+      yaw_rad += dt_s * (dt_s > max_gap_s ? rate_before : 0.5 * (rate_before + rate));
     }
-    has_last_ = true;
-    last_ns_ = t_ns;
-    last_rad_per_s_ = rate_rad_per_s;
-    return {t_ns, yaw_rad_};
+    rate_before = rate;
+    samples[i].yaw_rad = yaw_rad;
   }
-
- private:
-  bool has_last_ = false;
-  std::int64_t last_ns_ = 0;
-  double last_rad_per_s_ = 0., yaw_rad_ = 0.;
-};
+}
 
 }  // namespace viwo::log
