@@ -221,7 +221,6 @@ TEST(RecordingProblem, LeavesOutWhereAHeadingIsSetToAnotherValue) {
   };
   EXPECT_EQ(with_holes(later(-2.)), 1);
   EXPECT_EQ(with_holes(later(0.05)), 0) << "as a base turns in ten milliseconds";
-  EXPECT_EQ(with_holes([](HeadingSample& heading) { heading.yaw_rad *= 180. / M_PI; }), 0);
 }
 
 TEST(HeadingJumps, AreToldAfterAPauseAndNotOfStampsThatComeInPairs) {

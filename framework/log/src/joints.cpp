@@ -240,7 +240,6 @@ void JointMap::restart() {
 }
 
 const char* JointMap::convert(EncoderReading& reading) {
-  reading.is_start = false;
   if (!is_identity_) {
     if (const char* const why = to_model(reading)) return why;
   }

@@ -66,7 +66,8 @@ std::optional<MissingJoint> JointReadings::add(const Joints& joints, log::Encode
       return missing;
     }
     if (!std::all_of(wanted_.begin(), wanted_.end(), is_new)) {
-      if (++parts_ <= kLongestWait * wanted_.size()) {
+      parts_ = is_again ? parts_ + 1 : 0;
+      if (parts_ <= kLongestWait * wanted_.size()) {
         missing->what = is_again ? What::kAgain : What::kRest;
       }
       return missing;

@@ -51,7 +51,8 @@ class JointReadings {
   std::vector<Wanted> wanted_;  ///< drives, then steerings
   int n_drive_;
   double max_gap_s_;
-  std::size_t parts_ = 0;  ///< messages since the last reading
+  std::size_t parts_ =
+      0;  ///< messages since a joint came for the first time since the last reading
 };
 
 /// "velocity of joint 'left' that is not finite": the first of a reading that has one.

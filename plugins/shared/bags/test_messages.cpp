@@ -109,7 +109,7 @@ TEST_F(JointReadingsTest, SayWhatDoesNotCome) {
   EXPECT_EQ(take(2, {"arm"}, 1., 0.), "no drive");
   EXPECT_EQ(take(3, {"steer"}, 0., 1.), "1 1 at 3");
   EXPECT_EQ(take(4, {"drive"}, 1., 0.), "rest");
-  for (int k = 1; k < 40; ++k) EXPECT_EQ(take(4 + k, {"drive"}, 1., 0.), "again");
+  for (int k = 1; k <= 40; ++k) EXPECT_EQ(take(4 + k, {"drive"}, 1., 0.), "again");
   EXPECT_EQ(take(50, {"drive"}, 1., 0.), "no steer") << "it came once, and comes no more";
   // A drive from before a pause is of no use to a steering after it.
   constexpr std::int64_t kLater = 10'000'000'000;

@@ -67,7 +67,7 @@ class DriveRanges {
 
 /// Rows of wheels that roll on a floor never agree to this part of their speed: encoders have steps
 /// and floors are not flat. What a program commands does, and so do copies of one reading.
-inline constexpr double kExactly = 1e-4;
+inline constexpr double kExactly = 1e-5;
 
 inline constexpr const char* kSetpoints =
     "exactly, as no wheels do: what the program commanded (setpoints, targets) in place of what "
