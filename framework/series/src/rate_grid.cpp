@@ -5,6 +5,7 @@
 
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/heading_jumps.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/plausibility/heading_rate.hpp"
@@ -68,8 +69,10 @@ std::vector<Turn> turns_of(std::span<const ImuSample> imu) {
 }
 
 std::vector<Turn> turns_of(std::span<const HeadingSample> headings) {
+  const std::vector<std::size_t> jumps = heading_jumps(headings);
   std::vector<Turn> turns;
   for (std::size_t i = 1; i < headings.size(); ++i) {
+    if (std::binary_search(jumps.begin(), jumps.end(), i)) continue;
     const auto rate = yaw_rate_between(headings[i - 1], headings[i]);
     if (rate) turns.push_back({headings[i - 1].t_ns, headings[i].t_ns, {0., 0., *rate}});
   }
