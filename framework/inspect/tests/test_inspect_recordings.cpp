@@ -88,6 +88,24 @@ TEST(Inspection, FindsAnImuThatIsShakenAtRest) {
   EXPECT_NEAR(figure_of(finding_of(inspection, "imu0", "gravity"), "gravity"), 9.78, 0.02);
 }
 
+// A log has both, under names that are nearly the same.
+TEST(Inspection, FindsTheStatesThatAProgramCommandedInThePlaceOfThoseThatItMeasured) {
+  if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
+  const RunSetup commanded =
+      setup_of(testing::configuration("runs/frc_swerve.yaml"),
+               {"sensors.wheels0.module_entries=[/Chassis/TargetFrontLeftModuleState, "
+                "/Chassis/TargetFrontRighttModuleState, /Chassis/TargetBackLeftModuleState, "
+                "/Chassis/TargetBackRightModuleState]",
+                "kinematics.x_m=[0.28575, 0.28575, -0.28575, -0.28575]",
+                "kinematics.y_m=[0.28575, -0.28575, 0.28575, -0.28575]"});
+  const auto says_so = [](RunSetup setup) {
+    const Inspection inspection = inspect(setup);
+    return finding_of(inspection, "wheels0", "parity").what.find("setpoints") != std::string::npos;
+  };
+  EXPECT_TRUE(says_so(commanded));
+  EXPECT_FALSE(says_so(setup_of(testing::configuration("runs/frc_swerve.yaml"))));
+}
+
 TEST(Inspection, FindsTheSteeringOfARealCarInDegrees) {
   if (!std::filesystem::exists(shared_data())) GTEST_SKIP() << shared_data() << " is not there";
   const auto file = testing::configuration("runs/comma2k19_car.yaml");
