@@ -89,9 +89,8 @@ std::string compact(double value, int digits);
 
 /// What nees_text() says, for captions.
 inline constexpr const char* kNees =
-    "NEES, 1 is consistent, ! is outside of the bounds of 99 %; behind a slash that of sigmas "
-    "times "
-    "their scatter";
+    "NEES, 1 is consistent, ! is outside of the bounds of 99 %; behind a slash that of "
+    "sigmas times their scatter";
 
 /// "2.4"; "54! / 2.3" where it is not consistent, and sigmas that are widened by their scatter make
 /// it smaller.

@@ -212,30 +212,26 @@ log::PoseRecording read_poses(const Params& params) {
   return collector.finish(table.at());
 }
 
+/// Headings, or rates that become some.
 log::HeadingRecording read_headings(const Params& params) {
   Table table(params);
-  const std::size_t yaw = table.column("yaw_column", params.yaw_column);
-  table.require_unit("yaw_unit", {yaw}, Quantity::kAngle, params.yaw_factor());
-  const double factor = params.heading_scale * params.yaw_factor();
+  const bool are_rates = !params.yaw_rate_column.empty();
+  const std::size_t column = are_rates ? table.column("yaw_rate_column", params.yaw_rate_column)
+                                       : table.column("yaw_column", params.yaw_column);
+  if (are_rates) {
+    table.require_unit("gyro_unit", {column}, Quantity::kRate, radians_in(params.gyro_unit),
+                       params.gyro_scale != 1.);
+  } else {
+    table.require_unit("yaw_unit", {column}, Quantity::kAngle, params.yaw_factor());
+  }
+  const double factor =
+      params.heading_scale * (are_rates ? params.gyro_factor() : params.yaw_factor());
   log::HeadingCollector collector(params.limits());
-  table.read({yaw}, collector, [&](std::int64_t t_ns) {
-    collector.add({t_ns, factor * table.number(yaw)}, table.at());
-  });
-  return collector.finish(table.at());
-}
-
-log::HeadingRecording read_yaw_rates(const Params& params) {
-  Table table(params);
-  const std::size_t rate = table.column("yaw_rate_column", params.yaw_rate_column);
-  table.require_unit("gyro_unit", {rate}, Quantity::kRate, radians_in(params.gyro_unit),
-                     params.gyro_scale != 1.);
-  const double factor = params.heading_scale * params.gyro_factor();
-  log::HeadingCollector collector(params.limits());
-  table.read({rate}, collector, [&](std::int64_t t_ns) {
-    collector.add({t_ns, factor * table.number(rate)}, table.at());
+  table.read({column}, collector, [&](std::int64_t t_ns) {
+    collector.add({t_ns, factor * table.number(column)}, table.at());
   });
   log::HeadingRecording out = collector.finish(table.at());
-  log::integrate_yaw(params.max_gap_s, out.samples);
+  if (are_rates) log::integrate_yaw(params.max_gap_s, out.samples);
   return out;
 }
 
@@ -252,8 +248,7 @@ log::Recording<Measurement> read(const Params& params) {
   params.check();
   log::Recording<Measurement> out;
   if (params.has_poses()) log::append(out, read_poses(params), "poses");
-  if (params.has_yaw_as_heading()) log::append(out, read_headings(params), "headings");
-  if (!params.yaw_rate_column.empty()) log::append(out, read_yaw_rates(params), "headings");
+  if (params.has_heading()) log::append(out, read_headings(params), "headings");
   if (params.has_imu()) log::append(out, read_imu(params), "IMU");
   if (params.has_wheels()) log::append(out, read_wheels(params), "wheels");
   log::sort_by_time(out);
