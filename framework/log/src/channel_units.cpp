@@ -34,6 +34,11 @@ void check_in_radians(const char* key, const char* unit_key, const std::vector<d
   }
 }
 
+const Eigen::Vector3d& checked_signs(const char* key, const Eigen::Vector3d& signs) {
+  if ((signs.array().abs() == 1.).all()) return signs;
+  throw ParamError(key, "a sign is 1 or -1: a scale is gyro_scale, accel_scale");
+}
+
 }  // namespace
 
 double radians_in(AngleUnit unit) {
@@ -128,13 +133,23 @@ void EncoderUnitParams::check_turns(bool is_angle, const std::vector<double>& dr
 void ImuUnitParams::bind(ParamBinder& b) {
   b(VIWO_PARAM(gyro_unit), kAngleUnits, {.help = "of angular rates, per second"});
   b(VIWO_PARAM(gyro_scale), {.above = 0., .help = "makes gyro_unit of a reading"});
+  b(VIWO_PARAM(gyro_sign),
+    {.min = -1.,
+     .max = 1.,
+     .help = "x, y, z: -1 for an axis that counts the other way than I's, else 1"});
   b(VIWO_PARAM(accel_unit), {{"m_per_s2", AccelUnit::kMetrePerS2}, {"g", AccelUnit::kGravity}},
     {.help = "of specific forces; g is 9.80665 m/s^2"});
   b(VIWO_PARAM(accel_scale), {.above = 0., .help = "makes accel_unit of a reading"});
+  b(VIWO_PARAM(accel_sign), {.min = -1., .max = 1., .help = "likewise"});
 }
 
-double ImuUnitParams::accel_factor() const {
-  return accel_scale * (accel_unit == AccelUnit::kGravity ? kStandardGravity_m_per_s2 : 1.);
+Eigen::Vector3d ImuUnitParams::gyro_factors() const {
+  return gyro_factor() * checked_signs("gyro_sign", gyro_sign);
+}
+
+Eigen::Vector3d ImuUnitParams::accel_factors() const {
+  const double unit = accel_unit == AccelUnit::kGravity ? kStandardGravity_m_per_s2 : 1.;
+  return accel_scale * unit * checked_signs("accel_sign", accel_sign);
 }
 
 void PoseUnitParams::bind(ParamBinder& b) {

@@ -172,13 +172,16 @@ log::ImuRecording read_imu(const Params& params) {
   auto all = table.columns("gyro_columns", params.gyro_columns);
   const auto accel = table.columns("accel_columns", params.accel_columns);
   all.insert(all.end(), accel.begin(), accel.end());
+  const Eigen::Vector3d gyro_factor = params.gyro_factors();
+  const Eigen::Vector3d accel_factor = params.accel_factors();
   log::ImuCollector collector(params.limits());
   table.read(all, collector, [&](std::int64_t t_ns) {
     ImuSample imu;
     imu.t_ns = t_ns;
-    for (std::size_t i = 0; i < 3; ++i) {
-      imu.gyro_rad_per_s[i] = params.gyro_factor() * table.number(all[i]);
-      imu.accel_m_per_s2[i] = params.accel_factor() * table.number(all[3 + i]);
+    for (int i = 0; i < 3; ++i) {
+      const auto axis = static_cast<std::size_t>(i);
+      imu.gyro_rad_per_s[axis] = gyro_factor[i] * table.number(all[axis]);
+      imu.accel_m_per_s2[axis] = accel_factor[i] * table.number(all[3 + axis]);
     }
     collector.add(imu, table.at());
   });
@@ -252,6 +255,7 @@ log::Recording<Measurement> read(const Params& params) {
   if (params.has_imu()) log::append(out, read_imu(params), "IMU");
   if (params.has_wheels()) log::append(out, read_wheels(params), "wheels");
   log::sort_by_time(out);
+  log::cut(params, out);
   return out;
 }
 

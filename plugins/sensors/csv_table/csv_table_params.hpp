@@ -92,6 +92,7 @@ struct Params : LayoutParams,
                 WheelParams,
                 log::ImuUnitParams,
                 log::PoseUnitParams,
+                log::PieceParams,
                 log::LimitParams {
   std::filesystem::path path;
   std::vector<std::string> gyro_columns;
@@ -119,6 +120,7 @@ struct Params : LayoutParams,
       {.help =
            "rate of a gyro of the yaw alone (gyro_unit, gyro_scale), of which a heading is made"});
     PoseUnitParams::bind(b);
+    log::PieceParams::bind(b);
     log::LimitParams::bind(b);
   }
 

@@ -215,6 +215,43 @@ TEST_F(CsvTable, AYawRateAloneIsAHeading) {
               HasSubstr("gyro_unit: the header says"));
 }
 
+TEST_F(CsvTable, AnAxisOfAnImuMayCountTheOtherWay) {
+  const std::string text = "t,gx,gy,gz,ax,ay,az\n0,1,2,3,4,5,-1\n";
+  const std::string imu =
+      "time_column: t, time_unit: s, gyro_columns: [gx, gy, gz], accel_columns: [ax, ay, az]";
+  const auto samples = play_only<ImuSample>(table(
+      text,
+      imu + ", gyro_scale: 10, gyro_sign: [1, -1, -1], accel_unit: g, accel_sign: [1, 1, -1]"));
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_THAT(samples[0].gyro_rad_per_s, ElementsAre(10., -20., -30.));
+  EXPECT_NEAR(samples[0].accel_m_per_s2[0], 4. * 9.80665, 1e-12);
+  EXPECT_NEAR(samples[0].accel_m_per_s2[2], 9.80665, 1e-12);
+  EXPECT_THAT(error_of(table(text, imu + ", accel_sign: [1, 0.5, 1]")),
+              HasSubstr("accel_sign: a sign is 1 or -1"));
+}
+
+TEST_F(CsvTable, APieceOfTheTableIsPlayed) {
+  std::string text = "t,d,yaw\n";
+  for (int k = 0; k < 10; ++k) {
+    text += std::to_string(100 + k) + "," + std::to_string(k) + "," + std::to_string(k) + "\n";
+  }
+  const std::string rest =
+      "time_column: t, time_unit: s, drive_columns: [d], drive_input: angle, yaw_column: yaw, "
+      "max_gap_s: 2, ";
+  // Seconds from the first row on; a cell that lies across an end is no part of it.
+  const auto samples = play(*make_sensor(table(text, rest + "start_s: 2, duration_s: 3.5")));
+  const auto cells = only<EncoderSample>(samples);
+  ASSERT_EQ(cells.size(), 3U);
+  EXPECT_EQ(cells.front().begin_ns, 102'000'000'000);
+  EXPECT_EQ(cells.back().end_ns, 105'000'000'000);
+  const auto headings = only<HeadingSample>(samples);
+  ASSERT_EQ(headings.size(), 4U);
+  EXPECT_EQ(headings.front().yaw_rad, 2.);
+  EXPECT_EQ(play(*make_sensor(table(text, rest + "start_s: 7.5"))).size(), 1U + 2U);
+  EXPECT_THAT(error_of(table(text, rest + "start_s: 10")),
+              HasSubstr("start_s: nothing is left: what is read is 9 s long"));
+}
+
 TEST_F(CsvTable, ColumnsAreFoundByNumberInTablesWithoutAHeaderAndWithBlanks) {
   const std::string rest = "time_column: 1, time_unit: s, drive_columns: [4, 2], ";
   const auto samples =

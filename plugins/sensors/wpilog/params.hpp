@@ -47,7 +47,11 @@ struct WheelParams : log::EncoderUnitParams, log::StrideParams, log::JointParams
   }
 };
 
-struct Params : WheelParams, log::ImuUnitParams, log::PoseUnitParams, log::LimitParams {
+struct Params : WheelParams,
+                log::ImuUnitParams,
+                log::PoseUnitParams,
+                log::PieceParams,
+                log::LimitParams {
   std::filesystem::path path;
   std::vector<std::string> gyro_entries;
   std::vector<std::string> accel_entries;
@@ -81,6 +85,7 @@ struct Params : WheelParams, log::ImuUnitParams, log::PoseUnitParams, log::Limit
       {.help =
            "in place of a heading: the rate of a gyro of the yaw alone (gyro_unit, gyro_scale)"});
     PoseUnitParams::bind(b);
+    log::PieceParams::bind(b);
     log::LimitParams::bind(b);
   }
 

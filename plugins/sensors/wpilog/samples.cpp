@@ -206,6 +206,8 @@ log::ImuRecording read_imu(const Contents& contents, const Params& params) {
   auto sources = number_sources(contents, "gyro_entries", params.gyro_entries);
   auto accel = number_sources(contents, "accel_entries", params.accel_entries);
   std::move(accel.begin(), accel.end(), std::back_inserter(sources));
+  const Eigen::Vector3d gyro_factor = params.gyro_factors();
+  const Eigen::Vector3d accel_factor = params.accel_factors();
   StampOrder order(params.limits());
   std::vector<ImuSample> samples;
   for_each_reading(contents, sources, {nullptr, spread_us(params), params.max_rejected_fraction},
@@ -213,9 +215,10 @@ log::ImuRecording read_imu(const Contents& contents, const Params& params) {
                    [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
                      ImuSample imu;
                      imu.t_ns = t_ns;
-                     for (std::size_t i = 0; i < 3; ++i) {
-                       imu.gyro_rad_per_s[i] = params.gyro_factor() * numbers[i];
-                       imu.accel_m_per_s2[i] = params.accel_factor() * numbers[3 + i];
+                     for (int i = 0; i < 3; ++i) {
+                       const auto axis = static_cast<std::size_t>(i);
+                       imu.gyro_rad_per_s[axis] = gyro_factor[i] * numbers[axis];
+                       imu.accel_m_per_s2[axis] = accel_factor[i] * numbers[3 + axis];
                      }
                      if (const char* const why = log::why_rejected(imu))
                        return order.reject(why, where);
@@ -233,40 +236,35 @@ bool is_unit(std::span<const double> q) {
   return std::abs(norm - 1.) < 1e-3;
 }
 
-log::HeadingRecording read_headings(const Contents& contents, const Params& params) {
+std::vector<Source> heading_source(const Contents& contents, const Params& params) {
+  if (params.heading_entry.empty()) {
+    return number_sources(contents, "yaw_rate_entry", {params.yaw_rate_entry});
+  }
   const Finder find(contents, "heading_entry", "yaw",
                     [&](const Entry& entry, std::string_view path) {
                       return pick_heading(entry.type, path, contents.schemas());
                     });
   auto [entry, pick] = find(params.heading_entry);
-  const std::vector<Source> sources = {{entry, std::move(pick)}};
+  return {{entry, std::move(pick)}};
+}
+
+/// Headings, or rates that become some.
+log::HeadingRecording read_headings(const Contents& contents, const Params& params) {
+  const bool are_rates = params.heading_entry.empty();
+  const std::vector<Source> sources = heading_source(contents, params);
+  const double factor = are_rates ? params.gyro_factor() : params.heading_factor();
   StampOrder order(params.limits());
   std::vector<HeadingSample> samples;
   for_each_reading(contents, sources, {nullptr, 0, params.max_rejected_fraction}, order,
                    [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
                      const bool is_number = numbers.size() == 1;
-                     const double yaw_rad =
-                         is_number ? params.heading_factor() * numbers[0] : yaw_of(numbers);
-                     const HeadingSample heading{t_ns, params.heading_scale * yaw_rad};
+                     const double yaw = is_number ? factor * numbers[0] : yaw_of(numbers);
+                     const HeadingSample heading{t_ns, params.heading_scale * yaw};
                      if (const char* const why = heading.fault()) return order.reject(why, where);
                      if (!is_number && !is_unit(numbers)) return order.reject(log::kNotUnit, where);
                      if (order.accept(t_ns, where)) samples.push_back(heading);
                    });
-  return finish(contents, order, std::move(samples));
-}
-
-log::HeadingRecording read_yaw_rates(const Contents& contents, const Params& params) {
-  const auto sources = number_sources(contents, "yaw_rate_entry", {params.yaw_rate_entry});
-  const double factor = params.heading_scale * params.gyro_factor();
-  StampOrder order(params.limits());
-  std::vector<HeadingSample> samples;
-  for_each_reading(contents, sources, {nullptr, 0, params.max_rejected_fraction}, order,
-                   [&](std::int64_t t_ns, std::span<const double> numbers, const auto& where) {
-                     const HeadingSample heading{t_ns, factor * numbers[0]};
-                     if (const char* const why = heading.fault()) return order.reject(why, where);
-                     if (order.accept(t_ns, where)) samples.push_back(heading);
-                   });
-  log::integrate_yaw(params.max_gap_s, samples);
+  if (are_rates) log::integrate_yaw(params.max_gap_s, samples);
   return finish(contents, order, std::move(samples));
 }
 
@@ -347,15 +345,11 @@ log::Recording<Measurement> read_samples(const Params& params) {
   log::Recording<Measurement> out;
   contents.rejections().append_to(out.rejections);
   if (params.has_poses()) log::append(out, read_poses(contents, params), "poses");
-  if (!params.heading_entry.empty()) {
-    log::append(out, read_headings(contents, params), "headings");
-  }
-  if (!params.yaw_rate_entry.empty()) {
-    log::append(out, read_yaw_rates(contents, params), "headings");
-  }
+  if (params.has_heading()) log::append(out, read_headings(contents, params), "headings");
   if (params.has_imu()) log::append(out, read_imu(contents, params), "IMU");
   if (params.has_wheels()) log::append(out, read_wheels(contents, params), "wheels");
   log::sort_by_time(out);
+  log::cut(params, out);
   return out;
 }
 

@@ -282,6 +282,15 @@ TEST_F(WpiLog, AFullImuIsOneAndComesInTheOrderOfTime) {
   EXPECT_NEAR(imu->accel_m_per_s2[0], 9.80665, 1e-12);
 }
 
+TEST_F(WpiLog, APieceOfTheLogIsPlayed) {
+  Writer out;
+  for (int k = 0; k < 10; ++k) out.add("/gyro", "double", 100 * k * kMs, numbers({0.1 * k}));
+  const auto headings = play_only<HeadingSample>(
+      log(out.bytes, "heading_entry: /gyro, start_s: 0.25, duration_s: 0.3"));
+  ASSERT_EQ(headings.size(), 3U);
+  EXPECT_EQ(headings[0].t_ns, 300'000'000);
+}
+
 TEST_F(WpiLog, IdsAreUsedAgainAndFieldsOfRecordsMayBeAsWideAsTheyCan) {
   Writer out;
   out.start(7, "/other", "string");

@@ -7,24 +7,18 @@
 
 namespace viwo::bag {
 
-struct BagOptions : TopicOptions, log::StrideParams, log::ClockParams, log::MaxRejectedParams {
-  double start_s = 0.;
-  double duration_s = 0.;
+struct BagOptions : TopicOptions,
+                    log::StrideParams,
+                    log::ClockParams,
+                    log::PieceParams,
+                    log::MaxRejectedParams {
   int gnss_stride = 1;
 
   void bind(ParamBinder& b) {
     TopicOptions::bind(b);
     log::StrideParams::bind(b);
     log::ClockParams::bind(b);
-    b(VIWO_PARAM(start_s),
-      {.unit = "s",
-       .min = 0.,
-       .max = 1e9,
-       .help = "leaves out what was recorded before this time after the first message"});
-    b(VIWO_PARAM(duration_s), {.unit = "s",
-                               .min = 0.,
-                               .max = 1e9,
-                               .help = "how long a piece is read from there; 0: up to the end"});
+    log::PieceParams::bind(b);
     b(VIWO_PARAM(gnss_stride),
       {.min = 1.,
        .max = 1e6,

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "viwo/api/params.hpp"
 
 namespace viwo::log {
@@ -37,14 +39,19 @@ struct EncoderUnitParams {
 struct ImuUnitParams {
   AngleUnit gyro_unit = AngleUnit::kRadian;
   double gyro_scale = 1.;
+  Eigen::Vector3d gyro_sign = Eigen::Vector3d::Ones();
   enum class AccelUnit : std::uint8_t { kMetrePerS2, kGravity };
   AccelUnit accel_unit = AccelUnit::kMetrePerS2;
   double accel_scale = 1.;
+  Eigen::Vector3d accel_sign = Eigen::Vector3d::Ones();
 
   void bind(ParamBinder& b);
 
+  /// Of a gyro of one axis.
   double gyro_factor() const { return gyro_scale * radians_in(gyro_unit); }
-  double accel_factor() const;
+  /// What makes rad/s of the readings of the axes, and m/s^2. ParamError for signs that are none.
+  Eigen::Vector3d gyro_factors() const;
+  Eigen::Vector3d accel_factors() const;
 };
 
 struct PoseUnitParams {

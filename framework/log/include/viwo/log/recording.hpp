@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "viwo/api/measurement.hpp"
+#include "viwo/api/params.hpp"
 #include "viwo/api/sensor.hpp"
 #include "viwo/log/cells.hpp"
 #include "viwo/log/joints.hpp"
@@ -40,17 +41,29 @@ using StateRecording = Recording<StateSample>;
 using CalibrationRecording = Recording<CalibrationSample>;
 
 /// Takes over what was recorded of one kind, behind what is there; `name` stands before the
-/// reasons.
+/// reasons, unless it is empty.
 template <class Sample>
 void append(Recording<Measurement>& out, Recording<Sample> more, const std::string& name) {
   for (Sample& sample : more.samples) out.samples.emplace_back(std::move(sample));
   for (RejectionCount& rejection : more.rejections) {
-    rejection.reason = name + ": " + rejection.reason;
+    if (!name.empty()) rejection.reason = name + ": " + rejection.reason;
     out.rejections.push_back(std::move(rejection));
   }
 }
 /// Into time order; samples of one time stay in the order in which their kinds were appended.
 void sort_by_time(Recording<Measurement>& recording);
+
+/// What of a log is played.
+struct PieceParams {
+  double start_s = 0.;
+  double duration_s = 0.;
+
+  void bind(ParamBinder& b);
+};
+
+/// Leaves out what is not of the piece, and the cells of encoders that lie across its ends. The
+/// piece counts from where the first sample begins. ParamError when nothing is left.
+void cut(const PieceParams& piece, Recording<Measurement>& recording);
 
 /// Why a datum cannot be used (kNotFinite, kTooFar, kNotUnit); nullptr when it can. A quaternion
 /// whose norm is off by less than 1e-3 is of unit norm then.
