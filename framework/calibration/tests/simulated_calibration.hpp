@@ -26,6 +26,7 @@ inline calibration::CalibrationSetup setup_of(const std::vector<std::string>& mo
     auto all = assignments;
     all.emplace_back("sensors.simulator0.true_intrinsics_scale=1");
     all.emplace_back("odometry.twist=noise_weighted");
+    all.emplace_back("sensors.simulator0.repetition=" + std::to_string(setup.recordings.size()));
     RunSetup run = read_run(simulated(motion, all), registry(), seed);
     RunData data = collect(run);
     const Recording label{motion, {{"motion", motion}}};

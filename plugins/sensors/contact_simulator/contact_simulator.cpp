@@ -126,8 +126,9 @@ log::Recording<Measurement> simulate(Params params, const HostServices& services
   add(contact::intrinsics_of(vehicle.truth, solver.static_radius_m(), start_ns));
   add(sim::mounting_truth(rig.mounting, start_ns));
   out.samples.emplace_back(CalibrationSample{start_ns, "t_OtoI", params.t_OtoI_s});
-  add(sim::simulate_rig(trajectory, rig, services.seed));
-  auto from_wheels = encoders(params, trajectory, vehicle, solver, services.seed);
+  const std::uint64_t noise_seed = params.noise_seed(services.seed);
+  add(sim::simulate_rig(trajectory, rig, noise_seed));
+  auto from_wheels = encoders(params, trajectory, vehicle, solver, noise_seed);
   log::mount_joints(params, from_wheels, out.rejections);
   add(std::move(from_wheels));
   sim::sort_by_time(out.samples);

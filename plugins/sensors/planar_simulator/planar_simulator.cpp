@@ -56,7 +56,7 @@ std::vector<EncoderSample> encoders(const Params& params, const sim::PlanarMotio
   const double scale = services.exact ? 0. : params.true_intrinsics_scale;
   const Intrinsics truth = sim::perturbed_intrinsics(description, scale, services.seed);
   try {
-    return sim::simulate_encoders(robot, truth, motion, options, services.seed);
+    return sim::simulate_encoders(robot, truth, motion, options, params.noise_seed(services.seed));
   } catch (const InputError& error) {
     throw ParamError("motion", error.what());
   }

@@ -96,6 +96,9 @@ log::Recording<Measurement> simulate(const Params& params, const HostServices& s
   const double scale = services.exact ? 0. : params.true_intrinsics_scale;
   const Intrinsics x_WI = sim::perturbed_intrinsics(description, scale, services.seed);
 
+  HostServices for_noise = services;
+  for_noise.seed = params.noise_seed(services.seed);
+
   log::Recording<Measurement> out;
   const std::string& wheel_set = params.wheel_set;
   for (CalibrationSample truth :
@@ -103,20 +106,20 @@ log::Recording<Measurement> simulate(const Params& params, const HostServices& s
     if (!wheel_set.empty()) truth.name = wheel_set + "." + truth.name;
     out.samples.emplace_back(std::move(truth));
   }
-  auto from_rig = sim::simulate_rig(trajectory, rig, services.seed);
+  auto from_rig = sim::simulate_rig(trajectory, rig, for_noise.seed);
   if (!wheel_set.empty()) {
     std::erase_if(from_rig,
                   [](const Measurement& m) { return m.get_if<StateSample>() != nullptr; });
   }
   std::move(from_rig.begin(), from_rig.end(), std::back_inserter(out.samples));
   const auto poses = simulate_poses(trajectory, rig.mounting, params, params.duration_s, start_ns,
-                                    params.noise, services);
+                                    params.noise, for_noise);
   out.samples.insert(out.samples.end(), poses.begin(), poses.end());
   if (params.wheels) {
     try {
       auto from_wheels = sim::simulate_encoders(
           robot, x_WI, [&trajectory](double t_s) { return trajectory.twist(t_s); }, params.motion,
-          wheels, services.seed);
+          wheels, for_noise.seed);
       log::mount_joints(params, from_wheels, out.rejections);
       out.samples.insert(out.samples.end(), from_wheels.begin(), from_wheels.end());
     } catch (const InputError& error) {

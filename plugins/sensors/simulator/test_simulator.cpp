@@ -27,6 +27,33 @@ TEST(Simulator, SimulatesTheSixMotionsOnBothGrounds) {
   }
 }
 
+TEST(Simulator, RepetitionsAreOfOneRobotWithOtherNoise) {
+  const auto drive = [](int repetition) {
+    return play(
+        *make_sensor(section_of("duration_s: 1, features: 0, true_intrinsics_scale: 1, "
+                                "true_sigma_t_OtoI_s: 0.01, repetition: " +
+                                std::to_string(repetition))));
+  };
+  const auto first = drive(0), second = drive(1), third = drive(2);
+  const auto truth = only<CalibrationSample>(first);
+  EXPECT_GT(truth.size(), 10U);
+  for (const auto* other : {&second, &third}) {
+    const auto same = only<CalibrationSample>(*other);
+    ASSERT_EQ(same.size(), truth.size());
+    for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_EQ(same[i].value, truth[i].value);
+  }
+  const auto gyro = [](const auto& samples) {
+    return only<ImuSample>(samples)[100].gyro_rad_per_s;
+  };
+  const auto drives = [](const auto& samples) {
+    return only<EncoderSample>(samples)[50].drive_rad_per_s;
+  };
+  EXPECT_NE(gyro(first), gyro(second));
+  EXPECT_NE(gyro(second), gyro(third));
+  EXPECT_NE(drives(first), drives(second));
+  EXPECT_NE(drives(second), drives(third));
+}
+
 TEST(Simulator, ABaseThatCannotMoveSidewaysDrivesOnUnevenGround) {
   const auto samples = play_only<EncoderSample>(
       section_of("motion: figure_eight, ground: uneven, features: 0, noise: false", kDifferential));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "viwo/api/params.hpp"
+#include "viwo/math/mix.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 
 namespace viwo::sim {
@@ -27,6 +28,7 @@ struct MotionParams {
   double yaw_rate_rad_per_s = 0.6;
   Eigen::Vector2d pivot_m{0., 0.};
   double ramp_s = 1.;
+  int repetition = 0;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(motion), {.choices = kMotionChoices, .help = "how the base moves"});
@@ -45,6 +47,17 @@ struct MotionParams {
                            .min = 0.,
                            .max = 3600.,
                            .help = "smooth start from rest; 0: at speed from the beginning"});
+    b(VIWO_PARAM(repetition),
+      {.min = 0.,
+       .max = 1e9,
+       .help =
+           "of several drives of one robot, with one seed, which one: what is true of the robot "
+           "is the same in all, noise and slip are others in each"});
+  }
+
+  /// What noise is drawn with, where what is true of the robot is drawn with `seed`.
+  std::uint64_t noise_seed(std::uint64_t seed) const {
+    return repetition == 0 ? seed : mix64(seed + (static_cast<std::uint64_t>(repetition) << 32U));
   }
 };
 
