@@ -131,6 +131,25 @@ void RecordingProblem::cut(std::int64_t begin_ns, std::int64_t end_ns) {
   for (std::int64_t k = 0; k <= count; ++k) {
     stamps_ns_.push_back(begin_ns + part.quot * k + part.rem * k / count);
   }
+  move_to_poses(begin_ns, end_ns);
+}
+
+/// A straight line between two poses cuts corners, always to the inside: segments end where a pose
+/// was taken. The wheels are integrated to any time.
+void RecordingProblem::move_to_poses(std::int64_t begin_ns, std::int64_t end_ns) {
+  const std::int64_t offset_ns = to_ns(recording_.motion.offset_s);
+  const Trajectory& poses = recording_.motion.poses;
+  const auto before = [](const StampedPose& pose, std::int64_t t_ns) { return pose.t_ns < t_ns; };
+  const auto first = std::lower_bound(poses.begin(), poses.end(), begin_ns + offset_ns, before);
+  const auto past = std::lower_bound(first, poses.end(), end_ns + offset_ns + 1, before);
+  if (past - first < 2) return;
+  for (std::int64_t& stamp_ns : stamps_ns_) {
+    const std::int64_t t_ns = stamp_ns + offset_ns;
+    auto nearest = std::lower_bound(first, past - 1, t_ns, before);
+    if (nearest != first && t_ns - (nearest - 1)->t_ns < nearest->t_ns - t_ns) --nearest;
+    stamp_ns = nearest->t_ns - offset_ns;
+  }
+  stamps_ns_.erase(std::unique(stamps_ns_.begin(), stamps_ns_.end()), stamps_ns_.end());
 }
 
 std::optional<Eigen::Vector3d> RecordingProblem::reference_at(std::int64_t t_ns) const {

@@ -2,6 +2,7 @@
 // cannot determine is named.
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 
 #include <Eigen/Dense>
 #include <gmock/gmock.h>
@@ -11,6 +12,7 @@
 #include "simulated_calibration.hpp"
 #include "told.hpp"
 #include "viwo/eval/consistency.hpp"
+#include "viwo/math/chi2.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
@@ -26,8 +28,8 @@ using testing::truth_of;
 
 TEST(Calibrate, FindsTheTrueIntrinsicsWithHonestSigmas) {
   const int seeds = 12;
-  double sum = 0.;
-  int count = 0;
+  constexpr int kFree = 13;
+  double nees = 0., sum_of_first_radius = 0.;
   for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     // Small noise: lateral slip n shortens what a wheel rolls by n^2/v, at the default sizes as
     // much as the sigma of a radius (docs/math/wheel_odometry.md).
@@ -45,6 +47,7 @@ TEST(Calibrate, FindsTheTrueIntrinsicsWithHonestSigmas) {
     const Intrinsics prior = setup.recordings[0].setup.model->prior_sigma();
     EXPECT_TRUE(estimate.converged);
     EXPECT_TRUE(estimate.undetermined.empty());
+    std::vector<int> free;
     for (int i = 0; i < 16; ++i) {
       if (prior[i] == 0.) {
         EXPECT_NEAR(estimate.x_WI[i], truth[i], 1e-9) << "held";
@@ -52,21 +55,24 @@ TEST(Calibrate, FindsTheTrueIntrinsicsWithHonestSigmas) {
         continue;
       }
       EXPECT_LT(estimate.sigma[i], 0.1 * prior[i]) << i;
-      const double normalised = (estimate.x_WI[i] - truth[i]) / estimate.sigma[i];
-      EXPECT_LT(std::abs(normalised), 6.) << i << " seed " << seed;
-      sum += normalised * normalised;
-      ++count;
+      free.push_back(i);
     }
+    ASSERT_EQ(free.size(), std::size_t{kFree});
+    const Eigen::VectorXd error = (estimate.x_WI - truth)(free).cwiseQuotient(estimate.sigma(free));
+    nees += error.dot(estimate.correlations(free, free).ldlt().solve(error));
+    sum_of_first_radius += error[0];
     const Eigen::Vector3d O_in_body = -there.R_ItoO.transpose() * there.p_IinO;
     const double yaw = -log_so3(there.R_ItoO).z();
     EXPECT_LT((estimate.extrinsics - Eigen::Vector3d(O_in_body.x(), O_in_body.y(), yaw)).norm(),
               1e-3);
   }
-  // Mean squared error over sigma: the sigmas take the residuals of a segment for independent,
-  // which position and yaw of dead reckoning are not (batch_calibration.md, Limits). Right to a
-  // factor of 2.
-  EXPECT_GT(sum / count, 0.25);
-  EXPECT_LT(sum / count, 4.);
+  // 99 % of a chi-square.
+  std::cout << "NEES " << nees / seeds << "\n";
+  EXPECT_GT(nees, chi2_quantile(0.005, seeds * kFree));
+  EXPECT_LT(nees, chi2_quantile(0.995, seeds * kFree));
+  // Likewise. Straight lines between the poses cut corners, and made the radii, which are as wrong
+  // as one, 1.6 sigmas too small.
+  EXPECT_LT(std::abs(sum_of_first_radius), 2.58 * std::sqrt(seeds));
 }
 
 TEST(Calibrate, FindsTheGainsOfTheSteeringWhereTheyAreAskedFor) {
