@@ -1,10 +1,15 @@
 #!/usr/bin/env python3
-"""run_page.py PAGE.md SECTION SOURCE_FOLDER PROGRAMS_FOLDER: runs the commands of a section as they stand.
+"""run_page.py PAGE.md SECTION SOURCE_FOLDER PROGRAMS_FOLDER [ORDER]: runs the commands of a section as they stand.
 
 The commands are the blocks of ```sh below the heading. They run in an empty folder in which `configs` is
-that of the sources. Exit code 1 of `viwo inspect` says that something was found, which is no failure.
+that of the sources. Each robot of the pages has something that `viwo inspect` finds (exit code 1), and is
+calibrated in folder `calibrated`: what comes out must be what was simulated. ORDER: which wheels of the
+simulation those of the page are (1423).
 Prints how long each took. Ends with 77 when a program that a command begins with was not built.
 """
+import csv
+import json
+import math
 import os
 import pathlib
 import re
@@ -26,8 +31,30 @@ def commands(page, section):
     return found
 
 
+def check_calibration(folder, order):
+    """Each parameter within four of its sigmas of what is true; a zero half a turn away is the same wheel."""
+    truth_file = sorted(folder.rglob("calibration_groundtruth0/data.csv"))[0]
+    with truth_file.open() as file:
+        truth = {row["name"]: float(row["value"]) for row in csv.DictReader(file)}
+    found = json.loads((folder / "calibrated/summary.json").read_text())["calibration"]
+    checked = 0
+    for name, one in found.items():
+        if not one["sigma"]:
+            continue
+        simulated = name[:-1] + order[int(name[-1]) - 1] if order else name
+        error = one["final"] - truth[simulated]
+        if name.startswith("delta_"):
+            error = math.remainder(error, math.pi)
+        print(f"{name}: {one['final']:.6f}, true {truth[simulated]:.6f}, off by {error / one['sigma']:.2f} sigmas")
+        if abs(error) > 4 * one["sigma"]:
+            sys.exit(f"{name} is {one['final']} +- {one['sigma']}, true {truth[simulated]}")
+        checked += 1
+    if not checked:
+        sys.exit("nothing was calibrated")
+
+
 def main():
-    page, section, source, programs = sys.argv[1:]
+    page, section, source, programs, *order = sys.argv[1:]
     env = dict(os.environ, PATH=programs + os.pathsep + os.environ["PATH"])
     with tempfile.TemporaryDirectory() as folder:
         os.symlink(pathlib.Path(source) / "configs", pathlib.Path(folder) / "configs")
@@ -40,8 +67,9 @@ def main():
             done = subprocess.run(command, shell=True, cwd=folder, env=env, text=True,
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
             print(f"$ {command}\n{done.stdout}[{time.monotonic() - begin:.1f} s, exit {done.returncode}]\n")
-            if done.returncode not in ((0, 1) if command.startswith("viwo inspect") else (0,)):
+            if done.returncode != (1 if command.startswith("viwo inspect") else 0):
                 sys.exit(f"'{command}' ended with {done.returncode}")
+        check_calibration(pathlib.Path(folder), order[0] if order else None)
 
 
 if __name__ == "__main__":

@@ -76,6 +76,17 @@ TEST(InspectStamps, TellsSamplesThatAreMissingFromJitter) {
   EXPECT_NEAR(figure_of(finding_of(thinned, "imu0", "stamps"), "rate"), 200., 0.01);
 }
 
+TEST(InspectStamps, TellsWhatNothingTakes) {
+  RunSetup run = changed(swerve(), {});
+  EXPECT_EQ(finding_of(inspect(run), "wheels0", "unused").what, "");
+  // A run of camera and IMU, whose recording has wheels, too.
+  RunSetup without = changed(swerve(), {});
+  without.filter->wheels.clear();
+  const Finding unused = finding_of(inspect(without), "wheels0", "unused");
+  EXPECT_EQ(unused.severity, Severity::kNote);
+  EXPECT_THAT(unused.what, HasSubstr("no wheels take it"));
+}
+
 TEST(InspectStamps, TellsSensorsThatHaveLittleTimeInCommon) {
   const auto later = [](StateSample& s) { return s.t_ns > 37 * kSecond; };
   const auto sooner = [](FeatureSample& s) { return s.t_ns < 38 * kSecond; };
