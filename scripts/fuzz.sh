@@ -3,6 +3,7 @@
 # fuzz.sh --coverage TARGET|all    which lines the corpus reaches
 # fuzz.sh --minimise TARGET|all    what was found becomes the smallest corpus that reaches as much
 # fuzz.sh --list                   names of the targets
+# fuzz.sh --hours                  how long each has been run, over all versions (tests/fuzz/hours.csv)
 # Builds with clang, libFuzzer, address and undefined behaviour sanitizers (preset fuzz, folder
 # build-fuzz). What is found interesting is kept in build-fuzz/corpus, findings in build-fuzz/findings;
 # the corpus that the default tests run is tests/fuzz/corpus. Exit code 1: there are findings.
@@ -10,7 +11,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 usage() {
-  sed -n '2,5s/^# //p' "$0"
+  sed -n '2,6s/^# //p' "$0"
   exit 2
 }
 
@@ -36,6 +37,7 @@ fuzz() {  # TARGET SECONDS
     > "$log" 2>&1 || status=1
   local executions edges
   executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
+  echo "$(date +%F),$(git describe --always --dirty),$1,$2,${executions:-0},$status" >> "$hours"
   edges=$(grep -o 'cov: [0-9]*' "$log" | tail -n 1 || true)
   echo "$1: ${executions:-0} executions in $2 s, ${edges:-cov: 0} edges$( ((status)) && echo ', FINDING' || true)"
   if ((status)); then
@@ -69,6 +71,13 @@ minimise() {  # TARGET
   echo "$1: $(find "$corpus" -type f | wc -l) files, $(du -bs "$corpus" | cut -f 1) bytes"
 }
 
+hours=tests/fuzz/hours.csv
+if [ "${1:-}" = --hours ]; then
+  awk -F , 'NR > 1 {s[$3] += $4; n[$3] += $5; f[$3] += $6}
+    END {for (t in s) printf "%-18s %6.2f h %12d executions %3d runs with findings\n", t, s[t] / 3600, n[t], f[t]}' \
+    "$hours" | sort
+  exit
+fi
 action=fuzz
 case ${1:-} in
   --coverage | --minimise | --list) action=${1#--} && shift ;;
