@@ -12,8 +12,9 @@ namespace {
 
 /// Plain text that a reader would take for something else than this text.
 bool needs_quotes(const std::string& text) {
-  return text.empty() || text == "<<" || text == "~" || text == "null" || text == "Null" ||
-         text == "NULL";
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20; };
+  return std::any_of(text.begin(), text.end(), is_control) || text.empty() || text == "<<" ||
+         text == "~" || text == "null" || text == "Null" || text == "NULL";
 }
 
 void emit_text(YAML::Emitter& out, const std::string& text, bool quoted) {

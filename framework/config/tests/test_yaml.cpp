@@ -292,6 +292,12 @@ Node random_node(std::mt19937_64& random, int depth) {
   }
 }
 
+TEST(Yaml, ALoneCarriageReturnRoundTrips) {
+  const Node node = parse(" 6&\r", "f.yaml");
+  ASSERT_TRUE(node.is_scalar());
+  EXPECT_EQ(parse(to_yaml(node), "f.yaml"), node) << to_yaml(node);
+}
+
 TEST(Yaml, RoundTripsRandomTrees) {
   std::mt19937_64 random(7);
   for (int i = 0; i < 2000; ++i) {

@@ -112,9 +112,13 @@ std::vector<std::uint8_t> without_texts(Bytes png) {
   take(std::min(kMagic, png.size()));
   while (png.size() >= kAround) {
     const std::uint64_t length = big_endian(png.first(4));
-    if (length > png.size() - kAround) break;
-    const std::size_t size = kAround + static_cast<std::size_t>(length);
     const Bytes type = png.subspan(4);
+    if (length > png.size() - kAround) {
+      // libpng asks for the memory of a chunk before it looks whether that is there.
+      if (!begins(type, "IDAT")) png = {};
+      break;
+    }
+    const std::size_t size = kAround + static_cast<std::size_t>(length);
     const bool is_text = begins(type, "tEXt") || begins(type, "zTXt") || begins(type, "iTXt") ||
                          begins(type, "sPLT");
     if (is_text) {

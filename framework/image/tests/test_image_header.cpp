@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <zlib.h>
 
+#include "image_header.hpp"
 #include "message_of.hpp"
 #include "peak_memory.hpp"
 #include "viwo/image/image_file.hpp"
@@ -108,6 +109,22 @@ TEST(ImageHeader, TextsOfAPngAreNotRead) {
   decode_image(png, "a", image);
   EXPECT_EQ(image.pixels, expected.pixels);
   EXPECT_LT(testing::peak_mb() - before_mb, 50);
+}
+
+/// libpng would ask for its memory before it looks for it.
+TEST(ImageHeader, AChunkOfAPngThatIsNotThereIsNotAskedFor) {
+  const cv::Mat colours(20, 30, CV_8UC3, cv::Scalar(10, 200, 90));
+  Bytes png;
+  cv::imencode(".png", colours, png);
+  constexpr std::size_t kHead = 8 + 25;  // the magic, IHDR
+  const Bytes head(png.begin(), png.begin() + kHead);
+  for (const std::string_view type : {"zTXt", "eXIf", "abcd"}) {
+    Bytes claims = with_number(png, kHead, 0x6f67000f);
+    std::copy(type.begin(), type.end(), claims.begin() + kHead + 4);
+    EXPECT_EQ(without_texts(claims), head) << type;
+    Image image;
+    EXPECT_NE(testing::error_of([&] { decode_image(claims, "a", image); }), "") << type;
+  }
 }
 
 }  // namespace
