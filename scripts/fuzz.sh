@@ -27,7 +27,7 @@ limits=(-rss_limit_mb=1024 -malloc_limit_mb=512 -timeout=20 -detect_leaks=0)
 options=(-max_len=16384 -print_final_stats=1 -print_funcs=0 -use_value_profile=1)
 
 fuzz() {  # TARGET SECONDS
-  local corpus=build-fuzz/corpus/$1 log=build-fuzz/fuzz_$1.log status=0
+  local corpus=build-fuzz/corpus/$1 log=build-fuzz/fuzz_$1.log status=0 begin=$SECONDS
   mkdir -p "$corpus" build-fuzz/findings
   # A hundred epochs of a filter whose linear algebra is instrumented take seconds.
   local limits=("${limits[@]}")
@@ -35,9 +35,9 @@ fuzz() {  # TARGET SECONDS
   VIWO_FUZZ_TARGET=$1 build-fuzz/tests/fuzz/viwo_fuzz "${limits[@]}" "${options[@]}" \
     -max_total_time="$2" -artifact_prefix="build-fuzz/findings/$1-" "$corpus" "tests/fuzz/corpus/$1" \
     > "$log" 2>&1 || status=1
-  local executions edges
+  local executions edges seconds=$((SECONDS - begin))
   executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
-  echo "$(date +%F),$(git describe --always --dirty),$1,$2,${executions:-0},$status" >> "$hours"
+  echo "$(date +%F),$version,$1,$seconds,${executions:-0},$status" >> "$hours"
   edges=$(grep -o 'cov: [0-9]*' "$log" | tail -n 1 || true)
   echo "$1: ${executions:-0} executions in $2 s, ${edges:-cov: 0} edges$( ((status)) && echo ', FINDING' || true)"
   if ((status)); then
@@ -78,6 +78,8 @@ if [ "${1:-}" = --hours ]; then
     "$hours" | sort
   exit
 fi
+version=$(git describe --always 2> /dev/null || echo unknown)
+git diff --quiet HEAD -- . ":!$hours" 2> /dev/null || version+=-dirty
 action=fuzz
 case ${1:-} in
   --coverage | --minimise | --list) action=${1#--} && shift ;;

@@ -32,25 +32,29 @@ def commands(page, section):
 
 
 def check_calibration(folder, order):
-    """Each parameter within four of its sigmas of what is true; a zero half a turn away is the same wheel."""
-    truth_file = sorted(folder.rglob("calibration_groundtruth0/data.csv"))[0]
-    with truth_file.open() as file:
+    """Each parameter within four of its sigmas of what is true, and lengths and angles together less than half
+    as wrong as before; a zero half a turn away is the same wheel."""
+    with next(folder.rglob("calibration_groundtruth0/data.csv")).open() as file:
         truth = {row["name"]: float(row["value"]) for row in csv.DictReader(file)}
     found = json.loads((folder / "calibrated/summary.json").read_text())["calibration"]
-    checked = 0
+    before, after = {}, {}
     for name, one in found.items():
         if not one["sigma"]:
             continue
         simulated = name[:-1] + order[int(name[-1]) - 1] if order else name
-        error = one["final"] - truth[simulated]
+        error, was = one["final"] - truth[simulated], one["initial"] - truth[simulated]
         if name.startswith("delta_"):
-            error = math.remainder(error, math.pi)
+            error, was = math.remainder(error, math.pi), math.remainder(was, math.pi)
+        before[one["unit"]] = math.hypot(before.get(one["unit"], 0), was)
+        after[one["unit"]] = math.hypot(after.get(one["unit"], 0), error)
         print(f"{name}: {one['final']:.6f}, true {truth[simulated]:.6f}, off by {error / one['sigma']:.2f} sigmas")
         if abs(error) > 4 * one["sigma"]:
             sys.exit(f"{name} is {one['final']} +- {one['sigma']}, true {truth[simulated]}")
-        checked += 1
-    if not checked:
+    if not before:
         sys.exit("nothing was calibrated")
+    for unit, was in before.items():
+        if after[unit] > was / 2:
+            sys.exit(f"errors in {unit}: {after[unit]}, {was} before the calibration")
 
 
 def main():

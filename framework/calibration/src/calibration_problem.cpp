@@ -165,8 +165,8 @@ std::optional<Eigen::Vector3d> RecordingProblem::reference_at(std::int64_t t_ns)
   return planar_pose;
 }
 
-/// Motion of the reference over each segment. A segment end in a gap of the reference is left out:
-/// its neighbours become one.
+/// Motion of the reference over each segment. Where there are no two poses to end at, an end in a
+/// gap of the reference is left out.
 void RecordingProblem::compare_with_reference() {
   std::vector<std::int64_t> known_ns;
   std::vector<Eigen::Vector3d> ends;

@@ -163,6 +163,35 @@ TEST(RecordingProblem, IsZeroForTheTruthOfANoiseFreeRobotWithAClockOffset) {
   EXPECT_GT(wrong.r(rows).norm(), 1.);
 }
 
+TEST(RecordingProblem, EndsSegmentsWhereTheFewPosesWereTaken) {
+  // Three poses a second, which straight lines are no way between, by another clock.
+  auto simulated = recording(
+      {"sensors.simulator0.noise=false", "sensors.simulator0.time_offset_s=0.02",
+       "sensors.simulator0.reference_rate_hz=3", "odometry.reference_time_offset_s=0.02"});
+  CalibrationOptions options;
+  options.segments = Segments::kLength;
+  options.segment_s = 0.8;
+  CalibrationPoint at;
+  at.x_WI = simulated.setup.model->nominal();
+  RecordingResiduals residuals;
+  RecordingProblem problem(simulated, options);
+  problem.evaluate(at, false, residuals);
+  const auto rows = [](const RecordingProblem& of) {
+    return rows_of(of, ResidualKind::kParity, false);
+  };
+  EXPECT_GT(problem.motions().size(), 20u);
+  EXPECT_LT(residuals.r(rows(problem)).norm(), 0.05);
+  // A hole is within one segment, a length below the interval means from pose to pose.
+  auto& poses = simulated.motion.poses;
+  poses.erase(poses.begin() + 20, poses.begin() + 30);
+  RecordingProblem holed(simulated, options);
+  holed.evaluate(at, false, residuals);
+  EXPECT_LT(holed.motions().size(), problem.motions().size());
+  EXPECT_LT(residuals.r(rows(holed)).norm(), 0.05);
+  options.segment_s = 0.1;
+  EXPECT_EQ(RecordingProblem(simulated, options).motions().size(), poses.size() - 3);
+}
+
 TEST(TurningAxis, PointsUpHoweverTheImuIsMountedAndDespiteABias) {
   const Eigen::Vector3d up = Eigen::Vector3d(0.3, -0.9, 0.2).normalized();
   for (const double tilt : {0., 0.3}) {

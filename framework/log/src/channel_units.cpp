@@ -143,6 +143,12 @@ void ImuUnitParams::bind(ParamBinder& b) {
   b(VIWO_PARAM(accel_sign), {.min = -1., .max = 1., .help = "likewise"});
 }
 
+void ImuUnitParams::check_signs(bool has_imu) const {
+  if (has_imu || (gyro_sign == Eigen::Vector3d::Ones() && accel_sign == gyro_sign)) return;
+  throw ParamError(gyro_sign == Eigen::Vector3d::Ones() ? "accel_sign" : "gyro_sign",
+                   "is of an IMU, and none is read: of a heading it is heading_scale");
+}
+
 Eigen::Vector3d ImuUnitParams::gyro_factors() const {
   return gyro_factor() * checked_signs("gyro_sign", gyro_sign);
 }

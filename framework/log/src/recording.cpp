@@ -38,13 +38,6 @@ const char* why_rejected(StateSample& state) {
 const char* why_rejected(const GnssSample& fix) { return fix.fault(); }
 const char* why_rejected(const HeadingSample& heading) { return heading.fault(); }
 
-/// What a sample stands for: an instant, or the cell of an encoder sample.
-std::pair<std::int64_t, std::int64_t> extent_ns(const Measurement& sample) {
-  const auto* const encoders = sample.get_if<EncoderSample>();
-  if (encoders != nullptr) return {encoders->begin_ns, encoders->end_ns};
-  return {sample.t_ns(), sample.t_ns()};
-}
-
 }  // namespace
 
 void sort_by_time(Recording<Measurement>& recording) {
@@ -53,11 +46,11 @@ void sort_by_time(Recording<Measurement>& recording) {
 }
 
 void PieceParams::bind(ParamBinder& b) {
-  b(VIWO_PARAM(start_s),
-    {.unit = "s",
-     .min = 0.,
-     .max = 1e9,
-     .help = "leaves out what was recorded earlier than this after the begin of the log"});
+  b(VIWO_PARAM(start_s), {.unit = "s",
+                          .min = 0.,
+                          .max = 1e9,
+                          .help = "leaves out what was recorded earlier than this after the begin "
+                                  "of what this section reads"});
   b(VIWO_PARAM(duration_s), {.unit = "s",
                              .min = 0.,
                              .max = 1e9,
@@ -69,19 +62,20 @@ void cut(const PieceParams& piece, Recording<Measurement>& recording) {
   std::int64_t first_ns = std::numeric_limits<std::int64_t>::max();
   std::int64_t last_ns = std::numeric_limits<std::int64_t>::min();
   for (const Measurement& sample : recording.samples) {
-    const auto [begin_ns, end_ns] = extent_ns(sample);
-    first_ns = std::min(first_ns, begin_ns);
-    last_ns = std::max(last_ns, end_ns);
+    const SampleExtent extent = sample.view().extent();
+    first_ns = std::min(first_ns, extent.begin_ns);
+    last_ns = std::max(last_ns, extent.end_ns);
   }
   const std::int64_t from_ns = first_ns + to_ns(piece.start_s);
   const std::int64_t until_ns = piece.duration_s > 0. ? from_ns + to_ns(piece.duration_s) : last_ns;
   std::erase_if(recording.samples, [&](const Measurement& sample) {
-    const auto [begin_ns, end_ns] = extent_ns(sample);
-    return begin_ns < from_ns || end_ns > until_ns;
+    const SampleExtent extent = sample.view().extent();
+    return extent.begin_ns < from_ns || extent.end_ns > until_ns;
   });
   if (!recording.samples.empty()) return;
-  throw ParamError("start_s", "nothing is left: what is read is " +
-                                  number_text(seconds_between(first_ns, last_ns)) + " s long");
+  throw ParamError(from_ns > last_ns ? "start_s" : "duration_s",
+                   "nothing is left: what is read is " +
+                       number_text(seconds_between(first_ns, last_ns)) + " s long");
 }
 
 const char* why_rejected(PoseSample& pose) {

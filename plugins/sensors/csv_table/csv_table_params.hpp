@@ -142,6 +142,7 @@ struct Params : LayoutParams,
       throw ParamError(has_imu() ? "gyro_columns" : "accel_columns",
                        "an IMU has both, gyro_columns and accel_columns");
     }
+    check_signs(has_imu());
     log::check_names("gyro_columns", gyro_columns, 3, 3);
     log::check_names("accel_columns", accel_columns, 3, 3);
     log::check_names("position_columns", position_columns, 2, 3);

@@ -228,6 +228,11 @@ TEST_F(CsvTable, AnAxisOfAnImuMayCountTheOtherWay) {
   EXPECT_NEAR(samples[0].accel_m_per_s2[2], 9.80665, 1e-12);
   EXPECT_THAT(error_of(table(text, imu + ", accel_sign: [1, 0.5, 1]")),
               HasSubstr("accel_sign: a sign is 1 or -1"));
+  EXPECT_THAT(
+      error_of(table(text,
+                     "time_column: t, time_unit: s, yaw_rate_column: gz, "
+                     "gyro_sign: [1, 1, -1]")),
+      HasSubstr("gyro_sign: is of an IMU, and none is read: of a heading it is heading_scale"));
 }
 
 TEST_F(CsvTable, APieceOfTheTableIsPlayed) {
@@ -250,6 +255,8 @@ TEST_F(CsvTable, APieceOfTheTableIsPlayed) {
   EXPECT_EQ(play(*make_sensor(table(text, rest + "start_s: 7.5"))).size(), 1U + 2U);
   EXPECT_THAT(error_of(table(text, rest + "start_s: 10")),
               HasSubstr("start_s: nothing is left: what is read is 9 s long"));
+  EXPECT_THAT(error_of(table(text, rest + "start_s: 0.5, duration_s: 0.1")),
+              HasSubstr("duration_s: nothing is left"));
 }
 
 TEST_F(CsvTable, ColumnsAreFoundByNumberInTablesWithoutAHeaderAndWithBlanks) {

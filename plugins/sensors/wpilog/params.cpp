@@ -22,6 +22,7 @@ void Params::check() const {
   if (!heading_entry.empty() && !yaw_rate_entry.empty()) {
     throw ParamError("yaw_rate_entry", "heading_entry says the heading already");
   }
+  check_signs(has_imu());
   log::check_names("gyro_entries", gyro_entries, 3, 3);
   log::check_names("accel_entries", accel_entries, 3, 3);
   log::check_names("pose_entries", pose_entries, 1, 3);

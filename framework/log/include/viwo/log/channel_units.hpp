@@ -49,6 +49,8 @@ struct ImuUnitParams {
 
   /// Of a gyro of one axis.
   double gyro_factor() const { return gyro_scale * radians_in(gyro_unit); }
+  /// ParamError for signs where there is no IMU: a heading has its own.
+  void check_signs(bool has_imu) const;
   /// What makes rad/s of the readings of the axes, and m/s^2. ParamError for signs that are none.
   Eigen::Vector3d gyro_factors() const;
   Eigen::Vector3d accel_factors() const;
