@@ -269,6 +269,8 @@ TEST_F(ConfigurationTest, RefusesLabelsAndSegmentsOfACalibrationThatAreMeantOthe
   refuse("segment_s: 1e-6\n",
          "c.yaml:3:12  segment_s is shorter than the interval between readings of the wheels, "
          "0.01 s");
+  refuse("segment_s: 0.05\nset: {sensors.sim.reference_rate_hz: 5}\n",
+         "c.yaml:3:12  segment_s is shorter than the interval between poses, 0.2 s");
   // Keys of the calibration itself can be set as those of its base can.
   write("c.yaml", "calibration: c\nbase: run.yaml\n");
   const Outcome none = viwo({"calibrate", "c.yaml", "--set", "reference=gyro", "--out", "out"});
