@@ -79,17 +79,16 @@ void require_readings_in_segments(const CalibrationSetup& setup, const Node& fil
     const auto wheels = recording.data.wheels();
     const double interval_s = seconds_between(wheels.front().begin_ns, wheels.back().end_ns) /
                               static_cast<double>(wheels.size());
-    const Trajectory& poses = recording.motion.poses;
-    const double pose_interval_s = poses.size() < 2
-                                       ? 0.
-                                       : seconds_between(poses.front().t_ns, poses.back().t_ns) /
-                                             static_cast<double>(poses.size() - 1);
-    if (!(segment_s > 0.) || segment_s >= std::max(interval_s, pose_interval_s)) continue;
-    const std::string of = interval_s > segment_s ? "readings of the wheels, " : "poses, ";
+    if (!(segment_s > 0.) || segment_s >= interval_s) continue;
     config::fail(file.find("segment_s")->mark(),
-                 "segment_s is shorter than the interval between " + of +
-                     significant(std::max(interval_s, pose_interval_s), 2) + " s");
+                 "segment_s is shorter than the interval between readings of the wheels, " +
+                     significant(interval_s, 2) + " s");
   }
+  const double interval_s = pose_interval_s(setup);
+  if (!(segment_s > 0.) || segment_s >= interval_s || !std::isfinite(interval_s)) return;
+  config::fail(
+      file.find("segment_s")->mark(),
+      "segment_s is shorter than the interval between poses, " + significant(interval_s, 2) + " s");
 }
 
 /// What a smoother takes from the base, or does not look at.

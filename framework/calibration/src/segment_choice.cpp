@@ -17,19 +17,6 @@ namespace {
 
 constexpr std::size_t kFolds = 3;
 
-/// Longest time between two poses of most of a reference; infinite for none.
-double pose_interval_s(const CalibrationSetup& setup) {
-  std::vector<double> intervals_s;
-  for (const CalibrationRecording& recording : setup.recordings) {
-    const Trajectory& poses = recording.motion.poses;
-    for (std::size_t i = 1; i < poses.size(); ++i) {
-      intervals_s.push_back(seconds_between(poses[i - 1].t_ns, poses[i].t_ns));
-    }
-  }
-  if (intervals_s.empty()) return std::numeric_limits<double>::infinity();
-  return upper_median(intervals_s);
-}
-
 /// Every third recording is left out in turn: by how much dead reckoning then misses their ends.
 double predict(const CalibrationSetup& setup, const CalibrationOptions& options,
                const FitStart& start) {
@@ -75,6 +62,18 @@ std::vector<CalibrationOptions> candidates(const CalibrationSetup& setup) {
 }
 
 }  // namespace
+
+double pose_interval_s(const CalibrationSetup& setup) {
+  std::vector<double> intervals_s;
+  for (const CalibrationRecording& recording : setup.recordings) {
+    const Trajectory& poses = recording.motion.poses;
+    for (std::size_t i = 1; i < poses.size(); ++i) {
+      intervals_s.push_back(seconds_between(poses[i - 1].t_ns, poses[i].t_ns));
+    }
+  }
+  if (intervals_s.empty()) return std::numeric_limits<double>::infinity();
+  return upper_median(intervals_s);
+}
 
 std::string segments_text(const CalibrationEstimate& estimate) {
   switch (estimate.segments) {

@@ -34,8 +34,11 @@ void check_in_radians(const char* key, const char* unit_key, const std::vector<d
   }
 }
 
-const Eigen::Vector3d& checked_signs(const char* key, const Eigen::Vector3d& signs) {
-  if ((signs.array().abs() == 1.).all()) return signs;
+void check_sign(const char* key, const Eigen::Vector3d& sign, bool has_imu) {
+  if (!has_imu && sign != Eigen::Vector3d::Ones()) {
+    throw ParamError(key, "is of an IMU, and none is read: of a heading it is heading_scale");
+  }
+  if ((sign.array().abs() == 1.).all()) return;
   throw ParamError(key, "a sign is 1 or -1: a scale is gyro_scale, accel_scale");
 }
 
@@ -144,18 +147,15 @@ void ImuUnitParams::bind(ParamBinder& b) {
 }
 
 void ImuUnitParams::check_signs(bool has_imu) const {
-  if (has_imu || (gyro_sign == Eigen::Vector3d::Ones() && accel_sign == gyro_sign)) return;
-  throw ParamError(gyro_sign == Eigen::Vector3d::Ones() ? "accel_sign" : "gyro_sign",
-                   "is of an IMU, and none is read: of a heading it is heading_scale");
+  check_sign("gyro_sign", gyro_sign, has_imu);
+  check_sign("accel_sign", accel_sign, has_imu);
 }
 
-Eigen::Vector3d ImuUnitParams::gyro_factors() const {
-  return gyro_factor() * checked_signs("gyro_sign", gyro_sign);
-}
+Eigen::Vector3d ImuUnitParams::gyro_factors() const { return gyro_factor() * gyro_sign; }
 
 Eigen::Vector3d ImuUnitParams::accel_factors() const {
   const double unit = accel_unit == AccelUnit::kGravity ? kStandardGravity_m_per_s2 : 1.;
-  return accel_scale * unit * checked_signs("accel_sign", accel_sign);
+  return accel_scale * unit * accel_sign;
 }
 
 void PoseUnitParams::bind(ParamBinder& b) {

@@ -49,9 +49,9 @@ struct ImuUnitParams {
 
   /// Of a gyro of one axis.
   double gyro_factor() const { return gyro_scale * radians_in(gyro_unit); }
-  /// ParamError for signs where there is no IMU: a heading has its own.
+  /// ParamError for signs that are none, and where there is no IMU: a heading has its own.
   void check_signs(bool has_imu) const;
-  /// What makes rad/s of the readings of the axes, and m/s^2. ParamError for signs that are none.
+  /// What makes rad/s of the readings of the axes, and m/s^2.
   Eigen::Vector3d gyro_factors() const;
   Eigen::Vector3d accel_factors() const;
 };
