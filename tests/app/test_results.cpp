@@ -158,15 +158,23 @@ TEST_F(ResultsTest, AreAFailureOnAFullDisk) {
   }
 }
 
-TEST_F(ResultsTest, OfARunBeforeDoNotStandBesideThoseThatCouldNotBeWritten) {
+TEST_F(ResultsTest, OfARunBeforeStayAsTheyWereWhereNewOnesCannotBeWritten) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   write("run.yaml", kRun);
   expect_done({"run", "run.yaml", "--out", "again"});
   fs::remove(at("again") / "reference.tum");
   fs::create_symlink("/dev/full", at("again") / "reference.tum");
-  EXPECT_EQ(viwo({"run", "run.yaml", "--out", "again"}).code, 1);
-  EXPECT_FALSE(fs::exists(at("again") / "summary.json"));
-  EXPECT_FALSE(fs::exists(at("again") / "report.html"));
+  const auto files = [&] {
+    std::string all;
+    for (const char* name : {"summary.json", "report.html", "trajectory.tum", "timing.csv"}) {
+      all += read(std::string("again/") + name);
+    }
+    return all;
+  };
+  const std::string before = files();
+  EXPECT_EQ(viwo({"run", "run.yaml", "--out", "again", "--seed", "2"}).code, 1);
+  EXPECT_TRUE(files() == before);
+  EXPECT_FALSE(fs::exists(at("again") / "unfinished.tmp"));
 }
 
 TEST_F(ResultsTest, AreWrittenForARunThatDiverges) {

@@ -269,11 +269,14 @@ std::string describe(const CalibrationResult& result) {
   TextStream out;
   describe_parameters(result, out);
   if (!result.left_out.empty()) {
-    out << "sigma: that of the fit, or of how the estimate changes when ";
-    for (std::size_t i = 0; i < result.left_out.size(); ++i) {
-      out << (i > 0 ? " or " : "") << "a " << result.left_out[i].by;
-    }
-    out << " is left out, if that is larger\n";
+    std::string labels;
+    for (const LeftOut& one : result.left_out)
+      labels += (labels.empty() ? "a " : " or a ") + one.by;
+    out << (result.setup->leave_out_is_asked
+                ? "sigma: that of the fit, or of how the estimate changes when " + labels +
+                      " is left out, if that is larger\n"
+                : "sigma: that of the fit; 'leave_out_by' takes in how the estimate changes when " +
+                      labels + " is left out\n");
   }
   for (const std::string& text : search_text(result)) out << text << "\n";
   out << left_over_text(result) << "\n" << wander_text(result.wander) << "\n";
@@ -284,6 +287,7 @@ std::string describe(const CalibrationResult& result) {
                   result.fitted, out);
   for (const LeftOut& left_out : result.left_out) {
     describe_errors(left_out_title(left_out), *result.setup, left_out.runs, out);
+    for (const std::string& failed : left_out.failed) out << without_text(left_out, failed) << "\n";
   }
   out << "\n";
   for (const std::string& warning : result.warnings) out << "warning: " << warning << "\n";
@@ -293,12 +297,12 @@ std::string describe(const CalibrationResult& result) {
 }
 
 void write_calibration(const std::filesystem::path& folder, const CalibrationResult& result) {
-  log::make_folder(folder);
-  log::remove_results(folder, {"summary.json", "report.html"});
-  log::write_text(folder / "calibration.yaml",
+  log::NewResults out(folder);
+  log::write_text(out.file("calibration.yaml"),
                   calibration_text(calibration_file_of(result), "viwo calibrate"));
-  log::write_text(folder / "summary.json", json_text(summary_of(result)));
-  log::write_text(folder / "report.html", report::to_html(page_of(result)));
+  log::write_text(out.file("summary.json"), json_text(summary_of(result)));
+  log::write_text(out.file("report.html"), report::to_html(page_of(result)));
+  out.commit({"summary.json", "report.html"});
 }
 
 }  // namespace viwo::calibration

@@ -145,9 +145,13 @@ std::string runs_csv(const ExperimentResult& result) {
   for (const ExperimentRun& run : result.runs) {
     csv << result.setup.variants[run.variant].name << ','
         << result.setup.recordings[run.recording].name << ',' << run.seed << ','
-        << status_text(run.result) << ',' << run.result.duration_s << ',' << run.result.wall_s
-        << ',' << run.result.total.samples << ',' << run.result.total.rank_deficient << ','
-        << run.result.total.gated;
+        << status_text(run.result) << ',' << run.result.duration_s << ',' << run.result.wall_s;
+    const PreintegratedPose& total = run.result.total;
+    if (total.samples > 0) {
+      csv << ',' << total.samples << ',' << total.rank_deficient << ',' << total.gated;
+    } else {
+      csv << ",,,";  // of a filter: its updates count for themselves
+    }
     for (const Metric& metric : metrics) {
       csv << ',';
       if (const double value = metric.of(run.result); std::isfinite(value)) csv << value;
@@ -160,11 +164,11 @@ std::string runs_csv(const ExperimentResult& result) {
 }  // namespace
 
 void write_experiment(const std::filesystem::path& folder, const ExperimentResult& result) {
-  log::make_folder(folder);
-  log::remove_results(folder, kResults);
-  log::write_text(folder / "runs.csv", runs_csv(result));
-  log::write_text(folder / "summary.json", json_text(summary_of(result)));
-  log::write_text(folder / "report.html", report::to_html(report_of(result)));
+  log::NewResults out(folder);
+  log::write_text(out.file("runs.csv"), runs_csv(result));
+  log::write_text(out.file("summary.json"), json_text(summary_of(result)));
+  log::write_text(out.file("report.html"), report::to_html(report_of(result)));
+  out.commit(kResults);
   RunJournal(folder).remove();
 }
 

@@ -155,9 +155,10 @@ report::Document report_of(const Inspection& inspection) {
 }
 
 void write_inspection(const std::filesystem::path& folder, const Inspection& inspection) {
-  log::remove_results(folder, {"inspection.json", "report.html"});
-  log::write_text(folder / "inspection.json", json_text(to_json(inspection)));
-  log::write_text(folder / "report.html", report::to_html(report_of(inspection)));
+  log::NewResults out(folder);
+  log::write_text(out.file("inspection.json"), json_text(to_json(inspection)));
+  log::write_text(out.file("report.html"), report::to_html(report_of(inspection)));
+  out.commit({"inspection.json", "report.html"});
 }
 
 namespace {

@@ -1,8 +1,11 @@
 #include "viwo/log/files.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -29,6 +32,11 @@ bool sync_folder(const std::filesystem::path& folder) {
   return well;
 }
 
+[[noreturn]] void fail(const std::filesystem::path& file) {
+  throw std::runtime_error("cannot write " + file.string() + ": " +
+                           std::generic_category().message(errno));
+}
+
 /// ".PROCESS@HOST", of processes on all machines that share a file system.
 std::string this_process() {
   std::array<char, 256> host{};
@@ -39,11 +47,21 @@ std::string this_process() {
 }  // namespace
 
 void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
+  std::error_code error, ignored;
+  std::vector<std::filesystem::path> changed;  // folders that get a new one
+  for (std::filesystem::path at = folder; !at.empty() && !std::filesystem::exists(at, ignored);) {
+    at = at.parent_path();
+    changed.push_back(at);
+  }
   std::filesystem::create_directories(folder, error);
   if (error) {
     throw std::runtime_error("cannot create the folder " + folder.string() + ": " +
                              error.message());
+  }
+  for (const std::filesystem::path& at : changed) {
+    if (sync_folder(at) || errno == EACCES) continue;  // one may be written and not be read
+    throw std::runtime_error("cannot create the folder " + folder.string() + ": " +
+                             std::generic_category().message(errno));
   }
 }
 
@@ -130,6 +148,59 @@ void write_bytes(const std::filesystem::path& file, std::string_view bytes) {
 
 void write_text(const std::filesystem::path& file, std::string_view text) {
   write_bytes(file, valid_utf8(text));
+}
+
+NewResults::NewResults(const std::filesystem::path& folder)
+    : folder_(folder), new_(folder / "unfinished.tmp") {
+  make_folder(folder_);
+  std::error_code ignored;  // of a command that was killed
+  std::filesystem::remove_all(new_, ignored);
+  make_folder(new_);
+}
+
+NewResults::~NewResults() {
+  std::error_code ignored;
+  std::filesystem::remove_all(new_, ignored);
+}
+
+std::vector<std::string> NewResults::names_of_new() const {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(new_)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+void NewResults::commit(std::initializer_list<const char*> names) {
+  std::vector<std::string> files = names_of_new();
+  // What cannot be replaced shows before anything is.
+  for (const std::string& name : files) write_to_device(name);
+  files = names_of_new();
+  const auto rank = [&](const std::string& name) {
+    return std::find(names.begin(), names.end(), name) - names.begin();
+  };
+  std::stable_sort(files.begin(), files.end(),
+                   [&](const std::string& a, const std::string& b) { return rank(a) > rank(b); });
+  remove_results(folder_, names);  // nothing of before is beside what is new
+  for (const std::string& name : files) {
+    if (name == files.back() && !sync_folder(folder_)) fail(folder_);
+    if (::rename((new_ / name).c_str(), (folder_ / name).c_str()) != 0) fail(folder_ / name);
+  }
+  if (!sync_folder(folder_)) fail(folder_);
+}
+
+void NewResults::write_to_device(const std::string& name) const {
+  const std::filesystem::path target = folder_ / name;
+  std::error_code ignored;
+  if (std::filesystem::is_directory(target, ignored)) {
+    errno = EISDIR;
+    fail(target);
+  }
+  if (!std::filesystem::is_other(target, ignored)) return;
+  std::ifstream in(new_ / name, std::ios::binary);
+  write_bytes(target, std::string{std::istreambuf_iterator<char>(in), {}});
+  std::filesystem::remove(new_ / name);
 }
 
 }  // namespace viwo::log

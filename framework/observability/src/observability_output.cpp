@@ -246,10 +246,10 @@ report::Document report_of(const ObservabilityReport& report) {
 }
 
 void write_observability(const std::filesystem::path& folder, const ObservabilityReport& report) {
-  log::make_folder(folder);
-  log::remove_results(folder, {"observability.json", "report.html"});
-  log::write_text(folder / "observability.json", json_text(to_json(report)));
-  log::write_text(folder / "report.html", report::to_html(report_of(report)));
+  log::NewResults out(folder);
+  log::write_text(out.file("observability.json"), json_text(to_json(report)));
+  log::write_text(out.file("report.html"), report::to_html(report_of(report)));
+  out.commit({"observability.json", "report.html"});
 }
 
 std::string describe(const ObservabilityReport& report) {

@@ -168,11 +168,11 @@ std::string pad(const std::string& text, std::size_t width) {
 }  // namespace
 
 void write_plan(const std::filesystem::path& folder, const PlanSetup& setup, const Plan& plan) {
-  log::make_folder(folder);
-  log::remove_results(folder, {"summary.json", "report.html"});
-  write_motion(folder, plan);
-  log::write_text(folder / "summary.json", json_text(summary_of(setup, plan)));
-  log::write_text(folder / "report.html", report::to_html(page_of(setup, plan)));
+  log::NewResults out(folder);
+  write_motion(out.folder(), plan);
+  log::write_text(out.file("summary.json"), json_text(summary_of(setup, plan)));
+  log::write_text(out.file("report.html"), report::to_html(page_of(setup, plan)));
+  out.commit({"summary.json", "report.html"});
 }
 
 std::string describe(const PlanSetup& setup, const Plan& plan) {

@@ -70,7 +70,6 @@ void write_start_of_next(const std::filesystem::path& file, const RunSetup& setu
 
 /// The trajectory of each piece of a run that has several.
 void write_pieces(const std::filesystem::path& folder, const RunResult& result) {
-  remove_piece_files(folder);
   if (result.pieces.size() < 2) return;
   auto pose = result.estimate.begin();
   for (std::size_t k = 0; k < result.pieces.size(); ++k) {
@@ -202,19 +201,20 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
 
 void write_run(const std::filesystem::path& folder, const RunSetup& setup,
                const RunResult& result) {
-  log::make_folder(folder);
-  log::remove_results(folder, {"summary.json", "report.html", "calibration.yaml", "reference.tum"});
-  log::write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
+  log::NewResults out(folder);
+  log::write_text(out.file("config.resolved.yaml"), config::to_yaml(setup.resolved));
   if (!result.on_disk) {
-    log::write_tum(folder / "trajectory.tum", result.estimate);
-    write_pieces(folder, result);
-    write_calibration(folder / "calibration.csv", result);
-    write_timing(folder / "timing.csv", result);
+    log::write_tum(out.file("trajectory.tum"), result.estimate);
+    write_pieces(out.folder(), result);
+    write_calibration(out.file("calibration.csv"), result);
+    write_timing(out.file("timing.csv"), result);
   }
-  if (!result.reference.empty()) log::write_tum(folder / "reference.tum", result.reference);
-  write_start_of_next(folder / "calibration.yaml", setup, result);
-  log::write_text(folder / "summary.json", json_text(summary_of(setup, result)));
-  log::write_text(folder / "report.html", report::to_html(report_of(setup, result)));
+  if (!result.reference.empty()) log::write_tum(out.file("reference.tum"), result.reference);
+  write_start_of_next(out.file("calibration.yaml"), setup, result);
+  log::write_text(out.file("summary.json"), json_text(summary_of(setup, result)));
+  log::write_text(out.file("report.html"), report::to_html(report_of(setup, result)));
+  if (!result.on_disk) remove_piece_files(folder);
+  out.commit({"summary.json", "report.html", "calibration.yaml", "reference.tum"});
 }
 
 namespace {

@@ -6,11 +6,13 @@
 #include <initializer_list>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "viwo/config/regular_file.hpp"
 
 namespace viwo::log {
 
+/// And those that it lies in; they are there after a loss of power, too.
 void make_folder(const std::filesystem::path& folder);
 
 /// A folder of its own in that of the results. InputError for a link: what is there may be somebody
@@ -19,7 +21,7 @@ std::filesystem::path make_folder_in(const std::filesystem::path& folder, const 
 void require_no_link(const std::filesystem::path& folder);
 
 /// Results of an earlier command, files of these names, do not stand beside those of this one where
-/// it has none, or on a full disk.
+/// it has none.
 void remove_results(const std::filesystem::path& folder, std::initializer_list<const char*> names);
 
 using config::require_regular_file;
@@ -57,5 +59,31 @@ void write_bytes(const std::filesystem::path& file, std::string_view bytes);
 
 /// The same; what is not UTF-8 becomes U+FFFD, so that others can read every text that viwo writes.
 void write_text(const std::filesystem::path& file, std::string_view text);
+
+/// Results that take the place of those before: all of them, or, on a full disk, none, and those
+/// before stay. Until commit() they lie in a folder of their own, FOLDER/unfinished.tmp, which goes
+/// if nobody commits. Nobody else may write results there at the time (FolderLock).
+class NewResults {
+ public:
+  explicit NewResults(const std::filesystem::path& folder);
+  ~NewResults();
+  NewResults(const NewResults&) = delete;
+  NewResults& operator=(const NewResults&) = delete;
+
+  /// The file to be written for that of this name, and the folder of all of them.
+  std::filesystem::path file(const char* name) const { return new_ / name; }
+  const std::filesystem::path& folder() const { return new_; }
+
+  /// Files of these names that are not new this time go, too. The first of them is there last: who
+  /// finds it finds all.
+  void commit(std::initializer_list<const char*> names);
+
+ private:
+  std::vector<std::string> names_of_new() const;
+  /// What is no file (a device, a pipe) takes it at once.
+  void write_to_device(const std::string& name) const;
+
+  std::filesystem::path folder_, new_;
+};
 
 }  // namespace viwo::log
