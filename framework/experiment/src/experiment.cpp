@@ -72,26 +72,24 @@ class Runner {
         identity_(folder),
         result_(result) {}
 
-  /// Wrong input is found here, before anything has run: sensors read their logs when made.
+  /// Wrong input is found here, before anything has run: sensors read their logs when made. A shard
+  /// looks only at what it runs.
   void check() {
+    const auto seeds = static_cast<std::size_t>(setup_.seeds);
     for (std::size_t v = 0; v < setup_.variants.size(); ++v) {
       for (std::size_t r = 0; r < setup_.recordings.size(); ++r) {
-        const Node run = configuration(v, r);
-        const RunSetup check = of_recording(setup_.recordings[r], [&] {
-          RunSetup read = read_run(run, plugins_);
-          const std::vector<std::filesystem::path> inputs = input_files(read.resolved);
-          for (const char* const name : kResults) {
-            if (!folder_.empty()) refuse_to_replace(folder_ / name, inputs);
-          }
-          if (!options_.collect && (v == 0 || r == 0)) collect(read);
-          return read;
-        });
-        configurations_.push_back(identity_.of(check));
-        for (int s = 0; s < setup_.seeds; ++s) {
-          const auto seed = setup_.seeds > 1 ? static_cast<std::uint64_t>(s) + 1 : check.seed;
-          result_.runs.push_back({v, r, seed, {}});
-          cells_ += is_mine(result_.runs.size() - 1) ? 1 : 0;
+        const std::size_t first = result_.runs.size();
+        int mine = 0;
+        for (std::size_t s = 0; s < seeds; ++s) {
+          result_.runs.push_back({v, r, s + 1, {}});
+          mine += is_mine(first + s) ? 1 : 0;
         }
+        configurations_.emplace_back();
+        if (mine == 0) continue;
+        cells_ += mine;
+        const RunSetup check = read(v, r);
+        configurations_.back() = identity_.of(check);
+        if (seeds == 1) result_.runs[first].seed = check.seed;
         if (stopped()) throw Interrupted("interrupted before the first run");
       }
     }
@@ -110,12 +108,15 @@ class Runner {
                     journal_.folder().string());
       return;
     }
-    int taken = 0, failed = 0;
+    int taken = 0, failed = 0, others = 0;
     for (std::size_t i = 0; i < result_.runs.size(); ++i) {
       ExperimentRun& run = result_.runs[i];
       if (!is_mine(i)) continue;
       std::optional<RunResult> kept = journal_.read(key_of(run));
-      if (!kept) continue;
+      if (!kept) {
+        others += journal_.has(key_of(run)) ? 1 : 0;
+        continue;
+      }
       // A run that failed may do better once its cause is mended.
       if (kept->status == RunStatus::kFailed && !options_.collect) {
         ++failed;
@@ -131,13 +132,19 @@ class Runner {
     finished_ = taken;
     const std::string of = " of " + std::to_string(cells_);
     progress.skipped(
-        taken, std::to_string(taken) + of + " runs taken over from an interrupted experiment");
+        taken, std::to_string(taken) + of + " runs " +
+                   (options_.collect ? "are there" : "taken over from an interrupted experiment"));
+    if (options_.shard && others > 0) {
+      progress.note(std::to_string(others) + " runs in " + journal_.folder().string() +
+                    " are damaged, or of another configuration, program or version: replaced");
+    }
     if (failed > 0) progress.note(std::to_string(failed) + " runs that failed are run again");
     if (!options_.shard && there > taken + failed) {
-      progress.note(std::to_string(there - taken - failed) + " of " + std::to_string(there) +
-                    " files in " + journal_.folder().string() +
-                    " are not used: damaged, of another configuration, seed or version, or without "
-                    "the folder that --keep-runs wants");
+      progress.note(
+          std::to_string(there - taken - failed) + " of " + std::to_string(there) + " files in " +
+          journal_.folder().string() +
+          " are not used: damaged, of another configuration, seed, program or version, or without "
+          "the folder that --keep-runs wants");
     }
   }
 
@@ -195,6 +202,22 @@ class Runner {
   int finished() const { return finished_; }
 
  private:
+  /// With its data read once, that what is wrong in them shows; InputError names the recording.
+  RunSetup read(std::size_t variant, std::size_t recording) {
+    const Node run = configuration(variant, recording);
+    return of_recording(setup_.recordings[recording], [&] {
+      RunSetup setup = read_run(run, plugins_);
+      const std::vector<std::filesystem::path> inputs = input_files(setup.resolved);
+      for (const char* const name : kResults) {
+        if (!folder_.empty()) refuse_to_replace(folder_ / name, inputs);
+      }
+      const bool is_new_variant = variants_read_.insert(variant).second;
+      const bool is_new_recording = recordings_read_.insert(recording).second;
+      if (!options_.collect && (is_new_variant || is_new_recording)) collect(setup);
+      return setup;
+    });
+  }
+
   /// Results that cannot be written are no fault of the run.
   struct Unwritable {
     std::string text;
@@ -261,7 +284,8 @@ class Runner {
   RunIdentity identity_;
   ExperimentResult& result_;
   std::vector<std::string> configurations_;  // by variant, recording
-  int cells_ = 0;                            // that are run or collected here
+  std::set<std::size_t> variants_read_, recordings_read_;
+  int cells_ = 0;  // that are run or collected here
   std::atomic<int> finished_ = 0;
   std::mutex said_mutex_;
   std::set<std::string> said_;  ///< kinds of warnings
@@ -286,10 +310,6 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
   progress.begin(setup.name, runner.cells());
   runner.open_journal(progress);
   if (options.collect) runner.require_all();
-  // Those of another experiment are not to be taken for those of this one when it is interrupted.
-  if (!folder.empty() && !options.collect && !options.shard) {
-    log::remove_results(folder, kResults);
-  }
   parallel_for(result.runs.size(), [&](std::size_t i) {
     ExperimentRun& run = result.runs[i];
     if (run.taken_over || !runner.is_mine(i)) return;
@@ -298,7 +318,9 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
   if (runner.finished() < runner.cells()) {
     throw Interrupted("interrupted after " + std::to_string(runner.finished()) + " of " +
                       std::to_string(runner.cells()) + " runs" +
-                      (folder.empty() ? "" : "; continue with --resume"));
+                      (folder.empty()  ? ""
+                       : options.shard ? "; the same command continues"
+                                       : "; continue with --resume"));
   }
   for (const ExperimentRun& run : result.runs) {
     for (const CalibrationTrack& track : run.result.calibration) {

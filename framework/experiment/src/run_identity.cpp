@@ -58,7 +58,9 @@ std::string checksums_of(const fs::path& folder, const fs::path& results) {
 }  // namespace
 
 std::string RunIdentity::of(const RunSetup& run) {
-  std::string text = std::string("viwo ") + viwo_version() + "\n";
+  // The filter is in the program.
+  std::string text =
+      std::string("viwo ") + viwo_version() + ": " + content_of("/proc/self/exe") + "\n";
   const auto add = [&](const PluginInfo& info) {
     text += info.kind + " " + info.name + " " + info.version;
     // One that is linked into the program has none.

@@ -16,8 +16,9 @@ class RunIdentity {
   explicit RunIdentity(const std::filesystem::path& results)
       : results_(std::filesystem::weakly_canonical(results)) {}
 
-  /// Versions, libraries of plugins, and the resolved configuration; each file or folder that these
-  /// name stands there as size and checksum. std::runtime_error for one that cannot be read.
+  /// Version, program, libraries of plugins, and the resolved configuration; each file or folder
+  /// that these name stands there as size and checksum. std::runtime_error for one that cannot be
+  /// read.
   std::string of(const RunSetup& run);
 
  private:

@@ -96,6 +96,11 @@ fs::path RunJournal::file_of(const RunKey& key) const {
 
 int RunJournal::size() const { return static_cast<int>(files_in(folder_, false).size()); }
 
+bool RunJournal::has(const RunKey& key) const {
+  std::error_code ignored;
+  return fs::exists(file_of(key), ignored);
+}
+
 std::optional<RunResult> RunJournal::read(const RunKey& key) const {
   try {
     const std::optional<std::string> all = bytes_of(file_of(key));

@@ -30,6 +30,9 @@ class RunJournal {
   /// Number of runs that are there, whatever they are.
   int size() const;
 
+  /// Whether there is a file for the run, of this configuration or another.
+  bool has(const RunKey& key) const;
+
   /// The run with this key. Nothing if there is none, or if its file is damaged or of another key.
   std::optional<RunResult> read(const RunKey& key) const;
 

@@ -7,6 +7,7 @@
 #include "experiment_file.hpp"
 #include "message_of.hpp"
 #include "run_identity.hpp"
+#include "told.hpp"
 
 namespace viwo {
 namespace {
@@ -134,6 +135,38 @@ TEST_F(Campaign, GoesOnWhereAShardWasKilled) {
   for (const ExperimentRun& cell : result.runs) taken_over += cell.taken_over ? 1 : 0;
   EXPECT_EQ(taken_over, 2);
   EXPECT_EQ(collected(out), table_of(run(options_, folder_ / "whole"), folder_ / "whole"));
+}
+
+TEST_F(Campaign, ShardsLookOnlyAtWhatTheyRun) {
+  const fs::path file = write(
+      "experiment: test\nbase: run.yaml\nmotions: [circle, nowhere]\nvariants:\n  redundant:\n");
+  const auto shard = [&](int index) {
+    ExperimentOptions options;
+    options.shard = Shard{index, 2};
+    return error_of([&] {
+      run_experiment(read_experiment(file, options), options, registry(), folder_ / "out");
+    });
+  };
+  EXPECT_EQ(shard(0), "");
+  EXPECT_THAT(shard(1), HasSubstr("nowhere"));
+}
+
+TEST_F(Campaign, RunsThatAnotherExperimentLeftAreReplacedAndThatIsSaid) {
+  const fs::path out = folder_ / "out";
+  run_shard(0, 3, out);
+  options_.assignments = {"sensors.simulator0.duration_s=5"};
+  testing::Told told;
+  options_.progress = &told;
+  run_shard(0, 3, out);
+  EXPECT_THAT(told.text(), HasSubstr("4 runs in " + (out / "journal").string() +
+                                     " are damaged, or of another configuration"));
+}
+
+TEST(RunIdentity, IsOfTheProgram) {
+  const std::string size = std::to_string(fs::file_size(fs::canonical("/proc/self/exe")));
+  RunSetup run;
+  run.resolved = config::Node::empty_map();
+  EXPECT_THAT(RunIdentity("").of(run), HasSubstr(": " + size + " bytes, crc "));
 }
 
 TEST(RunIdentity, IsOfContentsWhereverTheyLie) {

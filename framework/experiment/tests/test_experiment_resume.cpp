@@ -293,6 +293,16 @@ TEST_F(Resume, GivesTheFilesOfAnExperimentThatWasNotInterrupted) {
   expect_same_results(whole, parts);
 }
 
+TEST_F(Resume, LeavesTheResultsOfAnExperimentBeforeUntilItIsDone) {
+  file_ = write(kVariants);
+  const fs::path out = folder_ / "out";
+  ExperimentOptions options;
+  write_without_times(run(options, out), out);
+  const std::string before = text_of(out / "summary.json");
+  interrupt_after(3, options, out);
+  EXPECT_EQ(text_of(out / "summary.json"), before);
+}
+
 TEST_F(Resume, GivesTheFilesOfAnExperimentWithTheFilterToo) {
   file_ = VIWO_TEST_SOURCE_DIR "/configs/experiments/paper_accuracy.yaml";
   const fs::path whole = folder_ / "whole", parts = folder_ / "parts";
