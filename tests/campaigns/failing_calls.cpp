@@ -2,10 +2,10 @@
 // Calls are counted over all threads.
 //   FAILING_KIND=disk    what changes something below FAILING_FOLDER: open, write, fsync, close,
 //                        rename, mkdir, unlink ("No space left on device")
-//                open    opens a file or a folder, whichever ("Too many open files")
+//                open    opens a file, a folder or a pipe, whichever ("Too many open files")
 //                read    reads from a file that was opened ("Input/output error")
 //                mmap    maps memory or a file ("Cannot allocate memory")
-//                thread  begins a thread ("Resource temporarily unavailable")
+//                thread  begins a thread or a process ("Resource temporarily unavailable")
 //                memory  allocates ("Cannot allocate memory")
 //   FAILING_FOLDER=DIR   for the kind disk
 //   FAILING_CALL=N       1, 2, ...; 0: none, only counted
@@ -35,8 +35,10 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
+#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/uio.h>
 #include <unistd.h>
 
 namespace {
@@ -116,7 +118,11 @@ bool disk_fails(const char* call, const std::string& path) {
   return true;
 }
 
-bool open_fails(const char* path) { return is_to_fail(Kind::kOpen, EMFILE, "open", path); }
+bool open_fails(const char* path) {
+  // What the machine says of itself: libgcrypt, which videos load, aborts without it.
+  if (path != nullptr && std::string_view(path).starts_with("/proc/sys/")) return false;
+  return is_to_fail(Kind::kOpen, EMFILE, "open", path);
+}
 bool memory_fails() { return is_to_fail(Kind::kMemory, ENOMEM, "allocation", "memory"); }
 
 /// Opens a file with `call`, which gives its descriptor, and remembers it when it counts.
@@ -140,6 +146,26 @@ std::FILE* open_stream(const char* path, const char* mode, Stream* call) {
     return stream != nullptr ? fileno(stream) : -1;
   });
   return stream;
+}
+
+/// Writes to a file with `call`.
+template <class Call>
+ssize_t write_with(int fd, Call&& call) {
+  State& s = state();
+  const std::scoped_lock lock(s.mutex);
+  const auto file = s.open.find(fd);
+  if (file == s.open.end()) return call();
+  if (disk_fails("write", file->second)) return -1;
+  s.not_synced[file->second] = true;
+  return call();
+}
+
+/// Changes `path` with `call`, which gives 0 when it has.
+template <class Call>
+int change_with(const char* name, const char* path, Call&& call) {
+  const std::scoped_lock lock(state().mutex);
+  if (counts(path) && disk_fails(name, path)) return -1;
+  return call();
 }
 
 /// Whether the close of a file fails, which is then closed all the same. The mutex is held.
@@ -195,20 +221,10 @@ int open(const char* path, int flags, ...) {
                    [&] { return kReal(path, flags, mode); });
 }
 
-int open64(const char* path, int flags, ...) {
-  va_list arguments;
-  va_start(arguments, flags);
-  const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(arguments, mode_t) : 0;
-  va_end(arguments);
-  return open(path, flags, mode);
-}
-
 std::FILE* fopen(const char* path, const char* mode) {
   static const auto kReal = real<std::FILE* (*)(const char*, const char*)>("fopen");
   return open_stream(path, mode, kReal);
 }
-
-std::FILE* fopen64(const char* path, const char* mode) { return fopen(path, mode); }
 
 DIR* opendir(const char* path) {
   static const auto kReal = real<DIR* (*)(const char*)>("opendir");
@@ -224,12 +240,14 @@ int openat(int folder, const char* path, int flags, ...) {
   return open_fails(path) ? -1 : kReal(folder, path, flags, mode);
 }
 
-int openat64(int folder, const char* path, int flags, ...) {
-  va_list arguments;
-  va_start(arguments, flags);
-  const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(arguments, mode_t) : 0;
-  va_end(arguments);
-  return openat(folder, path, flags, mode);
+int memfd_create(const char* name, unsigned flags) {
+  static const auto kReal = real<int (*)(const char*, unsigned)>("memfd_create");
+  return open_fails(name) ? -1 : kReal(name, flags);
+}
+
+int pipe2(int ends[2], int flags) {
+  static const auto kReal = real<int (*)(int*, int)>("pipe2");
+  return open_fails("a pipe") ? -1 : kReal(ends, flags);
 }
 
 ssize_t read(int fd, void* bytes, size_t size) {
@@ -242,17 +260,19 @@ ssize_t pread(int fd, void* bytes, size_t size, off_t at) {
   return is_to_fail(Kind::kRead, EIO, "read", "a file") ? -1 : kReal(fd, bytes, size, at);
 }
 
-ssize_t pread64(int fd, void* bytes, size_t size, off_t at) { return pread(fd, bytes, size, at); }
-
 ssize_t write(int fd, const void* bytes, size_t size) {
   static const auto kReal = real<ssize_t (*)(int, const void*, size_t)>("write");
-  State& s = state();
-  const std::scoped_lock lock(s.mutex);
-  const auto file = s.open.find(fd);
-  if (file == s.open.end()) return kReal(fd, bytes, size);
-  if (disk_fails("write", file->second)) return -1;
-  s.not_synced[file->second] = true;
-  return kReal(fd, bytes, size);
+  return write_with(fd, [&] { return kReal(fd, bytes, size); });
+}
+
+ssize_t writev(int fd, const iovec* pieces, int count) {
+  static const auto kReal = real<ssize_t (*)(int, const iovec*, int)>("writev");
+  return write_with(fd, [&] { return kReal(fd, pieces, count); });
+}
+
+ssize_t pwrite(int fd, const void* bytes, size_t size, off_t at) {
+  static const auto kReal = real<ssize_t (*)(int, const void*, size_t, off_t)>("pwrite");
+  return write_with(fd, [&] { return kReal(fd, bytes, size, at); });
 }
 
 int fsync(int fd) {
@@ -305,9 +325,17 @@ int rename(const char* from, const char* to) {
 
 int mkdir(const char* path, mode_t mode) {
   static const auto kReal = real<int (*)(const char*, mode_t)>("mkdir");
-  const std::scoped_lock lock(state().mutex);
-  if (counts(path) && disk_fails("mkdir", path)) return -1;
-  return kReal(path, mode);
+  return change_with("mkdir", path, [&] { return kReal(path, mode); });
+}
+
+int unlink(const char* path) {
+  static const auto kReal = real<int (*)(const char*)>("unlink");
+  return change_with("unlink", path, [&] { return kReal(path); });
+}
+
+int remove(const char* path) {
+  static const auto kReal = real<int (*)(const char*)>("remove");
+  return change_with("unlink", path, [&] { return kReal(path); });
 }
 
 int unlinkat(int folder, const char* path, int flags) {
@@ -329,10 +357,6 @@ void* mmap(void* at, size_t size, int protection, int flags, int fd, off_t offse
   return kReal(at, size, protection, flags, fd, offset);
 }
 
-void* mmap64(void* at, size_t size, int protection, int flags, int fd, off_t offset) {
-  return mmap(at, size, protection, flags, fd, offset);
-}
-
 int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*run)(void*),
                    void* argument) {
   using Create = int (*)(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*);
@@ -340,6 +364,23 @@ int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*
   if (is_to_fail(Kind::kThread, EAGAIN, "creation", "a thread")) return EAGAIN;
   return kReal(thread, attributes, run, argument);
 }
+
+int posix_spawnp(pid_t* child, const char* program, const posix_spawn_file_actions_t* actions,
+                 const posix_spawnattr_t* attributes, char* const words[],
+                 char* const environment[]) {
+  static const auto kReal = real<decltype(&posix_spawnp)>("posix_spawnp");
+  if (is_to_fail(Kind::kThread, EAGAIN, "creation", "a process")) return EAGAIN;
+  return kReal(child, program, actions, attributes, words, environment);
+}
+
+// On 64 bit the same.
+[[gnu::alias("open")]] int open64(const char* path, int flags, ...);
+[[gnu::alias("openat")]] int openat64(int folder, const char* path, int flags, ...);
+[[gnu::alias("fopen")]] std::FILE* fopen64(const char* path, const char* mode);
+[[gnu::alias("pread")]] ssize_t pread64(int fd, void* bytes, size_t size, off_t at);
+[[gnu::alias("pwrite")]] ssize_t pwrite64(int fd, const void* bytes, size_t size, off_t at);
+[[gnu::alias("mmap")]] void* mmap64(void* at, size_t size, int protection, int flags, int fd,
+                                    off_t offset);
 
 // By other names, which need no look-up.
 void* __libc_malloc(size_t size);

@@ -9,6 +9,7 @@
 #include <iostream>
 #include <limits>
 #include <memory>
+#include <new>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -354,27 +355,33 @@ void convert(const fs::path& folder, const fs::path& out) {
             << log.poses.size() + log.truth.size() << " poses, " << log.fixes.size() << " fixes)\n";
 }
 
+int dispatch(const std::vector<std::string>& words) {
+  if (words.size() == 1 && (words[0] == "--help" || words[0] == "-h")) {
+    std::cout << kHelp;
+    return 0;
+  }
+  if (words.size() != 2 || words[0].starts_with("-") || words[1].starts_with("-")) {
+    std::cerr << kHelp;
+    return 2;
+  }
+  const fs::path bag = words[1];
+  convert(words[0], bag.has_filename() ? bag : bag.parent_path());  // "folder/"
+  return 0;
+}
+
 }  // namespace
 }  // namespace viwo
 
 int main(int argc, char** argv) {
   const viwo::log::PrintableOutput out(std::cout), err(std::cerr);
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  if (words.size() == 1 && (words[0] == "--help" || words[0] == "-h")) {
-    std::cout << viwo::kHelp;
-    return 0;
-  }
-  if (words.size() != 2 || words[0].starts_with("-") || words[1].starts_with("-")) {
-    std::cerr << viwo::kHelp;
-    return 2;
-  }
   try {
-    const std::filesystem::path bag = words[1];
-    viwo::convert(words[0], bag.has_filename() ? bag : bag.parent_path());  // "folder/"
-    return 0;
+    return viwo::dispatch({argv + 1, argv + argc});
   } catch (const viwo::InputError& error) {
     std::cerr << error.what() << "\n";
     return 2;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "viwo_bag: there is not enough memory\n";
+    return 1;
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

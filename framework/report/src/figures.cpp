@@ -1,5 +1,6 @@
 #include "viwo/report/figures.hpp"
 
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <stdexcept>
@@ -10,6 +11,9 @@
 
 namespace viwo::report {
 namespace {
+
+/// Of what is there of a figure.
+constexpr std::array<const char*, 4> kExtensions = {".svg", ".pdf", ".dat", ".gp"};
 
 /// A title as part of a file name: small letters and digits of ASCII, '_' for everything else.
 std::string slug(const std::string& title) {
@@ -46,6 +50,19 @@ void write(const std::filesystem::path& path, const std::string& text) {
   }
 }
 
+/// One figure, or nothing of it.
+void make_figure(const std::filesystem::path& folder, const std::string& name,
+                 const GnuplotFigure& figure) {
+  try {
+    write(folder / (name + ".dat"), figure.data);
+    write(folder / (name + ".gp"), figure.script);
+    run_gnuplot(folder, name + ".gp");
+  } catch (...) {
+    for (const char* extension : kExtensions) clear(folder / (name + extension));
+    throw;
+  }
+}
+
 /// Those of a document before, by their scripts.
 void clear_figures(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> scripts;
@@ -58,9 +75,7 @@ void clear_figures(const std::filesystem::path& folder) {
     if (is_own) scripts.push_back(entry.path());
   }
   for (std::filesystem::path file : scripts) {
-    for (const char* extension : {".svg", ".pdf", ".dat", ".gp"}) {
-      clear(file.replace_extension(extension));
-    }
+    for (const char* extension : kExtensions) clear(file.replace_extension(extension));
   }
 }
 
@@ -83,9 +98,7 @@ void write_figures(const std::filesystem::path& folder, const Document& document
       const GnuplotFigure figure = plot->heat_map ? gnuplot_heat_map(*plot, name, format)
                                                   : gnuplot_curves(*plot, name, format, colours);
       if (figure.script.empty()) continue;
-      write(folder / (name + ".dat"), figure.data);
-      write(folder / (name + ".gp"), figure.script);
-      run_gnuplot(folder, name + ".gp");
+      make_figure(folder, name, figure);
     }
   }
 }

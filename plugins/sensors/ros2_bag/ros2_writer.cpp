@@ -1,7 +1,6 @@
 #include "ros2_writer.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -10,6 +9,7 @@
 
 #include "cdr_message.hpp"
 #include "ros2_definitions.hpp"
+#include "viwo/log/files.hpp"
 
 namespace viwo::bag {
 
@@ -121,11 +121,7 @@ void Ros2Writer::write_metadata() const {
   times(out);
   out << YAML::Key << "message_count" << n << YAML::EndMap << YAML::EndSeq;
   out << YAML::EndMap << YAML::EndMap;
-  const std::filesystem::path file = file_.parent_path() / "metadata.yaml";
-  std::ofstream to(file);
-  to << out.c_str() << "\n";
-  to.close();
-  if (!to) throw std::runtime_error(file.string() + "  cannot be written");
+  log::write_text(file_.parent_path() / "metadata.yaml", std::string(out.c_str()) + "\n");
 }
 
 }  // namespace viwo::bag
