@@ -88,7 +88,8 @@ void add_wander(const WheelWander& wander, report::Document& document) {
 }
 
 void add_plots(const CalibrationResult& result, report::Document& document) {
-  const auto& runs = result.left_out.empty() ? result.fitted : result.left_out.front().runs;
+  const bool has_all = !result.left_out.empty() && result.left_out.front().failed.empty();
+  const auto& runs = has_all ? result.left_out.front().runs : result.fitted;
   for (const ValidationRun& run : runs) {
     const CalibrationRecording& recording = result.setup->recordings[run.recording];
     std::string heading = "Recording " + recording.label.name;
@@ -149,6 +150,10 @@ report::Document page_of(const CalibrationResult& result) {
   }
   for (const LeftOut& one : result.left_out) {
     document.sections.push_back({left_out_title(one), {error_table(*result.setup, one.runs)}});
+    for (const std::string& failed : one.failed) {
+      document.sections.back().blocks.emplace_back(
+          report::Paragraph{without_text(one, failed), kNote});
+    }
   }
   add_wander(result.wander, document);
   add_plots(result, document);

@@ -62,6 +62,10 @@ std::string left_out_title(const LeftOut& left_out) {
   return "End error of dead reckoning, recordings left out of the fit by " + left_out.by;
 }
 
+std::string without_text(const LeftOut& left_out, const std::string& failed) {
+  return "without " + left_out.by + " " + failed;
+}
+
 /// What was found, and what to write.
 std::string wander_text(const WheelWander& wander) {
   if (wander.lag_s.empty()) {

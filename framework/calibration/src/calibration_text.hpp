@@ -28,6 +28,8 @@ std::vector<ErrorRow> error_rows(const CalibrationSetup& setup,
 const WheelModel& model_of(const CalibrationResult& result);
 
 std::string left_out_title(const LeftOut& left_out);
+/// One of those that could not be fitted.
+std::string without_text(const LeftOut& left_out, const std::string& failed);
 /// What wanders, and what to write into the configuration of a filter.
 std::string wander_text(const WheelWander& wander);
 /// What was searched and found of the joints; empty for nothing.

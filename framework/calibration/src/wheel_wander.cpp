@@ -10,6 +10,9 @@ constexpr double kPiece_s = 0.1;
 constexpr int kMostLags = 100;
 /// Pairs of pieces that tell something.
 constexpr int kFewestPairs = 50;
+/// Of its own sigma where none wanders, over all time constants that are tried: once in some
+/// thousand calibrations.
+constexpr double kSurely = 4.;
 
 /// Parity information of the pieces, in units of the prior sigmas.
 std::vector<ParityInformation> pieces_of(const CalibrationRecording& recording,
@@ -34,29 +37,33 @@ std::vector<ParityInformation> pieces_of(const CalibrationRecording& recording,
   return out;
 }
 
-/// The exponential through the covariances (CAL-7): over time constants, the best sigma.
+/// The exponential through the covariances (CAL-7): over time constants, the best sigma; none that
+/// noise might give. A shorter time than those that are compared is not told.
 void fit_exponential(WheelWander& wander) {
+  if (wander.lag_s.empty()) return;
   double best = 0.;
-  for (double time_s = 0.5 * kPiece_s; time_s < 4. * kMostLags * kPiece_s; time_s *= 1.1) {
-    double ef = 0., ee = 0.;
+  for (double time_s = wander.lag_s.front(); time_s < 4. * kMostLags * kPiece_s; time_s *= 1.1) {
+    double ef = 0., ee = 0., variance = 0.;  // of ef, of noise alone
     for (std::size_t k = 0; k < wander.lag_s.size(); ++k) {
       const double e = std::exp(-wander.lag_s[k] / time_s);
       ef += wander.weight[k] * e * wander.covariance[k];
       ee += wander.weight[k] * e * e;
+      variance += std::pow(wander.weight[k] * e, 2) * wander.variance[k];
     }
     // By how much it lowers the sum of squares.
     const double gain = ef > 0. ? ef * ef / ee : 0.;
     if (gain <= best) continue;
     best = gain;
-    wander.sigma = std::sqrt(ef / ee);
-    wander.time_s = time_s;
+    const bool is_sure = ef > kSurely * std::sqrt(variance);
+    wander.sigma = is_sure ? std::sqrt(ef / ee) : 0.;
+    wander.time_s = is_sure ? time_s : 0.;
   }
 }
 
 }  // namespace
 
 WheelWander find_wander(const CalibrationSetup& setup, const Intrinsics& x_WI) {
-  std::vector<double> products(kMostLags + 1, 0.), expected(kMostLags + 1, 0.);
+  std::vector<double> products(kMostLags + 1, 0.), squares = products, expected = products;
   std::vector<int> pairs(kMostLags + 1, 0);
   for (const CalibrationRecording& recording : setup.recordings) {
     const std::vector<ParityInformation> pieces = pieces_of(recording, x_WI);
@@ -65,7 +72,9 @@ WheelWander find_wander(const CalibrationSetup& setup, const Intrinsics& x_WI) {
         const ParityInformation& now = pieces[i];
         const ParityInformation& later = pieces[i + k];
         if (now.dof == 0. || later.dof == 0.) continue;
-        products[k] += now.eta.dot(later.eta);
+        const double product = now.eta.dot(later.eta);
+        products[k] += product;
+        squares[k] += product * product;
         expected[k] += now.Lambda.cwiseProduct(later.Lambda).sum();
         ++pairs[k];
       }
@@ -76,6 +85,7 @@ WheelWander find_wander(const CalibrationSetup& setup, const Intrinsics& x_WI) {
     if (pairs[k] < kFewestPairs || !(expected[k] > 0.)) continue;
     out.lag_s.push_back(kPiece_s * static_cast<double>(k));
     out.covariance.push_back(products[k] / expected[k]);
+    out.variance.push_back(squares[k] / (expected[k] * expected[k]));
     out.weight.push_back(static_cast<double>(pairs[k]));
   }
   fit_exponential(out);

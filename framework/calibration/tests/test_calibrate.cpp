@@ -159,6 +159,30 @@ TEST(Calibrate, ReadsItsFileLeavesOutAndWritesACalibrationThatARunIncludes) {
   EXPECT_LT(included.accuracy->end_m, 0.1 * nominal.accuracy->end_m);
 }
 
+TEST(Calibrate, TellsWhatIsPredictedWithoutAMotionWhereNobodyAsksForSigmas) {
+  const auto folder = std::filesystem::path(::testing::TempDir()) / "viwo_calibrate_by_default";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "run.yaml") << config::to_yaml(simulated("'{motion}'", {}));
+  std::ofstream(folder / "calibration.yaml")
+      << "calibration: test\nbase: run.yaml\nset: {odometry.twist: noise_weighted}\n"
+         "segment_s: 2\nmotions:\n  - {motion: icr_sweep, repetition: 1}\n"
+         "  - {motion: figure_eight, repetition: 2}\n";
+  const auto read = [&](const std::vector<std::string>& assignments) {
+    return read_calibration_setup(folder / "calibration.yaml", assignments, registry());
+  };
+  auto setup = read({});
+  const CalibrationResult result = calibrate(setup);
+  ASSERT_EQ(result.left_out.size(), 1u);  // repetitions are motions here
+  EXPECT_EQ(result.left_out[0].by, "motion");
+  EXPECT_EQ(result.left_out[0].runs.size(), 2u);
+  EXPECT_GT(result.left_out[0].spread.maxCoeff(), 0.);
+  EXPECT_EQ(result.all.sigma, result.sigma_of_fit);
+  EXPECT_TRUE(read({"leave_out_by=[]"}).leave_out_by.empty());
+  const auto asked = read({"leave_out_by=[repetition]"});
+  EXPECT_TRUE(asked.leave_out_is_asked);
+  EXPECT_EQ(asked.leave_out_by, std::vector<std::string>{"repetition"});
+}
+
 TEST(Calibrate, LeavesSigmasCorrelationsAndTheReferencesPlaceAndClockToRuns) {
   const auto folder = std::filesystem::path(::testing::TempDir()) / "viwo_calibrated_reference";
   std::filesystem::remove_all(folder);
@@ -230,7 +254,14 @@ TEST(Calibrate, FindsHowTheWheelsWander) {
                                      "sensors.simulator0.intrinsics_wander_time_s=1"});
   EXPECT_NEAR(wanders.sigma, 0.5, 0.1);
   EXPECT_NEAR(wanders.time_s, 1., 0.5);
-  EXPECT_LT(found({}).sigma, 0.05);
+}
+
+TEST(Calibrate, FindsNoWanderInNoise) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    auto setup =
+        setup_of({"icr_sweep", "figure_eight"}, seed, {"sensors.simulator0.duration_s=40"});
+    EXPECT_EQ(calibrate(setup).wander.sigma, 0.) << seed;
+  }
 }
 
 TEST(Calibrate, DoesNotTellATimeOfWanderBeyondWhatItCompares) {

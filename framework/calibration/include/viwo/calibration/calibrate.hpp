@@ -89,6 +89,7 @@ struct CalibrationSetup {
   PluginRegistry* plugins = nullptr;  ///< that the runs were read with
   CalibrationOptions options;
   std::vector<std::string> leave_out_by;  ///< labels whose values are left out in turn
+  bool leave_out_is_asked = true;         ///< false: they are the usual ones
   std::vector<std::string> report_by;     ///< labels to break the tables down by
   std::vector<CalibrationRecording> recordings;
 };
@@ -105,6 +106,7 @@ struct WheelWander {
   double sigma = 0.;                              ///< 0: nothing was found
   double time_s = 0.;                             ///< time constant
   std::vector<double> lag_s, covariance, weight;  ///< what it was fitted to (CAL-6)
+  std::vector<double> variance;                   ///< of each covariance where nothing wanders
 };
 
 /// A measurement by hand, and what the fit leaves of it.
@@ -197,6 +199,7 @@ struct LeftOut {
   std::string by;     ///< the label
   Intrinsics spread;  ///< of the estimate from all, by how those without one value differ (CAL-8)
   std::vector<ValidationRun> runs;
+  std::vector<std::string> failed;  ///< values without which nothing could be fitted, and why
 };
 
 struct CalibrationResult {
@@ -206,10 +209,11 @@ struct CalibrationResult {
   std::optional<smoother::Smoothed> smoothed;
   std::vector<CalibrationEstimate> lengths;  ///< with segments of several lengths, if one is chosen
   std::vector<std::string> failed_lengths;   ///< those that could not be fitted, and why
-  CalibrationEstimate all;        ///< from all recordings; its sigmas are not below any `spread`
-  Intrinsics sigma_of_fit;        ///< those that the fit itself believes
-  std::vector<LeftOut> left_out;  ///< of each of leave_out_by
-  WheelWander wander;             ///< at the estimate from all
+  /// From all recordings; its sigmas are not below any `spread` that was asked for.
+  CalibrationEstimate all;
+  Intrinsics sigma_of_fit;            ///< those that the fit itself believes
+  std::vector<LeftOut> left_out;      ///< of each of leave_out_by
+  WheelWander wander;                 ///< at the estimate from all
   std::vector<ValidationRun> fitted;  ///< all recordings with the estimate from all of them
   std::vector<std::string> doubts;    ///< why it is not to be trusted
   std::vector<std::string> warnings;  ///< what its reader should know
