@@ -122,7 +122,9 @@ TEST(HiddenDirections, AreNoneOfASweepOverUnevenGround) {
   EXPECT_EQ(faults(runs("figure_eight", "uneven", {}), {}), "");
 }
 
-// Of a robot as it is configured: of one that is otherwise the clock has a NEES of 6.
+// Of a robot as it is configured, and with the noise as it is: of a drawn one the clock has a NEES
+// of 6, and with the noise that is found, which is the wander within an interval, others up to 5
+// (docs/contact_physics.md).
 TEST(WanderingIntrinsics, AreNotTakenForConstantOnes) {
   std::vector<std::string> wandering{
       "sensors.simulator0.intrinsics_wander=0.3", "sensors.simulator0.intrinsics_wander_time_s=2",

@@ -263,7 +263,7 @@ std::string describe(const RunResult& result) {
         << significant(result.total_ms.p95_ms, 3) << " ms p95\n";
   }
   for (const NoiseFound& noise : result.noises) {
-    out << "noise " << noise.name << ": " << significant(noise.found, 3) << " " << noise.unit
+    out << "noise " << noise.name << ": " << found_text(noise) << " " << noise.unit
         << (noise.unit.empty() ? "" : " ") << "found, " << significant(noise.configured, 3)
         << " configured\n";
   }
@@ -274,6 +274,12 @@ std::string describe(const RunResult& result) {
   for (const std::string& line : describe_failures(result)) out << "warning: " << line << "\n";
   for (const std::string& line : describe_rejections(result)) out << line << "\n";
   return out.str();
+}
+
+std::string found_text(const NoiseFound& noise) {
+  constexpr double kLeastTold = 0.1;  // NoiseScale tells no less
+  const bool is_told = noise.found > 1.0001 * kLeastTold * noise.configured;
+  return (is_told ? "" : "at most ") + significant(noise.found, 3);
 }
 
 std::vector<std::string> describe_failures(const RunResult& result) {

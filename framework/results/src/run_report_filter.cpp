@@ -280,8 +280,8 @@ void add_noise_section(const RunResult& result, Document& document) {
   table.caption = "Noise as it was found while the filter ran";
   table.columns = {{"parameter"}, {"unit"}, {"configured"}, {"found"}, {"measurements"}};
   for (const NoiseFound& noise : result.noises) {
-    table.rows.push_back(
-        {noise.name, noise.unit, noise.configured, noise.found, static_cast<double>(noise.count)});
+    table.rows.push_back({noise.name, noise.unit, noise.configured, found_text(noise),
+                          static_cast<double>(noise.count)});
   }
   document.sections.push_back({"Noise", {std::move(table)}});
 }

@@ -35,6 +35,10 @@ void write_run(const std::filesystem::path& folder, const RunSetup& setup, const
 /// A few lines for the terminal.
 std::string describe(const RunResult& result);
 
+/// "0.97", or "at most 0.1" where the residuals are so small that what is common to many of them
+/// (floors, the calibration) hides the noise: no figure for it.
+std::string found_text(const NoiseFound& noise);
+
 /// "sensor: 3 x reason, first at odom_1.csv.gz:17" for everything that was dropped.
 std::vector<std::string> describe_rejections(const RunResult& result);
 
