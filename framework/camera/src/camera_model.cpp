@@ -68,16 +68,34 @@ Squares equidistant_slope(const Eigen::Vector4d& k, const Squares& t2) {
   return 1. + t2 * (3. * k[0] + t2 * (5. * k[1] + t2 * (7. * k[2] + t2 * (9. * k[3]))));
 }
 
+/// The same by looking at every step of the way. A function of its own, for hardly any lens asks
+/// for it.
+[[gnu::noinline]] bool grows_up_to(const Eigen::Vector4d& k, double t2) {
+  using Steps = Eigen::Array<double, 32, 1>;
+  static const Steps fractions = Steps::LinSpaced(1. / 32., 1.);
+  return (equidistant_slope(k, Steps(fractions * t2)) > 0.).all();
+}
+
 /// Whether it has grown all the way up to there: behind a fold it may grow again, and what is seen
 /// there is nothing.
 bool is_before_fold(const Eigen::Vector4d& k, double theta) {
   const double t2 = theta * theta;
   if (!(theta >= 0.) || theta > 3.14) return false;
   // Not even if all that makes it less were there at once.
-  if (equidistant_slope(k.cwiseMin(0.), t2) > 0.) return true;
-  using Steps = Eigen::Array<double, 32, 1>;
-  static const Steps fractions = Steps::LinSpaced(1. / 32., 1.);
-  return (equidistant_slope(k, Steps(fractions * t2)) > 0.).all();
+  return equidistant_slope(k.cwiseMin(0.), t2) > 0. || grows_up_to(k, t2);
+}
+
+/// Derivative of the distorted point by p_C, which is r = |p_xy| from the axis, at z, |p_C|^2 = n2;
+/// `direction` is p_xy / r, `d` the distance from the centre and `slope` that by the angle.
+Eigen::Matrix<double, 2, 3> equidistant_jacobian(const Eigen::Vector2d& direction, double r,
+                                                 double z, double n2, double d, double slope) {
+  // xy = d(theta) a / r with d theta / d a = z a / (r n2), d theta / d z = -r / n2.
+  const double radial = slope * z / n2;
+  Eigen::Matrix<double, 2, 3> J;
+  J.leftCols<2>() =
+      (d / r) * Eigen::Matrix2d::Identity() + (radial - d / r) * direction * direction.transpose();
+  J.col(2) = -slope * r / n2 * direction;
+  return J;
 }
 
 bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& out,
@@ -102,11 +120,7 @@ bool distort_equidistant(const CameraView& camera, const Eigen::Vector3d& p_C, D
   const double d = theta * equidistant_part(k, t2);
   const Eigen::Vector2d direction = a / r;
   out.xy = d * direction;
-  // xy = d(theta) a / r with d theta / d a = z a / (r n2), d theta / d z = -r / n2.
-  const double radial = slope * z / n2;
-  out.J_point.leftCols<2>() =
-      (d / r) * Eigen::Matrix2d::Identity() + (radial - d / r) * direction * direction.transpose();
-  out.J_point.col(2) = -slope * r / n2 * direction;
+  out.J_point = equidistant_jacobian(direction, r, z, n2, d, slope);
   if (J_coefficients != nullptr) {
     double power = theta;
     for (int i = 0; i < 4; ++i) {
@@ -129,6 +143,75 @@ constexpr double kStepTolerance = 1e-9;
 
 Eigen::Vector3d direction_of(const Eigen::Vector2d& point) {
   return Eigen::Vector3d(point.x(), point.y(), 1.).normalized();
+}
+
+/// Unit vector towards a distorted point of the plane z = 1, with the derivative of the point by
+/// it.
+bool undistort_equidistant(const CameraView& camera, const Eigen::Vector2d& target,
+                           Eigen::Vector3d& ray, Eigen::Matrix<double, 2, 3>& J) {
+  const double d = target.norm();
+  if (d < 1e-12) {
+    ray = direction_of(target);
+    J << 1., 0., -target.x(), 0., 1., -target.y();
+    return true;
+  }
+  const Eigen::Vector4d k = camera.intrinsics.tail<4>();
+  double theta = d, step = -d;  // half a step where it would leave what is not folded
+  double not_folded = 0.;       // up to there
+  const auto is_allowed = [&] {
+    if (theta >= 0. && theta <= not_folded) return true;
+    if (!is_before_fold(k, theta)) return false;
+    not_folded = theta;
+    return true;
+  };
+  for (int i = 0; i < 60; ++i) {
+    if (!is_allowed()) {
+      step *= 0.5;
+      theta += step;
+      continue;
+    }
+    const double t2 = theta * theta;
+    step = (theta * equidistant_part(k, t2) - d) / equidistant_slope(k, t2);
+    theta -= step;
+    if (std::abs(step) < kStepTolerance) break;
+  }
+  if (!is_allowed() || std::abs(step) > kStepTolerance) return false;
+  const double r = std::sin(theta), z = std::cos(theta);
+  const Eigen::Vector2d direction = target / d;
+  ray << r * direction, z;
+  J = equidistant_jacobian(direction, r, z, 1., d, equidistant_slope(k, theta * theta));
+  return true;
+}
+
+/// The same. Newton's method on the distortion, from the distorted point; half a step where it
+/// would leave what is not folded.
+bool undistort_radtan(const CameraView& camera, const Eigen::Vector2d& target, Eigen::Vector3d& ray,
+                      Eigen::Matrix<double, 2, 3>& J_ray) {
+  Eigen::Vector2d point = target, step = -target, distorted;
+  Eigen::Matrix2d J;
+  const auto is_found = [&] {
+    const double n = std::sqrt(1. + point.squaredNorm());
+    ray << point / n, 1. / n;
+    J_ray.leftCols<2>() = n * J;
+    J_ray.col(2) = -n * (J * point);
+    return true;
+  };
+  for (int i = 0; i < 50; ++i) {
+    if (!distort_radtan(camera, point.x(), point.y(), distorted, J)) {
+      step *= 0.5;
+      point += step;
+      continue;
+    }
+    const Eigen::Vector2d residual = distorted - target;
+    const double determinant = J.determinant();
+    if (!(std::abs(determinant) > 1e-12)) return false;
+    Eigen::Matrix2d inverse;
+    inverse << J(1, 1), -J(0, 1), -J(1, 0), J(0, 0);
+    step = inverse * residual / determinant;
+    point -= step;
+    if (step.squaredNorm() < kStepTolerance * kStepTolerance) return is_found();
+  }
+  return distorted.isApprox(target, 1e-9) && is_found();
 }
 
 Eigen::Vector2d to_pixels(const CameraView& camera, const Eigen::Vector2d& xy) {
@@ -162,57 +245,19 @@ bool project(const CameraView& camera, const Eigen::Vector3d& p_C, Eigen::Vector
   return true;
 }
 
-std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::Vector2d& uv) {
-  const Eigen::Vector2d target =
-      (uv - camera.intrinsics.segment<2>(2)).cwiseQuotient(camera.intrinsics.head<2>());
+std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::Vector2d& uv,
+                                         PixelJacobian* J_ray) {
+  const Eigen::Vector2d focal = camera.intrinsics.head<2>();
+  const Eigen::Vector2d target = (uv - camera.intrinsics.segment<2>(2)).cwiseQuotient(focal);
   if (!target.allFinite()) return std::nullopt;
-  if (camera.distortion == CameraDistortion::kEquidistant) {
-    const double d = target.norm();
-    if (d < 1e-12) return Eigen::Vector3d(target.x(), target.y(), 1.).normalized();
-    const Eigen::Vector4d k = camera.intrinsics.tail<4>();
-    double theta = d, step = -d;  // half a step where it would leave what is not folded
-    double not_folded = 0.;       // up to there
-    const auto is_allowed = [&] {
-      if (theta >= 0. && theta <= not_folded) return true;
-      if (!is_before_fold(k, theta)) return false;
-      not_folded = theta;
-      return true;
-    };
-    for (int i = 0; i < 60; ++i) {
-      if (!is_allowed()) {
-        step *= 0.5;
-        theta += step;
-        continue;
-      }
-      const double t2 = theta * theta;
-      step = (theta * equidistant_part(k, t2) - d) / equidistant_slope(k, t2);
-      theta -= step;
-      if (std::abs(step) < kStepTolerance) break;
-    }
-    if (!is_allowed() || std::abs(step) > kStepTolerance) return std::nullopt;
-    const double s = std::sin(theta) / d;
-    return Eigen::Vector3d(s * target.x(), s * target.y(), std::cos(theta));
-  }
-  // Newton's method on the distortion, from the distorted point; half a step where it would leave
-  // what is not folded.
-  Eigen::Vector2d point = target, step = -target, distorted;
-  Eigen::Matrix2d J;
-  for (int i = 0; i < 50; ++i) {
-    if (!distort_radtan(camera, point.x(), point.y(), distorted, J)) {
-      step *= 0.5;
-      point += step;
-      continue;
-    }
-    const Eigen::Vector2d residual = distorted - target;
-    const double determinant = J.determinant();
-    if (!(std::abs(determinant) > 1e-12)) return std::nullopt;
-    Eigen::Matrix2d inverse;
-    inverse << J(1, 1), -J(0, 1), -J(1, 0), J(0, 0);
-    step = inverse * residual / determinant;
-    point -= step;
-    if (step.squaredNorm() < kStepTolerance * kStepTolerance) return direction_of(point);
-  }
-  return distorted.isApprox(target, 1e-9) ? std::optional(direction_of(point)) : std::nullopt;
+  Eigen::Vector3d ray;
+  Eigen::Matrix<double, 2, 3> J;
+  const bool is_seen = camera.distortion == CameraDistortion::kEquidistant
+                           ? undistort_equidistant(camera, target, ray, J)
+                           : undistort_radtan(camera, target, ray, J);
+  if (!is_seen) return std::nullopt;
+  if (J_ray != nullptr) *J_ray = focal.asDiagonal() * J;
+  return ray;
 }
 
 }  // namespace viwo

@@ -141,10 +141,13 @@ TEST(CameraModel, UnprojectLeadsBackToTheDirection) {
       const Eigen::Vector3d p_C = point_at(uniform(random, 0., c.max_angle), random);
       Eigen::Vector2d uv;
       ASSERT_TRUE(project(c.camera, p_C, uv));
-      const auto direction = unproject(c.camera, uv);
+      PixelJacobian J_ray, J;
+      const auto direction = unproject(c.camera, uv, &J_ray);
       ASSERT_TRUE(direction.has_value());
       EXPECT_NEAR(direction->norm(), 1., 1e-12);
       EXPECT_LT((*direction - p_C.normalized()).norm(), 1e-10);
+      ASSERT_TRUE(project(c.camera, *direction, uv, J));
+      EXPECT_LT((J_ray - J).norm(), 1e-6 * J.norm());
     }
     EXPECT_EQ(unproject(c.camera, c.camera.intrinsics.segment<2>(2)), Eigen::Vector3d::UnitZ());
   }

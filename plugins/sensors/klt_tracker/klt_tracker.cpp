@@ -23,6 +23,8 @@ constexpr double kContradictingShare = 0.7;
 /// Pairs in a row that contradict the extrinsics before it is said.
 constexpr int kContradictingPairs = 10;
 constexpr double kMinBaseline = 1e-3;  // m
+/// Cameras that share less of what they see are no pair.
+constexpr double kLeastShared = 0.5;
 /// Images of two cameras that come without a pair before it is said.
 constexpr int kGroupsWithoutPair = 10;
 /// Images of another size in a row that are not a slip of the log any more.
@@ -30,6 +32,12 @@ constexpr int kOtherSizes = 10;
 
 std::string size_text(int width_px, int height_px) {
   return std::to_string(width_px) + " x " + std::to_string(height_px) + " pixels";
+}
+
+/// Whether the camera is the right one of a pair.
+bool is_right(const Params& params, const std::vector<CameraView>& cameras, std::size_t camera) {
+  return params.stereo && camera % 2 == 1 &&
+         shared_view(cameras[camera - 1], cameras[camera]) >= kLeastShared;
 }
 
 std::vector<CameraView> read_cameras(const Params& params) {
@@ -41,7 +49,8 @@ std::vector<CameraView> read_cameras(const Params& params) {
                      "there are only " + std::to_string(cameras.size()) + " cameras in " + file);
   }
   cameras.resize(asked > 0 ? asked : std::min<std::size_t>(cameras.size(), kMaxCameras));
-  for (std::size_t i = 1; params.stereo && i < cameras.size(); i += 2) {
+  for (std::size_t i = 1; i < cameras.size(); i += 2) {
+    if (!is_right(params, cameras, i)) continue;
     const std::string names = "cam" + std::to_string(i - 1) + " and cam" + std::to_string(i);
     const CameraView &left = cameras[i - 1], &right = cameras[i];
     // Of the first rows and of the last ones.
@@ -91,11 +100,16 @@ KltTracker::KltTracker(const Params& params, const HostServices& services)
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     Eye& eye = eyes_.emplace_back(options_);
     const cv::Mat mask = read_mask(params, i, cameras_[i]);
-    if (params.stereo && i % 2 == 1) {
+    if (is_right(params, cameras_, i)) {
       eye.matcher.emplace(cameras_[i - 1], cameras_[i], options_, mask);
     } else {
       eye.tracker.emplace(cameras_[i], options_, mask, camera_seed(services.seed, i));
       followed_.push_back(i);
+      if (params.stereo && i % 2 == 1) {
+        services_.log(LogLevel::kInfo, "cameras " + std::to_string(i - 1) + " and " +
+                                           std::to_string(i) + " see too little of the same by " +
+                                           chain_file_ + ": each has points of its own");
+      }
     }
   }
   groups_.emplace(static_cast<int>(cameras_.size()), to_ns(max_camera_dt_s_));
@@ -193,7 +207,23 @@ void KltTracker::give_ids(std::vector<Track>& tracks) {
   }
 }
 
+void KltTracker::watch_matches(const StereoCounts& counts, std::size_t right) {
+  Eye& eye = eyes_[right];
+  const std::size_t points = eyes_[right - 1].tracker->tracks().size();
+  const bool are_few = points >= 2 * kMinMatches && counts.found < kMinMatches;
+  eye.pairs_without_matches = are_few ? eye.pairs_without_matches + 1 : 0;
+  if (eye.pairs_without_matches != kContradictingPairs || eye.told_no_matches) return;
+  eye.told_no_matches = true;
+  services_.log(LogLevel::kWarning,
+                std::to_string(counts.found) + " of the " + std::to_string(points) +
+                    " points of camera " + std::to_string(right - 1) + " are found in camera " +
+                    std::to_string(right) + ", which by " + chain_file_ +
+                    " sees the same: is the calibration that of other cameras, or the second "
+                    "covered? Without stereo=false it gives nothing else");
+}
+
 void KltTracker::watch_stereo(const StereoCounts& counts, std::size_t right, std::int64_t t_ns) {
+  watch_matches(counts, right);
   if (counts.found < kMinMatches) return;
   Eye& eye = eyes_[right];
   const double share =

@@ -50,6 +50,8 @@ class KltTracker final : public Sensor {
     std::optional<StereoMatcher> matcher;
     int contradicting_pairs = 0;  ///< in a row
     bool told_contradiction = false;
+    int pairs_without_matches = 0;  ///< in a row
+    bool told_no_matches = false;
     int groups_without_pair = 0;  ///< before the first pair
     bool pair_seen = false;
   };
@@ -66,6 +68,8 @@ class KltTracker final : public Sensor {
   /// The points of one camera; those of the right one of a pair are looked for now.
   FeatureSample points_of(std::size_t camera, const ImageGroup& group);
   void watch_stereo(const StereoCounts& counts, std::size_t right, std::int64_t t_ns);
+  /// Warns when hardly a point of the left camera is found in the right one.
+  void watch_matches(const StereoCounts& counts, std::size_t right);
   /// Warns when left and right images do not come together.
   void watch_pair(const ImageGroup& group, std::size_t right);
   void process(const ImageGroup& group);

@@ -31,8 +31,10 @@ struct Params : TrackerOptions {
        .max = kMaxCameras,
        .help = "use images of the first n cameras; 0: all of the chain, at most four"});
     b(VIWO_PARAM(stereo),
-      {.help = "cameras 0 and 1 are a pair, and so are 2 and 3: points of the first are looked for "
-               "in the second, under the same id; otherwise each camera has its own points"});
+      {.help =
+           "cameras 0 and 1 are a pair, and so are 2 and 3, if they see the same: points of the "
+           "first are looked for in the second, under the same id; otherwise each camera has "
+           "its own points"});
     b(VIWO_PARAM(max_camera_dt_s),
       {.unit = "s",
        .min = 0.,

@@ -11,6 +11,24 @@
 
 namespace viwo::klt {
 
+double shared_view(const CameraView& left, const CameraView& right) {
+  constexpr int kSteps = 16;
+  const Eigen::Matrix3d R_LtoR = right.R_ItoC * left.R_ItoC.transpose();
+  int seen = 0, shared = 0;
+  for (int v = 0; v < kSteps; ++v) {
+    for (int u = 0; u < kSteps; ++u) {
+      const Eigen::Vector2d size(left.width_px - 1., left.height_px - 1.);
+      const auto ray =
+          unproject(left, size.cwiseProduct(Eigen::Vector2d(u + 0.5, v + 0.5)) / kSteps);
+      if (!ray) continue;
+      ++seen;
+      Eigen::Vector2d uv;
+      if (project(right, R_LtoR * *ray, uv) && in_image(right, uv)) ++shared;
+    }
+  }
+  return seen > 0 ? static_cast<double>(shared) / seen : 0.;
+}
+
 StereoMatcher::StereoMatcher(const CameraView& left, const CameraView& right,
                              const TrackerOptions& options, cv::Mat mask)
     : options_(options),

@@ -25,6 +25,9 @@ struct StereoCounts {
   std::size_t contradicting = 0;
 };
 
+/// Part of what `left` sees far away that is in the image of `right`, too, 0 .. 1.
+double shared_view(const CameraView& left, const CameraView& right);
+
 class StereoMatcher {
  public:
   /// `mask` of the right camera, may be empty.

@@ -1,5 +1,6 @@
 // What the tracker makes of images that are broken, missing, dark, late or of another camera.
 #include <algorithm>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -237,6 +238,20 @@ TEST(KltTracker, WarnsOnceWhenTheCamerasAreSwapped) {
     EXPECT_EQ(told.rejections[0].count, 13);
     EXPECT_LT(told.samples.back().points.size(), 60U);
   }
+}
+
+TEST(KltTracker, WarnsOnceWhenTheSecondCameraSeesNothingOfTheFirst) {
+  std::mt19937 random(1);
+  std::vector<Measurement> input;
+  for (int i = 0; i < 12; ++i) {
+    Image noise = rig().render(i, 1);
+    for (std::uint8_t& pixel : noise.pixels) pixel = static_cast<std::uint8_t>(random());
+    input.emplace_back(sample_of(rig().render(i, 0), 0, stamp_of(i)));
+    input.emplace_back(sample_of(std::move(noise), 1, stamp_of(i)));
+  }
+  const Told told = told_of(input);
+  ASSERT_EQ(told.warnings.size(), 1U);
+  EXPECT_THAT(told.warnings[0], HasSubstr("points of camera 0 are found in camera 1, which by "));
 }
 
 TEST(KltTracker, WarnsOnceWhenLeftAndRightDoNotComeTogether) {

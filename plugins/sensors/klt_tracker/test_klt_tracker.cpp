@@ -12,6 +12,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "camera_tracker.hpp"
+#include "stereo_matcher.hpp"
 #include "test_drive.hpp"
 
 namespace viwo::klt {
@@ -111,6 +112,17 @@ TEST(KltTracker, GivesEachCameraItsOwnPointsWithoutStereo) {
     EXPECT_GT(played.samples[i + 1].points.size(), 185U);
   }
   EXPECT_GT(common(played.samples[1], played.samples[7]), 150U);
+}
+
+TEST(SharedView, IsWhatBothCamerasSeeFarAway) {
+  const CameraView left = rig().cameras[0];
+  EXPECT_GT(shared_view(left, rig().cameras[1]), 0.85);
+  EXPECT_EQ(shared_view(left, left), 1.);
+  CameraView turned = left;
+  turned.R_ItoC = exp_so3(Eigen::Vector3d(0., M_PI, 0.)) * left.R_ItoC;
+  EXPECT_LT(shared_view(left, turned), 0.4);  // the corners see more than a hemisphere
+  turned.R_ItoC = exp_so3(Eigen::Vector3d(0., M_PI / 2., 0.)) * left.R_ItoC;
+  EXPECT_NEAR(shared_view(left, turned), 0.5, 0.15);  // they see 170 degrees
 }
 
 TEST(KltTracker, FollowsTwoPairsAsItFollowsEachOfThem) {

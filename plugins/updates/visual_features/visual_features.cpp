@@ -180,9 +180,8 @@ void VisualFeatures::take_image(const FeatureSample& sample) {
   for (const FeaturePoint& point : sample.points) {
     Observation seen;
     seen.uv << point.u_px, point.v_px;
-    const auto ray = unproject(camera, seen.uv);
-    Eigen::Vector2d uv;
-    if (!ray || !ray->allFinite() || !project(camera, *ray, uv, seen.J_ray)) {
+    const auto ray = unproject(camera, seen.uv, &seen.J_ray);
+    if (!ray || !ray->allFinite()) {
       reject(kBadPixel, point.id);
       continue;
     }

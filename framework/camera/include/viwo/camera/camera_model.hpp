@@ -22,8 +22,10 @@ bool project(const CameraView& camera, const Eigen::Vector3d& p_C, Eigen::Vector
 bool project(const CameraView& camera, const Eigen::Vector3d& p_C, Eigen::Vector2d& uv,
              PixelJacobian& J_point, IntrinsicsJacobian* J_intrinsics = nullptr);
 
-/// Unit vector in C towards what is seen at a pixel. Nothing when no direction projects there.
-std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::Vector2d& uv);
+/// Unit vector in C towards what is seen at a pixel, and the derivative of the pixel by a point
+/// there. Nothing when no direction projects to it.
+std::optional<Eigen::Vector3d> unproject(const CameraView& camera, const Eigen::Vector2d& uv,
+                                         PixelJacobian* J_ray = nullptr);
 
 /// Inside of the image.
 inline bool in_image(const CameraView& camera, const Eigen::Vector2d& uv) {
