@@ -270,6 +270,31 @@ SegmentParts segment_parts(const eval::Accuracy& accuracy) {
 
 }  // namespace
 
+namespace {
+
+/// Updates that were given measurements and could use none of them; a doubt where no other could.
+void doubt_useless(RunResult& result) {
+  const auto is_used = [](const UpdateTrack& update) { return update.total.applied > 0; };
+  const bool is_alone = std::ranges::none_of(result.updates, is_used);
+  for (const UpdateTrack& update : result.updates) {
+    if (is_used(update)) continue;
+    const RejectionCount* most = nullptr;
+    for (const auto& [sensor, rejection] : result.rejections) {
+      if (!rejection.reason.starts_with(update.name + ": ")) continue;
+      if (rejection.count < (most == nullptr ? kFewestCounted : most->count)) continue;
+      most = &rejection;
+    }
+    if (most == nullptr) continue;
+    (is_alone ? result.doubts : result.warnings)
+        .push_back("nothing of what " + update.name + " was given could be used; " +
+                   std::to_string(most->count) + " x " +
+                   most->reason.substr(update.name.size() + 2) +
+                   (is_alone ? ": the estimate is that of the IMU alone" : ""));
+  }
+}
+
+}  // namespace
+
 void doubt(RunResult& result) {
   const bool is_done = result.status == RunStatus::kOk;
   SegmentParts parts;
@@ -286,6 +311,7 @@ void doubt(RunResult& result) {
     result.doubts.push_back("update '" + update.name +
                             "' was disabled: what it measures is missing from there on");
   }
+  doubt_useless(result);
   const PreintegratedPose& wheels = result.total;
   if (result.updates.empty() && 2 * wheels.rejected > wheels.samples) {
     result.doubts.push_back(std::to_string(wheels.rejected) + " of " +

@@ -31,6 +31,37 @@ TEST(Warnings, OfSamplesAreDoubtsWhereTheFilterHasFoundTheSame) {
   EXPECT_THAT(doubts_with(50., 1000), ElementsAre("imu0: turned"));
 }
 
+TEST(Warnings, OfUpdatesThatCouldUseNothingAreDoubtsWhereNoOtherCould) {
+  RunResult result;
+  result.status = RunStatus::kOk;
+  result.updates.resize(2);
+  result.updates[0].name = "visual_features";
+  result.updates[1].name = "zero_velocity";  // was given nothing
+  const auto reject = [&](const char* reason, std::int64_t count) {
+    RejectionCount rejection;
+    rejection.reason = reason;
+    rejection.count = count;
+    result.rejections.emplace_back("estimator", rejection);
+  };
+  reject("visual_features: track with too little parallax (max_condition)", 500);
+  reject("visual_features: track beyond max_features", 30);
+  RunResult with_other = result;
+  doubt(result);
+  EXPECT_EQ(result.warnings.size(), 0U);
+  ASSERT_EQ(result.doubts.size(), 1U);
+  EXPECT_EQ(result.doubts[0],
+            "nothing of what visual_features was given could be used; 500 x track with too little "
+            "parallax (max_condition): the estimate is that of the IMU alone");
+  with_other.updates[1].total.applied = 3;
+  RunResult used = with_other;
+  doubt(with_other);
+  EXPECT_EQ(with_other.doubts.size(), 0U);
+  ASSERT_EQ(with_other.warnings.size(), 1U);
+  used.updates[0].total.applied = 1;
+  doubt(used);
+  EXPECT_TRUE(used.doubts.empty() && used.warnings.empty());
+}
+
 TEST(Warnings, OfCalibrationFarFromItsPriorAreDoubtsWhereANoiseIsFarOffToo) {
   RunResult result;
   result.calibration = {{"r_1", "m", {0.1, 0.16}, {0.01, 0.01}},

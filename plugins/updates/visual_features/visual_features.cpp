@@ -30,6 +30,8 @@ constexpr const char* kStray = "observation left out: the others of its track se
 constexpr std::size_t kReasons = 13;
 /// In an epoch: their covariance is worked out, which most others do not need.
 constexpr int kTracksThatTellNoise = 2;
+/// Times as many tracks are tried in an epoch as may be used: what a try costs is bounded, too.
+constexpr std::size_t kTries = 3;
 constexpr int kMotionDof = 3;  ///< of a velocity
 
 const char* reason_of(FeatureStatus status) {
@@ -143,11 +145,15 @@ void VisualFeatures::update(const FilterView& filter, const EpochData& data, Fac
   for (const FeatureSample& sample : data.samples<FeatureSample>(images_)) take_image(sample);
   window_.set_poses();
   select(filter);
-  const std::size_t n_used =
-      std::min(candidates_.size(), static_cast<std::size_t>(params_.max_features));
-  for (std::size_t i = 0; i < n_used; ++i) use(candidates_[i], sink);
+  // Tracks that have no point yet come again and again: they must not take the place of others.
+  const auto most = static_cast<std::size_t>(params_.max_features);
+  std::size_t n_tried = 0;
+  for (std::size_t used = 0; used < most && n_tried < std::min(candidates_.size(), kTries * most);
+       ++n_tried) {
+    if (use(candidates_[n_tried], sink)) ++used;
+  }
   // A track that loses only its oldest observation waits: that goes with the clone.
-  for (std::size_t i = n_used; i < candidates_.size(); ++i) {
+  for (std::size_t i = n_tried; i < candidates_.size(); ++i) {
     reject(kTooMany, candidates_[i].id);
     if (candidates_[i].lost) tracks_.remove(candidates_[i].track);
   }
@@ -273,11 +279,12 @@ FeatureStatus VisualFeatures::try_feature(bool& passes) {
   return status;
 }
 
-void VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
+bool VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
   // A track that could not be triangulated goes on if it is still seen: it may gain parallax.
   const auto refuse = [&](const char* reason) {
     reject(reason, candidate.id);
     if (candidate.lost) tracks_.remove(candidate.track);
+    return false;
   };
   if (feature_.collect(tracks_, candidate.track, window_) < params_.min_observations) {
     return refuse(kShort);
@@ -298,7 +305,9 @@ void VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
   ++tried_;
   if (passes) {
     // A landmark takes the track as it is, strays and all.
-    if (strays == 0 && landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) return;
+    if (strays == 0 && landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) {
+      return true;
+    }
     equations_.add(feature_, window_, factor(sink));
     sink.count(1, 0);
   } else {
@@ -306,6 +315,7 @@ void VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
     sink.count(0, 1);
   }
   tracks_.remove(candidate.track);
+  return true;
 }
 
 }  // namespace viwo::visual

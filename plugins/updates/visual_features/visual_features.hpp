@@ -55,7 +55,8 @@ class VisualFeatures final : public Update {
   void take_image(const FeatureSample& sample);
   /// Fills candidates_, best first; drops lost tracks that are too short.
   void select(const FilterView& filter);
-  void use(const Candidate& candidate, FactorSink& sink);
+  /// Whether it had a point, and was taken or left to the gate.
+  bool use(const Candidate& candidate, FactorSink& sink);
   bool passes_gate();
   void tell_noise();
   /// Of the gate.

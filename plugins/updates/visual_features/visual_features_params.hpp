@@ -28,7 +28,8 @@ struct Params {
     b(VIWO_PARAM(max_features),
       {.min = 1.,
        .max = 100000.,
-       .help = "most tracks that are tried in one epoch; the longest come first"});
+       .help = "most tracks with a point that are taken in one epoch, of three times as many that "
+               "are tried; the longest come first"});
     b(VIWO_PARAM(gate_probability),
       {.min = 0.,
        .max = 0.999,
