@@ -87,7 +87,7 @@ def content(file):
         return file.read_text(encoding="utf-8").endswith("</html>\n")
     if file.suffix == ".avi":  # OpenCV takes another of its writers where one fails
         video = file.read_bytes()
-        return int.from_bytes(video[4:8], "little") == len(video) - 8 and b"idx1" in video
+        return b"idx1" in video, video.count(b"00dc") // 2  # pictures: they and the index have it
     if "_time_of_" in file.name:  # figures of times
         return file.read_text(encoding="utf-8").endswith(("\n", "</svg>\n"))
     return file.read_bytes()
@@ -313,7 +313,7 @@ class FailingCalls(unittest.TestCase):
                     self.assert_same(out, self.out / "whole" / "out", where)  # nothing was there to go
                 else:
                     self.assertEqual(done.returncode, 1, where + done.stdout + done.stderr)
-                    self.assertIn(REASONS["disk"], done.stderr, where)
+                    self.assertRegex(done.stderr, REASONS["disk"], where)
                 self.assert_whole_but_for_unfinished(out, where)
                 then(subject, out, where)
                 shutil.rmtree(out.parent, ignore_errors=True)
