@@ -133,41 +133,58 @@ nlohmann::json wheels_json(const RunSetup& setup, const PreintegratedPose& total
           {"path_length_m", total.path_length_m}};
 }
 
-}  // namespace
-
-nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
-  using nlohmann::json;
-  json accuracy = json::object();
+nlohmann::json accuracy_json(const RunSetup& setup, const RunResult& result) {
+  nlohmann::json accuracy = nlohmann::json::object();
   if (result.accuracy) accuracy = eval::to_json(*result.accuracy);
-  if (!setup.filter && result.accuracy)
+  if (!setup.filter && result.accuracy) {
     accuracy["nees_planar"] = number_or_null(result.nees_planar);
+  }
   accuracy["nees_pose"] = number_or_null(result.nees.pose);
   accuracy["nees_position"] = number_or_null(result.nees.position);
   accuracy["nees_orientation"] = number_or_null(result.nees.orientation);
   accuracy["nees_relative"] = number_or_null(result.nees.relative);
-  json metrics = json::object();
-  for (const Metric& metric : metrics_over(segment_lengths_m(result))) {
-    metrics[metric.key] = number_or_null(metric.of(result));
-  }
-  json rejected = json::object();
+  return accuracy;
+}
+
+nlohmann::json rejected_json(const RunResult& result) {
+  nlohmann::json rejected = nlohmann::json::object();
   for (const auto& [source, rejection] : result.rejections) {
     rejected[source].push_back(
         {{"reason", rejection.reason}, {"count", rejection.count}, {"first", rejection.first}});
   }
-  json noises = json::object();
+  return rejected;
+}
+
+nlohmann::json noises_json(const RunResult& result) {
+  nlohmann::json noises = nlohmann::json::object();
   for (const NoiseFound& noise : result.noises) {
     noises[noise.name] = {{"unit", noise.unit},
                           {"configured", noise.configured},
                           {"found", noise.found},
                           {"count", noise.count}};
   }
-  json updates = json::object();
+  return noises;
+}
+
+nlohmann::json updates_json(const RunResult& result) {
+  nlohmann::json updates = nlohmann::json::object();
   for (const UpdateTrack& update : result.updates) {
     updates[update.name] = {{"applied", update.total.applied},
                             {"rejected", update.total.rejected},
                             {"failed", update.failures.count},
                             {"disabled", update.failures.disabled}};
     if (update.failures.count > 0) updates[update.name]["cause"] = update.failures.cause;
+  }
+  return updates;
+}
+
+}  // namespace
+
+nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
+  using nlohmann::json;
+  json metrics = json::object();
+  for (const Metric& metric : metrics_over(segment_lengths_m(result))) {
+    metrics[metric.key] = number_or_null(metric.of(result));
   }
   json timing = json::object();
   for (const auto& [stage, time] : result.stages) timing[stage] = stage_json(time);
@@ -178,18 +195,18 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
       {"cause", result.cause},
       {"doubts", result.doubts},
       {"warnings", result.warnings},
-      {"noises", noises},
+      {"noises", noises_json(result)},
       {"name", setup.name},
       {"seed", setup.seed},
       {"epochs", result.epochs},
       {"duration_s", result.duration_s},
       {"wall_s", result.wall_s},
       {"pieces", pieces_json(result.pieces)},
-      {"accuracy", accuracy},
+      {"accuracy", accuracy_json(setup, result)},
       {"metrics", metrics},
       {"calibration", calibration_json(result)},
-      {"updates", updates},
-      {"rejected_measurements", rejected},
+      {"updates", updates_json(result)},
+      {"rejected_measurements", rejected_json(result)},
       {"timing_ms", timing},
       {"realtime_factor",
        number_or_null(result.wall_s > 0. ? result.duration_s / result.wall_s : std::nan(""))},

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 
 #include <Eigen/Dense>
@@ -152,6 +153,31 @@ void look_at_samples(const RunSetup& setup, const RunData& data, RunResult& resu
   }
 }
 
+/// Integrates the wheels over the next epoch; false with the cause where that is no pose.
+bool add_epoch(Preintegrator& preintegrator, std::span<const EncoderSample> wheels,
+               std::span<const std::int64_t> stamps, std::size_t k, PreintegratedPose& interval,
+               RunResult& result) {
+  const auto clock_begin = std::chrono::steady_clock::now();
+  const std::string epoch = std::to_string(k);
+  try {
+    preintegrator.integrate(wheels, stamps[k - 1], stamps[k], interval);
+  } catch (const PluginFailure& failure) {
+    result.status = RunStatus::kFailed;
+    result.cause = std::string(failure.what()) + " (epoch " + epoch + ")";
+    return false;
+  }
+  append(result.total, interval);
+  const std::chrono::duration<double, std::milli> spent =
+      std::chrono::steady_clock::now() - clock_begin;
+  const double t_s = seconds_between(stamps.front(), stamps[k]);
+  result.epoch_ms.emplace_back(t_s, spent.count());
+  ++result.epochs;
+  if (result.total.g.allFinite() && result.total.P_g.allFinite()) return true;
+  result.status = RunStatus::kDiverged;
+  result.cause = "the pose is not finite after epoch " + epoch + " (" + std::to_string(t_s) + " s)";
+  return false;
+}
+
 }  // namespace
 
 RunResult run_odometry(const RunSetup& setup, const RunData& data) {
@@ -180,26 +206,7 @@ RunResult run_odometry(const RunSetup& setup, const RunData& data) {
   result.estimate.push_back(stamped(stamps.front() + offset_ns, B_start));
   const auto wall_begin = std::chrono::steady_clock::now();
   for (std::size_t k = 1; k < stamps.size() && result.status == RunStatus::kOk; ++k) {
-    const auto epoch_begin = std::chrono::steady_clock::now();
-    try {
-      preintegrator.integrate(wheels, stamps[k - 1], stamps[k], interval);
-    } catch (const PluginFailure& failure) {
-      result.status = RunStatus::kFailed;
-      result.cause = std::string(failure.what()) + " (epoch " + std::to_string(k) + ")";
-      break;
-    }
-    append(result.total, interval);
-    const std::chrono::duration<double, std::milli> spent =
-        std::chrono::steady_clock::now() - epoch_begin;
-    const double t_s = seconds_between(stamps.front(), stamps[k]);
-    result.epoch_ms.emplace_back(t_s, spent.count());
-    ++result.epochs;
-    if (!result.total.g.allFinite() || !result.total.P_g.allFinite()) {
-      result.status = RunStatus::kDiverged;
-      result.cause = "the pose is not finite after epoch " + std::to_string(k) + " (" +
-                     std::to_string(t_s) + " s)";
-      break;
-    }
+    if (!add_epoch(preintegrator, wheels, stamps, k, interval, result)) break;
     const Eigen::Vector3d O_now = compose(O_start, result.total.g);
     result.estimate.push_back(stamped(stamps[k] + offset_ns, compose(O_now, B_in_O)));
     if (const auto truth = reference_at(stamps[k]); truth && start) {
