@@ -36,6 +36,8 @@ kinematics:
 DRIVES = [f'drive_{i}' for i in range(1, 5)]
 STEERS = [f'steer_{i}' for i in range(1, 5)]
 JOINTS = f'drive_joints: [{", ".join(DRIVES)}], steer_joints: [{", ".join(STEERS)}]'
+HEADS = {'imu.csv': 't,wx,wy,wz,ax,ay,az', 'features.csv': 't,cam_id,feat_id,u,v',
+         'groundtruth.csv': 't,qx,qy,qz,qw,px,py,pz,vx,vy,vz,bgx,bgy,bgz,bax,bay,baz'}
 # What stands in text where a number was.
 NUMBERS = [b'9223372036854775807', b'-9223372036854775808', b'1e308', b'-1e400', b'nan', b'inf',
            b'0', b'-1', b'', b'1' * 400, b'4294967296', b'0.1e-320', b'"', b'\xff', b'[' * 50]
@@ -128,6 +130,72 @@ def kalibr(inputs):
     return ([inputs.viwo, 'run', inputs.source / 'configs/runs/viwo_log.yaml', '--set',
              f'placeholders.log={inputs.log}', '--set', f'cameras.kalibr={file}', '--out',
              inputs.work / 'out/kalibr'], [file])
+
+
+def vio_csv(inputs):
+    """IMU, features and states in the tables of other simulators, noises in Kalibr's file."""
+    folder = inputs.work / 'vio'
+    folder.mkdir()
+    noises = inputs.work / 'imu.yaml'
+    noises.write_text('rostopic: /imu0\nupdate_rate: 200.0\naccelerometer_noise_density: 2.0e-3\n'
+                      'accelerometer_random_walk: 3.0e-3\ngyroscope_noise_density: 1.7e-4\n'
+                      'gyroscope_random_walk: 2.0e-5\n')
+
+    def table(name, source, columns):
+        rows = [line.split(',') for line in (inputs.log / source).read_text().splitlines()[1:]]
+        text = '\n'.join(','.join([f'{int(row[0]) / 1e9:.9f}'] + [row[i] for i in columns])
+                         for row in rows)
+        (folder / name).write_text(HEADS[name] + '\n' + text + '\n')
+    table('imu.csv', 'imu0/data.csv', range(1, 7))
+    table('features.csv', 'features0/data.csv', range(1, 5))
+    table('groundtruth.csv', 'state_groundtruth_estimate0/data.csv',
+          [5, 6, 7, 4, 1, 2, 3, *range(8, 17)])
+    config = inputs.config('vio_csv', f'''sensors: {{export0: {{type: vio_csv, folder: {folder}}}}}
+cameras: {{kalibr: {inputs.source}/configs/cameras/t265_like.yaml}}
+imu: {{kalibr: {noises}}}
+estimator: {{start: reference}}
+updates: {{visual_features: {{}}}}
+''')
+    return ([inputs.viwo, 'run', config, '--out', inputs.work / 'out/vio_csv'],
+            sorted(folder.glob('*')) + [noises])
+
+
+def kaist_urban(inputs):
+    """A car on a circle: wheels that count, and its poses."""
+    folder = inputs.work / 'kaist'
+    for name in ('sensor_data', 'calibration'):
+        (folder / name).mkdir(parents=True)
+    stamps = [1544581170000000000 + 10_000_000 * k for k in range(500)]
+    (folder / 'sensor_data/encoder.csv').write_text(
+        ''.join(f'{t},{5000 + 40 * k},{7000 + 45 * k}\n' for k, t in enumerate(stamps)))
+    (folder / 'global_pose.csv').write_text(
+        ''.join(f'{t},1,0,0,{k / 50},0,1,0,7,0,0,1,22\n' for k, t in enumerate(stamps)))
+    (folder / 'calibration/EncoderParameter.txt').write_text(
+        'Encoder calibrated parameter\nEncoder resolution: 4096\n'
+        'Encoder left wheel diameter: 0.623479\nEncoder right wheel diameter: 0.622806\n'
+        'Encoder wheel base: 1.52439\n')
+    config = inputs.config('kaist_urban', f'''\
+sensors: {{kaist0: {{type: kaist_urban, path: {folder}, imu: false, images: false}}}}
+kinematics: {{type: differential, radius_left_m: 0.3117, radius_right_m: 0.3114, baseline_m: 1.524}}
+''')
+    return ([inputs.viwo, 'run', config, '--out', inputs.work / 'out/kaist_urban'],
+            sorted(file for file in folder.rglob('*') if file.is_file()))
+
+
+def journal(inputs):
+    """A shard that is started again."""
+    config = inputs.work / 'experiment.yaml'
+    config.write_text(f'''\
+experiment: journal
+base: {inputs.source}/configs/runs/simulated_swerve.yaml
+set: {{sensors.simulator0.duration_s: 2}}
+seeds: 4
+variants: {{one: {{}}}}
+''')
+    out = inputs.work / 'out/journal'
+    command = [inputs.viwo, 'experiment', config, '--shard', '0/2', '--out', out]
+    run(command, stderr=subprocess.DEVNULL)
+    return command, sorted((out / 'journal').glob('*.cbor'))
 
 
 def tum(inputs):
@@ -250,8 +318,9 @@ def plugin(inputs):
     return [inputs.viwo, 'plugins', 'check', file], [file]
 
 
-FORMATS = {f.__name__: f for f in (asl, gz, csv_table, ros_text, kalibr, tum, ros1, mcap, sqlite,
-                                   wpilog, png, calibration, plugin)}
+FORMATS = {f.__name__: f for f in (asl, gz, csv_table, ros_text, vio_csv, kaist_urban, kalibr,
+                                   tum, ros1, mcap, sqlite, wpilog, png, calibration, journal,
+                                   plugin)}
 
 
 def mutated(whole, rng):
@@ -310,7 +379,7 @@ def observe(command, errors_file):
 def try_format(name, inputs, count):
     made = FORMATS[name](inputs)
     if made is None:
-        print(f'{name:10} left out: its programs are not built')
+        print(f'{name:11} left out: its programs are not built')
         return []
     command, files = made
     errors = inputs.work / f'{name}.stderr'
@@ -333,7 +402,7 @@ def try_format(name, inputs, count):
             failures.append(f'{name} {seed}: exit {code}, {mb:.0f} MB, {cpu_s:.1f} s: {kept}')
         file.write_bytes(whole[file])
     said = ', '.join(f'{code}: {n}' for code, n in sorted(codes.items()))
-    print(f'{name:10} {count} mutations; exit codes {said}; at most {most_mb:.0f} MB, '
+    print(f'{name:11} {count} mutations; exit codes {said}; at most {most_mb:.0f} MB, '
           f'{most_s:.1f} s of CPU', flush=True)
     return failures
 
@@ -346,7 +415,7 @@ def main():
     parser.add_argument('--count', type=int, default=200)
     parser.add_argument('--formats', default=','.join(FORMATS))
     arguments = parser.parse_args()
-    inputs = Inputs(arguments.bin, arguments.source, arguments.work)
+    inputs = Inputs(*(path.resolve() for path in (arguments.bin, arguments.source, arguments.work)))
     failures = []
     for name in arguments.formats.split(','):
         failures += try_format(name, inputs, arguments.count)
