@@ -196,7 +196,7 @@ TEST_F(ImagesTest, CanBeDarkForFiveSecondsWhileWheelsAndImuGoOn) {
   expect_done(words);
   const auto accuracy = summary("out").at("accuracy");
   EXPECT_LT(accuracy.at("ate_m"), 0.02);
-  // Of one run; consistency over many is that of the experiment images_dark.yaml.
+  // Of one run.
   EXPECT_LT(accuracy.at("nees_pose"), 16.);
 }
 

@@ -145,8 +145,8 @@ LeftOut leave_out(const std::string& label, const CalibrationSetup& setup,
   }
   for (std::size_t i = 0; i < setup.recordings.size(); ++i) {
     for (const FitOf& one : fits) {
-      if (one.label != label || !one.failed.empty() || !one.leaves_out(setup.recordings[i]))
-        continue;
+      const bool is_it = one.label == label && one.failed.empty();
+      if (!is_it || !one.leaves_out(setup.recordings[i])) continue;
       out.runs.push_back(validate(setup, i, one.estimate));
     }
   }

@@ -270,8 +270,9 @@ std::string describe(const CalibrationResult& result) {
   describe_parameters(result, out);
   if (!result.left_out.empty()) {
     std::string labels;
-    for (const LeftOut& one : result.left_out)
+    for (const LeftOut& one : result.left_out) {
       labels += (labels.empty() ? "a " : " or a ") + one.by;
+    }
     out << (result.setup->leave_out_is_asked
                 ? "sigma: that of the fit, or of how the estimate changes when " + labels +
                       " is left out, if that is larger\n"

@@ -23,8 +23,8 @@ struct Params {
        .above = 0.,
        .help = "noise of a feature, per coordinate of the image as it is (distorted)"});
     b(VIWO_PARAM(find_noise),
-      {.help = "sigma_px is scaled to what the residuals tell, and reported; false: as "
-               "configured"});
+      {.help = "sigma_px is scaled up where the residuals are larger, and what they tell is "
+               "reported; false: as configured"});
     b(VIWO_PARAM(max_features),
       {.min = 1.,
        .max = 100000.,

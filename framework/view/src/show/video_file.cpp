@@ -1,13 +1,16 @@
 #include "video_file.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
+#include <fcntl.h>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/videoio.hpp>
+#include <unistd.h>
 
 #include "canvas.hpp"
 #include "viwo/api/status.hpp"
@@ -63,6 +66,14 @@ bool is_whole(const fs::path& file, std::int64_t pictures) {
   video.set(cv::CAP_PROP_POS_FRAMES, static_cast<double>(pictures - 1));
   cv::Mat last;
   return video.read(last) && !last.empty();
+}
+
+/// What is under the name of a video must be there after a loss of power, too.
+bool sync_to_disk(const fs::path& file) {
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool is_synced = fd >= 0 && (::fsync(fd) == 0 || errno == EINVAL);
+  if (fd >= 0) ::close(fd);
+  return is_synced;
 }
 
 }  // namespace
@@ -148,7 +159,9 @@ void VideoFile::close() {
   if (pictures_ == 0) return;
   if (writer_ == nullptr) start();
   writer_->close();
-  if (failure_.empty() && !is_whole(part_, pictures_)) failure_ = "not all of it was written";
+  if (failure_.empty() && !(is_whole(part_, pictures_) && sync_to_disk(part_))) {
+    failure_ = "not all of it was written";
+  }
   writer_.reset();
   const std::int64_t pictures = std::exchange(pictures_, 0);
   std::error_code error;
