@@ -135,5 +135,25 @@ TEST(WanderingIntrinsics, AreNotTakenForConstantOnes) {
   EXPECT_EQ(faults(runs("icr_sweep", "uneven", wandering, "true_init_calib_on"), {}), "");
 }
 
+// The robot drawn, with the noise that is found.
+TEST(WanderingSteering, IsReckonedWithWhereItAloneWanders) {
+  std::vector<std::string> wandering{"sensors.simulator0.intrinsics_wander=0.25",
+                                     "sensors.simulator0.intrinsics_wander_time_s=2",
+                                     "sensors.simulator0.intrinsics_wander_of=[delta_o]"};
+  EXPECT_NE(faults(runs("icr_sweep", "uneven", wandering), {}), "");
+  wandering.insert(wandering.end(),
+                   {"wheels.intrinsics_wander=0.25", "wheels.intrinsics_wander_time_s=2",
+                    "wheels.intrinsics_wander_of=[delta_o]"});
+  const std::vector<RunResult> known = runs("icr_sweep", "uneven", wandering);
+  EXPECT_EQ(faults(known, {}), "");
+  for (const CalibrationTrack& track : known.front().calibration) {
+    // What does not wander is held.
+    const bool wanders = track.name.find("wander_") != std::string::npos;
+    if (wanders && track.name.find("wander_delta_o") == std::string::npos) {
+      EXPECT_EQ(track.sigma.back(), 0.) << track.name;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace viwo

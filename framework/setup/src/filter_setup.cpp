@@ -228,7 +228,8 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
       set.model = model;
       set.prior.wheels.x_WI = x_WI;
       set.prior.sigma_intrinsics = sigma;
-      read_wheels(*params, std::move(set), error, context, setup, errors);
+      read_wheels(*params, section_or_empty(run, "wheels"), std::move(set), error, context, setup,
+                  errors);
     }
   }
   read_wheel_sets(run, error, context, setup, resolved, errors);

@@ -293,6 +293,7 @@ struct WheelsParams {
   double intrinsics_walk_per_sqrt_s = 0.;
   double intrinsics_wander = 0.;
   double intrinsics_wander_time_s = 2.;
+  std::vector<std::string> intrinsics_wander_of;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(sensor),
@@ -342,6 +343,9 @@ struct WheelsParams {
                "viwo calibrate finds it; 0: nothing"});
     b(VIWO_PARAM(intrinsics_wander_time_s),
       {.unit = "s", .above = 0., .help = "time constant of intrinsics_wander"});
+    b(VIWO_PARAM(intrinsics_wander_of),
+      {.help = "what the names of the intrinsics that wander begin with, radii and steering: "
+               "[r, delta_o]; none: all wander, also distances that do not"});
   }
 };
 

@@ -10,6 +10,7 @@
 #include "viwo/config/suggest.hpp"
 #include "viwo/math/rpy.hpp"
 #include "viwo/math/so3.hpp"
+#include "viwo/sim/encoder_simulator.hpp"
 #include "viwo/wheel/held_gauge.hpp"
 
 namespace viwo {
@@ -101,9 +102,21 @@ void move_prior(const Drawn& drawn, WheelSet& set) {
   prior.sigma_extrinsics = sigmas.tail<6>();
 }
 
+/// What comes and goes of the intrinsics.
+void read_wander(const WheelsParams& p, const Node& section, WheelSet& set, Errors& errors) {
+  try {
+    set.prior.sigma_wander =
+        sim::wander_sigmas(set.model->description(), p.intrinsics_wander, p.intrinsics_wander_of);
+    set.prior.wander_time_s = p.intrinsics_wander_time_s;
+  } catch (const ParamError& error) {
+    errors.add(section.find("intrinsics_wander_of")->mark(),
+               std::string("intrinsics_wander_of: ") + error.what());
+  }
+}
+
 }  // namespace
 
-void read_wheels(const WheelsParams& p, WheelSet set, CalibrationError error,
+void read_wheels(const WheelsParams& p, const Node& section, WheelSet set, CalibrationError error,
                  const ReadContext& context, FilterSetup& setup, Errors& errors) {
   WheelsPrior& prior = set.prior;
   prior.sensor = p.sensor;
@@ -117,14 +130,7 @@ void read_wheels(const WheelsParams& p, WheelSet set, CalibrationError error,
   const Drawn drawn = hold_gauge(p, context.start, set);
   make_wrong(WrongStart(error, context.seed, setup.wheels.size()), drawn, set);
   prior.intrinsics_walk = p.intrinsics_walk_per_sqrt_s;
-  if (const double wander = p.intrinsics_wander; wander > 0. && !context.exact) {
-    prior.sigma_wander.resize(prior.wheels.x_WI.size());
-    for (Eigen::Index i = 0; i < prior.wheels.x_WI.size(); ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      prior.sigma_wander[i] = wander * set.model->description().intrinsics[k].prior_sigma;
-    }
-    prior.wander_time_s = p.intrinsics_wander_time_s;
-  }
+  if (p.intrinsics_wander > 0. && !context.exact) read_wander(p, section, set, errors);
   move_prior(drawn, set);
   if (!p.calibrate_extrinsics) prior.sigma_extrinsics.setZero();
   if (!p.calibrate_time_offset) prior.sigma_time_offset_s = 0.;
@@ -159,8 +165,9 @@ void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext&
     const auto model = context.plugins.make_kinematics(
         *kinematics, model_path, instance_seed(context.seed, "kinematics", model_path), errors);
     Node resolved_wheels;
-    const auto params = read_section<WheelsParams>(section_or_empty(entry.value, "wheels"),
-                                                   path + ".wheels", resolved_wheels, errors);
+    const Node wheels = section_or_empty(entry.value, "wheels");
+    const auto params =
+        read_section<WheelsParams>(wheels, path + ".wheels", resolved_wheels, errors);
     if (!model.object || !params) continue;
     WheelSet set;
     set.prior.name = entry.key;
@@ -173,7 +180,7 @@ void read_wheel_sets(const Node& run, CalibrationError error, const ReadContext&
       context.start->take_intrinsics(entry.key, *set.model, set.info.name, set.prior.wheels.x_WI,
                                      set.prior.sigma_intrinsics, errors);
     }
-    read_wheels(*params, std::move(set), error, context, setup, errors);
+    read_wheels(*params, wheels, std::move(set), error, context, setup, errors);
     Node resolved_set = Node::empty_map();
     resolved_set.set("kinematics", model.resolved);
     resolved_set.set("wheels", resolved_wheels);

@@ -9,10 +9,12 @@
 
 namespace viwo {
 
-/// Appends a wheel set from its section `wheels` to `setup`. `set` has the model and its name;
-/// intrinsics and their sigmas are those of the model, or of the calibration.yaml in `context`.
-void read_wheels(const WheelsParams& p, WheelSet set, CalibrationError error,
-                 const ReadContext& context, FilterSetup& setup, config::Errors& errors);
+/// Appends a wheel set from its `section` `wheels`, read as `p`, to `setup`. `set` has the model
+/// and its name; intrinsics and their sigmas are those of the model, or of the calibration.yaml in
+/// `context`.
+void read_wheels(const WheelsParams& p, const config::Node& section, WheelSet set,
+                 CalibrationError error, const ReadContext& context, FilterSetup& setup,
+                 config::Errors& errors);
 
 /// Further wheel sets: NAME: {kinematics: {...}, wheels: {...}}.
 void read_wheel_sets(const config::Node& run, CalibrationError error, const ReadContext& context,

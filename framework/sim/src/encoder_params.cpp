@@ -11,7 +11,9 @@ EncoderSimulation encoder_simulation_from(const EncoderParams& params,
   out.duration_s = duration_s;
   out.start_ns = start_ns;
   out.noise = noise;
-  out.wander = params.intrinsics_wander;
+  if (params.intrinsics_wander > 0.) {
+    out.sigma_wander = wander_sigmas(robot, params.intrinsics_wander, params.intrinsics_wander_of);
+  }
   out.wander_time_s = params.intrinsics_wander_time_s;
   out.slip.start_s = params.slip_start_s;
   out.slip.duration_s = params.slip_duration_s;

@@ -101,24 +101,20 @@ class Disturbances {
 /// Intrinsics that wander about true ones.
 class Wander {
  public:
-  Wander(const ModelDescription& description, const Intrinsics& truth,
-         const EncoderSimulation& options, std::uint64_t seed)
+  Wander(const Intrinsics& truth, const EncoderSimulation& options, std::uint64_t seed)
       : truth_(truth),
-        sigma_(Intrinsics::Zero(truth.size())),
+        sigma_(options.sigma_wander),
         off_(sigma_),
         x_WI_(truth),
         kept_(std::exp(-1. / (options.rate_hz * options.wander_time_s))),
         random_(seed, Stream::kWander) {
-    if (options.wander <= 0.) return;
-    for (Eigen::Index i = 0; i < truth.size(); ++i) {
-      sigma_[i] = options.wander * description.intrinsics[static_cast<std::size_t>(i)].prior_sigma;
-      off_[i] = sigma_[i] * random_.gaussian();
-    }
+    if (sigma_.size() == 0) return;
+    for (Eigen::Index i = 0; i < truth.size(); ++i) off_[i] = sigma_[i] * random_.gaussian();
     x_WI_ += off_;
   }
 
   void step() {
-    if (sigma_.isZero(0.)) return;
+    if (sigma_.size() == 0) return;
     const double gained = std::sqrt(1. - kept_ * kept_);
     for (Eigen::Index i = 0; i < off_.size(); ++i) {
       off_[i] = kept_ * off_[i] + gained * sigma_[i] * random_.gaussian();
@@ -212,7 +208,7 @@ class Base {
 void EncoderSimulation::make_exact() {
   noise = false;
   slip = {};
-  wander = 0.;
+  sigma_wander.resize(0);
   outlier_probability = 0.;
   drive_resolution_rad_per_s = 0.;
 }
@@ -231,7 +227,7 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
     throw std::invalid_argument("slip: no wheel " + std::to_string(options.slip.wheel));
   }
   Disturbances disturbances(description, options, seed);
-  Wander wander(description, truth, options, seed);
+  Wander wander(truth, options, seed);
   Base base(model, description, wander.x_WI());
   // Wheels stand in the direction of the motion when it starts.
   Twist at_start = twist(std::max(options.time_offset_s, 0.) + 0.05);
@@ -259,6 +255,32 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
   return simulate_encoders(
       model, truth, [&motion](double t_s) { return motion.twist(t_s); }, motion.name(), options,
       seed);
+}
+
+Intrinsics wander_sigmas(const ModelDescription& description, double prior_sigmas,
+                         const std::vector<std::string>& of) {
+  const auto begins = [](const IntrinsicSpec& spec, const std::string& name) {
+    return !name.empty() && std::string_view(spec.name).starts_with(name);
+  };
+  const auto& specs = description.intrinsics;
+  for (const std::string& name : of) {
+    if (std::any_of(specs.begin(), specs.end(), [&](const auto& s) { return begins(s, name); })) {
+      continue;
+    }
+    std::string known;
+    for (const IntrinsicSpec& spec : specs) known += (known.empty() ? "" : ", ") + spec.name;
+    throw ParamError("intrinsics_wander_of",
+                     "no intrinsic of the model begins with '" + name + "' - there are " + known);
+  }
+  Intrinsics sigma = Intrinsics::Zero(static_cast<Eigen::Index>(specs.size()));
+  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
+    const IntrinsicSpec& spec = specs[static_cast<std::size_t>(i)];
+    const bool wanders = of.empty() || std::any_of(of.begin(), of.end(), [&](const auto& name) {
+                           return begins(spec, name);
+                         });
+    if (wanders) sigma[i] = prior_sigmas * spec.prior_sigma;
+  }
+  return sigma;
 }
 
 Intrinsics perturbed_intrinsics(const ModelDescription& description, double scale,

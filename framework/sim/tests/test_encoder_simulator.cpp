@@ -285,5 +285,19 @@ TEST(SolveInverse, LeavesTheSampleAloneWhereThereIsNoSolution) {
   EXPECT_EQ(y.drive_rad_per_s[0], 3.);
 }
 
+TEST(WanderSigmas, AreOfThoseThatAreNamed) {
+  const ModelDescription description = description_of(TwoWheels());
+  EXPECT_EQ(wander_sigmas(description, 0.5, {}), Eigen::Vector4d(0.0005, 0.001, 0.005, 0.01));
+  EXPECT_EQ(wander_sigmas(description, 0.5, {"r_2", "o"}), Eigen::Vector4d(0., 0.001, 0.005, 0.01));
+  try {
+    wander_sigmas(description, 0.5, {"o", "radius"});
+    FAIL() << "'radius' was taken";
+  } catch (const ParamError& error) {
+    EXPECT_EQ(error.key(), "intrinsics_wander_of");
+    EXPECT_STREQ(error.what(),
+                 "no intrinsic of the model begins with 'radius' - there are r_1, r_2, o_1, o_2");
+  }
+}
+
 }  // namespace
 }  // namespace viwo::sim

@@ -15,6 +15,7 @@ struct EncoderParams {
   double true_intrinsics_scale = 0.;
   double intrinsics_wander = 0.;
   double intrinsics_wander_time_s = 2.;
+  std::vector<std::string> intrinsics_wander_of;
   std::vector<double> slip_start_s;
   double slip_duration_s = 0.5;
   int slip_wheel = 1;
@@ -33,6 +34,8 @@ struct EncoderParams {
                "sigmas (Gauss-Markov)"});
     b(VIWO_PARAM(intrinsics_wander_time_s),
       {.unit = "s", .above = 0., .help = "its time constant"});
+    b(VIWO_PARAM(intrinsics_wander_of),
+      {.help = "what the names of those that wander begin with: [r, delta_o]; none: all wander"});
     b(VIWO_PARAM(slip_start_s),
       {.unit = "s", .help = "when a wheel starts to spin, reading more than it rolls"});
     b(VIWO_PARAM(slip_duration_s), {.unit = "s", .min = 0., .help = "for how long each time"});

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -30,9 +31,9 @@ struct EncoderSimulation {
   double outlier_probability = 0.;  ///< per sample; hits one drive channel
   double outlier_rad_per_s = 0.;    ///< size, of either sign
   double drive_resolution_rad_per_s = 0.;  ///< rates are rounded to its multiples; 0: not rounded
-  /// Each intrinsic wanders about its true value as a Gauss-Markov process of this sigma, in prior
-  /// sigmas, with or without `noise`.
-  double wander = 0.;
+  /// Intrinsics wander about their true values as Gauss-Markov processes of these sigmas, with or
+  /// without `noise`; empty: none does.
+  Intrinsics sigma_wander;
   double wander_time_s = 2.;
   /// A base that cannot move sideways follows a twist all the same whose v_y is not more than this:
   /// it slides then. For twists that are exact only up to an approximation.
@@ -73,6 +74,11 @@ std::vector<EncoderSample> simulate_encoders(const KinematicModel& model, const 
 /// and index alone.
 Intrinsics perturbed_intrinsics(const ModelDescription& description, double scale,
                                 std::uint64_t seed);
+
+/// Sigmas of intrinsics that wander: so many prior sigmas for those whose names begin with one of
+/// `of`, all if that is empty. ParamError of `intrinsics_wander_of` for what begins none.
+Intrinsics wander_sigmas(const ModelDescription& description, double prior_sigmas,
+                         const std::vector<std::string>& of);
 
 /// Solves b(y) - A(y) xi = slip for the encoder channels that have a noise source, starting at `y`;
 /// what inverse() does for models that offer it. kRejected when no solution was found; then `y` is
