@@ -138,7 +138,7 @@ TEST_F(DeliveredTest, ConfigurationsWithTyres) {
   expect_done({"experiment", kConfigFolder + "experiments/contact_physics.yaml", "--seeds", "1",
                "--out", "experiment", "--set", shorter});
   const nlohmann::json variants = summary("experiment").at("variants");
-  EXPECT_EQ(variants.size(), 18U);
+  EXPECT_EQ(variants.size(), 20U);
   for (const auto& variant : variants) EXPECT_EQ(variant.at("runs"), 1);
 }
 
