@@ -219,7 +219,7 @@ void KltTracker::watch_matches(const StereoCounts& counts, std::size_t right) {
                     " points of camera " + std::to_string(right - 1) + " are found in camera " +
                     std::to_string(right) + ", which by " + chain_file_ +
                     " sees the same: is the calibration that of other cameras, or the second "
-                    "covered? Without stereo=false it gives nothing else");
+                    "covered? With stereo=false each follows points of its own");
 }
 
 void KltTracker::watch_stereo(const StereoCounts& counts, std::size_t right, std::int64_t t_ns) {
