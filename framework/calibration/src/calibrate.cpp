@@ -91,7 +91,7 @@ JointSearch find_joints(CalibrationSetup& setup, WorkProgress& progress) {
   return search;
 }
 
-/// Makes one of them. What nobody has asked for may fail.
+/// Makes one of them. What nobody has asked for may have no solution.
 void make_fit(FitOf& one, const CalibrationSetup& setup, const CalibrationOptions& options,
               const FitStart& start, CalibrationResult& result, WorkProgress& progress) {
   std::vector<std::size_t> used;
@@ -107,7 +107,7 @@ void make_fit(FitOf& one, const CalibrationSetup& setup, const CalibrationOption
     smoother::Smoothed smoothed = smooth(setup, used, is_of_all ? progress : no_progress());
     one.estimate = estimate_of(smoothed, setup);
     if (is_of_all) result.smoothed = std::move(smoothed);
-  } catch (const std::exception& error) {
+  } catch (const NoSolution& error) {
     if (is_of_all || setup.leave_out_is_asked) throw;
     one.failed = error.what();
   }

@@ -85,7 +85,7 @@ class Fit {
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
     if (!summary.IsSolutionUsable()) {
-      throw std::runtime_error("the calibration did not converge: " + summary.message);
+      throw NoSolution("the calibration did not converge: " + summary.message);
     }
     estimate_.iterations += static_cast<int>(summary.iterations.size());
     estimate_.converged = summary.termination_type == ceres::CONVERGENCE;

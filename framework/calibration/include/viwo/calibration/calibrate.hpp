@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -235,8 +236,13 @@ FitStart start_of(const CalibrationSetup& setup, const JointSearch& search);
 /// All recordings by index.
 std::vector<std::size_t> all_of(const CalibrationSetup& setup);
 
+/// Of a fit: the recordings have no solution.
+struct NoSolution : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Fits the recordings named by index (CAL-1); the segments of `options` are not kAuto. Throws
-/// std::runtime_error when the solver fails.
+/// NoSolution when the solver fails.
 CalibrationEstimate fit(const CalibrationSetup& setup, const std::vector<std::size_t>& recordings,
                         const CalibrationOptions& options, const FitStart& start);
 
