@@ -134,9 +134,9 @@ Intrinsics spread_of(const std::string& label, const std::vector<FitOf>& fits) {
   return without.empty() ? mean : Intrinsics(((n - 1.) / n * squares).cwiseSqrt());
 }
 
-/// What fits without the values of a label say of that of all.
+/// What fits without the values of a label say of that of all, `fitted` to all recordings.
 LeftOut leave_out(const std::string& label, const CalibrationSetup& setup,
-                  const std::vector<FitOf>& fits) {
+                  const std::vector<FitOf>& fits, const std::vector<ValidationRun>& fitted) {
   LeftOut out{label, spread_of(label, fits), {}, {}};
   for (const FitOf& one : fits) {
     if (one.label == label && !one.failed.empty()) {
@@ -147,7 +147,7 @@ LeftOut leave_out(const std::string& label, const CalibrationSetup& setup,
     for (const FitOf& one : fits) {
       const bool is_it = one.label == label && one.failed.empty();
       if (!is_it || !one.leaves_out(setup.recordings[i])) continue;
-      out.runs.push_back(validate(setup, i, one.estimate));
+      out.runs.push_back({i, fitted[i].nominal, dead_reckon(setup.recordings[i], one.estimate)});
     }
   }
   return out;
@@ -192,7 +192,7 @@ CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress) {
     result.fitted.push_back(validate(setup, i, result.all));
   }
   for (const std::string& label : setup.leave_out_by) {
-    result.left_out.push_back(leave_out(label, setup, fits));
+    result.left_out.push_back(leave_out(label, setup, fits, result.fitted));
     if (!setup.leave_out_is_asked) continue;
     // What is held has no sigma, whatever is left out.
     result.all.sigma = (result.all.sigma.array() > 0.)

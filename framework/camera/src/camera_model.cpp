@@ -68,8 +68,8 @@ Squares equidistant_slope(const Eigen::Vector4d& k, const Squares& t2) {
   return 1. + t2 * (3. * k[0] + t2 * (5. * k[1] + t2 * (7. * k[2] + t2 * (9. * k[3]))));
 }
 
-/// The same by looking at every step of the way. A function of its own, for hardly any lens asks
-/// for it.
+/// Whether the distance has grown all the way up to there, looked at step by step. A function of
+/// its own, for hardly any lens asks for it.
 [[gnu::noinline]] bool grows_up_to(const Eigen::Vector4d& k, double t2) {
   using Steps = Eigen::Array<double, 32, 1>;
   static const Steps fractions = Steps::LinSpaced(1. / 32., 1.);
