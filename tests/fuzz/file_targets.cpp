@@ -13,12 +13,14 @@
 #include "plugin_file.hpp"
 #include "run_journal.hpp"
 #include "target.hpp"
+#include "viwo/calibration/calibrate.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/image/image_file.hpp"
 #include "viwo/log/kalibr.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/math/utf8.hpp"
+#include "viwo/plan/plan.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
 #include "viwo/results/run_record.hpp"
 #include "viwo/setup/calibration_file.hpp"
@@ -42,10 +44,6 @@ namespace fs = std::filesystem;
 
 std::string_view text_of(Bytes bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-Bytes bytes_of(const std::string& text) {
-  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
 void tum(Bytes bytes) {
@@ -91,7 +89,14 @@ void experiment_file(Bytes bytes) {
   experiment::read_experiment(write("experiment.yaml", bytes), {});
 }
 
-void calibration(Bytes bytes) {
+/// Its recordings are read, too.
+void calibrate(Bytes bytes) {
+  calibration::read_calibration_setup(write("calibrate.yaml", bytes), {}, registry());
+}
+
+void plan_file(Bytes bytes) { plan::read_plan_setup(write("plan.yaml", bytes), {}, registry()); }
+
+void calibration_file(Bytes bytes) {
   const CalibrationFile read = read_calibration(write("in_calibration.yaml", bytes));
   const std::string text = calibration_text(read, "viwo");
   const CalibrationFile again = read_calibration(write("out_calibration.yaml", bytes_of(text)));
@@ -205,7 +210,9 @@ std::vector<Target> file_targets() {
         {"yaml", yaml, "framework/config/src/yaml_read.cpp framework/config/src/node.cpp"},
         {"run", run_configuration, "framework/setup/src framework/config/src"},
         {"experiment", experiment_file, "framework/experiment/src/experiment.cpp"},
-        {"calibration", calibration, "framework/setup/src/calibration_file.cpp"},
+        {"calibrate", calibrate, "framework/calibration/src/calibration_setup.cpp"},
+        {"plan", plan_file, "framework/plan/src/plan_setup.cpp"},
+        {"calibration", calibration_file, "framework/setup/src/calibration_file.cpp"},
         {"journal", journal,
          "framework/experiment/src/run_journal.cpp framework/results/src/run_record.cpp"},
         {"plugin", plugin,

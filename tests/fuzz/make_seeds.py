@@ -126,6 +126,20 @@ def messages(cdr, png):
     return out
 
 
+def live_messages(kinds):
+    """A few of each topic of live_targets.cpp, later and later."""
+    topics = [(0, 0, "0"), (1, 0, "3"), (2, 0, "4"), (2, 1, "5"), (3, 0, "6"), (4, 0, "7"), (5, 0, "1"), (6, 0, "1"),
+              (5, 1, "2")]
+    out = b""
+    for i in range(4):
+        for topic, kind, name in topics:
+            message = kinds[name][1:]  # CDR: four bytes, and then the stamp
+            stamp = struct.pack("<II", 100, 10_000_000 * i + 1_000_000 * kind + 5_000_000)
+            message = message[:4] + stamp + message[12:]
+            out += bytes([topic + (0x80 if i == 2 else 0), kind]) + struct.pack("<H", len(message)) + message
+    return out
+
+
 def database(imu, folder):
     path = folder / "seed.db3"
     with sqlite3.connect(path) as db:
@@ -140,6 +154,22 @@ def database(imu, folder):
             db.execute("INSERT INTO messages VALUES(?, 1, ?, ?)", (i + 1, 100_000_000_000 + 5_000_000 * i, data))
     db.close()
     return path.read_bytes()
+
+
+def killed_log(imu, folder):
+    """Pages of the log beside a bag whose recorder was killed: number, pages in all where a
+    transaction ends, bytes."""
+    path = folder / "killed.db3"
+    shutil.copy(FILES / "killed/bag.db3", path)
+    db = sqlite3.connect(path)
+    for i in range(2, 5):
+        data = imu[:8] + struct.pack("<I", 5000000 * (i + 1)) + imu[12:]
+        db.execute("INSERT INTO messages VALUES(?, 1, ?, ?)", (i + 1, 100_000_000_000 + 5_000_000 * i, data))
+        db.commit()
+    log = Path(f"{path}-wal").read_bytes()
+    db.close()
+    frames = [log[at:at + 24 + 512] for at in range(32, len(log), 24 + 512)]
+    return b"".join(frame[3:4] + frame[7:8] + frame[24:] for frame in frames)
 
 
 def library(build):
@@ -238,6 +268,10 @@ def main():
             seed(target, name, data)
     seed("sqlite_bag", "imu", database(messages(True, png)["0"][1:], folder))
 
+    seed("sqlite_log", "rows", killed_log(messages(True, png)["0"][1:], folder))
+    for in_step in (0, 1, 2):
+        seed("live", f"all_{in_step}", bytes([in_step]) + live_messages(messages(True, png)))
+
     seed("urdf", "a", "<?xml version='1.0'?>\n<robot name='r'><link name='a'/>\n<joint name='j' type='fixed'>"
          "<parent link='a'/><child link='b'/><origin xyz='0.1 0 2e-1' rpy='0 0 1.5'/></joint>\n"
          "<joint name='k' type='fixed'><parent link='b'/><child link='/c'/></joint>"
@@ -263,6 +297,11 @@ def main():
          "estimator: {start: moving, clones: 4}\nupdates: {wheel_odometry: {}}\n")
     seed("experiment", "a", "experiment: e\nbase: robot.yaml\nseeds: 2\nset: {odometry.twist: noise_weighted}\n"
          "variants:\n  a: {}\n  b: {estimator.clones: 5}\n")
+    seed("calibrate", "a", "calibration: c\nbase: robot.yaml\nreference: poses\nsegment_s: 0.1\nfind_steering_zeros: true\n"
+         "set: {sensors.robot.duration_s: 0.3, updates.gnss.enabled: false, odometry.twist: noise_weighted,\n"
+         "  sensors.robot.repetition: \"{repetition}\"}\nleave_out_by: [motion]\nreport_by: [repetition]\n"
+         "motions:\n  - {motion: circle, repetition: 1}\n  - {motion: icr_sweep, repetition: 2, turn_deg: 3}\n")
+    seed("plan", "a", (ROOT / "configs/plans/swerve.yaml").read_bytes())
     calibrated = folder / "run"
     run(viwo, "run", FILES / "robot.yaml", "--set", "sensors.robot.duration_s=1", "--set", "updates.gnss.enabled=false",
         "--out", calibrated)

@@ -17,7 +17,62 @@ struct Reader {
   const char* file;     ///< that has the bytes
   const char* section;  ///< of the sensor; FILE and FOLDER stand for the file and its folder
   const char* sources;
+  std::string (*file_of)(Bytes) = nullptr;  ///< what the bytes become; null: they are the file
 };
+
+#ifdef VIWO_FUZZ_ROS2
+/// SQLite's sums of a log: over pairs of numbers, from those before.
+class LogSums {
+ public:
+  void add(const std::string& bytes) {
+    for (std::size_t i = 0; i + 8 <= bytes.size(); i += 8) {
+      first_ += number(bytes, i) + second_;
+      second_ += number(bytes, i + 4) + first_;
+    }
+  }
+  std::string text() const { return big_endian(first_) + big_endian(second_); }
+
+  static std::string big_endian(std::uint32_t value) {
+    std::string text;
+    for (int shift = 24; shift >= 0; shift -= 8) text.push_back(static_cast<char>(value >> shift));
+    return text;
+  }
+
+ private:
+  static std::uint32_t number(const std::string& bytes, std::size_t at) {
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      value = value << 8U | static_cast<std::uint8_t>(bytes[at + i]);
+    }
+    return value;
+  }
+  std::uint32_t first_ = 0, second_ = 0;
+};
+
+/// The log beside a bag whose recorder was killed. Of each page: number, whether a transaction
+/// ends, 512 bytes. The sums are as they must be: they are no secret.
+std::string sqlite_log(Bytes bytes) {
+  constexpr std::size_t kPage = 512;
+  const auto u32 = LogSums::big_endian;
+  const std::string salt = u32(1) + u32(2);
+  std::string log = u32(0x377f0683) + u32(3'007'000) + u32(kPage) + u32(0) + salt;
+  LogSums sums;
+  sums.add(log);
+  log += sums.text();
+  while (bytes.size() >= 2) {
+    const std::string head = u32(bytes[0]) + u32(bytes[1]);
+    const Bytes page = bytes.subspan(2, std::min(kPage, bytes.size() - 2));
+    bytes = bytes.subspan(2 + page.size());
+    std::string content(page.begin(), page.end());
+    content.resize(kPage);
+    sums.add(head);
+    sums.add(content);
+    log += head;
+    log += salt + sums.text() + content;
+  }
+  return log;
+}
+#endif
 
 // Bad rows are counted, and all that is left is played.
 #define ALL "max_rejected_fraction: 1"
@@ -109,6 +164,9 @@ constexpr Reader kReaders[] = {
     {"mcap", "log.mcap", "{type: ros2_bag, path: FILE, " TOPICS "}", BAGS "ros2_bag"},
     {"sqlite_bag", "log.db3", "{type: ros2_bag, path: FILE, imu_topic: /imu0, " ALL "}",
      BAGS "ros2_bag/database.cpp plugins/sensors/ros2_bag/ros2_file.cpp"},
+    {"sqlite_log", "killed/bag.db3-wal",
+     "{type: ros2_bag, path: FOLDER/bag.db3, imu_topic: /imu0, " ALL "}",
+     "plugins/sensors/ros2_bag/database.cpp", sqlite_log},
     {"ros2_metadata", "bag/metadata.yaml",
      "{type: ros2_bag, path: FOLDER, imu_topic: /imu0, " ALL "}",
      "plugins/sensors/ros2_bag/ros2_bag.cpp plugins/sensors/ros2_bag/ros2_file.cpp"},
@@ -165,7 +223,8 @@ std::vector<Target> sensor_targets() {
   for (const Reader& reader : kReaders) {
     const auto run = [&reader,
                       section = config::parse(section_of(reader), reader.name)](Bytes bytes) {
-      write(reader.file, bytes);
+      const std::string made = reader.file_of != nullptr ? reader.file_of(bytes) : "";
+      write(reader.file, reader.file_of != nullptr ? bytes_of(made) : bytes);
       config::Errors errors;
       const auto sensor = registry().make_sensor(section, "sensor", 1, errors);
       errors.throw_if_any();

@@ -31,7 +31,7 @@ class Folder {
 
 std::vector<Target> all_targets() {
   std::vector<Target> all;
-  for (auto&& some : {sensor_targets(), file_targets(), filter_targets()}) {
+  for (auto&& some : {sensor_targets(), file_targets(), live_targets(), filter_targets()}) {
     all.insert(all.end(), some.begin(), some.end());
   }
   return all;
@@ -68,6 +68,10 @@ void require(bool holds, const std::string& what) {
 const fs::path& folder() {
   static const Folder own;
   return own.path();
+}
+
+Bytes bytes_of(const std::string& text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
 fs::path write(const std::string& name, Bytes bytes) {

@@ -26,6 +26,7 @@ const std::vector<Target>& targets();
 const Target* find(const std::string& name);
 std::vector<Target> sensor_targets();
 std::vector<Target> file_targets();
+std::vector<Target> live_targets();
 std::vector<Target> filter_targets();
 
 /// Text of the InputError that the bytes are answered with; empty where they are taken. Whatever
@@ -37,6 +38,7 @@ void require(bool holds, const std::string& what);
 
 /// The process's own folder, with a copy of tests/fuzz/files; it is removed at the end.
 const std::filesystem::path& folder();
+Bytes bytes_of(const std::string& text);
 /// A file in it, with these bytes.
 std::filesystem::path write(const std::string& name, Bytes bytes);
 
