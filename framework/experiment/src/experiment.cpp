@@ -100,8 +100,15 @@ class Runner {
   void open_journal(WorkProgress& progress) {
     if (!folder_.empty()) journal_.require_own_folder();
     const int there = folder_.empty() ? 0 : journal_.size();
+    if (options_.shard) journal_.keep_for_shards();
     if (there == 0) return;
     if (!options_.resume && !options_.shard && !options_.collect) {
+      if (journal_.is_of_shards()) {
+        throw InputError("there are " + std::to_string(there) + " runs of shards in " +
+                         journal_.folder().string() +
+                         ": --collect makes the results of them, --resume runs what is missing; "
+                         "remove that folder to begin anew");
+      }
       journal_.remove();
       progress.note(std::to_string(there) +
                     " runs of an interrupted experiment are discarded (not --resume): " +

@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kExtension = ".cbor";
 constexpr std::string_view kUnfinished = ".tmp";
+constexpr const char* kOfShards = "of_shards";
 constexpr std::size_t kChecksumBytes = 4;
 
 std::string checksum(std::string_view bytes) {
@@ -122,6 +123,18 @@ std::optional<RunResult> RunJournal::read(const RunKey& key) const {
   }
 }
 
+void RunJournal::keep_for_shards() const {
+  if (is_of_shards()) return;
+  require_own_folder();
+  log::make_folder(folder_);
+  log::FileWriter(folder_ / kOfShards, log::Appears::kWholeBesideOthers).commit();
+}
+
+bool RunJournal::is_of_shards() const {
+  std::error_code ignored;
+  return fs::exists(folder_ / kOfShards, ignored);
+}
+
 void RunJournal::write(const RunKey& key, const RunResult& run) const {
   require_own_folder();
   log::make_folder(folder_);
@@ -143,6 +156,7 @@ void RunJournal::remove() const {
   require_own_folder();
   std::error_code ignored;  // what stays is a file too many, not a wrong result
   for (const fs::path& file : files_in(folder_, true)) fs::remove(file, ignored);
+  fs::remove(folder_ / kOfShards, ignored);  // last: what is left of a crash is still theirs
   fs::remove(folder_, ignored);
 }
 

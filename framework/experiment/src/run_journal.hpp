@@ -40,6 +40,11 @@ class RunJournal {
   /// Throws std::runtime_error when it cannot be written.
   void write(const RunKey& key, const RunResult& run) const;
 
+  /// From now on the runs are those of shards, perhaps of many machines: nobody discards them by a
+  /// word that is missing. Throws std::runtime_error when that cannot be written.
+  void keep_for_shards() const;
+  bool is_of_shards() const;
+
   /// Removes the files of runs, and the folder if nothing else is in it.
   void remove() const;
 

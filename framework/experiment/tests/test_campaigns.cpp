@@ -124,7 +124,8 @@ TEST_F(Campaign, GoesOnWhereAShardWasKilled) {
   killed.shard = Shard{0, 2};
   killed.interrupted = [&] {
     return fs::exists(out / "journal") &&
-           std::distance(fs::directory_iterator(out / "journal"), fs::directory_iterator()) >= 2;
+           std::distance(fs::directory_iterator(out / "journal"), fs::directory_iterator()) >=
+               3;  // with of_shards
   };
   EXPECT_THROW(run(killed, out), Interrupted);
   run_shard(1, 2, out);
@@ -149,6 +150,19 @@ TEST_F(Campaign, ShardsLookOnlyAtWhatTheyRun) {
   };
   EXPECT_EQ(shard(0), "");
   EXPECT_THAT(shard(1), HasSubstr("nowhere"));
+}
+
+TEST_F(Campaign, AWordThatIsMissingDoesNotDiscardTheRunsOfShards) {
+  const fs::path out = folder_ / "out";
+  run_shard(0, 3, out);
+  EXPECT_THAT(error_of([&] { run(options_, out); }),
+              AllOf(HasSubstr("there are 4 runs of shards in " + (out / "journal").string()),
+                    HasSubstr("--collect"), HasSubstr("--resume")));
+  ExperimentOptions rest = options_;
+  rest.resume = true;
+  const std::string table = table_of(run(rest, out), out);
+  EXPECT_EQ(table, table_of(run(options_, folder_ / "whole"), folder_ / "whole"));
+  EXPECT_EQ(table_of(run(options_, out), out), table);  // the shards' are used up
 }
 
 TEST_F(Campaign, RunsThatAnotherExperimentLeftAreReplacedAndThatIsSaid) {
