@@ -4,11 +4,22 @@
 #include <bit>
 #include <limits>
 
+#include "viwo/math/stamp.hpp"
+
 namespace viwo::visual {
 namespace {
 
 /// Gate refusals in a row that end a landmark: it has moved, or its track has.
 constexpr int kMaxMisses = 2;
+
+/// Clones over which the motion in the image is taken.
+constexpr std::size_t kClonesOfMotion = 4;
+
+/// Until a point leaves an image that is `size_px` wide. Where that is not known it stays.
+double seconds_to_edge(double at_px, double px_per_s, int size_px) {
+  if (size_px <= 0 || px_per_s == 0.) return std::numeric_limits<double>::infinity();
+  return std::max(0., (px_per_s > 0. ? size_px - at_px : -at_px) / px_per_s);
+}
 
 }  // namespace
 
@@ -54,9 +65,28 @@ void Landmarks::begin(const Window& window, TrackStore& tracks) {
   }
 }
 
+double Landmarks::seconds_in_sight(int track, const Window& window,
+                                   const TrackStore& tracks) const {
+  const auto clones = window.filter().clones;
+  const CloneState& now = clones.back();
+  const CloneState& before = clones[clones.size() - std::min(clones.size(), kClonesOfMotion)];
+  const double dt_s = seconds_between(before.t_ns, now.t_ns);
+  double longest_s = 0.;
+  for (int camera = 0; camera < window.n_cameras(); ++camera) {
+    if (std::popcount(tracks.mask(track, camera)) != max_clones_) continue;
+    const CameraView& view = window.camera(camera).view;
+    const Eigen::Vector2d uv = tracks.observation(track, now.slot, camera).uv;
+    const Eigen::Vector2d moved_px = uv - tracks.observation(track, before.slot, camera).uv;
+    longest_s =
+        std::max(longest_s, std::min(seconds_to_edge(uv.x(), moved_px.x() / dt_s, view.width_px),
+                                     seconds_to_edge(uv.y(), moved_px.y() / dt_s, view.height_px)));
+  }
+  return longest_s;
+}
+
 bool Landmarks::add(int track, const Feature& feature, const Window& window, TrackStore& tracks,
                     FactorSink& sink) {
-  if (size() == options_.most) return false;
+  if (room() == 0) return false;
   // The anchor that stays longest: the newest clone, in the first camera that sees it there and has
   // seen it all the time.
   const CloneState& newest = window.filter().clones.back();

@@ -45,10 +45,15 @@ class Landmarks {
 
   bool is_landmark(int track) const { return of_track_[static_cast<std::size_t>(track)] >= 0; }
   int size() const { return static_cast<int>(landmarks_.size()); }
+  int room() const { return options_.most - size(); }
   std::span<const Landmark> all() const { return landmarks_; }
 
   /// A new epoch: forgets what the host has not taken, or has lost its anchor.
   void begin(const Window& window, TrackStore& tracks);
+
+  /// For how long a track will go on if its point moves on in the image as it has moved last; 0
+  /// when no camera has seen it in all clones, infinity for one that stands.
+  double seconds_in_sight(int track, const Window& window, const TrackStore& tracks) const;
 
   /// Makes a linearised feature a landmark if all clones have seen it and there is room.
   bool add(int track, const Feature& feature, const Window& window, TrackStore& tracks,

@@ -1,10 +1,13 @@
 // How landmarks begin in the state.
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "anchored_point.hpp"
@@ -180,6 +183,54 @@ TEST(Landmarks, DoNotBeginWithStrays) {
     const Eigen::MatrixXd known = scene.P.inverse();
     const Eigen::VectorXd dx = (Lambda + known).llt().solve(eta);
     EXPECT_LT(dx.dot(known * dx), 10.) << most;
+  }
+}
+
+/// When a point that moves on as from one image to another leaves an image of make_camera().
+double time_in_sight(const FeaturePoint& before, const FeaturePoint& now, double dt_s) {
+  const CameraView camera = testing::make_camera(CameraDistortion::kRadtan);
+  double t_s = 0.;
+  for (; t_s < 1000.; t_s += 1e-4) {
+    const double u = now.u_px + t_s / dt_s * (now.u_px - before.u_px);
+    const double v = now.v_px + t_s / dt_s * (now.v_px - before.v_px);
+    if (u < 0. || v < 0. || u > camera.width_px || v > camera.height_px) break;
+  }
+  return t_s;
+}
+
+TEST(Landmarks, AreThoseThatWillBeSeenLongest) {
+  Random random(68);
+  const SceneOptions options{.n_clones = 8, .n_cameras = 1};
+  Scene scene = testing::make_scene(options, 0, random);
+  scene.landmarks = {
+      {0.4, 0.1, 4.}, {0.7, -0.2, 5.}, {0.2, 0.3, 3.5}, {1., 0.5, 6.}, {0.5, 0., 3.}};
+  for (std::size_t most = 1; most <= 5; ++most) {
+    Random noise(69);
+    Scene estimate = scene;
+    Params params = testing::default_params();
+    params.max_landmarks = static_cast<int>(most);
+    params.gate_probability = 0.;
+    VisualFeatures update(params, HostServices{});
+    estimate.start(update);
+    FactorSink sink = estimate.sink();
+    std::vector<std::vector<FeaturePoint>> seen;
+    for (std::size_t k = 0; k < 8; ++k) {
+      const auto images = testing::images(scene, k, 1., noise);
+      ASSERT_EQ(images[0].points.size(), 5u);
+      seen.push_back(images[0].points);
+      testing::epoch(update, estimate, k + 1, images, sink, k == 7);
+    }
+    std::vector<std::pair<double, std::int64_t>> expected;
+    for (std::size_t i = 0; i < 5; ++i) {
+      const FeaturePoint &before = seen[4][i], &now = seen[7][i];
+      expected.emplace_back(-time_in_sight(before, now, 0.3), now.id);
+    }
+    std::sort(expected.begin(), expected.end());
+    std::vector<std::int64_t> longest, chosen;
+    for (std::size_t i = 0; i < most; ++i) longest.push_back(expected[i].second);
+    for (const Landmark& landmark : update.landmarks()) chosen.push_back(landmark.id);
+    EXPECT_THAT(chosen, ::testing::UnorderedElementsAreArray(longest)) << most;
+    EXPECT_EQ(sink.applied(), 5);  // the others are used up
   }
 }
 

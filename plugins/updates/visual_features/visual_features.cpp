@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <span>
 #include <string>
@@ -91,6 +92,7 @@ void VisualFeatures::start(const UpdateSetup& setup) {
   equations_.start(setup.max_clones, n_cameras);
   gate_.start(setup.max_clones, n_cameras);
   candidates_.reserve(static_cast<std::size_t>(params_.max_tracks));
+  seconds_.reserve(static_cast<std::size_t>(params_.max_tracks));
   seen_epoch_.assign(static_cast<std::size_t>(params_.max_tracks), -1);
   const auto thresholds = [&](double probability) {
     std::vector<double> of_dof;
@@ -226,7 +228,7 @@ void VisualFeatures::select(const FilterView& filter) {
     const int length = tracks_.length(track);
     const std::int64_t id = tracks_.id(track);
     if (length >= params_.min_observations) {
-      candidates_.push_back({track, length, id, lost});
+      candidates_.push_back({track, length, id, lost, 0.});
     } else if (lost) {
       reject(kShort, id);
       tracks_.remove(track);
@@ -235,6 +237,25 @@ void VisualFeatures::select(const FilterView& filter) {
   std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
     return a.length != b.length ? a.length > b.length : a.id < b.id;
   });
+  choose_landmarks();
+}
+
+void VisualFeatures::choose_landmarks() {
+  const int room = landmarks_.room();
+  if (room == 0) return;
+  seconds_.clear();
+  for (Candidate& candidate : candidates_) {
+    if (candidate.lost) continue;
+    candidate.seconds_in_sight = landmarks_.seconds_in_sight(candidate.track, window_, tracks_);
+    if (candidate.seconds_in_sight > 0.) seconds_.push_back(candidate.seconds_in_sight);
+  }
+  const auto n = static_cast<std::size_t>(room);
+  if (seconds_.size() <= n) return;
+  const auto least = seconds_.begin() + (room - 1);
+  std::nth_element(seconds_.begin(), least, seconds_.end(), std::greater<>());
+  for (Candidate& candidate : candidates_) {
+    if (candidate.seconds_in_sight < *least) candidate.seconds_in_sight = 0.;
+  }
 }
 
 bool VisualFeatures::passes_gate() {
@@ -305,7 +326,8 @@ bool VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
   ++tried_;
   if (passes) {
     // A landmark takes the track as it is, strays and all.
-    if (strays == 0 && landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) {
+    if (strays == 0 && candidate.seconds_in_sight > 0. &&
+        landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) {
       return true;
     }
     equations_.add(feature_, window_, factor(sink));

@@ -43,7 +43,8 @@ class VisualFeatures final : public Update {
     int track = 0;
     int length = 0;
     std::int64_t id = 0;
-    bool lost = false;  ///< else it has an observation at the oldest clone, which leaves
+    bool lost = false;             ///< else it has an observation at the oldest clone, which leaves
+    double seconds_in_sight = 0.;  ///< from now on, of one that may become a landmark
   };
 
   /// What was not used for one reason. Counting it allocates nothing.
@@ -55,6 +56,8 @@ class VisualFeatures final : public Update {
   void take_image(const FeatureSample& sample);
   /// Fills candidates_, best first; drops lost tracks that are too short.
   void select(const FilterView& filter);
+  /// As many of them as there is room for landmarks: those that will be seen longest.
+  void choose_landmarks();
   /// Whether it had a point, and was taken or left to the gate.
   bool use(const Candidate& candidate, FactorSink& sink);
   bool passes_gate();
@@ -92,6 +95,7 @@ class VisualFeatures final : public Update {
   std::optional<Told> told_;
   InformationFactor* factor_ = nullptr;  ///< of this epoch, once there is a feature
   std::vector<Candidate> candidates_;
+  std::vector<double> seconds_;           ///< in sight, of candidates
   std::vector<std::int64_t> seen_epoch_;  ///< per track
   std::vector<double> thresholds_;        ///< of each of the two tests of a track, per dof
   std::int64_t epoch_ = 0;
