@@ -31,15 +31,15 @@ void set_calibration(const WindowCamera& camera, const WindowClone& clone, const
   auto rows = row.calibration.transpose();
   rows.setZero();
   if (camera.has_extrinsics) {
-    const Eigen::Vector3d turned = pose.R_GtoC_fej * (p_FinG - pose.p_IinG_fej);  // R_ItoC p_FinI
+    const Eigen::Vector3d turned = pose.R_GtoC * (p_FinG - pose.p_IinG);  // R_ItoC p_FinI
     rows.leftCols<3>().noalias() = J * skew(turned);
     rows.middleCols<3>(3) = J;
   }
   if (camera.has_intrinsics) rows.middleCols<8>(kIntrinsicsEntry) = inverse_sigma * J_intrinsics;
   if (camera.has_clock) {
-    const Eigen::Vector3d w_IinG = clone.R_GtoI_fej.transpose() * clone.w_IinI;
+    const Eigen::Vector3d w_IinG = clone.R_GtoI.transpose() * clone.w_IinI;
     rows.col(kClockEntry).noalias() =
-        row.H_f * ((p_FinG - pose.p_IinG_fej).cross(w_IinG) - clone.v_IinG);
+        row.H_f * ((p_FinG - pose.p_IinG).cross(w_IinG) - clone.v_IinG);
   }
   rows.col(kCalibrationSize) = row.residual;
 }
@@ -59,7 +59,7 @@ void collect_sights(const TrackStore& tracks, int track, const Window& window,
 }
 
 bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vector3d& p_FinG,
-                     const Eigen::Vector3d& p_FinG_fej, double inverse_sigma, LinearSight& row) {
+                     double inverse_sigma, LinearSight& row) {
   const WindowClone& clone = window.clone(sight.clone);
   const WindowCamera& camera = window.camera(sight.camera);
   CameraPose own;
@@ -69,28 +69,24 @@ bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vect
   row.column = clone.column;
   row.camera = sight.camera;
   row.t_s = seconds_between(window.clone(0).t_ns, clone.t_ns);
-  const Eigen::Vector3d p_C = pose.R_GtoC_fej * (p_FinG_fej - pose.p_CinG_fej);
+  const Eigen::Vector3d p_C = pose.R_GtoC * (p_FinG - pose.p_CinG);
   Eigen::Vector2d uv;
   PixelJacobian J;
   IntrinsicsJacobian J_intrinsics;
   if (!project(camera.view, p_C, uv, J, camera.has_intrinsics ? &J_intrinsics : nullptr)) {
     return false;
   }
-  if (!clone.at_first_estimate || p_FinG != p_FinG_fej) {
-    const Eigen::Vector3d p_C_now = pose.R_GtoC * (p_FinG - pose.p_CinG);
-    if (!project(camera.view, p_C_now, uv)) return false;
-  }
   row.residual = inverse_sigma * (sight.observation->uv - uv);
   J *= inverse_sigma;
-  row.H_f.noalias() = J * pose.R_GtoC_fej;  // (VF-4)
+  row.H_f.noalias() = J * pose.R_GtoC;  // (VF-4)
   // (VF-5): h^T skew(d) = (h x d)^T.
-  const Eigen::Vector3d d = p_FinG_fej - clone.p_IinG_fej;
+  const Eigen::Vector3d d = p_FinG - clone.p_IinG;
   Eigen::Matrix<double, 2, 3> H_f_skew;
   for (int i = 0; i < 2; ++i) H_f_skew.row(i) = row.H_f.row(i).cross(d.transpose());
-  row.H_x.leftCols<3>().noalias() = H_f_skew * clone.R_GtoI_fej.transpose();
+  row.H_x.leftCols<3>().noalias() = H_f_skew * clone.R_GtoI.transpose();
   row.H_x.rightCols<3>() = -row.H_f;
   if (camera.calibrates()) {
-    set_calibration(camera, clone, pose, p_FinG_fej, J, J_intrinsics, inverse_sigma, row);
+    set_calibration(camera, clone, pose, p_FinG, J, J_intrinsics, inverse_sigma, row);
   }
   return true;
 }
@@ -255,10 +251,22 @@ FeatureStatus Feature::check_distance() const {
 
 FeatureStatus Feature::linearize(const Window& window) {
   linear_.clear();
+  Eigen::Vector3d off = Eigen::Vector3d::Zero();
   for (const Sight& sight : sights_) {
-    if (!linearize_sight(window, sight, p_FinG_, p_FinG_, inverse_sigma_, linear_.emplace_back())) {
+    LinearSight& row = linear_.emplace_back();
+    if (!linearize_sight(window, sight, p_FinG_, inverse_sigma_, row)) {
       return FeatureStatus::kNotVisible;
     }
+    const WindowClone& clone = window.clone(sight.clone);
+    off += clone.p_IinG_fej - clone.p_IinG;
+  }
+  // (VF-25): the point goes to the first estimates with the clones.
+  off /= static_cast<double>(sights_.size());
+  const Eigen::Vector3d turn = world_turn_of_point(p_FinG_ + off);
+  for (LinearSight& row : linear_) {
+    const auto& of_clone = window.clone(row.clone).world_turn;
+    const Eigen::Vector2d seen = row.H_x * of_clone + row.H_f * turn;
+    row.H_x.leftCols<3>().noalias() -= seen * of_clone.head<3>().transpose();
   }
   return FeatureStatus::kOk;
 }

@@ -48,10 +48,11 @@ struct LinearSight {
   CalibrationRows calibration;      ///< valid when the camera calibrates()
 };
 
-/// Rows of a sight of a point: residual at the estimates and `p_FinG`, Jacobians at the first
-/// estimates of the clones and `p_FinG_fej`. False: the camera model has no image of the point.
+/// Rows of a sight of a point, all at the estimates: H_x may see a turn of the world, where these
+/// are not the first ones, and is to be made blind for it (VF-25). False: the camera model has no
+/// image of the point.
 bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vector3d& p_FinG,
-                     const Eigen::Vector3d& p_FinG_fej, double inverse_sigma, LinearSight& row);
+                     double inverse_sigma, LinearSight& row);
 
 /// Finds p_FinG and its linear system. Keeps its storage.
 class Feature {
@@ -71,8 +72,8 @@ class Feature {
   /// how many; 0 when none does so, or when no half of the sights agrees on a point (VF-22).
   int leave_out_strays();
 
-  /// Residuals at the estimates, Jacobians at the first estimates of the clones, both at point().
-  /// kNotVisible: a camera model has no image of the point.
+  /// Rows at the estimates and point() that do not see a turn of the world. kNotVisible: a camera
+  /// model has no image of the point.
   FeatureStatus linearize(const Window& window);
 
   const Eigen::Vector3d& point() const { return p_FinG_; }

@@ -5,17 +5,6 @@
 #include <Eigen/Cholesky>
 
 namespace viwo::visual {
-namespace {
-
-Anchor anchor_at_estimate(const WindowClone& clone, const CameraView& camera) {
-  return {clone.R_GtoI, camera.R_ItoC, clone.p_IinG, camera.p_IinC};
-}
-Anchor anchor_at_first(const WindowClone& clone, const CameraView& camera) {
-  return {clone.R_GtoI_fej, camera.R_ItoC, clone.p_IinG_fej, camera.p_IinC};
-}
-
-}  // namespace
-
 void LandmarkRows::start(int max_clones, int n_cameras, int max_factor_columns, double sigma_px) {
   set_sigma(sigma_px);
   const int rows = 2 * max_clones * n_cameras;
@@ -50,13 +39,13 @@ bool LandmarkRows::linearize(std::span<const Sight> sights, const Window& window
   n_rows_ = 2 * static_cast<int>(sights.size());
   const WindowClone& clone = window.clone(landmark.clone);
   const CameraView& camera = window.camera(landmark.camera).view;
-  const AnchoredPoint first(anchor_at_first(clone, camera), landmark.first_estimate);
-  const AnchoredPoint now(anchor_at_estimate(clone, camera), landmark.value);
+  const AnchoredPoint point({clone.R_GtoI, camera.R_ItoC, clone.p_IinG, camera.p_IinC},
+                            landmark.value);
   bool visible = true;
   for (std::size_t i = 0; visible && i < sights.size(); ++i) {
     LinearSight row;
-    visible = linearize_sight(window, sights[i], now.p_FinG, first.p_FinG, inverse_sigma_, row);
-    if (visible) add_sight(row, 2 * static_cast<int>(i), window, landmark, first);
+    visible = linearize_sight(window, sights[i], point.p_FinG, inverse_sigma_, row);
+    if (visible) add_sight(row, 2 * static_cast<int>(i), window, landmark, point);
   }
   for (const int column : columns_) local_[static_cast<std::size_t>(column)] = -1;
   return visible && residual_.head(n_rows_).allFinite() && H().allFinite();
@@ -69,8 +58,17 @@ void LandmarkRows::add_sight(const LinearSight& row, int at, const Window& windo
   const auto place_clone = [&](int factor_column) {
     return place(factor_column, window.state_column(factor_column), kPoseSize);
   };
-  rows_at(place_clone(row.column), kPoseSize) += row.H_x;
-  rows_at(place_clone(window.clone(landmark.clone).column), kPoseSize) += row.H_f * point.by_clone;
+  const WindowClone& clone = window.clone(row.clone);
+  const WindowClone& anchor = window.clone(landmark.clone);
+  auto by_clone = rows_at(place_clone(row.column), kPoseSize);
+  auto by_anchor = rows_at(place_clone(anchor.column), kPoseSize);
+  by_clone += row.H_x;
+  by_anchor += row.H_f * point.by_clone;
+  // (VF-25); where both are one clone, they see nothing.
+  const Eigen::Vector2d seen =
+      row.H_x * clone.world_turn + row.H_f * point.by_clone * anchor.world_turn;
+  by_clone.leftCols<3>() -= 0.5 * seen * clone.world_turn.head<3>().transpose();
+  by_anchor.leftCols<3>() -= 0.5 * seen * anchor.world_turn.head<3>().transpose();
   // (VF-18)
   const auto add_entry = [&](int camera, int entry, const Eigen::Vector2d& rows) {
     const int column = window.camera(camera).column[static_cast<std::size_t>(entry)];

@@ -15,7 +15,7 @@ namespace viwo::visual {
 
 /// A landmark and where it stands.
 struct LandmarkState {
-  Eigen::Vector3d value, first_estimate;
+  Eigen::Vector3d value;
   int state_column = 0;
   int factor_column = 0;
   int clone = 0;   ///< of the anchor, in the window

@@ -156,8 +156,6 @@ void Landmarks::use_sights(const Window& window, TrackStore& tracks, Information
     const BlockView& block = filter.block(landmark.block);
     LandmarkState state;
     state.value = landmark.is_new ? landmark.value : Eigen::Vector3d(block.numbers());
-    state.first_estimate =
-        landmark.is_new ? landmark.value : Eigen::Vector3d(block.first_numbers());
     state.state_column = block.column();
     state.factor_column = first + block.column() - range.first;
     state.clone = window.clone_in_slot(landmark.slot);
@@ -210,11 +208,14 @@ bool Landmarks::move_anchor(Landmark& landmark, const FilterView& filter, BlockE
   const BlockView& block = filter.block(landmark.block);
   const Eigen::Matrix3d R_ItoC = extrinsics.rotation();
   const Eigen::Vector3d p_IinC = extrinsics.numbers();
-  const MovedLandmark now({from.R_GtoI, R_ItoC, from.p_IinG, p_IinC},
-                          {to.R_GtoI, R_ItoC, to.p_IinG, p_IinC}, block.numbers());
-  const MovedLandmark first({from.R_GtoI_fej, R_ItoC, from.p_IinG_fej, p_IinC},
-                            {to.R_GtoI_fej, R_ItoC, to.p_IinG_fej, p_IinC}, block.first_numbers());
-  if (!can_be_anchored(now.p_C) || !can_be_anchored(first.p_C)) return false;
+  MovedLandmark moved({from.R_GtoI, R_ItoC, from.p_IinG, p_IinC},
+                      {to.R_GtoI, R_ItoC, to.p_IinG, p_IinC}, block.numbers());
+  if (!can_be_anchored(moved.p_C)) return false;
+  // (VF-25)
+  const WorldTurn turn_from = world_turn_of(from), turn_to = world_turn_of(to);
+  const Eigen::Vector3d seen = moved.by_old_clone * turn_from + moved.by_new_clone * turn_to;
+  moved.by_old_clone.leftCols<3>() -= 0.5 * seen * turn_from.head<3>().transpose();
+  moved.by_new_clone.leftCols<3>() -= 0.5 * seen * turn_to.head<3>().transpose();
   rewrite_.id = landmark.block;
   rewrite_.columns.clear();
   const auto add = [&](int column, int count) { rewrite_.columns.add(column, count); };
@@ -223,12 +224,12 @@ bool Landmarks::move_anchor(Landmark& landmark, const FilterView& filter, BlockE
   add(to.column, kPoseSize);
   if (extrinsics.column() >= 0) add(extrinsics.column(), kPoseSize);
   rewrite_.J.resize(3, rewrite_.columns.size());
-  rewrite_.J.leftCols<3>() = first.by_landmark;
-  rewrite_.J.middleCols<kPoseSize>(3) = first.by_old_clone;
-  rewrite_.J.middleCols<kPoseSize>(3 + kPoseSize) = first.by_new_clone;
-  if (extrinsics.column() >= 0) rewrite_.J.rightCols<kPoseSize>() = first.by_extrinsics;
-  std::copy(now.landmark.begin(), now.landmark.end(), rewrite_.value.begin());
-  std::copy(first.landmark.begin(), first.landmark.end(), rewrite_.first_estimate.begin());
+  rewrite_.J.leftCols<3>() = moved.by_landmark;
+  rewrite_.J.middleCols<kPoseSize>(3) = moved.by_old_clone;
+  rewrite_.J.middleCols<kPoseSize>(3 + kPoseSize) = moved.by_new_clone;
+  if (extrinsics.column() >= 0) rewrite_.J.rightCols<kPoseSize>() = moved.by_extrinsics;
+  std::copy(moved.landmark.begin(), moved.landmark.end(), rewrite_.value.begin());
+  rewrite_.first_estimate = rewrite_.value;
   edits.rewrite(rewrite_);
   landmark.slot = to.slot;
   landmark.clone_ns = to.t_ns;

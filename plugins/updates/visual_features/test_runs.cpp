@@ -46,6 +46,7 @@ struct RunOptions {
   double wrong = 0.;  ///< calibration that starts wrong: times the sigmas below
   double line_delay_s = 0.;
   bool knows_shutter = true;
+  double sigma_velocity_m_per_s = 5e-3;  ///< of the start
 };
 
 /// Takes from new anchors what depends on their clones.
@@ -201,7 +202,8 @@ class FilterRun {
     const StateSample truth = truth_at(kStartNs);
     Eigen::VectorXd sigma(kImuSize);
     sigma << Eigen::Vector3d::Constant(2e-3), Eigen::Vector3d::Constant(5e-3),
-        Eigen::Vector3d::Constant(5e-3), Eigen::VectorXd::Constant(6, 2e-3);
+        Eigen::Vector3d::Constant(options_.sigma_velocity_m_per_s),
+        Eigen::VectorXd::Constant(6, 2e-3);
     const Eigen::VectorXd e = sigma.cwiseProduct(testing::normals(random_, kImuSize));
     ImuPrior prior;
     prior.t_ns = kStartNs;
@@ -311,6 +313,12 @@ TEST(VisualRuns, CalibrationThatStartsWrongIsFoundConsistently) {
   EXPECT_EQ(inconsistency({.wrong = 1.}, 8), "");
   EXPECT_EQ(inconsistency({.n_cameras = 2, .wrong = 1.}, 8), "");
   EXPECT_EQ(inconsistency({.n_cameras = 2, .max_landmarks = 10, .wrong = 1.}, 8), "");
+}
+
+TEST(VisualRuns, AStartWhoseVelocityIsHardlyKnownIsConsistent) {
+  // One camera has the scale of all from the IMU: a quarter of it is corrected on the way.
+  EXPECT_EQ(inconsistency({.sigma_velocity_m_per_s = 0.3}, 8), "");
+  EXPECT_EQ(inconsistency({.n_cameras = 2, .sigma_velocity_m_per_s = 0.3}, 8), "");
 }
 
 TEST(VisualRuns, RollingShuttersAreConsistentIfTheyAreKnown) {

@@ -281,6 +281,29 @@ inline void show_all(VisualFeatures& update, Scene& truth, Scene& estimate, doub
   epoch(update, estimate, n, empty_images(truth, n - 1), sink);
 }
 
+/// What a turn of the world about the vertical, and moving it, do to the error state: at the first
+/// estimates.
+inline Eigen::MatrixXd world_motions(const Scene& scene, Eigen::Index size) {
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(size, 4);
+  for (const CloneState& clone : scene.clones) {
+    N.block<3, 1>(clone.column, 0) = clone.R_GtoI_fej * Eigen::Vector3d::UnitZ();
+    N.block<3, 1>(clone.column + 3, 0) = Eigen::Vector3d::UnitZ().cross(clone.p_IinG_fej);
+    N.block<3, 3>(clone.column + 3, 1).setIdentity();
+  }
+  return N;
+}
+
+/// Rows by the whole error state without what they say of the orientation of a clone about the
+/// vertical as it was first: there rows are not quite derivatives.
+inline Eigen::MatrixXd without_verticals(Eigen::MatrixXd H, const Scene& scene) {
+  for (const CloneState& clone : scene.clones) {
+    const Eigen::Vector3d u = clone.R_GtoI_fej * Eigen::Vector3d::UnitZ();
+    auto block = H.middleCols<3>(clone.column);
+    block -= (block * u).eval() * u.transpose();
+  }
+  return H;
+}
+
 /// Scatters a factor into the whole error state.
 inline void scatter(const InformationFactor& factor, Eigen::MatrixXd& Lambda,
                     Eigen::VectorXd& eta) {

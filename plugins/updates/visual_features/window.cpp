@@ -15,6 +15,12 @@ constexpr double kStampResolutionS = 1e-9;
 
 }  // namespace
 
+WorldTurn world_turn_of(const CloneState& clone) {
+  WorldTurn turn;
+  turn << clone.R_GtoI_fej.col(2), world_turn_of_point(clone.p_IinG_fej);
+  return turn;
+}
+
 void Window::start(int max_clones, std::span<const CameraPrior> cameras,
                    std::span<const CameraBlocks> blocks) {
   const auto clones = static_cast<std::size_t>(max_clones);
@@ -63,13 +69,12 @@ void Window::set_clones() {
     clone.t_ns = from.t_ns;
     clone.slot = from.slot;
     clone.column = kPoseSize * (n_clones() - 1);
-    clone.at_first_estimate = from.R_GtoI == from.R_GtoI_fej && from.p_IinG == from.p_IinG_fej;
     clone.R_GtoI = from.R_GtoI;
     clone.p_IinG = from.p_IinG;
-    clone.R_GtoI_fej = from.R_GtoI_fej;
-    clone.p_IinG_fej = from.p_IinG_fej;
     clone.w_IinI = from.w_IinI;
-    clone.v_IinG = from.v_IinG;
+    clone.v_IinG = from.R_GtoI.transpose() * (from.R_GtoI_fej * from.v_IinG);
+    clone.p_IinG_fej = from.p_IinG_fej;
+    clone.world_turn = world_turn_of(from);
   }
 }
 
@@ -161,22 +166,16 @@ double Window::seconds_to_image(int clone, int camera) const {
 CameraPose Window::make_pose(int clone, int camera, double dt_s) const {
   const WindowClone& at = this->clone(clone);
   const CameraView& view = this->camera(camera).view;
-  Eigen::Matrix3d R_GtoI = at.R_GtoI, R_GtoI_fej = at.R_GtoI_fej;
-  Eigen::Vector3d p_IinG = at.p_IinG;
+  Eigen::Matrix3d R_GtoI = at.R_GtoI;
   CameraPose pose;
-  pose.p_IinG_fej = at.p_IinG_fej;
+  pose.p_IinG = at.p_IinG;
   if (dt_s != 0.) {  // (VF-14)
-    p_IinG += R_GtoI.transpose() * (R_GtoI_fej * at.v_IinG) * dt_s;
-    pose.p_IinG_fej += at.v_IinG * dt_s;
-    const Eigen::Matrix3d turn = exp_so3(-dt_s * at.w_IinI);
-    R_GtoI = turn * R_GtoI;
-    R_GtoI_fej = turn * R_GtoI_fej;
+    pose.p_IinG += at.v_IinG * dt_s;
+    R_GtoI = exp_so3(-dt_s * at.w_IinI) * R_GtoI;
   }
   const Eigen::Vector3d p_CinI = -view.R_ItoC.transpose() * view.p_IinC;
   pose.R_GtoC = view.R_ItoC * R_GtoI;
-  pose.p_CinG = p_IinG + R_GtoI.transpose() * p_CinI;
-  pose.R_GtoC_fej = view.R_ItoC * R_GtoI_fej;
-  pose.p_CinG_fej = pose.p_IinG_fej + R_GtoI_fej.transpose() * p_CinI;
+  pose.p_CinG = pose.p_IinG + R_GtoI.transpose() * p_CinI;
   return pose;
 }
 

@@ -23,21 +23,30 @@ inline constexpr int kIntrinsicsEntry = kPoseSize;
 inline constexpr int kClockEntry = kPoseSize + 8;
 inline constexpr int kCalibrationSize = kClockEntry + 1;
 
+/// What a turn of the world about the vertical does to dtheta, dp of a clone: at the first
+/// estimate, for all of the filter (VF-25). And to a point.
+using WorldTurn = Eigen::Matrix<double, kPoseSize, 1>;
+WorldTurn world_turn_of(const CloneState& clone);
+inline Eigen::Vector3d world_turn_of_point(const Eigen::Vector3d& p_FinG) {
+  return Eigen::Vector3d::UnitZ().cross(p_FinG);
+}
+
 struct WindowClone {
   std::int64_t t_ns = 0;
   int slot = 0;
-  int column = 0;                 ///< in the factor
-  bool at_first_estimate = true;  ///< first estimate and estimate are the same
-  Eigen::Matrix3d R_GtoI, R_GtoI_fej;
-  Eigen::Vector3d p_IinG, p_IinG_fej;
+  int column = 0;  ///< in the factor
+  Eigen::Matrix3d R_GtoI;
+  Eigen::Vector3d p_IinG;
   Eigen::Vector3d w_IinI, v_IinG;  ///< then, with what its epoch measured
+  Eigen::Vector3d p_IinG_fej;
+  WorldTurn world_turn;
 };
 
 /// A camera at the time of its image that belongs to a clone, or of one row of it.
 struct CameraPose {
-  Eigen::Matrix3d R_GtoC, R_GtoC_fej;
-  Eigen::Vector3d p_CinG, p_CinG_fej;
-  Eigen::Vector3d p_IinG_fej;  ///< of the IMU at that time
+  Eigen::Matrix3d R_GtoC;
+  Eigen::Vector3d p_CinG;
+  Eigen::Vector3d p_IinG;  ///< of the IMU at that time
 };
 
 /// A camera as configured, with its calibration as estimated: Jacobians are taken there, too.
