@@ -70,8 +70,8 @@ viwo_describe_package(images "visual-inertial-wheel odometry: images from files"
   "kaist_urban, klt_tracker. They link the image codecs of OpenCV.")
 
 viwo_describe_package(show "visual-inertial-wheel odometry: window and video file"
-  "What the options --show and --video of viwo run need: a toolkit and the codecs"
-  "of films, which a robot does without.")
+  "What the options --show and --video of viwo run need, and the plugin that reads"
+  "images out of films, video: a toolkit and the codecs, which a robot does without.")
 
 viwo_describe_package(ros "visual-inertial-wheel odometry: bags and live topics of ROS"
   "Plugins of viwo that read bags of ROS 1 and ROS 2 and take part in a running"

@@ -49,6 +49,7 @@ std::string_view package_of(std::string_view kind, std::string_view name) {
   for (const char* const own : {"asl_images", "kaist_urban", "klt_tracker"}) {
     if (name == own) return "viwo-images";
   }
+  if (name == "video") return "viwo-show";
   return {};
 }
 

@@ -8,12 +8,12 @@
 #include <utility>
 
 #include <fcntl.h>
-#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/videoio.hpp>
 #include <unistd.h>
 
 #include "canvas.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/image/silent_opencv.hpp"
 #include "viwo/math/median.hpp"
 
 namespace viwo::view {
@@ -34,18 +34,6 @@ int codec_of(const fs::path& file) {
   throw InputError("video " + file.string() + ": " + why);
 }
 
-/// Without what OpenCV itself says on stderr.
-class Silence {
- public:
-  Silence() : level_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
-  ~Silence() { cv::utils::logging::setLogLevel(level_); }
-  Silence(const Silence&) = delete;
-  Silence& operator=(const Silence&) = delete;
-
- private:
-  cv::utils::logging::LogLevel level_;
-};
-
 /// Pictures of a second: from the median of the times between pictures, to a tenth, which both
 /// formats can hold.
 double rate_of(const std::vector<double>& t_s) {
@@ -59,7 +47,7 @@ double rate_of(const std::vector<double>& t_s) {
 
 /// Whether all pictures can be read again. Libraries do not tell when the disk was full.
 bool is_whole(const fs::path& file, std::int64_t pictures) {
-  const Silence silence;
+  const SilentOpenCv silence;
   cv::VideoCapture video(file.string());
   const auto count = static_cast<std::int64_t>(video.get(cv::CAP_PROP_FRAME_COUNT));
   if (!video.isOpened() || count != pictures) return false;
@@ -81,7 +69,7 @@ bool sync_to_disk(const fs::path& file) {
 class VideoFile::Writer {
  public:
   Writer(const fs::path& file, double rate_hz, const cv::Size& size) {
-    const Silence silence;
+    const SilentOpenCv silence;
     // What is there is not written into: it may be a link, or a pipe that nobody reads.
     std::error_code ignored;
     fs::remove(file, ignored);
@@ -90,7 +78,7 @@ class VideoFile::Writer {
   bool opened() const { return video_.isOpened(); }
   void write(const Picture& picture) { video_.write(as_mat(picture)); }
   void close() {
-    const Silence silence;
+    const SilentOpenCv silence;
     video_.release();
   }
 
