@@ -43,15 +43,16 @@ TEST(Warnings, OfUpdatesThatCouldUseNothingAreDoubtsWhereNoOtherCould) {
     rejection.count = count;
     result.rejections.emplace_back("estimator", rejection);
   };
-  reject("visual_features: track with too little parallax (max_condition)", 500);
+  reject("visual_features: point out of the sight of one of its cameras", 500);
   reject("visual_features: track beyond max_features", 30);
   RunResult with_other = result;
   doubt(result);
   EXPECT_EQ(result.warnings.size(), 0U);
   ASSERT_EQ(result.doubts.size(), 1U);
-  EXPECT_EQ(result.doubts[0],
-            "nothing of what visual_features was given could be used; 500 x track with too little "
-            "parallax (max_condition): the estimate is that of the IMU alone");
+  EXPECT_EQ(
+      result.doubts[0],
+      "nothing of what visual_features was given could be used; 500 x point out of the sight of "
+      "one of its cameras: the estimate is that of the IMU alone");
   with_other.updates[1].total.applied = 3;
   RunResult used = with_other;
   doubt(with_other);

@@ -34,10 +34,11 @@ double Chi2Gate::chi2(const Feature& feature, Window& window) {
     read_covariance(window);
     add_calibration(feature, window);
   }
+  const Eigen::Matrix3d by_point = feature.met().by_point();
   for (int i = 0; i < n; ++i) {
     const LinearSight& sight = sights[static_cast<std::size_t>(i)];
     rhs_.block<2, 3>(2 * i, 0) = sight.H_f;
-    rhs_.block<2, 3>(2 * i, 3) = sight.t_s * sight.H_f;
+    rhs_.block<2, 3>(2 * i, 3).noalias() = sight.t_s * sight.H_f * by_point;
     rhs_.block<2, 1>(2 * i, 6) = sight.residual;
   }
   auto S = S_.topLeftCorner(2 * n, 2 * n);
@@ -48,7 +49,8 @@ double Chi2Gate::chi2(const Feature& feature, Window& window) {
   // (VF-9), minimised as (VF-10)
   const TrackSums sums = rhs.transpose().lazyProduct(rhs);
   n_rows_ = 2 * n;
-  return fit_.solve(sums) ? fit_.chi2 : std::numeric_limits<double>::infinity();
+  return fit_.solve(sums, feature.information_of_rho()) ? fit_.chi2
+                                                        : std::numeric_limits<double>::infinity();
 }
 
 void Chi2Gate::tell(NoiseScale& noise) {

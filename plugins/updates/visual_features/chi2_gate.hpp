@@ -51,7 +51,7 @@ class Chi2Gate {
   bool has_covariance_ = false;
   Eigen::Matrix<double, Eigen::Dynamic, kCalibrationRows> T_;
   Eigen::MatrixXd S_, M_;
-  Eigen::Matrix<double, Eigen::Dynamic, 7> rhs_;  ///< H_f, t H_f, residual, whitened
+  Eigen::Matrix<double, Eigen::Dynamic, 7> rhs_;  ///< H_f, t H_f D, residual, whitened
   int n_rows_ = 0;                                ///< of the feature asked for last
   PointFit fit_;                                  ///< of the same
   Eigen::MatrixXd L_inverse_, S_inverse_;

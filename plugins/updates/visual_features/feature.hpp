@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "track_store.hpp"
+#include "triangulation.hpp"
 #include "viwo/camera/camera_model.hpp"
 #include "window.hpp"
 
@@ -23,14 +24,6 @@ struct Sight {
 void collect_sights(const TrackStore& tracks, int track, const Window& window,
                     std::vector<Sight>& out);
 
-struct TriangulationLimits {
-  double min_distance_m = 0.1;
-  double max_distance_m = 60.;
-  double max_condition = 1e4;
-};
-
-enum class FeatureStatus : std::uint8_t { kOk, kParallax, kNotVisible, kDistance };
-
 /// Rows of a sight by the calibration of its camera, and its residual behind them, transposed: one
 /// multiple of the vector registers.
 inline constexpr int kCalibrationRows = kCalibrationSize + 1;
@@ -43,7 +36,8 @@ struct LinearSight {
   int camera = 0;
   double t_s = 0.;                  ///< of the clone, from any instant on
   Eigen::Vector2d residual;         ///< measured - predicted, at the estimates
-  Eigen::Matrix<double, 2, 3> H_f;  ///< by p_FinG
+  Eigen::Matrix<double, 2, 3> H_f;  ///< by the direction of the point; of a track by (VF-26)
+  Eigen::Vector2d by_rho;           ///< by its inverse distance
   Eigen::Matrix<double, 2, 6> H_x;  ///< by dtheta, dp of the clone
   CalibrationRows calibration;      ///< valid when the camera calibrates()
 };
@@ -51,51 +45,45 @@ struct LinearSight {
 /// Rows of a sight of a point, all at the estimates: H_x may see a turn of the world, where these
 /// are not the first ones, and is to be made blind for it (VF-25). False: the camera model has no
 /// image of the point.
-bool linearize_sight(const Window& window, const Sight& sight, const Eigen::Vector3d& p_FinG,
+bool linearize_sight(const Window& window, const Sight& sight, const InversePoint& point,
                      double inverse_sigma, LinearSight& row);
 
-/// Finds p_FinG and its linear system. Keeps its storage.
+/// Finds a point and its linear system. Keeps its storage.
 class Feature {
  public:
   /// Allocates for tracks of up to `max_sights` observations.
-  void start(int max_sights, double sigma_px, const TriangulationLimits& limits);
-  void set_sigma(double sigma_px) { inverse_sigma_ = 1. / sigma_px; }
+  void start(int max_sights, double sigma_px, double min_distance_m);
+  void set_sigma(double sigma_px) { sigma_px_ = sigma_px; }
 
   /// All observations of a track whose clones are in the window; returns how many.
   int collect(const TrackStore& tracks, int track, const Window& window);
 
-  /// Least squares of the pixel residuals, from the point next to all rays; anything but kOk: no
-  /// use to linearise.
+  /// Least squares of the pixel residuals; anything but kOk: no use to linearise.
   FeatureStatus triangulate(const Window& window);
 
   /// After triangulate(): leaves out the sights that do not see the point of the others. Returns
   /// how many; 0 when none does so, or when no half of the sights agrees on a point (VF-22).
   int leave_out_strays();
 
-  /// Rows at the estimates and point() that do not see a turn of the world. kNotVisible: a camera
+  /// Rows at the estimates and the point that do not see a turn of the world. kNotVisible: a camera
   /// model has no image of the point.
-  FeatureStatus linearize(const Window& window);
+  FeatureStatus linearize(Window& window);
 
-  const Eigen::Vector3d& point() const { return p_FinG_; }
-  void set_point(const Eigen::Vector3d& p_FinG) { p_FinG_ = p_FinG; }
+  const MetRays& met() const { return met_; }
+  void set_point(const Eigen::Vector3d& p_FinG);
+  /// What is known of rho besides, where the rays tell nothing. Else it would be known from where
+  /// the rays begin, and with it where the world is.
+  double information_of_rho() const {
+    return met_.has_distance() ? 0. : visual::information_of_rho(min_distance_m_);
+  }
   const std::vector<Sight>& sights() const { return sights_; }
   const std::vector<LinearSight>& linear() const { return linear_; }
 
  private:
-  /// Ray of a sight in G.
-  struct Ray {
-    Eigen::Vector3d origin;
-    Eigen::Vector3d direction;
-    Eigen::Matrix<double, 2, 3> J;  ///< d uv / d (p_FinG - origin) at `direction`
-  };
-  FeatureStatus intersect_rays();
-  int mark_agreeing(const Eigen::Vector3d& point, std::vector<bool>& agrees) const;
-  FeatureStatus refine();
-  FeatureStatus check_distance() const;
+  void leave_to_noise(Window& window);
 
-  double inverse_sigma_ = 1.;
-  TriangulationLimits limits_;
-  Eigen::Vector3d p_FinG_ = Eigen::Vector3d::Zero();
+  double sigma_px_ = 1., min_distance_m_ = 0.1;
+  MetRays met_;
   std::vector<Sight> sights_;
   std::vector<Ray> rays_;
   std::vector<LinearSight> linear_;

@@ -44,7 +44,8 @@ bool LandmarkRows::linearize(std::span<const Sight> sights, const Window& window
   bool visible = true;
   for (std::size_t i = 0; visible && i < sights.size(); ++i) {
     LinearSight row;
-    visible = linearize_sight(window, sights[i], point.p_FinG, inverse_sigma_, row);
+    visible =
+        linearize_sight(window, sights[i], InversePoint::at(point.p_FinG), inverse_sigma_, row);
     if (visible) add_sight(row, 2 * static_cast<int>(i), window, landmark, point);
   }
   for (const int column : columns_) local_[static_cast<std::size_t>(column)] = -1;

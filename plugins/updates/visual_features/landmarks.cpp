@@ -86,7 +86,8 @@ double Landmarks::seconds_in_sight(int track, const Window& window,
 
 bool Landmarks::add(int track, const Feature& feature, const Window& window, TrackStore& tracks,
                     FactorSink& sink) {
-  if (room() == 0) return false;
+  // One whose distance is not told yet may be told to be behind the camera later.
+  if (room() == 0 || !feature.met().has_distance()) return false;
   // The anchor that stays longest: the newest clone, in the first camera that sees it there and has
   // seen it all the time.
   const CloneState& newest = window.filter().clones.back();
@@ -96,7 +97,7 @@ bool Landmarks::add(int track, const Feature& feature, const Window& window, Tra
     const WindowClone& at = window.clone(clone);
     const CameraView& view = window.camera(camera).view;
     const Anchor anchor{at.R_GtoI, view.R_ItoC, at.p_IinG, view.p_IinC};
-    const Eigen::Vector3d p_C = anchor.to_camera(feature.point());
+    const Eigen::Vector3d p_C = anchor.to_camera(feature.met().point.p_FinG());
     if (!can_be_anchored(p_C)) continue;
     Landmark landmark;
     landmark.value = inverse_depth_of_point(p_C);
@@ -176,8 +177,7 @@ bool Landmarks::is_sound(const Landmark& landmark, const FilterView& filter) con
   const BlockView& block = filter.block(landmark.block);
   const Eigen::Vector3d value = block.numbers();
   if (!value.allFinite() || !(value.z() > 0.)) return false;
-  const double distance = point_of_inverse_depth(value).norm();
-  return distance >= options_.min_distance_m && distance <= options_.max_distance_m;
+  return point_of_inverse_depth(value).norm() >= options_.min_distance_m;
 }
 
 void Landmarks::settle(const FilterView& filter, TrackStore& tracks, BlockEdits& edits) {

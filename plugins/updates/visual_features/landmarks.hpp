@@ -17,7 +17,6 @@ struct LandmarkOptions {
   int most = 0;  ///< at a time; 0: none
   double sigma_px = 1.;
   double min_distance_m = 0.1;
-  double max_distance_m = 60.;
 };
 
 struct Landmark {

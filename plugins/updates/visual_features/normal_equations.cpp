@@ -35,7 +35,12 @@ bool NormalEquations::prepare(const Feature& feature) {
     sums.block<1, 3>(6, 3) += row.t_s * b.transpose();
     sums(6, 6) += row.residual.squaredNorm();
   }
-  return fit_.solve(sums) && fit_.L.allFinite() && std::isfinite(fit_.chi2);  // (VF-11)
+  const Eigen::Matrix3d D = feature.met().by_point();
+  sums.block<3, 3>(3, 0) = (D.transpose() * sums.block<3, 3>(3, 0)).eval();
+  sums.block<3, 3>(3, 3) = (D.transpose() * sums.block<3, 3>(3, 3) * D).eval();
+  sums.block<1, 3>(6, 3) = (sums.block<1, 3>(6, 3) * D).eval();
+  return fit_.solve(sums, feature.information_of_rho()) && fit_.L.allFinite() &&
+         std::isfinite(fit_.chi2);  // (VF-11)
 }
 
 void NormalEquations::begin(const Window& window, InformationFactor& factor) {

@@ -7,8 +7,8 @@
 
 namespace viwo::visual {
 
-/// Sums of squares and products of the rows [H_f, t H_f, r] of a track, lower triangle; t [s]: of
-/// the sights, from any instant on.
+/// Sums of squares and products of the rows [H_f, t H_f D, r] of a track, lower triangle; t [s]: of
+/// the sights, from any instant on; D: the derivative of the point's coordinates by the point.
 using TrackSums = Eigen::Matrix<double, 7, 7>;
 
 /// Cholesky factor of the sums; its last row is L^-1 of what the others say of the residual.
@@ -19,18 +19,20 @@ struct PointFit {
 
   auto y_f() const { return L.block<1, 3>(6, 0).transpose(); }
 
-  /// False when the sums do not determine the point within double precision.
-  bool solve(const TrackSums& sums) {
+  /// `information_of_rho`: what is known of the inverse distance besides. False when all that does
+  /// not determine the point within double precision.
+  bool solve(const TrackSums& sums, double information_of_rho) {
     // Where a velocity cannot be told from another point (one camera that moves evenly), this one
     // is known to be less.
     constexpr double kSpeed = 10.;  // m/s
     constexpr double kSmallestPivot = 1e-12;
-    const double limit = kSmallestPivot * sums.diagonal().head<3>().sum();
     L.setZero();
     for (int j = 0; j < 6; ++j) {
-      double pivot = sums(j, j) + (j < 3 ? 0. : 1. / (kSpeed * kSpeed));
+      const double known = j > 2 ? 1. / (kSpeed * kSpeed) : j == 2 ? information_of_rho : 0.;
+      double pivot = sums(j, j) + known;
+      const double limit = j < 3 ? kSmallestPivot * pivot : 0.;
       for (int k = 0; k < j; ++k) pivot -= L(j, k) * L(j, k);
-      if (!(pivot > (j < 3 ? limit : 0.))) return false;
+      if (!(pivot > limit)) return false;
       L(j, j) = std::sqrt(pivot);
       for (int i = j + 1; i < 7; ++i) {
         double sum = sums(i, j);

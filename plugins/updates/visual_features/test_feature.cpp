@@ -21,7 +21,7 @@ struct Track {
   Feature feature;
 
   Track(Scene& truth, Scene& estimate, const Eigen::Vector3d& landmark, double sigma_px,
-        double noise_px, Random& random, const TriangulationLimits& limits = {}) {
+        double noise_px, Random& random, double min_distance_m = 0.1) {
     const int n_clones = static_cast<int>(truth.clones.size());
     const int n_cameras = static_cast<int>(truth.n_cameras());
     window.start(n_clones, estimate.rig().cameras(), estimate.camera_blocks);
@@ -43,7 +43,7 @@ struct Track {
       }
     }
     window.set_poses();
-    feature.start(n_clones * n_cameras, sigma_px, limits);
+    feature.start(n_clones * n_cameras, sigma_px, min_distance_m);
     feature.collect(store, track, window);
   }
 };
@@ -78,7 +78,9 @@ Eigen::MatrixXd dense_row(const LinearSight& row, const Sight& sight, const Scen
   return H;
 }
 
-void check_jacobians(const SceneOptions& options, std::uint64_t seed) {
+/// Of a window that is known, where no row is worth less for what is not.
+void check_jacobians(SceneOptions options, std::uint64_t seed) {
+  options.sigma_theta = options.sigma_p = 1e-6;
   SCOPED_TRACE("seed " + std::to_string(seed));
   Random random(seed);
   Scene scene = testing::make_scene(options, 1, random);
@@ -87,7 +89,8 @@ void check_jacobians(const SceneOptions& options, std::uint64_t seed) {
   ASSERT_GE(track.feature.sights().size(), 3u);
   ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
   ASSERT_EQ(track.feature.linearize(track.window), FeatureStatus::kOk);
-  const Eigen::Vector3d p_FinG = track.feature.point();
+  const Eigen::Vector3d p_FinG = track.feature.met().point.p_FinG();
+  const Eigen::Matrix3d by_point = track.feature.met().by_point();
   const double step = 1e-6;
   for (std::size_t k = 0; k < track.feature.sights().size(); ++k) {
     const Sight& sight = track.feature.sights()[k];
@@ -120,7 +123,8 @@ void check_jacobians(const SceneOptions& options, std::uint64_t seed) {
       const Eigen::Vector2d column = (predicted(scene, track.window, sight, p_FinG + d) -
                                       predicted(scene, track.window, sight, p_FinG - d)) /
                                      (2. * step * sigma_px);
-      EXPECT_LT((row.H_f.col(c) - column).norm(), 1e-6 * row.H_f.norm());
+      const Eigen::Vector2d by_coordinate = row.H_f * by_point.col(c);
+      EXPECT_LT((by_coordinate - column).norm(), 1e-6 * (row.H_f * by_point).norm());
     }
   }
 }
@@ -146,8 +150,12 @@ TEST(Feature, JacobiansAreThoseOfTheEstimates) {
 TEST(Feature, RowsDoNotSeeAMotionOfTheWholeWorldWhereEstimatesHaveMoved) {
   // As it is of the first estimates: some motion of the point, one for all rows, goes with it.
   Random random(7);
-  const SceneOptions options{
-      .n_clones = 6, .n_cameras = 2, .calibrates = true, .first_estimate_off = 0.03};
+  const SceneOptions options{.n_clones = 6,
+                             .n_cameras = 2,
+                             .calibrates = true,
+                             .first_estimate_off = 0.03,
+                             .sigma_theta = 1e-6,
+                             .sigma_p = 1e-6};
   Scene scene = testing::make_scene(options, 1, random);
   Track track(scene, scene, scene.landmarks[0], 1., 0., random);
   ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
@@ -162,7 +170,9 @@ TEST(Feature, RowsDoNotSeeAMotionOfTheWholeWorldWhereEstimatesHaveMoved) {
     for (std::size_t k = 0; k < sights.size(); ++k) {
       LinearSight row = track.feature.linear()[k];
       if (!blind) {
-        EXPECT_TRUE(linearize_sight(track.window, sights[k], track.feature.point(), 1., row));
+        const InversePoint& point = track.feature.met().point;
+        EXPECT_TRUE(linearize_sight(track.window, sights[k], point, 1., row));
+        row.H_f = (row.H_f * track.feature.met().point.rho).eval();  // by the point
       }
       H.middleRows<2>(2 * static_cast<Eigen::Index>(k)) =
           dense_row(row, sights[k], scene, track.window);
@@ -214,10 +224,10 @@ TEST(Feature, ARollingShutterMovesPointsAndIsTakenIntoAccount) {
   Scene global = testing::make_scene({.n_clones = 8}, 50, random);
   int seen = 0, off = 0;
   for (const Eigen::Vector3d& landmark : scene.landmarks) {
-    Track track(scene, scene, landmark, 1., 0., random);
+    Track track(scene, scene, landmark, 1e-4, 0., random);
     if (track.feature.sights().size() < 4) continue;
     ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
-    EXPECT_LT((track.feature.point() - landmark).norm(), 1e-8);
+    EXPECT_LT((track.feature.met().point.p_FinG() - landmark).norm(), 1e-7);
     // The middle row is where a global shutter's image is.
     for (std::size_t i = 0; i < scene.clones.size(); ++i) {
       Eigen::Vector2d rolling, all_rows;
@@ -238,10 +248,10 @@ TEST(Feature, TriangulationRecoversExactPoints) {
     Random random(3);
     Scene scene = testing::make_scene({.n_clones = 8, .distortion = distortion}, 50, random);
     for (const Eigen::Vector3d& landmark : scene.landmarks) {
-      Track track(scene, scene, landmark, 1., 0., random);
+      Track track(scene, scene, landmark, 1e-4, 0., random);
       if (track.feature.sights().size() < 4) continue;
       ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
-      EXPECT_LT((track.feature.point() - landmark).norm(), 1e-8);
+      EXPECT_LT((track.feature.met().point.p_FinG() - landmark).norm(), 1e-7);
     }
   }
 }
@@ -262,7 +272,9 @@ TEST(Feature, TriangulationIsUnbiasedAndAsPreciseAsItsNormalMatrixSays) {
     for (const LinearSight& row : track.feature.linear()) {
       information += row.H_f.transpose() * row.H_f;
     }
-    const Eigen::Vector3d error = track.feature.point() - landmark;
+    const Eigen::Matrix3d by_point = track.feature.met().by_point();
+    information = (by_point.transpose() * information * by_point).eval();
+    const Eigen::Vector3d error = track.feature.met().point.p_FinG() - landmark;
     mean += error / n;
     nees += error.dot(information * error);
   }
@@ -291,19 +303,77 @@ TEST(Feature, TriangulationIsTheMinimumOfThePixelResiduals) {
   }
 }
 
-TEST(Feature, RefusesPointsWithoutParallaxTooFarTooNearAndBehind) {
+TEST(Feature, APointWithoutParallaxIsInfinitelyFarAndTellsOrientationsOnly) {
   Random random(6);
-  Scene still = testing::make_scene({.n_clones = 6}, 0, random);
-  for (CloneState& clone : still.clones) clone.p_IinG.setZero();
-  Track no_parallax(still, still, {0.1, 0.1, 4.}, 1., 0.3, random);
-  ASSERT_EQ(no_parallax.feature.sights().size(), 6u);
-  EXPECT_EQ(no_parallax.feature.triangulate(no_parallax.window), FeatureStatus::kParallax);
+  Scene scene = testing::make_scene({.n_clones = 6, .sigma_p = 1e-6}, 0, random);
+  for (int i = 0; i < 6; ++i) {  // a millimetre from each other, as it is known
+    scene.clones[static_cast<std::size_t>(i)].p_IinG = {1e-3 * i, 0., 0.};
+  }
+  Track track(scene, scene, {3000., 1000., 9000.}, 1., 0.3, random);
+  ASSERT_EQ(track.feature.sights().size(), 6u);
+  ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+  EXPECT_FALSE(track.feature.met().has_distance());
+  EXPECT_EQ(track.feature.met().point.rho, 0.);
+  EXPECT_LT(
+      (track.feature.met().point.direction - Eigen::Vector3d(3000., 1000., 9000.).normalized())
+          .norm(),
+      2e-3);
+  ASSERT_EQ(track.feature.linearize(track.window), FeatureStatus::kOk);
+  for (const LinearSight& row : track.feature.linear()) {
+    EXPECT_EQ(row.H_x.rightCols<3>().norm(), 0.);
+    EXPECT_GT(row.H_x.leftCols<3>().norm(), 100.);
+  }
+}
 
+TEST(Feature, WhatNeitherDistanceNorWayAreKnownOfIsNoise) {
+  // A quarter of a metre of way that may be off by 10 cm, and points whose distance a millimetre of
+  // parallax tells: rows are worth less than a pixel.
+  Random random(6);
+  const auto worth = [&random](double way_m, double sigma_p_m) {
+    Scene scene = testing::make_scene({.n_clones = 6, .sigma_p = sigma_p_m}, 0, random);
+    for (int i = 0; i < 6; ++i) {
+      scene.clones[static_cast<std::size_t>(i)].p_IinG = {way_m / 5. * i, 0., 0.};
+    }
+    Track track(scene, scene, {0.3, 0.1, 4.}, 1., 0.3, random);
+    EXPECT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+    EXPECT_EQ(track.feature.linearize(track.window), FeatureStatus::kOk);
+    return track.feature.linear().front().H_x.leftCols<3>().norm();
+  };
+  const double whole = worth(0.25, 1e-6);
+  EXPECT_NEAR(worth(0.25, 1e-4), whole, 0.1 * whole);
+  EXPECT_NEAR(worth(1e-3, 1e-7), whole, 0.1 * whole);
+  EXPECT_LT(worth(1e-3, 0.1), 0.1 * whole);
+}
+
+TEST(Feature, PointsOfAnyDistanceAreTakenWhateverTheirNoise) {
+  // Those whose noise has them nearer must not be chosen: they would all say that the way was
+  // longer than it was.
+  Random random(8);
+  const SceneOptions options{.n_clones = 8, .sigma_p = 1e-3};
+  for (const double distance_m : {20., 200., 2000., 20000.}) {
+    int taken = 0, infinite = 0;
+    const int n = 300;
+    for (int i = 0; i < n; ++i) {
+      Scene scene = testing::make_scene(options, 0, random);
+      const Eigen::Vector3d landmark =
+          distance_m * Eigen::Vector3d(testing::uniform(random, -0.2, 0.3),
+                                       testing::uniform(random, -0.2, 0.2), 1.);
+      Track track(scene, scene, landmark, 1., 1., random);
+      if (track.feature.sights().size() < 4) continue;
+      if (track.feature.triangulate(track.window) != FeatureStatus::kOk) continue;
+      ++taken;
+      infinite += track.feature.met().has_distance() ? 0 : 1;
+    }
+    EXPECT_GT(taken, 0.97 * n) << distance_m;
+    EXPECT_EQ(infinite > n / 2, distance_m > 150.) << distance_m << " m: " << infinite;
+  }
+}
+
+TEST(Feature, RefusesPointsThatAreTooNearAndBehind) {
+  Random random(6);
   Scene scene = testing::make_scene({.n_clones = 6}, 0, random);
-  Track far(scene, scene, {0.4, 0.1, 5.}, 1., 0.1, random, {.max_distance_m = 4.5});
-  EXPECT_EQ(far.feature.triangulate(far.window), FeatureStatus::kDistance);
-  Track near(scene, scene, {0.4, 0.1, 5.}, 1., 0.1, random, {.min_distance_m = 5.5});
-  EXPECT_EQ(near.feature.triangulate(near.window), FeatureStatus::kDistance);
+  Track near(scene, scene, {0.4, 0.1, 5.}, 1., 0.1, random, 5.5);
+  EXPECT_EQ(near.feature.triangulate(near.window), FeatureStatus::kNear);
 
   Scene backwards = scene;  // the same bearings from a mirrored path meet behind the cameras
   for (CloneState& clone : backwards.clones) clone.p_IinG *= -1.;

@@ -43,7 +43,7 @@ struct Batch {
       }
     }
     window.set_poses();
-    feature.start(n_clones * options.n_cameras, 1., {});
+    feature.start(n_clones * options.n_cameras, 1., 0.1);
   }
 
   bool linearize(int track) {
@@ -78,7 +78,8 @@ struct Batch {
       for (int i = 0; i < n / 2; ++i) {
         const WindowClone& clone =
             window.clone(feature.sights()[static_cast<std::size_t>(i)].clone);
-        H_f.middleRows<2>(2 * i) *= 1e-9 * static_cast<double>(clone.t_ns);
+        H_f.middleRows<2>(2 * i) *=
+            1e-9 * static_cast<double>(clone.t_ns) * feature.met().by_point();
       }
       *H_v = Q.rightCols(n - 3).transpose() * H_f;
     }
@@ -132,7 +133,7 @@ TEST(NormalEquations, EqualTheDenseProjectionOnTheNullSpace) {
 }
 
 TEST(NormalEquations, KeepTheirPrecisionWhenTheParallaxIsWeak) {
-  // Half a millimetre between clones, points several metres away: far beyond max_condition.
+  // Half a millimetre between clones, points several metres away.
   Random random(12);
   const SceneOptions options{.n_clones = 8};
   Batch batch(options, 40, random);
@@ -230,7 +231,7 @@ TEST(NormalEquations, RefuseAPointThatTheRowsDoNotDetermine) {
   Random random(15);
   Batch batch({.n_clones = 5}, 30, random);
   for (CloneState& clone : batch.estimate.clones) {
-    clone.p_IinG = clone.p_IinG_fej = Eigen::Vector3d(1e-9 * clone.slot, 0., 0.);
+    clone.p_IinG = clone.p_IinG_fej = Eigen::Vector3d::Zero();
   }
   batch.estimate.numbers(batch.estimate.camera_blocks[0].extrinsics).setZero();
   batch.window.set(batch.estimate.view());

@@ -20,9 +20,9 @@ constexpr const char* kDuplicate = "id twice in one image";
 constexpr const char* kNoRoom = "no room for another track (max_tracks)";
 constexpr const char* kShort = "track lost with too few observations (min_observations)";
 constexpr const char* kTooMany = "track beyond max_features";
-constexpr const char* kParallax = "track with too little parallax (max_condition)";
+constexpr const char* kBroken = "track with something that is not finite";
 constexpr const char* kNotVisible = "point out of the sight of one of its cameras";
-constexpr const char* kDistance = "point too near or too far";
+constexpr const char* kNear = "point too near (min_distance_m)";
 constexpr const char* kGate = "track dropped by the chi-square gate";
 constexpr const char* kMoves =
     "track dropped: its point moves (much of the view does, or calibration or clock of the cameras "
@@ -39,25 +39,19 @@ const char* reason_of(FeatureStatus status) {
   switch (status) {
     case FeatureStatus::kNotVisible:
       return kNotVisible;
-    case FeatureStatus::kDistance:
-      return kDistance;
+    case FeatureStatus::kNear:
+      return kNear;
     default:
-      return kParallax;
+      return kBroken;
   }
 }
 
 }  // namespace
 
 VisualFeatures::VisualFeatures(const Params& params, const HostServices& services)
-    : params_(params),
-      limits_{.min_distance_m = params.min_distance_m,
-              .max_distance_m = params.max_distance_m,
-              .max_condition = params.max_condition} {
+    : params_(params) {
   noise_.set_enabled(!services.exact && params.find_noise);
   dropped_.reserve(kReasons);
-  if (limits_.min_distance_m >= limits_.max_distance_m) {
-    throw ParamError("min_distance_m", "min_distance_m must be less than max_distance_m");
-  }
 }
 
 void VisualFeatures::declare(Declarations& host) {
@@ -88,7 +82,7 @@ void VisualFeatures::start(const UpdateSetup& setup) {
   const int max_sights = setup.max_clones * n_cameras;
   tracks_.start(params_.max_tracks, setup.max_clones, n_cameras);
   window_.start(setup.max_clones, cameras_, blocks_);
-  feature_.start(max_sights, params_.sigma_px, limits_);
+  feature_.start(max_sights, params_.sigma_px, params_.min_distance_m);
   equations_.start(setup.max_clones, n_cameras);
   gate_.start(setup.max_clones, n_cameras);
   candidates_.reserve(static_cast<std::size_t>(params_.max_tracks));
@@ -104,8 +98,7 @@ void VisualFeatures::start(const UpdateSetup& setup) {
   thresholds_ = thresholds(params_.gate_probability / 2.);
   landmarks_.start({.most = params_.max_landmarks,
                     .sigma_px = params_.sigma_px,
-                    .min_distance_m = limits_.min_distance_m,
-                    .max_distance_m = limits_.max_distance_m},
+                    .min_distance_m = params_.min_distance_m},
                    room_, params_.max_tracks, setup.max_clones, blocks_,
                    thresholds(params_.gate_probability));
 }
@@ -295,7 +288,7 @@ FeatureStatus VisualFeatures::try_feature(bool& passes) {
   FeatureStatus status = feature_.triangulate(window_);
   if (status == FeatureStatus::kOk) status = feature_.linearize(window_);
   if (status != FeatureStatus::kOk) return status;
-  if (!equations_.prepare(feature_)) return FeatureStatus::kParallax;
+  if (!equations_.prepare(feature_)) return FeatureStatus::kBroken;
   passes = passes_gate();
   return status;
 }

@@ -72,7 +72,6 @@ class VisualFeatures final : public Update {
   InformationFactor& factor(FactorSink& sink);
 
   Params params_;
-  TriangulationLimits limits_;
 
   std::vector<CameraPrior> cameras_;
   std::vector<CameraBlocks> blocks_;  ///< of each camera

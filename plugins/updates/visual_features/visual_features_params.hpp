@@ -14,8 +14,6 @@ struct Params {
   int max_tracks = 2000;
   int max_landmarks = 0;
   double min_distance_m = 0.1;
-  double max_distance_m = 1000.;
-  double max_condition = 1e6;
 
   void bind(ParamBinder& b) {
     b(VIWO_PARAM(sigma_px),
@@ -49,16 +47,7 @@ struct Params {
     b(VIWO_PARAM(min_distance_m),
       {.unit = "m",
        .min = 0.,
-       .help = "a track whose point is nearer to one of its cameras is not used"});
-    b(VIWO_PARAM(max_distance_m),
-      {.unit = "m",
-       .above = 0.,
-       .help = "a track whose point is farther from all of its cameras is not used"});
-    b(VIWO_PARAM(max_condition),
-      {.min = 1.,
-       .max = 1e8,
-       .help = "largest condition number of the intersection of a track's rays; 1e4 is a "
-               "parallax of about one degree, 1e6 of a tenth"});
+       .help = "no point is nearer to a camera: a track that has one there is not used"});
   }
 };
 

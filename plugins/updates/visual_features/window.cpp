@@ -32,6 +32,7 @@ void Window::start(int max_clones, std::span<const CameraPrior> cameras,
   for (std::size_t i = 0; i < cameras.size(); ++i) cameras_[i].view = cameras[i].camera;
   stamps_.assign(clones * cameras.size(), {});
   poses_.assign(clones * cameras.size(), {});
+  way_variance_.reserve(clones);
   const int columns = kPoseSize * max_clones + kCalibrationSize * n_cameras();
   state_columns_.reserve(static_cast<std::size_t>(columns));
   covariance_.setZero(columns, columns);
@@ -40,6 +41,7 @@ void Window::start(int max_clones, std::span<const CameraPrior> cameras,
 void Window::set(const FilterView& filter) {
   filter_ = filter;
   has_covariance_ = false;
+  way_variance_.clear();
   set_clones();
   set_cameras();
   set_columns();
@@ -184,6 +186,34 @@ void Window::set_poses() {
     for (int j = 0; j < n_cameras(); ++j) {
       poses_[image_index(i, j)] = make_pose(i, j, seconds_to_image(i, j));
     }
+  }
+}
+
+double Window::way_variance(int clone) {
+  if (way_variance_.empty()) set_way_variances();
+  return way_variance_[static_cast<std::size_t>(clone)];
+}
+
+void Window::set_way_variances() {
+  const FilterView::Covariance P = filter_.P();
+  const int newest = clone_in_slot(filter_.clones.back().slot);
+  const WindowClone& from = this->clone(std::max(newest, 0));
+  for (const WindowClone& to : clones_) {
+    // By dtheta and dp of the one, dp of the other.
+    Eigen::Matrix<double, 3, 9> J;
+    J << skew(from.R_GtoI * (to.p_IinG - from.p_IinG)), -from.R_GtoI, from.R_GtoI;
+    Eigen::Matrix<double, 9, 9> P_of;
+    const auto column = [&](int i) {
+      return state_column(i < kPoseSize ? from.column + i : to.column + i - 3);
+    };
+    for (int i = 0; i < 9; ++i) {
+      for (int k = 0; k <= i; ++k) {
+        P_of(i, k) = P(std::max(column(i), column(k)), std::min(column(i), column(k)));
+        P_of(k, i) = P_of(i, k);
+      }
+    }
+    const double trace = (J * P_of * J.transpose()).trace();
+    way_variance_.push_back(&to == &from ? 0. : std::max(0., trace / 3.));
   }
 }
 

@@ -99,6 +99,9 @@ class Window {
   }
 
   const FilterView& filter() const { return filter_; }
+  /// How well it is known where a clone is from the newest one: variance of a coordinate there,
+  /// m^2.
+  double way_variance(int clone);
   /// Covariance of the factor's columns, all of it, in their order. Copied at the first call after
   /// set(); of the filter's covariance only the lower triangle is read.
   const Eigen::MatrixXd& covariance();
@@ -115,6 +118,7 @@ class Window {
   void set_clones();
   void set_cameras();
   void set_columns();
+  void set_way_variances();
   /// Time from a clone to the middle row of an image of it.
   double seconds_to_image(int clone, int camera) const;
   CameraPose make_pose(int clone, int camera, double dt_s) const;
@@ -129,6 +133,7 @@ class Window {
   std::vector<CameraPose> poses_;
   FactorColumns columns_;
   std::vector<int> state_columns_;
+  std::vector<double> way_variance_;  ///< of each clone; empty: not worked out yet
   Eigen::MatrixXd covariance_;
   bool has_covariance_ = false;
 };

@@ -1,0 +1,71 @@
+// Where rays of cameras meet, be it at infinity.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace viwo::visual {
+
+/// A point by its direction and inverse distance from somewhere: p_FinG = origin + direction / rho.
+/// rho = 0: infinitely far.
+struct InversePoint {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+  double rho = 0.;  ///< 1/m where `direction` is of unit length
+
+  /// rho = 1 from the origin of G.
+  static InversePoint at(const Eigen::Vector3d& p_FinG) {
+    return {Eigen::Vector3d::Zero(), p_FinG, 1.};
+  }
+  /// The direction from `p`, times rho and the distance.
+  Eigen::Vector3d seen_from(const Eigen::Vector3d& p) const {
+    return direction + rho * (origin - p);
+  }
+  Eigen::Vector3d p_FinG() const { return origin + direction / rho; }
+};
+
+enum class FeatureStatus : std::uint8_t { kOk, kNotVisible, kNear, kBroken };
+
+/// Two unit vectors across a unit vector, and each other.
+Eigen::Matrix<double, 3, 2> basis_across(const Eigen::Vector3d& unit);
+
+/// What a camera has measured, in G.
+struct Ray {
+  Eigen::Vector3d origin;
+  Eigen::Vector3d direction;      ///< unit
+  Eigen::Matrix<double, 2, 3> J;  ///< d uv / d (p_FinG - origin) at `direction`
+};
+
+/// A point, and how well its rays tell it: infinitely far where they do not tell its distance
+/// beyond what noise feigns.
+struct MetRays {
+  InversePoint point;                 ///< `direction` of unit length
+  Eigen::Matrix<double, 3, 2> basis;  ///< of what is across it
+  double sigma_rho = 0.;              ///< 1/m
+
+  /// Derivative by p_FinG of the coordinates: across the direction, and rho (VF-26).
+  Eigen::Matrix3d by_point() const;
+  bool has_distance() const { return point.rho > 0.; }
+};
+
+/// What is known of rho before: no point is nearer than `min_distance_m`.
+inline double information_of_rho(double min_distance_m) { return min_distance_m * min_distance_m; }
+
+/// Least squares of the pixel residuals (VF-3) over direction and inverse distance from the first
+/// ray's origin. Anything but kOk: no use to linearise.
+FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min_distance_m,
+                          MetRays& out);
+
+/// Rays that see a point within `most_px`, in front of them; returns how many.
+int mark_agreeing(std::span<const Ray> rays, const InversePoint& point, double most_px,
+                  std::vector<bool>& agrees);
+
+/// The rays that agree on the point of two of them, for the two with which most do (VF-22); returns
+/// how many. `agrees` is for work.
+int find_agreeing(std::span<const Ray> rays, double most_px, std::vector<bool>& agrees,
+                  std::vector<bool>& best);
+
+}  // namespace viwo::visual
