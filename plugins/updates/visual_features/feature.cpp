@@ -92,6 +92,7 @@ bool linearize_sight(const Window& window, const Sight& sight, const InversePoin
 void Feature::start(int max_sights, double sigma_px, double min_distance_m) {
   set_sigma(sigma_px);
   min_distance_m_ = min_distance_m;
+  distances_ = FoundDistances();
   sights_.reserve(static_cast<std::size_t>(max_sights));
   rays_.reserve(static_cast<std::size_t>(max_sights));
   linear_.reserve(static_cast<std::size_t>(max_sights));
@@ -109,6 +110,7 @@ void Feature::set_point(const Eigen::Vector3d& p_FinG) {
   met_.point = {Eigen::Vector3d::Zero(), p_FinG / distance, 1. / distance};
   met_.basis = basis_across(met_.point.direction);
   met_.sigma_rho = 0.;
+  met_.has_distance = true;
 }
 
 FeatureStatus Feature::triangulate(const Window& window) {
@@ -121,7 +123,12 @@ FeatureStatus Feature::triangulate(const Window& window) {
     ray.direction.noalias() = pose.R_GtoC.transpose() * sight.observation->ray;
     ray.J.noalias() = sight.observation->J_ray * pose.R_GtoC;
   }
-  return visual::triangulate(rays_, sigma_px_, min_distance_m_, met_);
+  const FeatureStatus status = visual::triangulate(rays_, sigma_px_, min_distance_m_, met_);
+  if (status != FeatureStatus::kOk) return status;
+  found_rho_ = met_.point.rho;
+  found_variance_ = met_.sigma_rho * met_.sigma_rho;
+  distances_.expect(met_);
+  return status;
 }
 
 int Feature::leave_out_strays() {

@@ -70,11 +70,13 @@ class Feature {
   FeatureStatus linearize(Window& window);
 
   const MetRays& met() const { return met_; }
+  /// It was used: others will be about as far.
+  void remember_distance() { distances_.add(found_rho_, found_variance_); }
   void set_point(const Eigen::Vector3d& p_FinG);
   /// What is known of rho besides, where the rays tell nothing. Else it would be known from where
   /// the rays begin, and with it where the world is.
   double information_of_rho() const {
-    return met_.has_distance() ? 0. : visual::information_of_rho(min_distance_m_);
+    return met_.point.rho != 0. ? 0. : visual::information_of_rho(min_distance_m_);
   }
   const std::vector<Sight>& sights() const { return sights_; }
   const std::vector<LinearSight>& linear() const { return linear_; }
@@ -84,6 +86,8 @@ class Feature {
 
   double sigma_px_ = 1., min_distance_m_ = 0.1;
   MetRays met_;
+  FoundDistances distances_;
+  double found_rho_ = 0., found_variance_ = 0.;  ///< of the last track
   std::vector<Sight> sights_;
   std::vector<Ray> rays_;
   std::vector<LinearSight> linear_;

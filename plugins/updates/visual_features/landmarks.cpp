@@ -87,7 +87,7 @@ double Landmarks::seconds_in_sight(int track, const Window& window,
 bool Landmarks::add(int track, const Feature& feature, const Window& window, TrackStore& tracks,
                     FactorSink& sink) {
   // One whose distance is not told yet may be told to be behind the camera later.
-  if (room() == 0 || !feature.met().has_distance()) return false;
+  if (room() == 0 || !feature.met().has_distance) return false;
   // The anchor that stays longest: the newest clone, in the first camera that sees it there and has
   // seen it all the time.
   const CloneState& newest = window.filter().clones.back();

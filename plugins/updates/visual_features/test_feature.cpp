@@ -312,7 +312,7 @@ TEST(Feature, APointWithoutParallaxIsInfinitelyFarAndTellsOrientationsOnly) {
   Track track(scene, scene, {3000., 1000., 9000.}, 1., 0.3, random);
   ASSERT_EQ(track.feature.sights().size(), 6u);
   ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
-  EXPECT_FALSE(track.feature.met().has_distance());
+  EXPECT_FALSE(track.feature.met().has_distance);
   EXPECT_EQ(track.feature.met().point.rho, 0.);
   EXPECT_LT(
       (track.feature.met().point.direction - Eigen::Vector3d(3000., 1000., 9000.).normalized())
@@ -362,7 +362,7 @@ TEST(Feature, PointsOfAnyDistanceAreTakenWhateverTheirNoise) {
       if (track.feature.sights().size() < 4) continue;
       if (track.feature.triangulate(track.window) != FeatureStatus::kOk) continue;
       ++taken;
-      infinite += track.feature.met().has_distance() ? 0 : 1;
+      infinite += track.feature.met().has_distance ? 0 : 1;
     }
     EXPECT_GT(taken, 0.97 * n) << distance_m;
     EXPECT_EQ(infinite > n / 2, distance_m > 150.) << distance_m << " m: " << infinite;

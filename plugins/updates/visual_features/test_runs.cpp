@@ -47,6 +47,7 @@ struct RunOptions {
   double line_delay_s = 0.;
   bool knows_shutter = true;
   double sigma_velocity_m_per_s = 5e-3;  ///< of the start
+  double far = 1.;                       ///< times as far as they are usually
 };
 
 /// Takes from new anchors what depends on their clones.
@@ -163,6 +164,8 @@ class FilterRun {
     features.start_ns = kStartNs;
     features.phase_s = 0.0137;
     features.features = 150;
+    features.landmark_min_m *= options_.far;
+    features.landmark_max_m *= options_.far;
     return features;
   }
 
@@ -319,6 +322,13 @@ TEST(VisualRuns, AStartWhoseVelocityIsHardlyKnownIsConsistent) {
   // One camera has the scale of all from the IMU: a quarter of it is corrected on the way.
   EXPECT_EQ(inconsistency({.sigma_velocity_m_per_s = 0.3}, 8), "");
   EXPECT_EQ(inconsistency({.n_cameras = 2, .sigma_velocity_m_per_s = 0.3}, 8), "");
+}
+
+TEST(VisualRuns, PointsThatAreTooFarForParallaxDoNoHarm) {
+  for (const double far : {30., 100., 400.}) {
+    EXPECT_EQ(inconsistency({.far = far}, 8), "") << far;
+    EXPECT_EQ(inconsistency({.n_cameras = 2, .far = far}, 8), "") << far;
+  }
 }
 
 TEST(VisualRuns, RollingShuttersAreConsistentIfTheyAreKnown) {

@@ -16,6 +16,8 @@ constexpr int kMaxIterations = 10;
 constexpr double kStepTolerance = 1e-6;
 /// Noise does not make more of rho.
 constexpr double kSigmas = 4.;
+/// Points that say how far others are: too few, and the last that count.
+constexpr int kFewPoints = 20, kMostPoints = 300;
 
 /// The problem at a point.
 struct Normal {
@@ -56,17 +58,6 @@ void move(InversePoint& point, const Eigen::Matrix<double, 3, 2>& basis,
   const double norm = direction.norm();
   point.direction = direction / norm;
   point.rho = (point.rho + step[2]) / norm;
-}
-
-/// (VF-28)
-void take_off_noise(MetRays& met) {
-  double& rho = met.point.rho;
-  if (rho > kSigmas * met.sigma_rho) {
-    rho = std::sqrt(rho * rho - met.sigma_rho * met.sigma_rho);
-  } else {
-    met.sigma_rho = std::hypot(rho, met.sigma_rho);
-    rho = 0.;
-  }
 }
 
 /// Next to all rays: as if distances were all alike, but in one step.
@@ -151,12 +142,40 @@ FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min
   if (!(variance > 0.)) return FeatureStatus::kBroken;
   out.sigma_rho = sigma_px * std::sqrt(variance);
   if (out.point.rho < -kSigmas * out.sigma_rho) return FeatureStatus::kNotVisible;  // behind
-  take_off_noise(out);
+  out.has_distance = out.point.rho > kSigmas * out.sigma_rho;
   for (const Ray& ray : rays) {
     const double distance = out.point.seen_from(ray.origin).norm();  // times rho
     if (distance < out.point.rho * min_distance_m) return FeatureStatus::kNear;
   }
   return FeatureStatus::kOk;
+}
+
+void FoundDistances::add(double rho, double variance) {
+  count_ = std::min(count_ + 1, kMostPoints);
+  // The better it is told, beside how different points are, the more it says of them.
+  const double weight = 1. / (variance + (count_ > kFewPoints ? this->variance() : 0.));
+  weight_ = (1. - 1. / kMostPoints) * weight_ + weight;
+  const double part = weight / weight_;
+  mean_ += part * (rho - mean_);
+  second_ += part * (rho * rho - variance - second_);
+}
+
+void FoundDistances::expect(MetRays& met) const {
+  double& rho = met.point.rho;
+  const double variance = met.sigma_rho * met.sigma_rho;
+  if (count_ <= kFewPoints) {
+    if (met.has_distance) return;
+    met.sigma_rho = std::hypot(rho, met.sigma_rho);
+    rho = 0.;
+  } else if (variance > second_) {
+    const double unsure = variance * std::sqrt(2. / count_);  // of second_
+    met.sigma_rho = std::sqrt(std::min(variance, std::max(0., second_) + unsure));
+    rho = 0.;
+  } else {
+    const double told = this->variance() / (this->variance() + variance);
+    rho = mean_ + told * (rho - mean_);
+    met.sigma_rho *= std::sqrt(told);
+  }
 }
 
 int mark_agreeing(std::span<const Ray> rays, const InversePoint& point, double most_px,

@@ -1,6 +1,7 @@
 // Where rays of cameras meet, be it at infinity.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -10,7 +11,7 @@
 namespace viwo::visual {
 
 /// A point by its direction and inverse distance from somewhere: p_FinG = origin + direction / rho.
-/// rho = 0: infinitely far.
+/// rho = 0: infinitely far; less: rays that part, as those of a far point do for their noise.
 struct InversePoint {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
@@ -39,16 +40,15 @@ struct Ray {
   Eigen::Matrix<double, 2, 3> J;  ///< d uv / d (p_FinG - origin) at `direction`
 };
 
-/// A point, and how well its rays tell it: infinitely far where they do not tell its distance
-/// beyond what noise feigns.
+/// A point, and how well its rays tell it.
 struct MetRays {
   InversePoint point;                 ///< `direction` of unit length
   Eigen::Matrix<double, 3, 2> basis;  ///< of what is across it
   double sigma_rho = 0.;              ///< 1/m
+  bool has_distance = false;          ///< beyond what noise feigns
 
   /// Derivative by p_FinG of the coordinates: across the direction, and rho (VF-26).
   Eigen::Matrix3d by_point() const;
-  bool has_distance() const { return point.rho > 0.; }
 };
 
 /// What is known of rho before: no point is nearer than `min_distance_m`.
@@ -58,6 +58,22 @@ inline double information_of_rho(double min_distance_m) { return min_distance_m 
 /// ray's origin. Anything but kOk: no use to linearise.
 FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min_distance_m,
                           MetRays& out);
+
+/// How far the points are, of those that were found last. What a track tells of the way goes with
+/// its rho: taken as it was found, noise and all, it would be seen where it is not (VF-28).
+class FoundDistances {
+ public:
+  void add(double rho, double variance);
+  /// What is to be expected of the point: its rho, and its sigma. 0 where its rays tell less than
+  /// the others do, or nothing and there are no others yet.
+  void expect(MetRays& met) const;
+
+ private:
+  double variance() const { return std::max(0., second_ - mean_ * mean_); }
+  double weight_ = 0.;
+  int count_ = 0;
+  double mean_ = 0., second_ = 0.;  ///< of rho: mean, and mean square
+};
 
 /// Rays that see a point within `most_px`, in front of them; returns how many.
 int mark_agreeing(std::span<const Ray> rays, const InversePoint& point, double most_px,

@@ -318,6 +318,7 @@ bool VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
   if (status != FeatureStatus::kOk) return refuse(reason_of(status));
   ++tried_;
   if (passes) {
+    feature_.remember_distance();
     // A landmark takes the track as it is, strays and all.
     if (strays == 0 && candidate.seconds_in_sight > 0. &&
         landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) {
