@@ -200,6 +200,13 @@ Loaded<Update> Subject::make(const Node& section, std::uint64_t seed) const {
   return loaded;
 }
 
+Loaded<Update> Subject::make_exact_update() const {
+  config::Errors errors;
+  auto loaded = registry_->make_update(section_, "update", 1, errors, {}, true);
+  errors.throw_if_any();
+  return loaded;
+}
+
 std::string Subject::try_section(const Node& section) const {
   try {
     if (info_.kind == "kinematics") make<KinematicModel>(section);

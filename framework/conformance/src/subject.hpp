@@ -33,6 +33,8 @@ class Subject {
   Loaded<Interface> make() const {
     return make<Interface>(section_);
   }
+  /// An update whose rows are to be derivatives (HostServices::exact).
+  Loaded<Update> make_exact_update() const;
   /// Makes an object of the plugin's kind and drops it; "" or what the host says about the section.
   std::string try_section(const config::Node& section) const;
 

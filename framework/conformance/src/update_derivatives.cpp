@@ -286,11 +286,17 @@ class Comparison {
     if (moved.columns.size() != n) return;
     const Eigen::MatrixXd Lambda = there.Lambda.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
     const VectorXd found = (there.eta.head(n) - moved.eta.head(n)) / kStep;
-    const VectorXd expected = Lambda * dx, scale = Lambda.diagonal().cwiseSqrt();
+    const VectorXd expected = Lambda * dx;
+    // Where there is no information, rounding may leave less.
+    const VectorXd scale = Lambda.diagonal().cwiseMax(0.).cwiseSqrt();
     const VectorXd sigma = known(there.columns);
     const double size = scale.cwiseProduct(dx).norm();
     for (Eigen::Index i = 0; i < n; ++i) {
       const double off = std::abs(found[i] - expected[i]);
+      // What a factor says nothing of may change to second order in a step.
+      const bool is_told =
+          scale[i] * sigma[i] > kNothing || std::abs(there.eta[i]) * sigma[i] > kNegligible;
+      if (!is_told) continue;
       if (off <= scale[i] * (kTolerance * size + kNegligible) || off * sigma[i] <= kNegligible) {
         continue;
       }
@@ -309,6 +315,7 @@ class Comparison {
   }
 
   static constexpr double kNegligible = 1e-2;  ///< sigmas of a measurement
+  static constexpr double kNothing = 1e-3;     ///< root of information, over that of the prior
   const Emitted& there_;
   const std::vector<Column>& columns_;
   Findings& findings_;
@@ -321,7 +328,7 @@ int check_on(const char* motion, const Subject& subject, Findings& findings) {
   const auto run = [&](const std::vector<Move>& moves) {
     std::vector<std::shared_ptr<Differenced>> runs;
     for (const Move& move : moves) {
-      runs.push_back(std::make_shared<Differenced>(subject.make<Update>(), move));
+      runs.push_back(std::make_shared<Differenced>(subject.make_exact_update(), move));
     }
     const std::vector<std::shared_ptr<Update>> updates(runs.begin(), runs.end());
     robot::run_updates(updates, subject.info().name, drive, robot::Calibration::kEstimated);

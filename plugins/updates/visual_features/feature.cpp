@@ -89,8 +89,9 @@ bool linearize_sight(const Window& window, const Sight& sight, const InversePoin
   return true;
 }
 
-void Feature::start(int max_sights, double sigma_px, double min_distance_m) {
+void Feature::start(int max_sights, double sigma_px, double min_distance_m, bool exact) {
   set_sigma(sigma_px);
+  exact_ = exact;
   min_distance_m_ = min_distance_m;
   distances_ = FoundDistances();
   sights_.reserve(static_cast<std::size_t>(max_sights));
@@ -127,7 +128,8 @@ FeatureStatus Feature::triangulate(const Window& window) {
   if (status != FeatureStatus::kOk) return status;
   found_rho_ = met_.point.rho;
   found_variance_ = met_.sigma_rho * met_.sigma_rho;
-  distances_.expect(met_);
+  if (!exact_) distances_.expect(met_);
+  if (exact_ && !met_.has_distance) met_.point.rho = 0.;  // it would be whatever rounding makes it
   return status;
 }
 
@@ -170,7 +172,7 @@ FeatureStatus Feature::linearize(Window& window) {
     row.H_f.leftCols<2>() = (row.H_f * met_.basis).eval();  // (VF-26)
     row.H_f.col(2) = row.by_rho;
   }
-  leave_to_noise(window);
+  if (!exact_) leave_to_noise(window);
   return FeatureStatus::kOk;
 }
 

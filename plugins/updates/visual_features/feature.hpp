@@ -51,8 +51,9 @@ bool linearize_sight(const Window& window, const Sight& sight, const InversePoin
 /// Finds a point and its linear system. Keeps its storage.
 class Feature {
  public:
-  /// Allocates for tracks of up to `max_sights` observations.
-  void start(int max_sights, double sigma_px, double min_distance_m);
+  /// Allocates for tracks of up to `max_sights` observations. `exact`: rows are derivatives,
+  /// without what is known of the noise of the point (HostServices::exact).
+  void start(int max_sights, double sigma_px, double min_distance_m, bool exact = false);
   void set_sigma(double sigma_px) { sigma_px_ = sigma_px; }
 
   /// All observations of a track whose clones are in the window; returns how many.
@@ -85,6 +86,7 @@ class Feature {
   void leave_to_noise(Window& window);
 
   double sigma_px_ = 1., min_distance_m_ = 0.1;
+  bool exact_ = false;
   MetRays met_;
   FoundDistances distances_;
   double found_rho_ = 0., found_variance_ = 0.;  ///< of the last track

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 namespace viwo::visual {
@@ -136,7 +137,11 @@ FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min
     if (!step.allFinite()) return FeatureStatus::kBroken;
     point = out.point;
     move(point, out.basis, step);
-    if (std::hypot(step[0], step[1], step[2] * farthest_m) <= kStepTolerance) break;
+    if (std::hypot(step[0], step[1], step[2] * farthest_m) <= kStepTolerance) {
+      out.point = point;  // so small a step is an improvement for sure
+      out.basis = basis_across(point.direction);
+      break;
+    }
   }
   const double variance = best.A.inverse()(2, 2);
   if (!(variance > 0.)) return FeatureStatus::kBroken;

@@ -49,7 +49,7 @@ const char* reason_of(FeatureStatus status) {
 }  // namespace
 
 VisualFeatures::VisualFeatures(const Params& params, const HostServices& services)
-    : params_(params) {
+    : params_(params), exact_(services.exact) {
   noise_.set_enabled(!services.exact && params.find_noise);
   dropped_.reserve(kReasons);
 }
@@ -82,7 +82,7 @@ void VisualFeatures::start(const UpdateSetup& setup) {
   const int max_sights = setup.max_clones * n_cameras;
   tracks_.start(params_.max_tracks, setup.max_clones, n_cameras);
   window_.start(setup.max_clones, cameras_, blocks_);
-  feature_.start(max_sights, params_.sigma_px, params_.min_distance_m);
+  feature_.start(max_sights, params_.sigma_px, params_.min_distance_m, exact_);
   equations_.start(setup.max_clones, n_cameras);
   gate_.start(setup.max_clones, n_cameras);
   candidates_.reserve(static_cast<std::size_t>(params_.max_tracks));

@@ -72,6 +72,7 @@ class VisualFeatures final : public Update {
   InformationFactor& factor(FactorSink& sink);
 
   Params params_;
+  bool exact_ = false;
 
   std::vector<CameraPrior> cameras_;
   std::vector<CameraBlocks> blocks_;  ///< of each camera

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "viwo/api/filter_view.hpp"
 #include "viwo/api/rig.hpp"

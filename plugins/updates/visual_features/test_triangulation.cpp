@@ -1,0 +1,80 @@
+// Where rays meet, and how far points are to be expected.
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "test_support.hpp"
+#include "triangulation.hpp"
+
+namespace viwo::visual {
+namespace {
+
+using testing::Random;
+
+/// Points of a scene as noisy rays tell them, once it is known.
+struct Sums {
+  double truth = 0., found = 0., taken = 0., with_noise = 0.;  ///< mean squares of rho
+  double error_found = 0., error_expected = 0.;
+
+  Sums(double mean, double spread, double sigma, std::uint64_t seed) {
+    Random random(seed);
+    FoundDistances distances;
+    const int n = 4000, learning = 1000;
+    for (int i = 0; i < learning + n; ++i) {
+      const double rho = mean + spread * testing::normal(random);
+      MetRays met;
+      met.sigma_rho = sigma * testing::uniform(random, 0.5, 1.5);
+      met.point.rho = rho + met.sigma_rho * testing::normal(random);
+      met.has_distance = met.point.rho > 4. * met.sigma_rho;
+      const double as_found = met.point.rho, variance = met.sigma_rho * met.sigma_rho;
+      distances.expect(met);
+      distances.add(as_found, variance);
+      if (i < learning) continue;
+      truth += rho * rho / n;
+      found += as_found * as_found / n;
+      taken += met.point.rho * met.point.rho / n;
+      with_noise += (met.point.rho * met.point.rho + met.sigma_rho * met.sigma_rho) / n;
+      error_found += (as_found - rho) * (as_found - rho) / n;
+      error_expected += (met.point.rho - rho) * (met.point.rho - rho) / n;
+    }
+  }
+};
+
+TEST(FoundDistances, GiveNoMoreOfTheWayThanIsThere) {
+  // Mean, spread, and sigma of what is found of it.
+  const std::vector<std::vector<double>> scenes{
+      {0.0056, 0.0006, 0.0012},  // 150 to 210 m, 1.3 m of way
+      {0.001, 0.0005, 0.004},    // 1 km
+      {0.02, 0.02, 0.004},       // some near, some far
+      {1.5, 0.4, 0.02}};         // a room
+  for (const auto& scene : scenes) {
+    const Sums sums(scene[0], scene[1], scene[2], 3);
+    EXPECT_LT(sums.taken, 1.1 * sums.truth) << scene[0];
+    EXPECT_GT(sums.with_noise, 0.9 * sums.truth) << scene[0];
+    EXPECT_LT(sums.error_expected, 1.05 * sums.error_found) << scene[0];
+  }
+  // As they are found, those of a kilometre show the way a dozen times as well as they do.
+  const Sums far(0.001, 0.0005, 0.004, 3);
+  EXPECT_GT(far.found, 10. * far.truth);
+}
+
+TEST(FoundDistances, LeaveAFewPointsAsTheyAreFoundOrInfinitelyFar) {
+  FoundDistances distances;
+  for (int i = 0; i < 10; ++i) distances.add(0.2, 1e-6);
+  MetRays told;
+  told.point.rho = 0.5;
+  told.sigma_rho = 0.01;
+  told.has_distance = true;
+  distances.expect(told);
+  EXPECT_EQ(told.point.rho, 0.5);
+  MetRays untold;
+  untold.point.rho = 0.03;
+  untold.sigma_rho = 0.04;
+  distances.expect(untold);
+  EXPECT_EQ(untold.point.rho, 0.);
+  EXPECT_DOUBLE_EQ(untold.sigma_rho, 0.05);
+}
+
+}  // namespace
+}  // namespace viwo::visual
