@@ -1,12 +1,7 @@
 #include "feature.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <limits>
-
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include "viwo/math/so3.hpp"
 
@@ -134,9 +129,7 @@ FeatureStatus Feature::triangulate(const Window& window) {
 }
 
 int Feature::leave_out_strays() {
-  const auto is_finite = [](const Ray& ray) {
-    return ray.origin.allFinite() && ray.direction.allFinite() && ray.J.allFinite();
-  };
+  const auto is_finite = [](const Ray& ray) { return ray.is_finite(); };
   if (!std::all_of(rays_.begin(), rays_.end(), is_finite)) return 0;  // no fault of the matches
   const int n = static_cast<int>(sights_.size());
   const int most = find_agreeing(rays_, kStraySigmas * sigma_px_, agrees_, best_);
@@ -168,7 +161,7 @@ FeatureStatus Feature::linearize(Window& window) {
   for (LinearSight& row : linear_) {
     const WindowClone& clone = window.clone(row.clone);
     const Eigen::Vector2d seen = row.H_x * clone.world_turn + row.H_f * turn;
-    row.H_x.leftCols<3>().noalias() -= seen * clone.world_turn.head<3>().transpose();
+    make_blind(row.H_x, seen, clone.world_turn);
     row.H_f.leftCols<2>() = (row.H_f * met_.basis).eval();  // (VF-26)
     row.H_f.col(2) = row.by_rho;
   }

@@ -68,8 +68,8 @@ void LandmarkRows::add_sight(const LinearSight& row, int at, const Window& windo
   // (VF-25); where both are one clone, they see nothing.
   const Eigen::Vector2d seen =
       row.H_x * clone.world_turn + row.H_f * point.by_clone * anchor.world_turn;
-  by_clone.leftCols<3>() -= 0.5 * seen * clone.world_turn.head<3>().transpose();
-  by_anchor.leftCols<3>() -= 0.5 * seen * anchor.world_turn.head<3>().transpose();
+  make_blind(by_clone, 0.5 * seen, clone.world_turn);
+  make_blind(by_anchor, 0.5 * seen, anchor.world_turn);
   // (VF-18)
   const auto add_entry = [&](int camera, int entry, const Eigen::Vector2d& rows) {
     const int column = window.camera(camera).column[static_cast<std::size_t>(entry)];

@@ -214,8 +214,8 @@ bool Landmarks::move_anchor(Landmark& landmark, const FilterView& filter, BlockE
   // (VF-25)
   const WorldTurn turn_from = world_turn_of(from), turn_to = world_turn_of(to);
   const Eigen::Vector3d seen = moved.by_old_clone * turn_from + moved.by_new_clone * turn_to;
-  moved.by_old_clone.leftCols<3>() -= 0.5 * seen * turn_from.head<3>().transpose();
-  moved.by_new_clone.leftCols<3>() -= 0.5 * seen * turn_to.head<3>().transpose();
+  make_blind(moved.by_old_clone, 0.5 * seen, turn_from);
+  make_blind(moved.by_new_clone, 0.5 * seen, turn_to);
   rewrite_.id = landmark.block;
   rewrite_.columns.clear();
   const auto add = [&](int column, int count) { rewrite_.columns.add(column, count); };

@@ -80,6 +80,23 @@ InversePoint next_to(std::span<const Ray> rays, double information) {
   return point;
 }
 
+/// Rays that see a point within `most_px`, in front of them; returns how many.
+int mark_agreeing(std::span<const Ray> rays, const InversePoint& point, double most_px,
+                  std::vector<bool>& agrees) {
+  agrees.assign(rays.size(), false);
+  int count = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Eigen::Vector3d q = point.seen_from(rays[i].origin);
+    const double depth = rays[i].direction.dot(q);
+    if (!(depth > 0.)) continue;
+    const Eigen::Vector2d e = rays[i].J * q / depth;
+    if (!(e.squaredNorm() < most_px * most_px)) continue;
+    agrees[i] = true;
+    ++count;
+  }
+  return count;
+}
+
 }  // namespace
 
 Eigen::Matrix<double, 3, 2> basis_across(const Eigen::Vector3d& unit) {
@@ -104,9 +121,7 @@ FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min
   const double information = sigma_px * sigma_px * information_of_rho(min_distance_m);
   double farthest_m = 0.;
   for (const Ray& ray : rays) {
-    if (!ray.origin.allFinite() || !ray.direction.allFinite() || !ray.J.allFinite()) {
-      return FeatureStatus::kBroken;
-    }
+    if (!ray.is_finite()) return FeatureStatus::kBroken;
     farthest_m = std::max(farthest_m, (ray.origin - rays.front().origin).norm());
   }
   // Levenberg-Marquardt. `point` is the one under test, out.point the best so far.
@@ -181,22 +196,6 @@ void FoundDistances::expect(MetRays& met) const {
     rho = mean_ + told * (rho - mean_);
     met.sigma_rho *= std::sqrt(told);
   }
-}
-
-int mark_agreeing(std::span<const Ray> rays, const InversePoint& point, double most_px,
-                  std::vector<bool>& agrees) {
-  agrees.assign(rays.size(), false);
-  int count = 0;
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Eigen::Vector3d q = point.seen_from(rays[i].origin);
-    const double depth = rays[i].direction.dot(q);
-    if (!(depth > 0.)) continue;
-    const Eigen::Vector2d e = rays[i].J * q / depth;
-    if (!(e.squaredNorm() < most_px * most_px)) continue;
-    agrees[i] = true;
-    ++count;
-  }
-  return count;
 }
 
 int find_agreeing(std::span<const Ray> rays, double most_px, std::vector<bool>& agrees,

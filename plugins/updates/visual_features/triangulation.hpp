@@ -38,6 +38,8 @@ struct Ray {
   Eigen::Vector3d origin;
   Eigen::Vector3d direction;      ///< unit
   Eigen::Matrix<double, 2, 3> J;  ///< d uv / d (p_FinG - origin) at `direction`
+
+  bool is_finite() const { return origin.allFinite() && direction.allFinite() && J.allFinite(); }
 };
 
 /// A point, and how well its rays tell it.
@@ -75,12 +77,8 @@ class FoundDistances {
   double mean_ = 0., second_ = 0.;  ///< of rho: mean, and mean square
 };
 
-/// Rays that see a point within `most_px`, in front of them; returns how many.
-int mark_agreeing(std::span<const Ray> rays, const InversePoint& point, double most_px,
-                  std::vector<bool>& agrees);
-
-/// The rays that agree on the point of two of them, for the two with which most do (VF-22); returns
-/// how many. `agrees` is for work.
+/// The rays that agree within `most_px` on the point of two of them, for the two with which most do
+/// (VF-22); returns how many. `agrees` is for work.
 int find_agreeing(std::span<const Ray> rays, double most_px, std::vector<bool>& agrees,
                   std::vector<bool>& best);
 

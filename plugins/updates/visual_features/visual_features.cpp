@@ -294,7 +294,7 @@ FeatureStatus VisualFeatures::try_feature(bool& passes) {
 }
 
 bool VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
-  // A track that could not be triangulated goes on if it is still seen: it may gain parallax.
+  // A track that could not be triangulated goes on if it is still seen: poses may get better.
   const auto refuse = [&](const char* reason) {
     reject(reason, candidate.id);
     if (candidate.lost) tracks_.remove(candidate.track);

@@ -31,6 +31,11 @@ WorldTurn world_turn_of(const CloneState& clone);
 inline Eigen::Vector3d world_turn_of_point(const Eigen::Vector3d& p_FinG) {
   return Eigen::Vector3d::UnitZ().cross(p_FinG);
 }
+/// Takes what rows see of the turn off their columns of the orientation of a clone.
+template <class Rows, class Seen>
+void make_blind(Rows&& by_pose, const Seen& seen, const WorldTurn& turn) {
+  by_pose.template leftCols<3>() -= seen * turn.head<3>().transpose();
+}
 
 struct WindowClone {
   std::int64_t t_ns = 0;
