@@ -115,19 +115,48 @@ void CameraTracker::keep(double dt_s) {
   tracks_.resize(kept);
 }
 
+void CameraTracker::find_those(const Frame& from, const Frame& to, double dt_s) {
+  cv::parallel_for_(cv::Range(0, static_cast<int>(which_.size())), [&](const cv::Range& range) {
+    for (int k = range.start; k < range.end; ++k) {
+      const std::size_t i = which_[static_cast<std::size_t>(k)];
+      status_[i] = find(from, to, dt_s, i) ? 1 : 0;
+    }
+  });
+}
+
+void CameraTracker::expect_new(double dt_s) {
+  found_.clear();
+  for (const std::size_t i : which_) {
+    if (status_[i] != 0) found_.add(tracks_[i].uv, i);
+  }
+  which_.clear();
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    Track& track = tracks_[i];
+    if (track.has_velocity) continue;
+    which_.push_back(i);
+    const auto near = found_.nearest(track.uv);
+    if (!near) continue;
+    const cv::Point2f step(median(*near, [&](auto k) { return now_[k].x - tracks_[k].uv.x; }),
+                           median(*near, [&](auto k) { return now_[k].y - tracks_[k].uv.y; }));
+    track.velocity_px_per_s = step * static_cast<float>(1. / dt_s);
+    track.has_velocity = true;
+  }
+}
+
 void CameraTracker::follow(const Frame& from, const Frame& to, double dt_s) {
   ++images_;
   if (tracks_.empty()) return;
   const std::size_t n = tracks_.size();
   now_.resize(n);
   rays_.resize(n);
-  status_.resize(n);
-  cv::parallel_for_(cv::Range(0, static_cast<int>(n)), [&](const cv::Range& range) {
-    for (int k = range.start; k < range.end; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      status_[i] = find(from, to, dt_s, i) ? 1 : 0;
-    }
-  });
+  status_.assign(n, 0);
+  which_.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    if (tracks_[i].has_velocity) which_.push_back(i);
+  }
+  find_those(from, to, dt_s);
+  expect_new(dt_s);
+  find_those(from, to, dt_s);
   if (options_.ransac) check_epipolar(dt_s);
   keep(dt_s);
 }

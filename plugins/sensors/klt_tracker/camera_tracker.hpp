@@ -11,6 +11,7 @@
 
 #include "detector.hpp"
 #include "frame.hpp"
+#include "neighbours.hpp"
 #include "patch.hpp"
 #include "tracker_options.hpp"
 #include "viwo/api/filter_view.hpp"
@@ -51,8 +52,12 @@ class CameraTracker {
   std::vector<Track>& tracks() { return tracks_; }
 
  private:
+  /// Looks for the tracks of `which_`; fills `status_`.
+  void find_those(const Frame& from, const Frame& to, double dt_s);
   /// Where a point is in the next image, first near the predicted place; fills `now_` and `rays_`.
   bool find(const Frame& from, const Frame& to, double dt_s, std::size_t track);
+  /// New tracks, which become `which_`, are expected to move as what is next to them did.
+  void expect_new(double dt_s);
   void check_epipolar(double dt_s);
   /// The tracks that are left, at their new places.
   void keep(double dt_s);
@@ -68,6 +73,8 @@ class CameraTracker {
   std::vector<cv::Point2f> now_;
   std::vector<std::uint8_t> status_;
   std::vector<Eigen::Vector3d> rays_;
+  std::vector<std::size_t> which_;
+  Neighbours found_;
 };
 
 /// Looks for a track of `from` in another frame: Lucas-Kanade from level `highest` down, then, with

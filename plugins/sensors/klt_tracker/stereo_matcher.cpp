@@ -39,8 +39,7 @@ StereoMatcher::StereoMatcher(const CameraView& left, const CameraView& right,
       motion_{R_LtoR_, p_LinR_.normalized()},
       focal_px_(focal_px(right)) {}
 
-bool StereoMatcher::guess(const Track& track, cv::Point2f& uv) const {
-  const double per_m = std::max(track.inverse_distance_per_m, 0.);
+bool StereoMatcher::guess(const Track& track, double per_m, cv::Point2f& uv) const {
   Eigen::Vector2d projected;
   if (!project(right_, R_LtoR_ * track.ray + per_m * p_LinR_, projected)) return false;
   uv = cv::Point2f(static_cast<float>(projected.x()), static_cast<float>(projected.y()));
@@ -60,40 +59,64 @@ bool StereoMatcher::inverse_distance(const Eigen::Vector3d& ray_left,
 }
 
 bool StereoMatcher::find(const Frame& left, const Frame& right, const Track& track,
-                         cv::Point2f& uv) const {
-  cv::Point2f expected;
-  if (!guess(track, expected)) return false;
-  const auto search = [&](int highest) {
-    uv = expected;
+                         double expected_per_m, cv::Point2f& uv) const {
+  const auto search = [&](double per_m, int highest) {
+    if (!guess(track, per_m, uv)) return false;
     // The two cameras see nearly the same: what the left one has is the better first guess.
     Eigen::Matrix2f A = track.A;
     return find_track(track, left, right, options_, highest, uv, A);
   };
-  if (track.inverse_distance_per_m >= 0. && search(kLevelOfGuess)) return true;
-  return search(options_.pyr_levels);
+  if (expected_per_m >= 0. && search(expected_per_m, kLevelOfGuess)) return true;
+  return search(std::max(track.inverse_distance_per_m, 0.), options_.pyr_levels);
+}
+
+void StereoMatcher::find_those(const Frame& left, const Frame& right,
+                               const std::vector<Track>& tracks) {
+  cv::parallel_for_(cv::Range(0, static_cast<int>(which_.size())), [&](const cv::Range& range) {
+    for (int k = range.start; k < range.end; ++k) {
+      const std::size_t i = which_[static_cast<std::size_t>(k)];
+      Match& match = matches_[i];
+      if (!find(left, right, tracks[i], match.expected_per_m, match.to)) continue;
+      const auto ray = detector_.ray_at(match.to);
+      match.found = ray.has_value();
+      match.agrees = ray && inverse_distance(tracks[i].ray, *ray, match.per_m);
+      match.per_m = match.agrees ? std::max(match.per_m, 0.) : -1.;
+    }
+  });
+}
+
+void StereoMatcher::expect_new(const std::vector<Track>& tracks) {
+  agreeing_.clear();
+  for (const std::size_t i : which_) {
+    if (matches_[i].agrees) agreeing_.add(tracks[i].uv, i);
+  }
+  which_.clear();
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (matches_[i].expected_per_m >= 0.) continue;
+    which_.push_back(i);
+    const auto near = agreeing_.nearest(tracks[i].uv);
+    if (near) matches_[i].expected_per_m = median(*near, [&](auto k) { return matches_[k].per_m; });
+  }
 }
 
 StereoCounts StereoMatcher::match(const Frame& left, const Frame& right, std::vector<Track>& tracks,
                                   std::vector<FeaturePoint>& points) {
-  const std::size_t n = tracks.size();
-  to_.resize(n);
-  found_.resize(n);
-  cv::parallel_for_(cv::Range(0, static_cast<int>(n)), [&](const cv::Range& range) {
-    for (int k = range.start; k < range.end; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      found_[i] = find(left, right, tracks[i], to_[i]) ? 1 : 0;
-    }
-  });
+  matches_.assign(tracks.size(), {});
+  which_.clear();
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    matches_[i].expected_per_m = tracks[i].inverse_distance_per_m;
+    if (tracks[i].inverse_distance_per_m >= 0.) which_.push_back(i);
+  }
+  find_those(left, right, tracks);
+  expect_new(tracks);
+  find_those(left, right, tracks);
   StereoCounts counts;
-  for (std::size_t i = 0; i < n; ++i) {
-    Track& track = tracks[i];
-    double per_m = -1.;
-    const auto ray = found_[i] != 0 ? detector_.ray_at(to_[i]) : std::nullopt;
-    const bool agrees = ray && inverse_distance(track.ray, *ray, per_m);
-    track.inverse_distance_per_m = agrees ? std::max(per_m, 0.) : -1.;
-    if (ray) ++counts.found;
-    if (ray && !agrees) ++counts.contradicting;
-    if (agrees) points.push_back({track.id, to_[i].x, to_[i].y});
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const Match& match = matches_[i];
+    tracks[i].inverse_distance_per_m = match.per_m;
+    if (match.found) ++counts.found;
+    if (match.found && !match.agrees) ++counts.contradicting;
+    if (match.agrees) points.push_back({tracks[i].id, match.to.x, match.to.y});
   }
   return counts;
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -11,6 +10,7 @@
 #include "camera_tracker.hpp"
 #include "detector.hpp"
 #include "frame.hpp"
+#include "neighbours.hpp"
 #include "ray_ransac.hpp"
 #include "tracker_options.hpp"
 #include "viwo/api/filter_view.hpp"
@@ -40,10 +40,16 @@ class StereoMatcher {
                      std::vector<FeaturePoint>& points);
 
  private:
-  /// Where a point is expected in the right image; false when it is not in it.
-  bool guess(const Track& track, cv::Point2f& uv) const;
-  /// Where a point is in the right image, if it is.
-  bool find(const Frame& left, const Frame& right, const Track& track, cv::Point2f& uv) const;
+  /// Looks for the tracks of `which_`, each first at what is expected of it.
+  void find_those(const Frame& left, const Frame& right, const std::vector<Track>& tracks);
+  /// New tracks, which become `which_`, are expected as far away as what is next to them.
+  void expect_new(const std::vector<Track>& tracks);
+  /// Where a point at this inverse distance is in the right image; false when it is not in it.
+  bool guess(const Track& track, double per_m, cv::Point2f& uv) const;
+  /// Where a point is in the right image, if it is; `expected` is its inverse distance, negative:
+  /// not known.
+  bool find(const Frame& left, const Frame& right, const Track& track, double expected_per_m,
+            cv::Point2f& uv) const;
   /// Inverse distance of a match, 1/m; false when the extrinsics contradict it.
   bool inverse_distance(const Eigen::Vector3d& ray_left, const Eigen::Vector3d& ray_right,
                         double& per_m) const;
@@ -55,9 +61,18 @@ class StereoMatcher {
   Eigen::Vector3d p_LinR_;
   RelativeMotion motion_;  ///< the same with a unit vector
   double focal_px_;
-  // Per track; storage is used again.
-  std::vector<cv::Point2f> to_;
-  std::vector<std::uint8_t> found_;
+  /// What is known of a track in this pair.
+  struct Match {
+    double expected_per_m = -1.;
+    cv::Point2f to;
+    bool found = false;
+    bool agrees = false;
+    double per_m = -1.;  ///< where it agrees
+  };
+  // Storage is used again.
+  std::vector<Match> matches_;  // per track
+  std::vector<std::size_t> which_;
+  Neighbours agreeing_;
 };
 
 }  // namespace viwo::klt

@@ -243,6 +243,39 @@ TEST(KltTracker, LosesNothingByTurningOrStanding) {
   }
 }
 
+TEST(KltTracker, FindsNewPointsAgainWhileTheCameraTurns) {
+  // GIVEN a camera that turns by 0.3 rad from image to image, faster and faster until then
+  const std::vector<double> yaws{0., 0.1, 0.3, 0.6, 0.9, 1.2};
+  std::vector<Measurement> input;
+  std::vector<CameraPose> poses;
+  for (std::size_t i = 0; i < yaws.size(); ++i) {
+    poses.push_back({exp_so3(Eigen::Vector3d(0., yaws[i], 0.)), Eigen::Vector3d::Zero()});
+    input.emplace_back(
+        sample_of(rig().left.render(poses[i], 1.5, i), 0, stamp_of(static_cast<int>(i))));
+  }
+  const auto left = track(input, section({}, 1)).of(0);
+  // THEN points that are new in an image are found in the next one, if they are in it
+  const CameraView& view = rig().cameras[0];
+  const Eigen::Vector2d size(view.width_px, view.height_px);
+  int in_sight = 0, found = 0;
+  for (std::size_t i = 2; i + 1 < left.size(); ++i) {
+    const auto before = ids_of(left[i - 1]), after = ids_of(left[i + 1]);
+    for (const FeaturePoint& point : left[i].points) {
+      if (before.contains(point.id)) continue;
+      const auto ray = unproject(view, Eigen::Vector2d(point.u_px, point.v_px));
+      Eigen::Vector2d uv;
+      if (!project(view, poses[i + 1].R_CtoW.transpose() * (poses[i].R_CtoW * ray.value()), uv) ||
+          (uv - 0.5 * size).cwiseAbs().cwiseQuotient(size).maxCoeff() > 0.45) {
+        continue;
+      }
+      ++in_sight;
+      if (after.contains(point.id)) ++found;
+    }
+  }
+  EXPECT_GT(in_sight, 30);
+  EXPECT_GT(found, 0.7 * in_sight) << found << " of " << in_sight;  // 0.03 from where they were
+}
+
 TEST(KltTracker, RespectsMasksOfBothCameras) {
   Image mask{424, 400, std::vector<std::uint8_t>(424 * 400, 0)};
   std::fill(mask.pixels.begin() + 424 * 250, mask.pixels.end(), std::uint8_t{255});

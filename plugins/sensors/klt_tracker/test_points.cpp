@@ -8,6 +8,7 @@
 
 #include "detector.hpp"
 #include "frame.hpp"
+#include "neighbours.hpp"
 #include "patch.hpp"
 #include "test_scene.hpp"
 
@@ -195,6 +196,21 @@ TEST(Detector, PrefersTheBestCellsWhenThereAreMoreCellsThanPoints) {
   const auto points = detect(pinhole(320, 240), options, as_seen(image));
   EXPECT_EQ(points.size(), 20U);
   for (const cv::Point2f& uv : points) EXPECT_GT(uv.y, 110.F);
+}
+
+TEST(Neighbours, AreTheNearestThreeAndOneOfThemMayBeWrong) {
+  Neighbours points;
+  const std::vector<float> moved{7.F, 1.F, 2.F, 90.F, 3.F};
+  points.add({50.F, 0.F}, 0);
+  points.add({3.F, 4.F}, 1);
+  EXPECT_FALSE(points.nearest({0.F, 0.F}).has_value());
+  points.add({0.F, -2.F}, 2);
+  points.add({1.F, 0.F}, 3);
+  points.add({0.F, 40.F}, 4);
+  const auto three = points.nearest({0.F, 0.F});
+  ASSERT_TRUE(three.has_value());
+  EXPECT_EQ(*three, (Neighbours::Three{3, 2, 1}));
+  EXPECT_EQ(median(*three, [&](std::size_t i) { return moved[i]; }), 2.F);
 }
 
 TEST(Frame, IsBlankWhenDarkOrFlatButNotWhenDim) {
