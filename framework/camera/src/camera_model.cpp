@@ -138,8 +138,8 @@ bool distort(const CameraView& camera, const Eigen::Vector3d& p_C, Distorted& ou
              : distort_equidistant(camera, p_C, out, J_coefficients);
 }
 
-/// A step of Newton's method this small leaves an error of about its square.
-constexpr double kStepTolerance = 1e-9;
+/// A step of Newton's method this small leaves an error of about its square, in radians.
+constexpr double kStepTolerance = 1e-6;
 
 Eigen::Vector3d direction_of(const Eigen::Vector2d& point) {
   return Eigen::Vector3d(point.x(), point.y(), 1.).normalized();
@@ -183,11 +183,19 @@ bool undistort_equidistant(const CameraView& camera, const Eigen::Vector2d& targ
   return true;
 }
 
-/// The same. Newton's method on the distortion, from the distorted point; half a step where it
-/// would leave what is not folded.
+/// About the point of the plane z = 1 which is seen there: the inverse series of the radius.
+Eigen::Vector2d about_undistorted(const CameraView& camera, const Eigen::Vector2d& target) {
+  const double k1 = camera.intrinsics[4], k2 = camera.intrinsics[5];
+  const double r2 = target.squaredNorm();
+  const double scale = 1. + r2 * (-k1 + r2 * (3. * k1 * k1 - k2));
+  return (scale > 0.5 && scale < 2. ? scale : 1.) * target;
+}
+
+/// The same. Newton's method on the distortion; half a step where it would leave what is not
+/// folded.
 bool undistort_radtan(const CameraView& camera, const Eigen::Vector2d& target, Eigen::Vector3d& ray,
                       Eigen::Matrix<double, 2, 3>& J_ray) {
-  Eigen::Vector2d point = target, step = -target, distorted;
+  Eigen::Vector2d point = about_undistorted(camera, target), step = -point, distorted;
   Eigen::Matrix2d J;
   const auto is_found = [&] {
     const double n = std::sqrt(1. + point.squaredNorm());

@@ -22,7 +22,7 @@ void Chi2Gate::start(int max_clones, int n_cameras) {
   M_.setZero(2 * max_clones, 2 * max_clones);
   rhs_.setZero(2 * max_sights, 7);
   L_inverse_.setZero(2 * max_sights, 2 * max_sights);
-  S_inverse_.setZero(2 * max_sights, 2 * max_sights);
+  M_of_noise_.setZero(2 * max_sights, 2 * max_sights);
   PHt_.setZero(kPoseSize * max_clones, 2);
 }
 
@@ -69,10 +69,14 @@ void Chi2Gate::tell(NoiseScale& noise) {
   auto L_inverse = L_inverse_.topLeftCorner(n_rows_, n_rows_);
   L_inverse.setIdentity();
   L.solveInPlace(L_inverse);
-  auto M = S_inverse_.topLeftCorner(n_rows_, n_rows_);
-  M.noalias() = L_inverse.transpose().lazyProduct(L_inverse);
-  M.noalias() -= Q.lazyProduct(Q.transpose());
-  const double information = M.squaredNorm();
+  auto M = M_of_noise_.topLeftCorner(n_rows_, n_rows_);
+  auto lower = M.selfadjointView<Eigen::Lower>();
+  M.setZero();
+  lower.rankUpdate(L_inverse.transpose());
+  lower.rankUpdate(Q, -1.);
+  double information = M.diagonal().squaredNorm();
+  for (int k = 0; k < n_rows_; ++k)
+    information += 2. * M.col(k).tail(n_rows_ - k - 1).squaredNorm();
   const double variance = noise.variance();
   noise.add(variance * (1. + (rhs.col(kExplained).squaredNorm() - M.trace()) / information),
             information / static_cast<double>(n_rows_ - kExplained));

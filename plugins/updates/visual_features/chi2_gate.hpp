@@ -54,7 +54,7 @@ class Chi2Gate {
   Eigen::Matrix<double, Eigen::Dynamic, 7> rhs_;  ///< H_f, t H_f D, residual, whitened
   int n_rows_ = 0;                                ///< of the feature asked for last
   PointFit fit_;                                  ///< of the same
-  Eigen::MatrixXd L_inverse_, S_inverse_;
+  Eigen::MatrixXd L_inverse_, M_of_noise_;
   Eigen::Matrix<double, Eigen::Dynamic, 2> PHt_;
 };
 

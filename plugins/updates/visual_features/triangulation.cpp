@@ -80,21 +80,20 @@ InversePoint next_to(std::span<const Ray> rays, double information) {
   return point;
 }
 
-/// Rays that see a point within `most_px`, in front of them; returns how many.
-int mark_agreeing(std::span<const Ray> rays, const InversePoint& point, double most_px,
+/// Rays that see a point within `most_px`, in front of them; returns how many. Ends where there
+/// will not be more than `beaten`.
+int mark_agreeing(std::span<const Ray> rays, const InversePoint& point, double most_px, int beaten,
                   std::vector<bool>& agrees) {
   agrees.assign(rays.size(), false);
-  int count = 0;
-  for (std::size_t i = 0; i < rays.size(); ++i) {
+  int possible = static_cast<int>(rays.size());
+  for (std::size_t i = 0; i < rays.size() && possible > beaten; ++i) {
     const Eigen::Vector3d q = point.seen_from(rays[i].origin);
     const double depth = rays[i].direction.dot(q);
-    if (!(depth > 0.)) continue;
-    const Eigen::Vector2d e = rays[i].J * q / depth;
-    if (!(e.squaredNorm() < most_px * most_px)) continue;
-    agrees[i] = true;
-    ++count;
+    const double within = most_px * depth;
+    agrees[i] = depth > 0. && (rays[i].J * q).squaredNorm() < within * within;
+    if (!agrees[i]) --possible;
   }
-  return count;
+  return possible;
 }
 
 }  // namespace
@@ -200,9 +199,11 @@ void FoundDistances::expect(MetRays& met) const {
 
 int find_agreeing(std::span<const Ray> rays, double most_px, std::vector<bool>& agrees,
                   std::vector<bool>& best) {
+  const int n = static_cast<int>(rays.size());
   int most = 0;
+  // Those that are far apart first: they are likely to tell where the point is.
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    for (std::size_t j = i + 1; j < rays.size(); ++j) {
+    for (std::size_t j = rays.size() - 1; j > i; --j) {
       const Eigen::Vector3d& a = rays[i].direction;
       const Eigen::Vector3d& b = rays[j].direction;
       const Eigen::Vector3d apart = rays[j].origin - rays[i].origin;
@@ -211,10 +212,11 @@ int find_agreeing(std::span<const Ray> rays, double most_px, std::vector<bool>& 
       const double along = a.dot(apart) - ab * b.dot(apart), sine2 = 1. - ab * ab;
       const InversePoint point{rays[i].origin, along > 0. ? Eigen::Vector3d(along * a) : a,
                                along > 0. ? sine2 : 0.};
-      const int count = mark_agreeing(rays, point, most_px, agrees);
+      const int count = mark_agreeing(rays, point, most_px, most, agrees);
       if (count <= most) continue;
       most = count;
       best.swap(agrees);
+      if (most == n) return n;
     }
   }
   return most;
