@@ -31,8 +31,9 @@ EncoderSample blend(const EncoderSample& a, const EncoderSample& b, double weigh
 
 /// The piece [begin_ns, end_ns] of sample k, read at its middle. Readings change evenly within a
 /// cell, as since the cell before: so the pieces of a cell add up to what was counted in it, also
-/// when one is asked for before the next sample is known (W-11). `share`: how much of the sample
-/// before is taken off.
+/// when one is asked for before the next sample is known (W-11). Not from a cell that is much
+/// shorter: what was counted by stamps of arrival that came in a bunch is no rate of that time.
+/// `share`: how much of the sample before is taken off.
 EncoderSample cut(std::span<const EncoderSample> samples, std::size_t k, std::int64_t begin_ns,
                   std::int64_t end_ns, double& share) {
   const EncoderSample& sample = samples[k];
@@ -40,6 +41,7 @@ EncoderSample cut(std::span<const EncoderSample> samples, std::size_t k, std::in
   if (k == 0 || samples[k - 1].end_ns != sample.begin_ns) return sample;
   // What is not believed of the one before is not to be in this one.
   const EncoderSample& before = samples[k - 1];
+  if (2 * (before.end_ns - before.begin_ns) < sample.end_ns - sample.begin_ns) return sample;
   if (before.bad_drives != 0 || before.bad_steers != 0 || before.fault() != nullptr) return sample;
   // Twice the middles.
   const std::int64_t cell = sample.begin_ns + sample.end_ns;

@@ -310,6 +310,31 @@ TEST(Preintegration, GivesWhatWasCountedHoweverIntervalsCutAndStampsJitter) {
   }
 }
 
+TEST(Preintegration, TakesNoSlopeFromACellOfStampsThatCameInABunch) {
+  const auto model = load_model(swerve("four_wis_wid"));
+  // 0.04 m/s by counts over 50 ms, which arrive two at a time, two microseconds apart.
+  const double radius_m = 0.1;
+  std::vector<EncoderSample> samples;
+  std::int64_t begin_ns = 0;
+  for (int k = 1; k <= 40; ++k) {
+    EncoderSample sample;
+    sample.n_drive = sample.n_steer = 4;
+    sample.begin_ns = begin_ns;
+    sample.end_ns = sample.t_ns = begin_ns = k / 2 * (kSecond / 10) + (k % 2 == 0 ? 0 : 2'000);
+    for (std::size_t i = 0; i < 4; ++i) {
+      sample.drive_rad_per_s[i] =
+          0.002 / radius_m / seconds_between(sample.begin_ns, sample.end_ns);
+    }
+    samples.push_back(sample);
+  }
+  Preintegrator preintegrator(model, {});
+  PreintegratedPose pose;
+  for (std::int64_t to_ns = 330'000'000; to_ns < begin_ns; to_ns += 30'000'000) {
+    ASSERT_TRUE(preintegrator.integrate(samples, 0, to_ns, pose));
+    EXPECT_NEAR(pose.g[1], 0.04e-9 * static_cast<double>(to_ns), 0.0045) << to_ns;  // of a bunch
+  }
+}
+
 TEST(Preintegration, IsTheSameWhereSteeringReadingsBeginAnew) {
   for (const auto& yaml : {swerve("four_wis_wid"), swerve("four_wis_wid_drive_only")}) {
     const auto model = load_model(yaml);
