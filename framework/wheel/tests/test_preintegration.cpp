@@ -313,7 +313,7 @@ TEST(Preintegration, GivesWhatWasCountedHoweverIntervalsCutAndStampsJitter) {
 TEST(Preintegration, TakesNoSlopeFromACellOfStampsThatCameInABunch) {
   const auto model = load_model(swerve("four_wis_wid"));
   // 0.04 m/s by counts over 50 ms, which arrive two at a time, two microseconds apart.
-  const double radius_m = 0.1;
+  const double radius_m = 0.0255;
   std::vector<EncoderSample> samples;
   std::int64_t begin_ns = 0;
   for (int k = 1; k <= 40; ++k) {
