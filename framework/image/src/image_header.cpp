@@ -1,6 +1,7 @@
 #include "image_header.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cstddef>
 #include <cstdlib>
 #include <string_view>
@@ -59,10 +60,12 @@ std::optional<ImageSize> bmp_size(Bytes bytes) {
                    static_cast<std::uint64_t>(std::abs(std::int64_t{height}))};
 }
 
-/// "P5 # a comment\n 640 480 255".
+/// "P5 # a comment\n 640 480 255". Without the space OpenCV hands it to decoders of other formats,
+/// which nobody has asked for.
 std::optional<ImageSize> netpbm_size(Bytes bytes) {
   constexpr std::size_t kMostDigits = 9;
   std::size_t at = 2;
+  if (bytes.size() <= at || std::isspace(bytes[at]) == 0) return std::nullopt;
   const auto number = [&]() -> std::optional<std::uint64_t> {
     bool is_comment = false;
     for (; at < bytes.size() && (is_comment || bytes[at] < '0' || bytes[at] > '9'); ++at) {

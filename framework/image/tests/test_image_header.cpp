@@ -27,6 +27,15 @@ Bytes with_number(Bytes bytes, std::size_t at, std::uint32_t value) {
   return bytes;
 }
 
+// A decoder of another format would take what OpenCV's own does not: DICOM by its mark at 128.
+TEST(ImageHeader, IsNoneOfAPgmWithoutTheSpaceBehindItsMark) {
+  std::string bytes = "P5\x89 4 4 255 ";
+  bytes.resize(128, ' ');
+  bytes += "DICM";
+  bytes.resize(256, '\0');
+  EXPECT_FALSE(image_size(Bytes(bytes.begin(), bytes.end())).has_value());
+}
+
 TEST(ImageHeader, TheSizeIsReadBeforeThePixels) {
   Image image;
   const auto refusal = [&image](const Bytes& bytes) {
