@@ -268,7 +268,14 @@ FactorResult Covariance::apply(const InformationFactor& factor, Eigen::VectorXd&
   auto C = C_.topLeftCorner(m, m);
   auto T = T_.topLeftCorner(m, m);
   auto work = W_.topLeftCorner(m, m);
-  if (!upper_triangular::factorise(work, C)) return FactorResult::kFailed;
+  if (!upper_triangular::factorise(work, C)) {
+    // Where nothing tells the place, what clones are off by together is so much more than what they
+    // are off by from each other that rounding is as large as that: as much again, and once more.
+    constexpr double kRounding = 1e-12;
+    gather(factor);
+    work.diagonal() *= 1. + kRounding;
+    if (!upper_triangular::factorise(work, C)) return FactorResult::kFailed;
+  }
   upper_triangular::weigh(C, Lambda, work, T);
   Eigen::Ref<Eigen::MatrixXd> L(T);
   if (InPlaceCholesky(L).info() != Eigen::Success) return FactorResult::kRejected;

@@ -197,6 +197,21 @@ TEST(Covariance, RefusesWhatIsNotFiniteAndTellsWhenItIsLost) {
   EXPECT_EQ(covariance.apply(information, dx), FactorResult::kFailed);
 }
 
+TEST(Covariance, IsNotLostWhereRoundingIsAsLargeAsWhatClonesAreOffByFromEachOther) {
+  // A kilometre that all of them are off by together, and nothing else that a number can hold.
+  Covariance covariance(kDenseSize);
+  covariance.set_block(0, MatrixXd::Constant(kDenseSize, kDenseSize, 1e6));
+  InformationFactor information;
+  information.columns.add(18, 12);
+  information.Lambda = MatrixXd::Identity(12, 12);
+  information.eta = VectorXd::Constant(12, 1.);
+  VectorXd dx(kDenseSize);
+  EXPECT_EQ(covariance.apply(information, dx), FactorResult::kApplied);
+  EXPECT_TRUE(covariance.matrix().allFinite());
+  EXPECT_NEAR(covariance.matrix()(18, 18), 1. / 12., 1e-3);  // of twelve measurements
+  EXPECT_NEAR(dx[18], 1., 1e-3);
+}
+
 TEST(Covariance, PropagatesAndClonesLikeTheDenseProduct) {
   Random random(6);
   const MatrixXd P = random_covariance(random);

@@ -92,6 +92,8 @@ void Feature::start(int max_sights, double sigma_px, double min_distance_m, bool
   sights_.reserve(static_cast<std::size_t>(max_sights));
   rays_.reserve(static_cast<std::size_t>(max_sights));
   linear_.reserve(static_cast<std::size_t>(max_sights));
+  by_clones_.setZero(kPoseSize * max_sights);
+  P_by_clones_.setZero(kPoseSize * max_sights);
   agrees_.reserve(static_cast<std::size_t>(max_sights));
   best_.reserve(static_cast<std::size_t>(max_sights));
 }
@@ -109,7 +111,7 @@ void Feature::set_point(const Eigen::Vector3d& p_FinG) {
   met_.has_distance = true;
 }
 
-FeatureStatus Feature::triangulate(const Window& window) {
+FeatureStatus Feature::triangulate(Window& window) {
   rays_.clear();
   CameraPose own;
   for (const Sight& sight : sights_) {
@@ -119,13 +121,56 @@ FeatureStatus Feature::triangulate(const Window& window) {
     ray.direction.noalias() = pose.R_GtoC.transpose() * sight.observation->ray;
     ray.J.noalias() = sight.observation->J_ray * pose.R_GtoC;
   }
-  const FeatureStatus status = visual::triangulate(rays_, sigma_px_, min_distance_m_, met_);
+  FeatureStatus status = meet(rays_, sigma_px_, min_distance_m_, met_);
+  if (status != FeatureStatus::kOk) return status;
+  status = judge(rays_, min_distance_m_, met_);
   if (status != FeatureStatus::kOk) return status;
   found_rho_ = met_.point.rho;
   found_variance_ = met_.sigma_rho * met_.sigma_rho;
-  if (!exact_) distances_.expect(met_);
-  if (exact_ && !met_.has_distance) met_.point.rho = 0.;  // it would be whatever rounding makes it
+  if (exact_) {
+    if (!met_.has_distance) met_.point.rho = 0.;  // it would be whatever rounding makes it
+    return status;
+  }
+  is_of_scene_ = is_of_scene(window);
+  distances_.expect(is_of_scene_, met_);
   return status;
+}
+
+/// By a way that is hardly known all points are off together: they tell nothing of the scene, and
+/// the scene nothing of them.
+bool Feature::is_of_scene(Window& window) {
+  constexpr double kKnown = 0.1;  // of rho
+  if (window.knows_way()) return true;
+  const double square = std::max(found_rho_ * found_rho_, distances_.mean_square());
+  return variance_by_poses(window) < kKnown * kKnown * square;
+}
+
+/// Of rho, by where the clones may be: a way that is taken for longer than it is makes points
+/// farther that are told by it, and a turn feigns a distance (VF-29).
+double Feature::variance_by_poses(Window& window) {
+  const int columns = window.clone_columns();
+  auto by = by_clones_.head(columns);
+  by.setZero();
+  const double rho = met_.point.rho;
+  const int first = window.clone(sights_.front().clone).column;
+  for (std::size_t i = 0; i < sights_.size(); ++i) {
+    const WindowClone& clone = window.clone(sights_[i].clone);
+    const RayDerivative ray = derivative_of(rays_[i], met_.point, met_.basis);
+    const Eigen::Vector3d by_q = (met_.of_rho * ray.by_point.transpose() * ray.by_q).transpose();
+    const Eigen::Vector3d d = met_.point.seen_from(clone.p_IinG);
+    by.segment<3>(clone.column) += clone.R_GtoI * by_q.cross(d);
+    by.segment<3>(clone.column + 3) -= rho * by_q;
+    by.segment<3>(first + 3) += rho * by_q;  // from there it counts
+  }
+  auto P_by = P_by_clones_.head(columns);
+  P_by.noalias() = window.covariance().topLeftCorner(columns, columns) * by;
+  return std::max(0., by.dot(P_by));
+}
+
+/// What the rays hardly tell beside what is known before teaches nothing.
+void Feature::remember_distance() {
+  const bool is_told = 2. * found_variance_ * visual::information_of_rho(min_distance_m_) < 1.;
+  if (is_told && is_of_scene_) distances_.add(found_rho_, found_variance_);
 }
 
 int Feature::leave_out_strays() {
@@ -165,6 +210,7 @@ FeatureStatus Feature::linearize(Window& window) {
     row.H_f.leftCols<2>() = (row.H_f * met_.basis).eval();  // (VF-26)
     row.H_f.col(2) = row.by_rho;
   }
+  has_plain_noise_ = true;
   if (!exact_) leave_to_noise(window);
   return FeatureStatus::kOk;
 }
@@ -172,12 +218,14 @@ FeatureStatus Feature::linearize(Window& window) {
 /// Where both the distance and how far the camera went are not known, their product, which rows do
 /// not have, is noise (VF-27).
 void Feature::leave_to_noise(Window& window) {
+  constexpr double kPlain = 0.5;
   for (LinearSight& row : linear_) {
     const double sigma_m2 =
         window.way_variance(row.clone) + window.way_variance(linear_.front().clone);
     const double variance =
         0.5 * met_.sigma_rho * met_.sigma_rho * sigma_m2 * (row.H_f.leftCols<2>()).squaredNorm();
     if (variance < kLeastNoise) continue;
+    if (variance > kPlain) has_plain_noise_ = false;
     const double weight = 1. / std::sqrt(1. + variance);
     row.residual *= weight;
     row.H_f *= weight;

@@ -59,8 +59,9 @@ class Feature {
   /// All observations of a track whose clones are in the window; returns how many.
   int collect(const TrackStore& tracks, int track, const Window& window);
 
-  /// Least squares of the pixel residuals; anything but kOk: no use to linearise.
-  FeatureStatus triangulate(const Window& window);
+  /// Least squares of the pixel residuals, and what is known of distances besides; anything but
+  /// kOk: no use to linearise.
+  FeatureStatus triangulate(Window& window);
 
   /// After triangulate(): leaves out the sights that do not see the point of the others. Returns
   /// how many; 0 when none does so, or when no half of the sights agrees on a point (VF-22).
@@ -72,7 +73,9 @@ class Feature {
 
   const MetRays& met() const { return met_; }
   /// It was used: others will be about as far.
-  void remember_distance() { distances_.add(found_rho_, found_variance_); }
+  void remember_distance();
+  /// Whether its rows have the noise of pixels alone (VF-27).
+  bool has_plain_noise() const { return has_plain_noise_; }
   void set_point(const Eigen::Vector3d& p_FinG);
   /// What is known of rho besides, where the rays tell nothing. Else it would be known from where
   /// the rays begin, and with it where the world is.
@@ -84,12 +87,16 @@ class Feature {
 
  private:
   void leave_to_noise(Window& window);
+  bool is_of_scene(Window& window);
+  double variance_by_poses(Window& window);
 
   double sigma_px_ = 1., min_distance_m_ = 0.1;
   bool exact_ = false;
   MetRays met_;
   FoundDistances distances_;
   double found_rho_ = 0., found_variance_ = 0.;  ///< of the last track
+  bool is_of_scene_ = false, has_plain_noise_ = true;
+  Eigen::VectorXd by_clones_, P_by_clones_;  ///< derivatives of rho
   std::vector<Sight> sights_;
   std::vector<Ray> rays_;
   std::vector<LinearSight> linear_;

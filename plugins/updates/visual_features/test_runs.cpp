@@ -322,6 +322,8 @@ TEST(VisualRuns, AStartWhoseVelocityIsHardlyKnownIsConsistent) {
   // One camera has the scale of all from the IMU: a quarter of it is corrected on the way.
   EXPECT_EQ(inconsistency({.sigma_velocity_m_per_s = 0.3}, 8), "");
   EXPECT_EQ(inconsistency({.n_cameras = 2, .sigma_velocity_m_per_s = 0.3}, 8), "");
+  // What was found with another scale is not expected of those that are found later.
+  EXPECT_EQ(inconsistency({.sigma_velocity_m_per_s = 0.6, .far = 2.}, 8), "");
 }
 
 TEST(VisualRuns, PointsThatAreTooFarForParallaxDoNoHarm) {

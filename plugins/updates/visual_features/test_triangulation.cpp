@@ -28,7 +28,7 @@ struct Sums {
       met.point.rho = rho + met.sigma_rho * testing::normal(random);
       met.has_distance = met.point.rho > 4. * met.sigma_rho;
       const double as_found = met.point.rho, variance = met.sigma_rho * met.sigma_rho;
-      distances.expect(met);
+      distances.expect(true, met);
       distances.add(as_found, variance);
       if (i < learning) continue;
       truth += rho * rho / n;
@@ -66,12 +66,41 @@ TEST(FoundDistances, LeaveAFewPointsAsTheyAreFoundOrInfinitelyFar) {
   told.point.rho = 0.5;
   told.sigma_rho = 0.01;
   told.has_distance = true;
-  distances.expect(told);
+  distances.expect(true, told);
   EXPECT_EQ(told.point.rho, 0.5);
   MetRays untold;
   untold.point.rho = 0.03;
   untold.sigma_rho = 0.04;
-  distances.expect(untold);
+  distances.expect(true, untold);
+  EXPECT_EQ(untold.point.rho, 0.);
+  EXPECT_DOUBLE_EQ(untold.sigma_rho, 0.05);
+}
+
+TEST(FoundDistances, LeaveAPointThatIsNotOfTheSceneWhereItWasFound) {
+  Random random(4);
+  FoundDistances distances;
+  for (int i = 0; i < 2000; ++i) {
+    const double sigma = 0.01;
+    distances.add(0.001 + sigma * testing::normal(random), sigma * sigma);
+  }
+  for (const double sigma : {0.002, 0.03}) {  // better told than the scene is, and worse
+    MetRays met;
+    met.point.rho = 0.5;
+    met.sigma_rho = sigma;
+    met.has_distance = true;
+    distances.expect(true, met);
+    EXPECT_EQ(met.point.rho, 0.5) << sigma;
+    EXPECT_EQ(met.sigma_rho, sigma) << sigma;
+  }
+}
+
+TEST(FoundDistances, SayNothingWhereTheWayIsNotKnown) {
+  FoundDistances distances;
+  for (int i = 0; i < 100; ++i) distances.add(0.2, 1e-6);
+  MetRays untold;
+  untold.point.rho = 0.03;
+  untold.sigma_rho = 0.04;
+  distances.expect(false, untold);
   EXPECT_EQ(untold.point.rho, 0.);
   EXPECT_DOUBLE_EQ(untold.sigma_rho, 0.05);
 }

@@ -32,20 +32,11 @@ Normal normal_at(std::span<const Ray> rays, const InversePoint& point,
                  const Eigen::Matrix<double, 3, 2>& basis, double information) {
   Normal n;
   for (const Ray& ray : rays) {
-    const Eigen::Vector3d apart = point.origin - ray.origin;
-    const Eigen::Vector3d q = point.direction + point.rho * apart;
-    const double depth = ray.direction.dot(q);
-    n.visible = n.visible && depth > 0.;
-    const double inverse_depth = 1. / depth;
-    const Eigen::Vector2d e = ray.J * q * inverse_depth;
-    const Eigen::Matrix<double, 2, 3> by_q =
-        (ray.J - e * ray.direction.transpose()) * inverse_depth;
-    Eigen::Matrix<double, 2, 3> J;
-    J.leftCols<2>().noalias() = by_q * basis;
-    J.col(2).noalias() = by_q * apart;
-    n.cost += e.squaredNorm();
-    n.A.noalias() += J.transpose() * J;
-    n.b.noalias() -= J.transpose() * e;
+    const RayDerivative d = derivative_of(ray, point, basis);
+    n.visible = n.visible && d.is_visible;
+    n.cost += d.e.squaredNorm();
+    n.A.noalias() += d.by_point.transpose() * d.by_point;
+    n.b.noalias() -= d.by_point.transpose() * d.e;
   }
   n.A(2, 2) += information;
   n.b[2] -= information * point.rho;
@@ -115,8 +106,23 @@ Eigen::Matrix3d MetRays::by_point() const {
   return T;
 }
 
-FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min_distance_m,
-                          MetRays& out) {
+RayDerivative derivative_of(const Ray& ray, const InversePoint& point,
+                            const Eigen::Matrix<double, 3, 2>& basis) {
+  const Eigen::Vector3d apart = point.origin - ray.origin;
+  const Eigen::Vector3d q = point.direction + point.rho * apart;
+  const double depth = ray.direction.dot(q);
+  const double inverse_depth = 1. / depth;
+  RayDerivative d;
+  d.is_visible = depth > 0.;
+  d.e = ray.J * q * inverse_depth;
+  d.by_q = (ray.J - d.e * ray.direction.transpose()) * inverse_depth;
+  d.by_point.leftCols<2>().noalias() = d.by_q * basis;
+  d.by_point.col(2).noalias() = d.by_q * apart;
+  return d;
+}
+
+FeatureStatus meet(std::span<const Ray> rays, double sigma_px, double min_distance_m,
+                   MetRays& out) {
   const double information = sigma_px * sigma_px * information_of_rho(min_distance_m);
   double farthest_m = 0.;
   for (const Ray& ray : rays) {
@@ -157,14 +163,18 @@ FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min
       break;
     }
   }
-  const double variance = best.A.inverse()(2, 2);
-  if (!(variance > 0.)) return FeatureStatus::kBroken;
-  out.sigma_rho = sigma_px * std::sqrt(variance);
-  if (out.point.rho < -kSigmas * out.sigma_rho) return FeatureStatus::kNotVisible;  // behind
-  out.has_distance = out.point.rho > kSigmas * out.sigma_rho;
+  out.of_rho = best.A.inverse().row(2);
+  if (!(out.of_rho[2] > 0.)) return FeatureStatus::kBroken;
+  out.sigma_rho = sigma_px * std::sqrt(out.of_rho[2]);
+  return FeatureStatus::kOk;
+}
+
+FeatureStatus judge(std::span<const Ray> rays, double min_distance_m, MetRays& met) {
+  if (met.point.rho < -kSigmas * met.sigma_rho) return FeatureStatus::kNotVisible;  // behind
+  met.has_distance = met.point.rho > kSigmas * met.sigma_rho;
   for (const Ray& ray : rays) {
-    const double distance = out.point.seen_from(ray.origin).norm();  // times rho
-    if (distance < out.point.rho * min_distance_m) return FeatureStatus::kNear;
+    const double distance = met.point.seen_from(ray.origin).norm();  // times rho
+    if (distance < met.point.rho * min_distance_m) return FeatureStatus::kNear;
   }
   return FeatureStatus::kOk;
 }
@@ -172,25 +182,33 @@ FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min
 void FoundDistances::add(double rho, double variance) {
   count_ = std::min(count_ + 1, kMostPoints);
   // The better it is told, beside how different points are, the more it says of them.
-  const double weight = 1. / (variance + (count_ > kFewPoints ? this->variance() : 0.));
+  const double spread = this->variance();
+  const double weight = count_ > kFewPoints && spread > 0. ? spread / (spread + variance) : 1.;
   weight_ = (1. - 1. / kMostPoints) * weight_ + weight;
   const double part = weight / weight_;
   mean_ += part * (rho - mean_);
   second_ += part * (rho * rho - variance - second_);
 }
 
-void FoundDistances::expect(MetRays& met) const {
+void FoundDistances::expect(bool of_scene, MetRays& met) const {
   double& rho = met.point.rho;
   const double variance = met.sigma_rho * met.sigma_rho;
-  if (count_ <= kFewPoints) {
+  const auto is_stranger = [&](double about, double spread) {
+    const double off = rho - about;
+    return met.has_distance && off * off > kSigmas * kSigmas * (spread + variance);
+  };
+  if (!of_scene || count_ <= kFewPoints) {
     if (met.has_distance) return;
     met.sigma_rho = std::hypot(rho, met.sigma_rho);
     rho = 0.;
   } else if (variance > second_) {
+    const double second = std::max(0., second_);
+    if (is_stranger(0., second)) return;
     const double unsure = variance * std::sqrt(2. / count_);  // of second_
-    met.sigma_rho = std::sqrt(std::min(variance, std::max(0., second_) + unsure));
+    met.sigma_rho = std::sqrt(std::min(variance, second + unsure));
     rho = 0.;
   } else {
+    if (is_stranger(mean_, this->variance())) return;
     const double told = this->variance() / (this->variance() + variance);
     rho = mean_ + told * (rho - mean_);
     met.sigma_rho *= std::sqrt(told);

@@ -48,6 +48,8 @@ struct MetRays {
   Eigen::Matrix<double, 3, 2> basis;  ///< of what is across it
   double sigma_rho = 0.;              ///< 1/m
   bool has_distance = false;          ///< beyond what noise feigns
+  /// How rho answers to the gradients of the residuals: a row of the inverse of J^T J.
+  Eigen::RowVector3d of_rho = Eigen::RowVector3d::Zero();
 
   /// Derivative by p_FinG of the coordinates: across the direction, and rho (VF-26).
   Eigen::Matrix3d by_point() const;
@@ -56,19 +58,33 @@ struct MetRays {
 /// What is known of rho before: no point is nearer than `min_distance_m`.
 inline double information_of_rho(double min_distance_m) { return min_distance_m * min_distance_m; }
 
+/// Derivative of a ray's pixels by what it sees, q = rho (p_FinG - origin), and by the coordinates
+/// of the point.
+struct RayDerivative {
+  Eigen::Vector2d e;  ///< the residual, px
+  Eigen::Matrix<double, 2, 3> by_q, by_point;
+  bool is_visible = true;
+};
+RayDerivative derivative_of(const Ray& ray, const InversePoint& point,
+                            const Eigen::Matrix<double, 3, 2>& basis);
+
 /// Least squares of the pixel residuals (VF-3) over direction and inverse distance from the first
-/// ray's origin. Anything but kOk: no use to linearise.
-FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min_distance_m,
-                          MetRays& out);
+/// ray's origin. Its sigma is that of the pixels. kNotVisible, kBroken: there is none.
+FeatureStatus meet(std::span<const Ray> rays, double sigma_px, double min_distance_m, MetRays& out);
+
+/// Whether the point can be there, by its sigma: kNotVisible behind the cameras, kNear.
+FeatureStatus judge(std::span<const Ray> rays, double min_distance_m, MetRays& met);
 
 /// How far the points are, of those that were found last. What a track tells of the way goes with
 /// its rho: taken as it was found, noise and all, it would be seen where it is not (VF-28).
 class FoundDistances {
  public:
   void add(double rho, double variance);
-  /// What is to be expected of the point: its rho, and its sigma. 0 where its rays tell less than
-  /// the others do, or nothing and there are no others yet.
-  void expect(MetRays& met) const;
+  /// What is to be expected of the point: its rho, and its sigma, if it is `of_scene`. 0 where its
+  /// rays tell less than the others do, or nothing and there are no others yet. One that is not of
+  /// the scene stays where it was found.
+  void expect(bool of_scene, MetRays& met) const;
+  double mean_square() const { return second_; }
 
  private:
   double variance() const { return std::max(0., second_ - mean_ * mean_); }

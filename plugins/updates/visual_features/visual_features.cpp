@@ -257,7 +257,8 @@ bool VisualFeatures::passes_gate() {
   const int dof = 2 * static_cast<int>(feature_.linear().size()) - 3;
   const int dof_of_noise = dof - kMotionDof;
   // The longest tracks of an epoch tell the noise.
-  const bool tells_noise = noise_.enabled() && weighed_ < kTracksThatTellNoise && dof_of_noise > 0;
+  const bool tells_noise = noise_.enabled() && weighed_ < kTracksThatTellNoise &&
+                           dof_of_noise > 0 && feature_.has_plain_noise();
   const bool may_move = equations_.motion_bound() > threshold(kMotionDof);
   if (!tells_noise && !may_move && equations_.chi2_bound() <= threshold(dof)) return true;
   const double chi2 = gate_.chi2(feature_, window_);

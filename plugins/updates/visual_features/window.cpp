@@ -194,10 +194,22 @@ double Window::way_variance(int clone) {
   return way_variance_[static_cast<std::size_t>(clone)];
 }
 
+bool Window::knows_way() {
+  constexpr double kKnown = 0.1;
+  const WindowClone& now = *std::ranges::max_element(clones_, {}, &WindowClone::t_ns);
+  double longest_m2 = 0., variance_m2 = 0.;
+  for (int i = 0; i < n_clones(); ++i) {
+    const double way_m2 = (clone(i).p_IinG - now.p_IinG).squaredNorm();
+    if (way_m2 <= longest_m2) continue;
+    longest_m2 = way_m2;
+    variance_m2 = way_variance(i);
+  }
+  return variance_m2 < kKnown * kKnown * longest_m2;
+}
+
 void Window::set_way_variances() {
   const FilterView::Covariance P = filter_.P();
-  const int newest = clone_in_slot(filter_.clones.back().slot);
-  const WindowClone& from = this->clone(std::max(newest, 0));
+  const WindowClone& from = *std::ranges::max_element(clones_, {}, &WindowClone::t_ns);
   for (const WindowClone& to : clones_) {
     // By dtheta and dp of the one, dp of the other.
     Eigen::Matrix<double, 3, 9> J;

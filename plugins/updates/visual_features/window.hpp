@@ -108,6 +108,9 @@ class Window {
   /// How well it is known where a clone is from the newest one: variance of a coordinate there,
   /// m^2.
   double way_variance(int clone);
+  /// Whether the way over the window is known to a tenth: else all points that are told by it are
+  /// off together.
+  bool knows_way();
   /// Covariance of the factor's columns, all of it, in their order. Copied at the first call after
   /// set(); of the filter's covariance only the lower triangle is read.
   const Eigen::MatrixXd& covariance();
