@@ -5,6 +5,7 @@
 
 #include "checks.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/plausibility/parity_watch.hpp"
 #include "viwo/wheel/contradicted_channels.hpp"
 #include "viwo/wheel/drive_ranges.hpp"
 #include "viwo/wheel/twist_solver.hpp"
@@ -88,48 +89,15 @@ std::vector<NoiseFound> noises_of(const Wheels& wheels, const Calibration& calib
   return found;
 }
 
-/// How much the wheels contradict each other, whatever the noises are.
-struct Parity {
-  double rms = 0.;              ///< of a row, m/s; NaN where no sample gives a twist
-  double drive_rad_per_s = 0.;  ///< rms
-  double speed = 0.;            ///< of what the drives say, rms, m/s
-  double refused = 0.;          ///< part of the samples
-  /// A fifth of what moves: no noise, and no slip of a base that drives all the time.
-  bool is_gross() const {
-    constexpr double kMoves_rad_per_s = 0.1;
-    if (!std::isfinite(rms) || !std::isfinite(speed) || refused > 0.5) return true;
-    return drive_rad_per_s > kMoves_rad_per_s && rms > 0.2 * speed;
-  }
-};
-
 Parity parity_of(const Wheels& wheels, const Intrinsics& x_WI) {
   TwistSolver solver(wheels.model, {});
   solver.set_intrinsics(x_WI);
   TwistSolution solution;
-  RowSystem rows;
-  const ModelDescription& description = wheels.model->description();
-  rows.A.resize(description.n_rows, 3);
-  rows.b.resize(description.n_rows);
-  double squares = 0., speeds = 0., rates = 0., n = 0., n_refused = 0.;
+  ParityWatch watch(wheels.model);
   for (const EncoderSample& sample : wheels.samples) {
-    if (solver.solve(sample, solution) != Status::kOk) {
-      n_refused += 1.;
-      continue;
-    }
-    if (solution.rank_deficient) continue;
-    if (wheels.model->model().rows(sample, x_WI, false, rows) != Status::kOk) continue;
-    squares += solution.e.squaredNorm();
-    speeds += rows.b.squaredNorm();
-    for (int i = 0; i < description.n_drive; ++i) {
-      const double rate = sample.drive_rad_per_s[static_cast<std::size_t>(i)];
-      rates += rate * rate;
-    }
-    n += 1.;
+    watch.add(sample, x_WI, solver.solve(sample, solution) == Status::kOk ? &solution : nullptr);
   }
-  const double n_drives = n * std::max(1, description.n_drive);
-  return {n > 0. ? std::sqrt(squares / (n * description.n_rows)) : NAN,
-          n > 0. ? std::sqrt(rates / n_drives) : 0., n > 0. ? std::sqrt(speeds / n_drives) : 0.,
-          n_refused / static_cast<double>(wheels.samples.size())};
+  return watch.total();
 }
 
 void check_parity(const Parity& parity, const Wheels& wheels, const std::string& label,

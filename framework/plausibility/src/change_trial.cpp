@@ -44,7 +44,7 @@ bool ChangeTrial::is_next_to_none(const Tried& tried) const {
 
 std::vector<ChannelChange> ChangeTrial::explaining() const {
   constexpr std::int64_t kFewest = 50;
-  constexpr double kLeast_m_per_s = 0.01, kLeastPart = 0.01, kMostLeft = 0.1;
+  constexpr double kLeast_m_per_s = 0.001, kLeastPart = 0.01, kMostLeft = 0.1;
   const double rows = solver_.model().n_rows() * static_cast<double>(tried_);
   const double none = changes_.front().residual;
   if (tried_ < kFewest || none < rows * kLeast_m_per_s * kLeast_m_per_s ||

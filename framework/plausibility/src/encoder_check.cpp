@@ -29,7 +29,9 @@ EncoderCheck::EncoderCheck(const SensorName& wheels, const WheelSet& set)
       sensor_(wheels.sensor),
       solver_(set.model, {}),
       n_steer_(set.model->description().n_steer),
-      trial_(set.model, set.prior.wheels.x_WI, channel_changes(set.model->description())) {
+      trial_(set.model, set.prior.wheels.x_WI, channel_changes(set.model->description())),
+      parity_(set.model),
+      x_WI_(set.prior.wheels.x_WI) {
   solver_.set_intrinsics(set.prior.wheels.x_WI);
   const Eigen::Index n = set.prior.wheels.x_WI.size();
   prior_root_ = root_of(set.P_before().topLeftCorner(n, n));
@@ -49,7 +51,9 @@ std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
   // They cost as many solutions as there are changes.
   constexpr std::int64_t kEvery = 5;
   if (samples_++ % kEvery == 0) trial_.add(sample);
-  if (solver_.solve(sample, solution_) != Status::kOk || solution_.rank_deficient) return {};
+  const bool is_solved = solver_.solve(sample, solution_) == Status::kOk;
+  if (solver_.model().n_rows() > 3) parity_.add(sample, x_WI_, is_solved ? &solution_ : nullptr);
+  if (!is_solved || solution_.rank_deficient) return {};
   return solution_.xi;
 }
 
@@ -74,6 +78,7 @@ void EncoderCheck::findings(std::int64_t zero_ns, Findings& out) const {
   const std::size_t before = out.size();
   find_change(out);
   if (out.size() == before) find_degrees(out);
+  if (out.size() == before) find_gross(zero_ns, out);
 }
 
 void EncoderCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {
@@ -104,6 +109,26 @@ void EncoderCheck::find_degrees(Findings& out) const {
                  false,
                  ChannelChange{ChannelChange::kSteerUnit, 0, 0, std::numbers::pi / 180.}.remedies(
                      sensor_, solver_.model().description())});
+}
+
+/// Wheels that slip contradict the others now and then; what is wired, counted or written wrongly
+/// does for good.
+void EncoderCheck::find_gross(std::int64_t zero_ns, Findings& out) const {
+  constexpr double kLeast_s = 4., kMuch = 0.25, kMost = 0.5;  // of the driving
+  const double gross_s = parity_.gross_s();
+  if (gross_s < kLeast_s || gross_s < kMuch * parity_.driven_s()) return;
+  const Parity parity = parity_.total();
+  out.push_back({name_ + " parity",
+                 name_ + ": the wheels contradict each other grossly (rms " +
+                     significant(parity.rms, 2) + " m/s at " + significant(parity.speed, 2) +
+                     " m/s) for " + significant(gross_s, 3) + " of the " +
+                     significant(parity_.driven_s(), 3) + " s that it drives, first at " +
+                     time_text(parity_.first_gross_ns() - zero_ns) +
+                     ": a drive or a steering that is not read, order or signs of the channels, "
+                     "zeros or units of the steering (viwo inspect looks for them)",
+                 false,
+                 {},
+                 gross_s > kMost * parity_.driven_s()});
 }
 
 /// Where several changes explain the contradictions, all of them are named.

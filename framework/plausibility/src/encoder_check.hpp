@@ -12,6 +12,7 @@
 #include "stuck_channel.hpp"
 #include "viwo/plausibility/change_trial.hpp"
 #include "viwo/plausibility/finding.hpp"
+#include "viwo/plausibility/parity_watch.hpp"
 #include "viwo/setup/filter_setup.hpp"
 #include "viwo/wheel/twist_solver.hpp"
 
@@ -36,6 +37,7 @@ class EncoderCheck {
   void find_stuck(std::int64_t zero_ns, Findings& out) const;
   void find_degrees(Findings& out) const;
   void find_change(Findings& out) const;
+  void find_gross(std::int64_t zero_ns, Findings& out) const;
 
   std::string name_, sensor_;
   TwistSolver solver_;
@@ -43,6 +45,8 @@ class EncoderCheck {
   IntrinsicMatrix prior_root_;
   int n_steer_;
   ChangeTrial trial_;
+  ParityWatch parity_;
+  Intrinsics x_WI_;
   std::vector<StuckChannel> drives_;
   std::int64_t samples_ = 0;
   std::optional<EncoderSample> last_;

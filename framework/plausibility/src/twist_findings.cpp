@@ -26,6 +26,9 @@ bool is_about(double value, double wanted) {
   return std::abs(value / wanted - 1.) < kFactorTolerance;
 }
 
+/// No base is said to be so much wider than it is.
+bool is_beyond_scale(double slope) { return std::abs(slope) > 2. || std::abs(slope) < 0.5; }
+
 /// The quarter or half turn that takes the axis next to `is` to z.
 Eigen::Matrix3d upright(const Eigen::Vector3d& is) {
   int i = 0;
@@ -121,7 +124,7 @@ bool TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
                        "or scale of the gyro",
                    false,
                    {},
-                   gyro_is_ == Gyro::kLevel});
+                   gyro_is_ == Gyro::kLevel || is_beyond_scale(slope)});
   } else {
     return false;
   }
@@ -171,6 +174,7 @@ bool TwistCheck::finds_gravity(const Eigen::Vector3d& up, double slope, Findings
     text += "the IMU is mounted otherwise, its axes are exchanged or reversed";
   }
   finding.text = text;
+  finding.is_doubt = true;
   if (!is_opposite || slope <= 0.) finding.remedies = {turned_by(upright(is))};
   out.push_back(std::move(finding));
   return true;

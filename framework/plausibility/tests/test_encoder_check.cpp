@@ -63,11 +63,38 @@ TEST(EncoderCheck, NamesASteeringThatIsReversedThoughItStays) {
 }
 
 TEST(EncoderCheck, DoesNotTakeAnglesForDegreesWhereNoneFitAsWell) {
-  EXPECT_THAT(driven(kCrab_rad,
-                     [k = 0](EncoderSample& s) mutable {
-                       s.steer_rad[2] = std::sin(0.37 * ++k);  // whatever it is
-                     }),
-              IsEmpty());
+  EXPECT_THAT(texts(driven(kCrab_rad,
+                           [k = 0](EncoderSample& s) mutable {
+                             s.steer_rad[2] = std::sin(0.37 * ++k);  // whatever it is
+                           })),
+              ElementsAre(HasSubstr("contradict each other grossly")));
+}
+
+TEST(EncoderCheck, DoubtsWheelsOfWhichOneIsNotReadHoweverSlowTheyAre) {
+  for (const double slower : {1., 0.1}) {
+    const auto findings = [slower](std::int64_t from) {
+      return driven(0., [slower, from, k = std::int64_t{0}](EncoderSample& s) mutable {
+        for (std::size_t i = 0; i < 4; ++i) s.drive_rad_per_s[i] *= slower;
+        if (++k > from) s.drive_rad_per_s[2] = 0.;
+      });
+    };
+    for (const std::int64_t from : {0, 200}) {
+      ASSERT_EQ(findings(from).size(), 1U) << slower;
+      EXPECT_THAT(findings(from)[0].text, HasSubstr("contradict each other grossly"));
+      EXPECT_TRUE(findings(from)[0].is_doubt);
+    }
+    EXPECT_THAT(findings(400), ElementsAre(::testing::Field(&Finding::is_doubt, false)));
+    EXPECT_THAT(findings(900), IsEmpty());  // for a second, as wheels that slip
+  }
+}
+
+TEST(EncoderCheck, NamesTheOrderOfDrivesOfASlowBase) {
+  EXPECT_THAT(texts(driven(kCrab_rad,
+                           [](EncoderSample& s) {
+                             for (std::size_t i = 0; i < 4; ++i) s.drive_rad_per_s[i] *= 0.05;
+                             s.steer_rad[1] *= -1.;
+                           })),
+              ElementsAre(HasSubstr("steer_2 turns opposite")));
 }
 
 TEST(EncoderCheck, TellsTheUnitOfTheSteeringFromWhatItHasBeenTakenFor) {
