@@ -33,6 +33,8 @@ const Metric kBeforeRpe[] = {
      [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_m : kNone; }},
     {"ate_deg", "ATE [deg]", 1.,
      [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_deg : kNone; }},
+    {"end_sigma_m", "end sigma [mm]", 1e3,
+     [](const RunResult& r) { return r.end_sigma.position_m; }},
 };
 
 const Metric kAfterRpe[] = {

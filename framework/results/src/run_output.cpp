@@ -274,9 +274,17 @@ std::string describe(const RunResult& result) {
   } else if (!result.live && result.reference.empty()) {
     out << "no reference: accuracy unknown\n";
   }
+  if (std::isfinite(result.end_sigma.position_m)) {
+    out << "the filter's own sigma at the end " << significant(1e3 * result.end_sigma.position_m, 3)
+        << " mm, " << significant(result.end_sigma.yaw_rad, 3) << " rad yaw\n";
+  }
   if (std::isfinite(result.nees.pose)) {
-    out << "NEES of the pose " << significant(result.nees.pose, 3) << " (6 is consistent); epoch "
-        << significant(result.total_ms.mean_ms, 3) << " ms mean, "
+    constexpr double kHardlyItsOwn = 30.;
+    out << "NEES of the pose " << significant(result.nees.pose, 3) << " (6 is consistent"
+        << (result.nees.pose > kHardlyItsOwn
+                ? "; how good the reference is, viwo inspect tells by the IMU"
+                : "")
+        << "); epoch " << significant(result.total_ms.mean_ms, 3) << " ms mean, "
         << significant(result.total_ms.p95_ms, 3) << " ms p95\n";
   }
   for (const NoiseFound& noise : result.noises) {

@@ -72,6 +72,7 @@ namespace viwo {
 VIWO_RECORD(StageTime, mean_ms, p95_ms, p99_ms, max_ms)
 VIWO_RECORD(CalibrationTrack, name, unit, estimate, sigma, truth, final_error, scatter)
 VIWO_RECORD(PoseNees, pose, position, orientation, relative, series)
+VIWO_RECORD(EndSigma, position_m, yaw_rad, grown_m)
 VIWO_RECORD(PoseError, t_s, position_m, position_sigma_m, yaw_rad, yaw_sigma_rad)
 VIWO_RECORD(UpdateTrack, name, total, failures, applied, rejected)
 VIWO_RECORD(MonitorWarning, t_s, text, parameters)
@@ -79,16 +80,16 @@ VIWO_RECORD(MonitorTrack, t_s, parameters, sigma_ratio, held, warnings)
 VIWO_RECORD(RunPiece, begin_ns, end_ns, epochs, failure)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RunResult, status, cause, epochs, duration_s, wall_s, estimate,
                                    reference, accuracy, nees_planar, total, epoch_ms, stages,
-                                   total_ms, rejections, noises, warnings, doubts, nees, errors,
-                                   epoch_t_s, calibration, updates, monitor, pieces)
+                                   total_ms, rejections, noises, warnings, doubts, nees, end_sigma,
+                                   errors, epoch_t_s, calibration, updates, monitor, pieces)
 // As above, with what is only of a run that is going on (live, on_disk), or for its own page and
 // files (pictures, final_calibration).
 [[maybe_unused]] static void every_member_of(const RunResult& all) {
   [[maybe_unused]] const auto& [status, cause, epochs, duration_s, wall_s, live, estimate,
                                 reference, accuracy, nees_planar, total, epoch_ms, stages, total_ms,
-                                rejections, noises, warnings, doubts, nees, errors, epoch_t_s,
-                                calibration, final_calibration, updates, monitor, pieces, on_disk,
-                                pictures] = all;
+                                rejections, noises, warnings, doubts, nees, end_sigma, errors,
+                                epoch_t_s, calibration, final_calibration, updates, monitor, pieces,
+                                on_disk, pictures] = all;
 }
 
 nlohmann::json to_record(const RunResult& run) { return run; }

@@ -58,6 +58,7 @@ void Recorder::record(const Estimator& estimator) {
   result_.estimate.push_back({t_ns, imu.p_IinG, Eigen::Quaterniond(imu.R_GtoI.transpose())});
   result_.epoch_t_s.push_back(t_s);
   add_error(filter, t_s);
+  add_end_sigma(filter);
   add_calibration(filter);
   add_counts(estimator);
   record_monitors(estimator, t_s, result_.monitor);
@@ -84,6 +85,7 @@ void Recorder::add_piece(std::int64_t t_ns) {
     // A clock that was set back: the time of the run goes on.
     if (t_ns < last_ns_) begin_ns_ += t_ns - last_ns_;
     result_.pieces.push_back({t_ns, t_ns, 0, ""});
+    start_m2_.reset();
   }
   result_.pieces.back().end_ns = t_ns;
   ++result_.pieces.back().epochs;
@@ -168,6 +170,15 @@ void Recorder::add_error(const Filter& filter, double t_s) {
   sum_position_ += eval::nees(error.tail<3>(), P.block<3, 3>(3, 3));
   ++n_nees_;
   result_.nees.series.emplace_back(t_s, pose);
+}
+
+void Recorder::add_end_sigma(const Filter& filter) {
+  const ImuMatrix P = filter.imu_covariance();
+  const double m2 = P.diagonal().segment<3>(kPositionColumn).sum();
+  if (!start_m2_) start_m2_ = m2;
+  const Eigen::Vector3d up_in_I = filter.imu().R_GtoI.col(2);
+  result_.end_sigma = {std::sqrt(m2), std::sqrt(up_in_I.dot(P.topLeftCorner<3, 3>() * up_in_I)),
+                       std::sqrt(std::max(0., m2 - *start_m2_))};
 }
 
 /// From the oldest clone to now (F-40).

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,7 @@ class Recorder {
   void bound_series();
   void add_piece(std::int64_t t_ns);
   void add_error(const Filter& filter, double t_s);
+  void add_end_sigma(const Filter& filter);
   void add_relative_error(const Filter& filter, const StampedPose& truth);
   void add_counts(const Estimator& estimator);
   void add_calibration(const Filter& filter);
@@ -41,6 +43,7 @@ class Recorder {
   std::int64_t begin_ns_ = 0;
   std::int64_t last_ns_ = 0;
   CalibrationScatter scatter_;
+  std::optional<double> start_m2_;  ///< variance of the position, of this piece
   std::vector<TimeStatistics> stage_ms_;
   TimeStatistics total_ms_;
   double sum_pose_ = 0., sum_position_ = 0., sum_orientation_ = 0.;

@@ -293,6 +293,23 @@ void doubt_useless(RunResult& result) {
   }
 }
 
+/// An estimate that the filter itself knows no better than half of the way that it tells.
+void doubt_by_itself(RunResult& result) {
+  constexpr double kLeast_m = 0.1, kPart = 0.5;
+  const double sigma_m = result.end_sigma.grown_m;
+  if (result.updates.empty() || sigma_m < kLeast_m) return;
+  double way_m = 0.;
+  for (std::size_t i = 1; i < result.estimate.size(); ++i) {
+    way_m += (result.estimate[i].p_BinW - result.estimate[i - 1].p_BinW).norm();
+  }
+  if (sigma_m < kPart * way_m) return;
+  result.doubts.push_back("the filter itself knows the position at the end to " +
+                          significant(sigma_m, 2) + " m only, of a way of " +
+                          significant(way_m, 2) +
+                          " m: nothing tells how fast it goes - one camera without parallax (it "
+                          "stands, or only turns), or updates that were given nothing");
+}
+
 }  // namespace
 
 void doubt(RunResult& result) {
@@ -325,6 +342,7 @@ void doubt(RunResult& result) {
                             " s, in which the mean of the readings before and after is taken: gaps "
                             "of the log, readings that are refused, or a log of what changes only");
   }
+  doubt_by_itself(result);
   if (parts.shortest == nullptr) return;
   const double ate_m = result.accuracy->ate_m, extent = extent_m(result.reference);
   std::string text;

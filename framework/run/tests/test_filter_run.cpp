@@ -290,6 +290,24 @@ TEST(Doubts, AreOfAReferenceInOtherUnits) {
   EXPECT_THAT(doubts(1., 0, 97), ElementsAre());
 }
 
+TEST(Doubts, AreOfAnEstimateThatTheFilterItselfHardlyKnows) {
+  RunResult result;
+  result.status = RunStatus::kOk;
+  result.updates.resize(1);
+  result.updates[0].total.applied = 100;
+  for (int i = 0; i <= 10; ++i) result.estimate.push_back({i, {0.1 * i, 0., 0.}});
+  const auto doubts = [&result](double grown_m) {
+    result.doubts.clear();
+    result.end_sigma.grown_m = grown_m;
+    doubt(result);
+    return result.doubts;
+  };
+  EXPECT_THAT(doubts(0.6), ElementsAre(HasSubstr("to 0.6 m only, of a way of 1 m")));
+  EXPECT_THAT(doubts(0.4), ElementsAre());
+  result.estimate.resize(1);  // who stands, and knows it
+  EXPECT_THAT(doubts(0.05), ElementsAre());
+}
+
 TEST(Doubts, AreOfAFilterThatEndsFarOffAndIsNoBetterOnTheWay) {
   RunResult result;
   result.status = RunStatus::kOk;

@@ -34,6 +34,14 @@ struct CalibrationTrack {
   double scatter = 1.;
 };
 
+/// What the filter itself says of the pose that it ends with, in the frame that it started in; NaN
+/// without a filter.
+struct EndSigma {
+  double position_m = std::numeric_limits<double>::quiet_NaN();  ///< root of the trace
+  double yaw_rad = std::numeric_limits<double>::quiet_NaN();
+  double grown_m = 0.;  ///< of the position, since the start
+};
+
 /// Mean over the epochs of the squared normalised error, in the filter's own error convention.
 struct PoseNees {
   double pose = std::numeric_limits<double>::quiet_NaN();         ///< 6 = consistent
@@ -117,6 +125,7 @@ struct RunResult {
 
   // Of the filter.
   PoseNees nees;
+  EndSigma end_sigma;
   std::vector<PoseError> errors;  ///< where the reference is in the frame of the estimate
   std::vector<double> epoch_t_s;
   std::vector<CalibrationTrack> calibration;
