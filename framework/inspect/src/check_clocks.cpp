@@ -246,6 +246,8 @@ void check_camera_clocks(const Recording& recording, Findings& out) {
   const std::string imu = recording.label<ImuSample>(recording.imu_sensor);
   const std::vector<Turn> gyro = turns_of(recording.imu);
   const Span span = span_of(recording);
+  const bool is_upside_down = std::ranges::any_of(
+      recording.implausible, [](const viwo::Finding& one) { return one.key.ends_with(" up"); });
   for (const CameraTurns& camera : recording.cameras) {
     const CameraPrior& prior =
         recording.setup->filter->cameras[static_cast<std::size_t>(camera.camera)];
@@ -283,6 +285,18 @@ void check_camera_clocks(const Recording& recording, Findings& out) {
     if (!lag) {
       out.push_back({label, Severity::kNote, "clock",
                      "too little rotation to compare its clock with " + imu});
+      continue;
+    }
+    constexpr double kOpposite = -0.5;
+    if (lag->correlation < kOpposite && is_upside_down) continue;  // that tells it
+    if (lag->correlation < kOpposite) {
+      out.push_back({label,
+                     Severity::kFault,
+                     "axes",
+                     "turns opposite to " + imu + " (correlation " +
+                         significant(lag->correlation, 3) +
+                         "): signs of the gyro, or T_cam_imu in the file of section cameras",
+                     {{"correlation", lag->correlation, ""}}});
       continue;
     }
     Finding clock =

@@ -184,6 +184,19 @@ bool has_axes_of_imu(const Recording& recording, const Poses& poses, const std::
   const double angle = R ? log_so3(*R).norm() * 180. / std::numbers::pi : 0.;
   constexpr double kMostAngle = 15.;
   if (angle <= kMostAngle) return true;
+  const bool cameras_say_so = std::ranges::any_of(out, [](const Finding& finding) {
+    return finding.severity == Severity::kFault && finding.check == "axes";
+  });
+  if (cameras_say_so) {
+    const std::string imu = recording.label<ImuSample>(recording.imu_sensor);
+    out.push_back({imu,
+                   Severity::kFault,
+                   "axes",
+                   "turns otherwise than cameras and " + label +
+                       " do: signs or order of its columns, or the unit of one",
+                   {}});
+    return false;
+  }
   const Eigen::Quaterniond q(*R);
   out.push_back({label,
                  Severity::kFault,

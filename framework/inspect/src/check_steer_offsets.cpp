@@ -328,7 +328,15 @@ void check_offsets(const Recording& recording, const Wheels& wheels, const std::
 void check_steer_offsets(const Recording& recording, Findings& out) {
   for (const Wheels& wheels : recording.wheels) {
     if (wheels.samples.empty() || !wheels.unusable.empty()) continue;
-    check_offsets(recording, wheels, recording.label<EncoderSample>(wheels.sensor), out);
+    const std::string label = recording.label<EncoderSample>(wheels.sensor);
+    const std::size_t before = out.size();
+    check_offsets(recording, wheels, label, out);
+    // Zeros that make up for a channel that is not there are none of the robot.
+    if (!is_fault(out, label, "channel")) continue;
+    for (std::size_t i = before; i < out.size(); ++i) {
+      out[i].severity = std::min(out[i].severity, Severity::kNote);
+      out[i].remedies.clear();
+    }
   }
 }
 

@@ -48,5 +48,7 @@ void check_wheel_clocks(const series::Recording& recording, Findings& out);
 void check_camera_clocks(const series::Recording& recording, Findings& out);
 /// Clock, sign and speed of poses against gyro and wheels.
 void check_poses(const series::Recording& recording, Findings& out);
+/// How good poses are as a reference, by the IMU: noise of their orientations, their vertical.
+void check_references(const series::Recording& recording, Findings& out);
 
 }  // namespace viwo::inspect

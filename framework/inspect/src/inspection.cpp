@@ -213,6 +213,7 @@ Inspection inspect(RunSetup& setup) {
   check_wheel_clocks(recording, findings);
   check_camera_clocks(recording, findings);
   check_poses(recording, findings);
+  check_references(recording, findings);
   for (const viwo::Finding& found : recording.implausible) {
     Finding finding = of_plausibility(found);
     const bool is_told = is_one_of(finding.check, kToldWithMore) ||

@@ -1,5 +1,7 @@
 // Clocks and axes of wheels, cameras and poses against the gyro.
 #include <cmath>
+#include <cstdint>
+#include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,6 +17,8 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::IsSupersetOf;
+using ::testing::Not;
 
 template <class T>
 void shift(T& sample, double seconds) {
@@ -147,6 +151,38 @@ TEST_F(InspectRealCamera, ComesWithAReferenceWhoseBodyMustBeTheImu) {
                 }});
   EXPECT_THAT(faults_of(turned), ElementsAre("states0 axes"));
   EXPECT_NEAR(figure_of(finding_of(turned, "states0", "axes"), "angle"), 90., 3.);
+}
+
+TEST_F(InspectRealCamera, NamesAGyroThatBothCamerasAndReferenceContradict) {
+  const Inspection turned = inspected(board(), {.imu = [](ImuSample& s) {
+                                        for (double& rate : s.gyro_rad_per_s) rate = -rate;
+                                        return true;
+                                      }});
+  EXPECT_THAT(faults_of(turned),
+              IsSupersetOf({"images0, camera 0 axes", "images0, camera 1 axes", "imu0 axes"}));
+  EXPECT_THAT(faults_of(turned), Not(Contains("states0 axes")));
+}
+
+TEST_F(InspectRealCamera, TellsHowGoodTheReferenceIsByTheGyro) {
+  // Found from corners of a board, each image by itself.
+  const auto sigma = [](const Inspection& inspection) {
+    return figure_of(finding_of(inspection, "states0", "orientation noise"), "sigma");
+  };
+  const double as_it_is = sigma(inspected(board(), {}));
+  EXPECT_GT(as_it_is, 1e-3);
+  EXPECT_LT(as_it_is, 5e-3);
+  std::mt19937_64 engine(1);
+  std::normal_distribution<double> noise(0., 0.02);
+  const double worse = sigma(inspected(
+      board(), {.states = [&](StateSample& s) {
+        const Eigen::Quaterniond q =
+            to_quaternion(s.q_ItoG_xyzw) *
+            Eigen::Quaterniond(1., 0.5 * noise(engine), 0.5 * noise(engine), 0.5 * noise(engine))
+                .normalized();
+        s.q_ItoG_xyzw = {q.x(), q.y(), q.z(), q.w()};
+        return true;
+      }}));
+  EXPECT_NEAR(worse, 0.02, 2e-3);
 }
 
 TEST_F(InspectRealCamera, FindsThatItWasFrozen) {
