@@ -93,7 +93,9 @@ TEST_F(LogTest, OfJointsThatAreMountedWronglyIsPutRightByTheInverse) {
                "sensors.sim.drive_scale=[-1, 2, 0.5, 1]", "--set",
                "sensors.sim.drive_channel=[2, 1, 3, 4]", "--set",
                "sensors.sim.steer_scale=[1, 1, -1, 1]"});
-  expect_done({"run", "log.yaml", "--out", "out"});
+  const Outcome wrong = viwo({"run", "log.yaml", "--out", "out"});
+  EXPECT_EQ(wrong.code, 1);
+  EXPECT_NE(wrong.out.find("the wheels contradict each other grossly"), std::string::npos);
   const auto end_m = [&](const char* folder) -> double {
     return summary(folder)["accuracy"]["end"]["m"];
   };

@@ -123,6 +123,7 @@ TEST_F(Summary, HasEveryMetricInEveryPlaceAlsoOfARunThatWasTakenOver) {
   run.accuracy->rpe = {{2.5, 3, 0.01, 0.02, 0.03, 0.04}};
   run.nees_planar = run.nees.pose = run.nees.position = run.nees.orientation = run.nees.relative =
       2.25;
+  run.end_sigma.position_m = 2.25;
   run.updates = {{"parity", {8, 9}, {}, {}, {}}};
   CalibrationTrack& track = run.calibration.emplace_back();
   track.estimate = track.sigma = {0.1, 0.1};

@@ -83,8 +83,7 @@ TEST(EncoderCheck, DoubtsWheelsOfWhichOneIsNotReadHoweverSlowTheyAre) {
       EXPECT_THAT(findings(from)[0].text, HasSubstr("contradict each other grossly"));
       EXPECT_TRUE(findings(from)[0].is_doubt);
     }
-    EXPECT_THAT(findings(400), ElementsAre(::testing::Field(&Finding::is_doubt, false)));
-    EXPECT_THAT(findings(900), IsEmpty());  // for a second, as wheels that slip
+    EXPECT_THAT(findings(500), IsEmpty());  // for a while, as wheels that slip
   }
 }
 

@@ -33,8 +33,6 @@ const Metric kBeforeRpe[] = {
      [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_m : kNone; }},
     {"ate_deg", "ATE [deg]", 1.,
      [](const RunResult& r) { return r.accuracy ? r.accuracy->ate_deg : kNone; }},
-    {"end_sigma_m", "end sigma [mm]", 1e3,
-     [](const RunResult& r) { return r.end_sigma.position_m; }},
 };
 
 const Metric kAfterRpe[] = {
@@ -45,6 +43,8 @@ const Metric kAfterRpe[] = {
      3.},
     {"nees_relative", "NEES rel (6)", 1., [](const RunResult& r) { return r.nees.relative; }, 6.},
     {"scatter", "scatter [sigma]", 1., largest_scatter, 1.},
+    {"end_sigma_m", "end sigma [mm]", 1e3,
+     [](const RunResult& r) { return r.end_sigma.position_m; }},
     {"epoch_ms", "epoch [ms]", 1.,
      [](const RunResult& r) { return r.updates.empty() ? kNone : r.total_ms.mean_ms; }},
 };
