@@ -53,7 +53,7 @@ void ParityWatch::add(const EncoderSample& sample, const Intrinsics& x_WI,
 
 void ParityWatch::end_piece(std::int64_t end_ns) {
   const Parity parity = parity_of(piece_);
-  const double length_s = std::min(seconds_between(piece_ns_, end_ns), 2. * kPiece_s);
+  const double length_s = std::clamp(seconds_between(piece_ns_, end_ns), 0., 2. * kPiece_s);
   if (piece_.solved > 0. && parity.drive_rad_per_s > kMoves_rad_per_s) {
     driven_s_ += length_s;
     if (parity.is_gross()) {

@@ -121,9 +121,7 @@ FeatureStatus Feature::triangulate(Window& window) {
     ray.direction.noalias() = pose.R_GtoC.transpose() * sight.observation->ray;
     ray.J.noalias() = sight.observation->J_ray * pose.R_GtoC;
   }
-  FeatureStatus status = meet(rays_, sigma_px_, min_distance_m_, met_);
-  if (status != FeatureStatus::kOk) return status;
-  status = judge(rays_, min_distance_m_, met_);
+  const FeatureStatus status = visual::triangulate(rays_, sigma_px_, min_distance_m_, met_);
   if (status != FeatureStatus::kOk) return status;
   found_rho_ = met_.point.rho;
   found_variance_ = met_.sigma_rho * met_.sigma_rho;
@@ -142,14 +140,14 @@ bool Feature::is_of_scene(Window& window) {
   constexpr double kKnown = 0.1;  // of rho
   if (window.knows_way()) return true;
   const double square = std::max(found_rho_ * found_rho_, distances_.mean_square());
-  return variance_by_poses(window) < kKnown * kKnown * square;
+  const auto by = rho_by_poses(window);
+  auto P_by = P_by_clones_.head(by.size());
+  P_by.noalias() = window.covariance().topLeftCorner(by.size(), by.size()) * by;
+  return by.dot(P_by) < kKnown * kKnown * square;
 }
 
-/// Of rho, by where the clones may be: a way that is taken for longer than it is makes points
-/// farther that are told by it, and a turn feigns a distance (VF-29).
-double Feature::variance_by_poses(Window& window) {
-  const int columns = window.clone_columns();
-  auto by = by_clones_.head(columns);
+Eigen::Ref<const Eigen::VectorXd> Feature::rho_by_poses(const Window& window) {
+  auto by = by_clones_.head(window.clone_columns());
   by.setZero();
   const double rho = met_.point.rho;
   const int first = window.clone(sights_.front().clone).column;
@@ -158,13 +156,11 @@ double Feature::variance_by_poses(Window& window) {
     const RayDerivative ray = derivative_of(rays_[i], met_.point, met_.basis);
     const Eigen::Vector3d by_q = (met_.of_rho * ray.by_point.transpose() * ray.by_q).transpose();
     const Eigen::Vector3d d = met_.point.seen_from(clone.p_IinG);
-    by.segment<3>(clone.column) += clone.R_GtoI * by_q.cross(d);
-    by.segment<3>(clone.column + 3) -= rho * by_q;
-    by.segment<3>(first + 3) += rho * by_q;  // from there it counts
+    by.segment<3>(clone.column) -= clone.R_GtoI * by_q.cross(d);
+    by.segment<3>(clone.column + 3) += rho * by_q;
+    by.segment<3>(first + 3) -= rho * by_q;  // from there it counts
   }
-  auto P_by = P_by_clones_.head(columns);
-  P_by.noalias() = window.covariance().topLeftCorner(columns, columns) * by;
-  return std::max(0., by.dot(P_by));
+  return by;
 }
 
 /// What the rays hardly tell beside what is known before teaches nothing.

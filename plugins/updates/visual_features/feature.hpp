@@ -72,6 +72,11 @@ class Feature {
   FeatureStatus linearize(Window& window);
 
   const MetRays& met() const { return met_; }
+  /// After triangulate(): derivative of rho, as found, by dtheta and dp of the clones: a way that
+  /// is taken for longer than it is makes points farther that are told by it, and a turn feigns a
+  /// distance (VF-29). The place of the first camera in its IMU turns with it by too little to
+  /// count.
+  Eigen::Ref<const Eigen::VectorXd> rho_by_poses(const Window& window);
   /// It was used: others will be about as far.
   void remember_distance();
   /// Whether its rows have the noise of pixels alone (VF-27).
@@ -88,7 +93,6 @@ class Feature {
  private:
   void leave_to_noise(Window& window);
   bool is_of_scene(Window& window);
-  double variance_by_poses(Window& window);
 
   double sigma_px_ = 1., min_distance_m_ = 0.1;
   bool exact_ = false;

@@ -140,6 +140,34 @@ TEST(Feature, JacobiansAreCentralDifferencesThroughTheErrorState) {
   }
 }
 
+TEST(Feature, InverseDistanceMovesWithThePosesAsItSays) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Random random(seed);
+    Scene scene = testing::make_scene({.n_clones = 5, .n_cameras = 2}, 1, random);
+    const auto rho_of = [&](Scene& estimate) {
+      Random none(1);
+      Track track(scene, estimate, scene.landmarks[0], 0.1, 0., none);
+      EXPECT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+      return track.feature.met().point.rho;
+    };
+    Random none(1);
+    Track track(scene, scene, scene.landmarks[0], 0.1, 0., none);
+    ASSERT_EQ(track.feature.triangulate(track.window), FeatureStatus::kOk);
+    const Eigen::VectorXd by = track.feature.rho_by_poses(track.window);
+    Eigen::VectorXd numeric(by.size());
+    const double step = 1e-5;
+    for (int c = 0; c < by.size(); ++c) {
+      Scene plus = scene, minus = scene;
+      Eigen::VectorXd dx = Eigen::VectorXd::Zero(scene.P.cols());
+      dx[track.window.state_column(c)] = step;
+      plus.plus(dx);
+      minus.plus(-dx);
+      numeric[c] = (rho_of(plus) - rho_of(minus)) / (2. * step);
+    }
+    EXPECT_LT((by - numeric).norm(), 0.02 * numeric.norm()) << by << "\n\n" << numeric;
+  }
+}
+
 TEST(Feature, JacobiansAreThoseOfTheEstimates) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     check_jacobians({.n_clones = 5, .n_cameras = 2, .calibrates = true, .first_estimate_off = 0.01},

@@ -121,8 +121,8 @@ RayDerivative derivative_of(const Ray& ray, const InversePoint& point,
   return d;
 }
 
-FeatureStatus meet(std::span<const Ray> rays, double sigma_px, double min_distance_m,
-                   MetRays& out) {
+FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min_distance_m,
+                          MetRays& out) {
   const double information = sigma_px * sigma_px * information_of_rho(min_distance_m);
   double farthest_m = 0.;
   for (const Ray& ray : rays) {
@@ -166,15 +166,11 @@ FeatureStatus meet(std::span<const Ray> rays, double sigma_px, double min_distan
   out.of_rho = best.A.inverse().row(2);
   if (!(out.of_rho[2] > 0.)) return FeatureStatus::kBroken;
   out.sigma_rho = sigma_px * std::sqrt(out.of_rho[2]);
-  return FeatureStatus::kOk;
-}
-
-FeatureStatus judge(std::span<const Ray> rays, double min_distance_m, MetRays& met) {
-  if (met.point.rho < -kSigmas * met.sigma_rho) return FeatureStatus::kNotVisible;  // behind
-  met.has_distance = met.point.rho > kSigmas * met.sigma_rho;
+  if (out.point.rho < -kSigmas * out.sigma_rho) return FeatureStatus::kNotVisible;  // behind
+  out.has_distance = out.point.rho > kSigmas * out.sigma_rho;
   for (const Ray& ray : rays) {
-    const double distance = met.point.seen_from(ray.origin).norm();  // times rho
-    if (distance < met.point.rho * min_distance_m) return FeatureStatus::kNear;
+    const double distance = out.point.seen_from(ray.origin).norm();  // times rho
+    if (distance < out.point.rho * min_distance_m) return FeatureStatus::kNear;
   }
   return FeatureStatus::kOk;
 }

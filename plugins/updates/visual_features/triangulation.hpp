@@ -69,11 +69,9 @@ RayDerivative derivative_of(const Ray& ray, const InversePoint& point,
                             const Eigen::Matrix<double, 3, 2>& basis);
 
 /// Least squares of the pixel residuals (VF-3) over direction and inverse distance from the first
-/// ray's origin. Its sigma is that of the pixels. kNotVisible, kBroken: there is none.
-FeatureStatus meet(std::span<const Ray> rays, double sigma_px, double min_distance_m, MetRays& out);
-
-/// Whether the point can be there, by its sigma: kNotVisible behind the cameras, kNear.
-FeatureStatus judge(std::span<const Ray> rays, double min_distance_m, MetRays& met);
+/// ray's origin. Anything but kOk: no use to linearise.
+FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min_distance_m,
+                          MetRays& out);
 
 /// How far the points are, of those that were found last. What a track tells of the way goes with
 /// its rho: taken as it was found, noise and all, it would be seen where it is not (VF-28).
