@@ -241,6 +241,11 @@ void check_wheel_clocks(const Recording& recording, Findings& out) {
   check_gyro_columns(recording, vertically, out);
 }
 
+std::string label_of(const Recording& recording, const CameraTurns& camera) {
+  return recording.label<FeatureSample>(camera.sensor) + ", camera " +
+         std::to_string(camera.camera);
+}
+
 void check_camera_clocks(const Recording& recording, Findings& out) {
   if (recording.imu.empty() || !recording.setup->filter) return;
   const std::string imu = recording.label<ImuSample>(recording.imu_sensor);
@@ -251,8 +256,7 @@ void check_camera_clocks(const Recording& recording, Findings& out) {
   for (const CameraTurns& camera : recording.cameras) {
     const CameraPrior& prior =
         recording.setup->filter->cameras[static_cast<std::size_t>(camera.camera)];
-    const std::string label =
-        recording.label<FeatureSample>(camera.sensor) + ", camera " + std::to_string(camera.camera);
+    const std::string label = label_of(recording, camera);
     if (camera.turns.empty()) {
       out.push_back({label, Severity::kNote, "tracks", "no two images share eight points"});
       continue;
@@ -288,8 +292,8 @@ void check_camera_clocks(const Recording& recording, Findings& out) {
       continue;
     }
     constexpr double kOpposite = -0.5;
-    if (lag->correlation < kOpposite && is_upside_down) continue;  // that tells it
     if (lag->correlation < kOpposite) {
+      if (is_upside_down) continue;  // that tells it
       out.push_back({label,
                      Severity::kFault,
                      "axes",

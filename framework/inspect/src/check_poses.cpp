@@ -184,8 +184,8 @@ bool has_axes_of_imu(const Recording& recording, const Poses& poses, const std::
   const double angle = R ? log_so3(*R).norm() * 180. / std::numbers::pi : 0.;
   constexpr double kMostAngle = 15.;
   if (angle <= kMostAngle) return true;
-  const bool cameras_say_so = std::ranges::any_of(out, [](const Finding& finding) {
-    return finding.severity == Severity::kFault && finding.check == "axes";
+  const bool cameras_say_so = std::ranges::any_of(recording.cameras, [&](const auto& camera) {
+    return is_fault(out, label_of(recording, camera), "axes");
   });
   if (cameras_say_so) {
     const std::string imu = recording.label<ImuSample>(recording.imu_sensor);

@@ -14,6 +14,9 @@ namespace viwo::inspect {
 /// Whether `check` has found a fault of a sensor already.
 bool is_fault(const Findings& findings, std::string_view sensor, std::string_view check);
 
+/// What texts call one of the cameras that have tracks.
+std::string label_of(const series::Recording& recording, const series::CameraTurns& camera);
+
 /// Rate, jitter, gaps, what readers have rejected, sensors that broke off, what is in common.
 void check_stamps(const series::Recording& recording, Findings& out);
 /// Gravity at rest, biases, channels that repeat.
