@@ -41,10 +41,7 @@ Eigen::Matrix3d mounting_of(const Recording& recording, const Poses& poses) {
 void check_orientations(const Recording& recording, const BesideGyro& beside,
                         const std::string& label, Findings& out) {
   constexpr double kOfGyro = 3.;
-  const double gyro_rad =
-      recording.setup->filter
-          ? recording.setup->filter->options.filter.imu_noise.gyro_rad_per_s_sqrt_hz
-          : 0.;  // over a second
+  const ImuNoise& noise = recording.setup->filter->options.filter.imu_noise;
   Finding finding{
       label,
       Severity::kFits,
@@ -52,7 +49,7 @@ void check_orientations(const Recording& recording, const BesideGyro& beside,
       "its orientations scatter by " + angle_text(beside.sigma_rad) + " per axis around what " +
           recording.label<ImuSample>(recording.imu_sensor) + " turns in a second",
       {{"sigma", beside.sigma_rad, "rad"}, {"pairs", static_cast<double>(beside.pairs), ""}}};
-  if (beside.sigma_rad > kOfGyro * gyro_rad) {
+  if (beside.sigma_rad > kOfGyro * noise.gyro_rad_per_s_sqrt_hz) {  // over a second
     finding.severity = Severity::kNote;
     finding.what += ": errors of an orientation that are no larger, and their NEES, tell of it";
   }

@@ -30,8 +30,7 @@ EncoderCheck::EncoderCheck(const SensorName& wheels, const WheelSet& set)
       solver_(set.model, {}),
       n_steer_(set.model->description().n_steer),
       trial_(set.model, set.prior.wheels.x_WI, channel_changes(set.model->description())),
-      parity_(set.model),
-      x_WI_(set.prior.wheels.x_WI) {
+      parity_(set.model) {
   solver_.set_intrinsics(set.prior.wheels.x_WI);
   const Eigen::Index n = set.prior.wheels.x_WI.size();
   prior_root_ = root_of(set.P_before().topLeftCorner(n, n));
@@ -52,7 +51,9 @@ std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
   constexpr std::int64_t kEvery = 5;
   if (samples_++ % kEvery == 0) trial_.add(sample);
   const bool is_solved = solver_.solve(sample, solution_) == Status::kOk;
-  if (solver_.model().n_rows() > 3) parity_.add(sample, x_WI_, is_solved ? &solution_ : nullptr);
+  if (solver_.model().n_rows() > 3) {
+    parity_.add(sample, solver_.intrinsics(), is_solved ? &solution_ : nullptr);
+  }
   if (!is_solved || solution_.rank_deficient) return {};
   return solution_.xi;
 }

@@ -46,7 +46,6 @@ class EncoderCheck {
   int n_steer_;
   ChangeTrial trial_;
   ParityWatch parity_;
-  Intrinsics x_WI_;
   std::vector<StuckChannel> drives_;
   std::int64_t samples_ = 0;
   std::optional<EncoderSample> last_;

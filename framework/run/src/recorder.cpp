@@ -23,6 +23,11 @@ namespace {
 /// Points of each series that a live run keeps: this, to twice as many.
 constexpr std::size_t kLivePoints = 4096;
 
+double yaw_sigma_rad(const ImuState& imu, const ImuMatrix& P) {
+  const Eigen::Vector3d up_in_I = imu.R_GtoI.col(2);
+  return std::sqrt(up_in_I.dot(P.topLeftCorner<3, 3>() * up_in_I));
+}
+
 }  // namespace
 
 Recorder::Recorder(const RunSetup& setup, const RunData& data, const Filter& filter,
@@ -153,14 +158,13 @@ void Recorder::add_error(const Filter& filter, double t_s) {
   error.head<3>() = -log_so3(truth->q_BtoW.toRotationMatrix().transpose() * imu.R_GtoI.transpose());
   error.tail<3>() = truth->p_BinW - imu.p_IinG;
   const ImuMatrix P = filter.imu_covariance();
-  const Eigen::Vector3d up_in_I = imu.R_GtoI.col(2);
   PoseError sample;
   sample.t_s = t_s;
   sample.position_m = -error.tail<3>();
   sample.position_sigma_m = P.diagonal().segment<3>(3).cwiseSqrt();
   // R_GtoI = Exp(-dtheta) R_GtoI_hat: the true body is turned by dtheta further, in I.
-  sample.yaw_rad = -up_in_I.dot(error.head<3>());
-  sample.yaw_sigma_rad = std::sqrt(up_in_I.dot(P.topLeftCorner<3, 3>() * up_in_I));
+  sample.yaw_rad = -imu.R_GtoI.col(2).dot(error.head<3>());
+  sample.yaw_sigma_rad = yaw_sigma_rad(imu, P);
   result_.errors.push_back(sample);
   add_relative_error(filter, *truth);
   const double pose = eval::nees(error, P.topLeftCorner<6, 6>());
@@ -176,8 +180,7 @@ void Recorder::add_end_sigma(const Filter& filter) {
   const ImuMatrix P = filter.imu_covariance();
   const double m2 = P.diagonal().segment<3>(kPositionColumn).sum();
   if (!start_m2_) start_m2_ = m2;
-  const Eigen::Vector3d up_in_I = filter.imu().R_GtoI.col(2);
-  result_.end_sigma = {std::sqrt(m2), std::sqrt(up_in_I.dot(P.topLeftCorner<3, 3>() * up_in_I)),
+  result_.end_sigma = {std::sqrt(m2), yaw_sigma_rad(filter.imu(), P),
                        std::sqrt(std::max(0., m2 - *start_m2_))};
 }
 

@@ -195,21 +195,16 @@ double Window::way_variance(int clone) {
 }
 
 bool Window::knows_way() {
-  constexpr double kKnown = 0.1;
-  const WindowClone& now = *std::ranges::max_element(clones_, {}, &WindowClone::t_ns);
-  double longest_m2 = 0., variance_m2 = 0.;
-  for (int i = 0; i < n_clones(); ++i) {
-    const double way_m2 = (clone(i).p_IinG - now.p_IinG).squaredNorm();
-    if (way_m2 <= longest_m2) continue;
-    longest_m2 = way_m2;
-    variance_m2 = way_variance(i);
-  }
-  return variance_m2 < kKnown * kKnown * longest_m2;
+  if (way_variance_.empty()) set_way_variances();
+  return knows_way_;
 }
 
 void Window::set_way_variances() {
+  constexpr double kKnown = 0.1;
   const FilterView::Covariance P = filter_.P();
   const WindowClone& from = *std::ranges::max_element(clones_, {}, &WindowClone::t_ns);
+  double longest_m2 = 0.;
+  knows_way_ = false;
   for (const WindowClone& to : clones_) {
     // By dtheta and dp of the one, dp of the other.
     Eigen::Matrix<double, 3, 9> J;
@@ -226,6 +221,10 @@ void Window::set_way_variances() {
     }
     const double trace = (J * P_of * J.transpose()).trace();
     way_variance_.push_back(&to == &from ? 0. : std::max(0., trace / 3.));
+    const double way_m2 = (to.p_IinG - from.p_IinG).squaredNorm();
+    if (way_m2 <= longest_m2) continue;
+    longest_m2 = way_m2;
+    knows_way_ = way_variance_.back() < kKnown * kKnown * way_m2;
   }
 }
 

@@ -143,6 +143,7 @@ class Window {
   FactorColumns columns_;
   std::vector<int> state_columns_;
   std::vector<double> way_variance_;  ///< of each clone; empty: not worked out yet
+  bool knows_way_ = false;            ///< worked out with them
   Eigen::MatrixXd covariance_;
   bool has_covariance_ = false;
 };
