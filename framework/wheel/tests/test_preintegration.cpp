@@ -271,6 +271,18 @@ TEST(Preintegration, UsesTheParityOfACutSampleOnceOverBothIntervals) {
   EXPECT_LT((total.parity.Lambda - whole.parity.Lambda).norm(), 1e-9 * whole.parity.Lambda.norm());
 }
 
+/// What four wheels that go straight on have counted, all of them alike.
+EncoderSample counted_straight(std::int64_t begin_ns, std::int64_t end_ns, double angle_rad) {
+  EncoderSample sample;
+  sample.n_drive = sample.n_steer = 4;
+  sample.begin_ns = begin_ns;
+  sample.end_ns = sample.t_ns = end_ns;
+  for (std::size_t i = 0; i < 4; ++i) {
+    sample.drive_rad_per_s[i] = angle_rad / seconds_between(begin_ns, end_ns);
+  }
+  return sample;
+}
+
 TEST(Preintegration, GivesWhatWasCountedHoweverIntervalsCutAndStampsJitter) {
   const auto model = load_model(swerve("four_wis_wid"));
   // Counts of a straight way at a speed that changes, with stamps up to half a period off.
@@ -281,15 +293,10 @@ TEST(Preintegration, GivesWhatWasCountedHoweverIntervalsCutAndStampsJitter) {
   std::vector<EncoderSample> samples;
   std::int64_t begin_ns = 0;
   for (int k = 1; k <= 500; ++k) {
-    EncoderSample sample;
-    sample.n_drive = sample.n_steer = 4;
-    sample.begin_ns = begin_ns;
-    sample.end_ns = sample.t_ns = begin_ns = k * (kSecond / 50) + jitter_ns(rng);
+    const std::int64_t end_ns = k * (kSecond / 50) + jitter_ns(rng);
     const double counted = angle_rad(k / rate_hz) - angle_rad((k - 1) / rate_hz);
-    for (std::size_t i = 0; i < 4; ++i) {
-      sample.drive_rad_per_s[i] = counted / seconds_between(sample.begin_ns, sample.end_ns);
-    }
-    samples.push_back(sample);
+    samples.push_back(counted_straight(begin_ns, end_ns, counted));
+    begin_ns = end_ns;
   }
   Preintegrator preintegrator(model, {});
   PreintegratedPose whole, total, part;
@@ -317,15 +324,9 @@ TEST(Preintegration, TakesNoSlopeFromACellOfStampsThatCameInABunch) {
   std::vector<EncoderSample> samples;
   std::int64_t begin_ns = 0;
   for (int k = 1; k <= 40; ++k) {
-    EncoderSample sample;
-    sample.n_drive = sample.n_steer = 4;
-    sample.begin_ns = begin_ns;
-    sample.end_ns = sample.t_ns = begin_ns = k / 2 * (kSecond / 10) + (k % 2 == 0 ? 0 : 2'000);
-    for (std::size_t i = 0; i < 4; ++i) {
-      sample.drive_rad_per_s[i] =
-          0.002 / radius_m / seconds_between(sample.begin_ns, sample.end_ns);
-    }
-    samples.push_back(sample);
+    const std::int64_t end_ns = k / 2 * (kSecond / 10) + (k % 2 == 0 ? 0 : 2'000);
+    samples.push_back(counted_straight(begin_ns, end_ns, 0.002 / radius_m));
+    begin_ns = end_ns;
   }
   Preintegrator preintegrator(model, {});
   PreintegratedPose pose;

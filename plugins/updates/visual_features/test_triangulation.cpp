@@ -12,6 +12,14 @@ namespace {
 
 using testing::Random;
 
+MetRays met_at(double rho, double sigma_rho, bool has_distance) {
+  MetRays met;
+  met.point.rho = rho;
+  met.sigma_rho = sigma_rho;
+  met.has_distance = has_distance;
+  return met;
+}
+
 /// Points of a scene as noisy rays tell them, once it is known.
 struct Sums {
   double truth = 0., found = 0., taken = 0., with_noise = 0.;  ///< mean squares of rho
@@ -62,15 +70,10 @@ TEST(FoundDistances, GiveNoMoreOfTheWayThanIsThere) {
 TEST(FoundDistances, LeaveAFewPointsAsTheyAreFoundOrInfinitelyFar) {
   FoundDistances distances;
   for (int i = 0; i < 10; ++i) distances.add(0.2, 1e-6);
-  MetRays told;
-  told.point.rho = 0.5;
-  told.sigma_rho = 0.01;
-  told.has_distance = true;
+  MetRays told = met_at(0.5, 0.01, true);
   distances.expect(true, told);
   EXPECT_EQ(told.point.rho, 0.5);
-  MetRays untold;
-  untold.point.rho = 0.03;
-  untold.sigma_rho = 0.04;
+  MetRays untold = met_at(0.03, 0.04, false);
   distances.expect(true, untold);
   EXPECT_EQ(untold.point.rho, 0.);
   EXPECT_DOUBLE_EQ(untold.sigma_rho, 0.05);
@@ -84,10 +87,7 @@ TEST(FoundDistances, LeaveAPointThatIsNotOfTheSceneWhereItWasFound) {
     distances.add(0.001 + sigma * testing::normal(random), sigma * sigma);
   }
   for (const double sigma : {0.002, 0.03}) {  // better told than the scene is, and worse
-    MetRays met;
-    met.point.rho = 0.5;
-    met.sigma_rho = sigma;
-    met.has_distance = true;
+    MetRays met = met_at(0.5, sigma, true);
     distances.expect(true, met);
     EXPECT_EQ(met.point.rho, 0.5) << sigma;
     EXPECT_EQ(met.sigma_rho, sigma) << sigma;
@@ -97,9 +97,7 @@ TEST(FoundDistances, LeaveAPointThatIsNotOfTheSceneWhereItWasFound) {
 TEST(FoundDistances, SayNothingWhereTheWayIsNotKnown) {
   FoundDistances distances;
   for (int i = 0; i < 100; ++i) distances.add(0.2, 1e-6);
-  MetRays untold;
-  untold.point.rho = 0.03;
-  untold.sigma_rho = 0.04;
+  MetRays untold = met_at(0.03, 0.04, false);
   distances.expect(false, untold);
   EXPECT_EQ(untold.point.rho, 0.);
   EXPECT_DOUBLE_EQ(untold.sigma_rho, 0.05);
