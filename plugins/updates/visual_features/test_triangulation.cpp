@@ -94,6 +94,26 @@ TEST(FoundDistances, LeaveAPointThatIsNotOfTheSceneWhereItWasFound) {
   }
 }
 
+// Points of a wall differ by less than each is off by: none of them is all that is known of it.
+TEST(FoundDistances, AreOfAllPointsOfAWall) {
+  Random random(5);
+  FoundDistances distances;
+  double squares = 0., worst = 0.;
+  constexpr int kFirst = 1000, kLast = 6000;
+  for (int i = 0; i < kLast; ++i) {
+    const double sigma = 0.02 * (i % 4 == 0 ? 0.3 : i % 4 == 3 ? 3. : 1.);
+    const double rho = 0.2 + 0.002 * testing::normal(random);
+    distances.add(rho + sigma * testing::normal(random), sigma * sigma);
+    if (i < kFirst) continue;
+    const double error = distances.mean() - 0.2;
+    squares += error * error;
+    worst = std::max(worst, std::abs(error));
+  }
+  // The best that the last 300 points tell, by the inverses of their variances, is 0.0006.
+  EXPECT_LT(std::sqrt(squares / (kLast - kFirst)), 0.001);
+  EXPECT_LT(worst, 0.004);
+}
+
 TEST(FoundDistances, SayNothingWhereTheWayIsNotKnown) {
   FoundDistances distances;
   for (int i = 0; i < 100; ++i) distances.add(0.2, 1e-6);

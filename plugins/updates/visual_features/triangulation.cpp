@@ -177,13 +177,15 @@ FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min
 
 void FoundDistances::add(double rho, double variance) {
   count_ = std::min(count_ + 1, kMostPoints);
-  // The better it is told, beside how different points are, the more it says of them.
-  const double spread = this->variance();
+  // The better it is told, beside how different points are, the more it says of them: of a wall, or
+  // the horizon, as far as that difference is known itself.
+  const double spread = std::max(this->variance(), noise_ * std::sqrt(2. / count_));
   const double weight = count_ > kFewPoints && spread > 0. ? spread / (spread + variance) : 1.;
   weight_ = (1. - 1. / kMostPoints) * weight_ + weight;
   const double part = weight / weight_;
   mean_ += part * (rho - mean_);
   second_ += part * (rho * rho - variance - second_);
+  noise_ += part * (variance - noise_);
 }
 
 void FoundDistances::expect(bool of_scene, MetRays& met) const {

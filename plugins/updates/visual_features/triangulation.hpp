@@ -82,6 +82,7 @@ class FoundDistances {
   /// rays tell less than the others do, or nothing and there are no others yet. One that is not of
   /// the scene stays where it was found.
   void expect(bool of_scene, MetRays& met) const;
+  double mean() const { return mean_; }
   double mean_square() const { return second_; }
 
  private:
@@ -89,6 +90,7 @@ class FoundDistances {
   double weight_ = 0.;
   int count_ = 0;
   double mean_ = 0., second_ = 0.;  ///< of rho: mean, and mean square
+  double noise_ = 0.;               ///< mean variance of what was found
 };
 
 /// The rays that agree within `most_px` on the point of two of them, for the two with which most do
