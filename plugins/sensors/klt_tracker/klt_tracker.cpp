@@ -20,6 +20,8 @@ namespace {
 /// A pair with fewer matches says nothing about the extrinsics.
 constexpr std::size_t kMinMatches = 20;
 constexpr double kContradictingShare = 0.7;
+constexpr const char* kContradicts = "stereo pair that contradicts the extrinsics";
+constexpr const char* kShowsNothing = "stereo pair whose second image shows nothing of the first";
 /// Pairs in a row that contradict the extrinsics before it is said.
 constexpr int kContradictingPairs = 10;
 constexpr double kMinBaseline = 1e-3;  // m
@@ -207,11 +209,13 @@ void KltTracker::give_ids(std::vector<Track>& tracks) {
   }
 }
 
-void KltTracker::watch_matches(const StereoCounts& counts, std::size_t right) {
+void KltTracker::watch_matches(const StereoCounts& counts, std::size_t right, std::int64_t t_ns) {
   Eye& eye = eyes_[right];
   const std::size_t points = eyes_[right - 1].tracker->tracks().size();
+  if (points >= 2 * kMinMatches) ++pairs_with_points_;
   const bool are_few = points >= 2 * kMinMatches && counts.found < kMinMatches;
   eye.pairs_without_matches = are_few ? eye.pairs_without_matches + 1 : 0;
+  if (are_few) rejections_.add(kShowsNothing, t_ns);
   if (eye.pairs_without_matches != kContradictingPairs || eye.told_no_matches) return;
   eye.told_no_matches = true;
   services_.log(LogLevel::kWarning,
@@ -223,8 +227,9 @@ void KltTracker::watch_matches(const StereoCounts& counts, std::size_t right) {
 }
 
 void KltTracker::watch_stereo(const StereoCounts& counts, std::size_t right, std::int64_t t_ns) {
-  watch_matches(counts, right);
+  watch_matches(counts, right, t_ns);
   if (counts.found < kMinMatches) return;
+  ++pairs_with_matches_;
   Eye& eye = eyes_[right];
   const double share =
       static_cast<double>(counts.contradicting) / static_cast<double>(counts.found);
@@ -233,7 +238,7 @@ void KltTracker::watch_stereo(const StereoCounts& counts, std::size_t right, std
     return;
   }
   const std::string where = place(static_cast<int>(right) - 1, t_ns);
-  rejections_.add("stereo pair that contradicts the extrinsics", [&where] { return where; });
+  rejections_.add(kContradicts, [&where] { return where; });
   if (++eye.contradicting_pairs < kContradictingPairs || eye.told_contradiction) return;
   eye.told_contradiction = true;
   services_.log(LogLevel::kWarning,
@@ -338,6 +343,12 @@ Status KltTracker::next(Measurement& out) {
   return Status::kOk;
 }
 
-void KltTracker::rejections(std::vector<RejectionCount>& out) const { rejections_.append_to(out); }
+void KltTracker::rejections(std::vector<RejectionCount>& out) const {
+  for (const RejectionCount& one : rejections_.counts()) {
+    out.push_back(one);
+    if (one.reason == kContradicts) out.back().of = pairs_with_matches_;
+    if (one.reason == kShowsNothing) out.back().of = pairs_with_points_;
+  }
+}
 
 }  // namespace viwo::klt

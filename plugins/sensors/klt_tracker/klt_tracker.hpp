@@ -69,7 +69,7 @@ class KltTracker final : public Sensor {
   FeatureSample points_of(std::size_t camera, const ImageGroup& group);
   void watch_stereo(const StereoCounts& counts, std::size_t right, std::int64_t t_ns);
   /// Warns when hardly a point of the left camera is found in the right one.
-  void watch_matches(const StereoCounts& counts, std::size_t right);
+  void watch_matches(const StereoCounts& counts, std::size_t right, std::int64_t t_ns);
   /// Warns when left and right images do not come together.
   void watch_pair(const ImageGroup& group, std::size_t right);
   void process(const ImageGroup& group);
@@ -86,6 +86,8 @@ class KltTracker final : public Sensor {
   Sensor* input_ = nullptr;
   std::optional<ImageGroups> groups_;
   Rejections rejections_;
+  /// Stereo pairs whose first image has points, and those of them with matches.
+  std::int64_t pairs_with_points_ = 0, pairs_with_matches_ = 0;
   std::int64_t next_id_ = 0;
   std::deque<FeatureSample> ready_;
 };

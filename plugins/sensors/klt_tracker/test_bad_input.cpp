@@ -236,6 +236,7 @@ TEST(KltTracker, WarnsOnceWhenTheCamerasAreSwapped) {
     ASSERT_EQ(told.rejections.size(), 1U);
     EXPECT_EQ(told.rejections[0].reason, "stereo pair that contradicts the extrinsics");
     EXPECT_EQ(told.rejections[0].count, 13);
+    EXPECT_EQ(told.rejections[0].of, 13);
     EXPECT_LT(told.samples.back().points.size(), 60U);
   }
 }
@@ -252,6 +253,9 @@ TEST(KltTracker, WarnsOnceWhenTheSecondCameraSeesNothingOfTheFirst) {
   const Told told = told_of(input);
   ASSERT_EQ(told.warnings.size(), 1U);
   EXPECT_THAT(told.warnings[0], HasSubstr("points of camera 0 are found in camera 1, which by "));
+  ASSERT_EQ(told.rejections.size(), 1U);
+  EXPECT_EQ(told.rejections[0].count, 12);
+  EXPECT_EQ(told.rejections[0].of, 12);
 }
 
 TEST(KltTracker, WarnsOnceWhenLeftAndRightDoNotComeTogether) {
