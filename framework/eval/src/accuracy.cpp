@@ -105,6 +105,32 @@ RigidTransform align_first(std::span<const PosePair> first, Alignment alignment)
   return align(first, alignment == Alignment::kSe3 ? Alignment::kStart : alignment);
 }
 
+/// Whether the reference gives the same orientation all the time, and the estimate does not.
+bool are_positions_alone(const std::vector<PosePair>& pairs) {
+  constexpr double kTurns_rad = 0.1;
+  bool turns = false;
+  for (const PosePair& pair : pairs) {
+    if (pair.reference.q_BtoW.angularDistance(pairs.front().reference.q_BtoW) > 1e-6) return false;
+    turns =
+        turns || pair.estimate.q_BtoW.angularDistance(pairs.front().estimate.q_BtoW) > kTurns_rad;
+  }
+  return turns;
+}
+
+/// A reference without orientations gets those of the estimate, in its world.
+void give_orientations(std::vector<PosePair>& pairs, Alignment& alignment) {
+  if (alignment == Alignment::kStart) alignment = Alignment::kYawPosition;
+  const RigidTransform T_EtoR = align(pairs, alignment);
+  for (PosePair& pair : pairs) pair.reference.q_BtoW = (T_EtoR * pair.estimate).q_BtoW;
+}
+
+void forget_orientations(Accuracy& result) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  result.ate_deg = result.end_deg = result.end_yaw_deg = kNone;
+  for (SegmentErrors& errors : result.rpe) errors.mean_deg = errors.rmse_deg = kNone;
+  std::ranges::fill(result.series.yaw_error_deg, kNone);
+}
+
 ErrorSeries error_series(const std::vector<PosePair>& pairs, const std::vector<double>& path_m) {
   ErrorSeries series;
   series.path_length_m = path_m;
@@ -122,9 +148,12 @@ ErrorSeries error_series(const std::vector<PosePair>& pairs, const std::vector<d
 
 }  // namespace
 
-Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate, const Options& options) {
-  check(options);
-  const Association common = associate(reference, estimate, options.max_reference_gap_s);
+Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate, const Options& asked) {
+  check(asked);
+  Association common = associate(reference, estimate, asked.max_reference_gap_s);
+  Options options = asked;
+  const bool has_orientations = !are_positions_alone(common.pairs);
+  if (!has_orientations) give_orientations(common.pairs, options.alignment);
   const std::vector<double> path_m = reference_path_m(common.pairs);
 
   Accuracy result;
@@ -158,6 +187,7 @@ Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate, const
   result.end_m = position_error_m(from_start.back());
   result.end_deg = angle_error_deg(from_start.back());
   result.end_yaw_deg = result.series.yaw_error_deg.back();
+  if (!has_orientations) forget_orientations(result);
   return result;
 }
 

@@ -181,6 +181,32 @@ TEST(Accuracy, EndErrorLeavesOpenWhatTheAlignmentDoes) {
   EXPECT_GT(evaluate(reference, estimate, options).end_m, 3.);
 }
 
+// A prism, or GNSS: whatever the alignment, the orientations of such a reference mean nothing.
+TEST(Accuracy, OfPositionsAloneIsThatOfPositions) {
+  const Trajectory estimate = arc(0.2, 0.1, 401);
+  Trajectory reference = moved(estimate, about_z(0.7), {1., -2., 0.5});
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    reference[i].q_BtoW.setIdentity();
+    reference[i].p_BinW.z() += i % 2 == 0 ? 0.01 : -0.01;
+  }
+  for (const Alignment alignment : {Alignment::kStart, Alignment::kYawPosition, Alignment::kSe3}) {
+    Options options;
+    options.alignment = alignment;
+    options.segment_lengths_m = {5.};
+    const Accuracy accuracy = evaluate(reference, estimate, options);
+    EXPECT_NEAR(accuracy.ate_m, 0.01, 1e-3) << name(alignment);
+    EXPECT_LT(accuracy.rpe[0].mean_m, 0.021) << name(alignment);
+    EXPECT_LT(accuracy.end_m, 0.021) << name(alignment);
+    EXPECT_TRUE(std::isnan(accuracy.ate_deg));
+    EXPECT_TRUE(std::isnan(accuracy.rpe[0].mean_deg));
+    EXPECT_TRUE(std::isnan(accuracy.end_yaw_deg));
+    EXPECT_TRUE(to_json(accuracy).at("end").at("yaw_deg").is_null());
+  }
+  // What does not turn either has the orientation that it has.
+  const Trajectory straight = arc(0., 0.1, 401);
+  EXPECT_NEAR(evaluate(straight, moved(straight, about_z(0.1), {0., 0., 0.})).ate_deg, 0., 1e-6);
+}
+
 TEST(Accuracy, WithoutNumbersIsNullInJson) {
   Accuracy accuracy;
   accuracy.ate_m = std::numeric_limits<double>::quiet_NaN();

@@ -64,6 +64,9 @@ struct Accuracy {
 /// of ten (m) that the path of the reference has at least three of. Throws InputError for
 /// trajectories that cannot be compared (association.hpp, alignment.hpp) and for options out of
 /// range.
+/// A reference that has the same orientation all the time while the estimate turns has positions
+/// alone: they are compared as the estimate's orientations have them, aligned by yaw and position
+/// where `start` is asked for, and errors of the orientation are NaN.
 Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate,
                   const Options& options = {});
 

@@ -1,0 +1,74 @@
+#include "viwo/eval/hints.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "viwo/math/significant.hpp"
+
+namespace viwo::eval {
+namespace {
+
+/// What was read as x y z w has been w x y z.
+Trajectory reordered(Trajectory trajectory) {
+  for (StampedPose& pose : trajectory) {
+    const Eigen::Vector4d wxyz = pose.q_BtoW.coeffs();
+    pose.q_BtoW = Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+  }
+  return trajectory;
+}
+
+std::string order_hint(const Trajectory& reference, const Trajectory& estimate,
+                       const Options& options, double ate_deg) {
+  constexpr double kMuch_deg = 20., kPart = 0.25;
+  if (!(ate_deg > kMuch_deg)) return "";
+  const double by_estimate = evaluate(reference, reordered(estimate), options).ate_deg;
+  const double by_reference = evaluate(reordered(reference), estimate, options).ate_deg;
+  const bool is_estimate = by_estimate <= by_reference;
+  const double best = is_estimate ? by_estimate : by_reference;
+  if (!(best < kPart * ate_deg)) return "";
+  return "orientations differ by " + significant(ate_deg, 3) + " deg, by " + significant(best, 3) +
+         " deg where the quaternions of the " + (is_estimate ? "estimate" : "reference") +
+         " are w x y z: TUM files have x y z w";
+}
+
+}  // namespace
+
+double extent_m(const Trajectory& poses) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  const auto n = static_cast<double>(poses.size());
+  for (const StampedPose& pose : poses) mean += pose.p_BinW / n;
+  double squares = 0.;
+  for (const StampedPose& pose : poses) squares += (pose.p_BinW - mean).squaredNorm() / n;
+  return std::sqrt(squares);
+}
+
+std::string size_contradiction(const Trajectory& of_reference, const Trajectory& of_estimate) {
+  constexpr double kFar_m = 0.5, kMany = 5., kMostGap_s = 0.5;
+  Trajectory reference, estimate;
+  for (const StampedPose& pose : of_estimate) {
+    const auto at = interpolate(of_reference, pose.t_ns, kMostGap_s);
+    if (!at) continue;
+    reference.push_back(*at);
+    estimate.push_back(pose);
+  }
+  const double reference_m = extent_m(reference), estimate_m = extent_m(estimate);
+  const double larger = std::max(reference_m, estimate_m);
+  if (!(larger > kFar_m && larger > kMany * std::min(reference_m, estimate_m))) return "";
+  return "it goes " + significant(reference_m, 3) +
+         " m from its middle, root mean square, and the estimate " + significant(estimate_m, 3) +
+         " m";
+}
+
+std::vector<std::string> hints(const Trajectory& reference, const Trajectory& estimate,
+                               const Options& options, const Accuracy& accuracy) {
+  std::vector<std::string> lines;
+  std::string order = order_hint(reference, estimate, options, accuracy.ate_deg);
+  if (!order.empty()) lines.push_back(std::move(order));
+  const std::string size = size_contradiction(reference, estimate);
+  if (!size.empty()) {
+    lines.push_back("the reference: " + size + " - another unit of one, or another recording");
+  }
+  return lines;
+}
+
+}  // namespace viwo::eval
