@@ -52,10 +52,27 @@ std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
   if (samples_++ % kEvery == 0) trial_.add(sample);
   const bool is_solved = solver_.solve(sample, solution_) == Status::kOk;
   if (solver_.model().n_rows() > 3) {
-    parity_.add(sample, solver_.intrinsics(), is_solved ? &solution_ : nullptr);
+    const bool was_gross =
+        parity_.add(sample, solver_.intrinsics(), is_solved ? &solution_ : nullptr);
+    if (was_gross && is_solved) add_by_prior(sample);
   }
   if (!is_solved || solution_.rank_deficient) return {};
   return solution_.xi;
+}
+
+/// What the wheels may contradict each other by, for all that is known of them before.
+void EncoderCheck::add_by_prior(const EncoderSample& sample) {
+  const Intrinsics x_WI = solver_.intrinsics();
+  TwistSolution changed;
+  double squares = 0.;
+  for (Eigen::Index k = 0; k < prior_root_.cols(); ++k) {
+    solver_.set_intrinsics(x_WI + prior_root_.col(k));
+    if (solver_.solve(sample, changed) != Status::kOk) continue;
+    squares += (changed.e - solution_.e).squaredNorm();
+  }
+  solver_.set_intrinsics(x_WI);
+  by_prior_squares_ += squares / solver_.model().n_rows();
+  ++by_prior_count_;
 }
 
 void EncoderCheck::watch_steering(const EncoderSample& sample) {
@@ -118,7 +135,9 @@ void EncoderCheck::find_gross(std::int64_t zero_ns, Findings& out) const {
   constexpr double kLeast_s = 4., kMostPart = 0.5;  // of the driving
   const double gross_s = parity_.gross_s();
   if (gross_s < kLeast_s || gross_s <= kMostPart * parity_.driven_s()) return;
-  const Parity parity = parity_.total();
+  const Parity parity = parity_.gross();
+  // Wheels that a filter is to find are as their prior allows when they contradict each other.
+  const double by_prior = std::sqrt(by_prior_squares_ / std::max(1., by_prior_count_));
   out.push_back({name_ + " parity",
                  name_ + ": the wheels contradict each other grossly (rms " +
                      significant(parity.rms, 2) + " m/s at " + significant(parity.speed, 2) +
@@ -129,7 +148,7 @@ void EncoderCheck::find_gross(std::int64_t zero_ns, Findings& out) const {
                      "zeros or units of the steering (viwo inspect looks for them)",
                  false,
                  {},
-                 true});
+                 !(parity.rms < 2. * by_prior)});
 }
 
 /// Where several changes explain the contradictions, all of them are named.

@@ -33,6 +33,7 @@ class EncoderCheck {
   void findings(std::int64_t zero_ns, Findings& out) const;
 
  private:
+  void add_by_prior(const EncoderSample& sample);
   void watch_steering(const EncoderSample& sample);
   void find_stuck(std::int64_t zero_ns, Findings& out) const;
   void find_degrees(Findings& out) const;
@@ -46,6 +47,7 @@ class EncoderCheck {
   int n_steer_;
   ChangeTrial trial_;
   ParityWatch parity_;
+  double by_prior_squares_ = 0., by_prior_count_ = 0.;  ///< at the ends of gross pieces
   std::vector<StuckChannel> drives_;
   std::int64_t samples_ = 0;
   std::optional<EncoderSample> last_;

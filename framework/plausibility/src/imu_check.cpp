@@ -110,6 +110,7 @@ void ImuCheck::findings(std::int64_t zero_ns, Findings& out) const {
   find_stuck(zero_ns, out);
   find_stuck_channels(zero_ns, out);
   if (count_ < kFewest || seconds_between(begin_ns_, last_.t_ns) < kShortest_s) return;
+  find_constant(out);
   find_gravity(out);
   find_saturated(out);
   find_spikes(out);
@@ -162,6 +163,27 @@ void ImuCheck::find_stuck_channels(std::int64_t zero_ns, Findings& out) const {
                        " on, for " +
                        significant(seconds_between(channel.from_ns(), channel.to_ns()), 3) +
                        " s, while the other axes change: it was stuck",
+                   false,
+                   {},
+                   true});
+  }
+}
+
+/// One axis that never changes while both others of its kind do. Two, of a gyro about z alone, may
+/// not be there.
+void ImuCheck::find_constant(Findings& out) const {
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    const std::size_t triad = i < 3 ? 0 : 3;
+    const auto is_constant = [&](std::size_t one) {
+      const Axis& axis = axes_[triad + one % 3];
+      return axis.least == axis.most;
+    };
+    if (!is_constant(i) || is_constant(i + 1) || is_constant(i + 2)) continue;
+    out.push_back({name_ + " stuck " + kImuAxes[i],
+                   name_ + ": the " + kImuAxes[i] + " reads " + significant(axes_[i].last, 3) +
+                       unit_of(i) +
+                       " all the time, while the other axes change: it is not read (a column, a "
+                       "field of the message), or broken",
                    false,
                    {},
                    true});

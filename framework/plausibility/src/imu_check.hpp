@@ -56,6 +56,7 @@ class ImuCheck {
   };
 
   void watch_stuck(const ImuSample& sample, bool moves);
+  void find_constant(Findings& out) const;
   void find_gravity(Findings& out) const;
   void find_stuck(std::int64_t zero_ns, Findings& out) const;
   void find_stuck_channels(std::int64_t zero_ns, Findings& out) const;

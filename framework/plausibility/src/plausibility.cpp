@@ -25,6 +25,7 @@ struct Plausibility::Checks {
     EncoderCheck encoders;
     TwistCheck twist, heading;
     bool has_failed = false;  ///< what its model throws is told by those who need it
+    WheelsWay way;
   };
 
   /// What the estimator takes of a sensor.
@@ -58,10 +59,12 @@ struct Plausibility::Checks {
     SensorName imu, heading, wheels;
   };
   void add(const Names& names, const WheelSet& set, Gyro gyro) {
-    wheels.push_back(
-        {names.wheels.sensor, EncoderCheck(names.wheels, set),
-         TwistCheck(names.imu, names.wheels, set.model, set.prior, gyro),
-         TwistCheck(names.heading, names.wheels, set.model, set.prior, Gyro::kHeading)});
+    wheels.push_back({names.wheels.sensor,
+                      EncoderCheck(names.wheels, set),
+                      TwistCheck(names.imu, names.wheels, set.model, set.prior, gyro),
+                      TwistCheck(names.heading, names.wheels, set.model, set.prior, Gyro::kHeading),
+                      false,
+                      {}});
   }
 
   void add(WheelsCheck& check, const EncoderSample& sample) {
@@ -69,7 +72,10 @@ struct Plausibility::Checks {
       const std::optional<Twist> xi = check.encoders.add(sample);
       constexpr double kLeast = 0.05;  // m/s, rad/s
       moves = xi && xi->norm() > kLeast;
+      ++check.way.samples;
       if (xi) {
+        check.way.length_m +=
+            xi->head<2>().norm() * seconds_between(sample.begin_ns, sample.end_ns);
         check.twist.add_wheels(sample, *xi, check.encoders.rate_by_prior());
         check.heading.add_wheels(sample, *xi, check.encoders.rate_by_prior());
       }
@@ -272,6 +278,10 @@ void Plausibility::add(const std::string& sensor, SampleView sample) {
     checks_->stereo.add(sensor, *features);
   }
   watch(sensor, sample);
+}
+
+WheelsWay Plausibility::way() const {
+  return checks_ && !checks_->wheels.empty() ? checks_->wheels.front().way : WheelsWay();
 }
 
 namespace {

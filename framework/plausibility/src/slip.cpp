@@ -13,11 +13,13 @@ namespace viwo {
 namespace {
 
 constexpr std::size_t kFewestOfAll = 40;
+constexpr double kLeast_rad_per_s = 0.08;
+constexpr double kMostPart = 0.35;  ///< what is wrong more often is another fault than slip
 
 /// By how much the gyro turns otherwise than wheels that may be wrong by a factor, and it by a
 /// bias.
 std::vector<double> differences(std::span<const TurnWindow> windows) {
-  constexpr double kTurns_rad_per_s = 0.1, kMostOff = 1.5;
+  constexpr double kTurns_rad_per_s = 0.1, kMostOff = 1.5, kMostBias_rad_per_s = 0.1;
   std::vector<double> factors, left;
   for (const TurnWindow& w : windows) {
     if (std::abs(w.wheels) > kTurns_rad_per_s) factors.push_back(w.gyro / w.wheels);
@@ -25,7 +27,7 @@ std::vector<double> differences(std::span<const TurnWindow> windows) {
   const double factor =
       factors.empty() ? 1. : std::clamp(eval::median(factors), 1. / kMostOff, kMostOff);
   for (const TurnWindow& w : windows) left.push_back(w.gyro - factor * w.wheels);
-  const double bias = eval::median(left);
+  const double bias = std::clamp(eval::median(left), -kMostBias_rad_per_s, kMostBias_rad_per_s);
   for (double& one : left) one -= bias;
   return left;
 }
@@ -67,11 +69,31 @@ double usual_difference(std::span<const TurnWindow> windows) {
   return eval::median(sizes_of(differences(windows)));
 }
 
+std::optional<Disagreement> find_disagreement(std::span<const TurnWindow> windows) {
+  if (windows.size() < kFewestOfAll) return {};
+  constexpr double kTurns_rad_per_s = 0.1, kMoves_m_per_s = 0.05;
+  const std::vector<double> left = differences(windows);
+  std::vector<double> beyond;
+  std::size_t moving = 0;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const TurnWindow& w = windows[i];
+    const bool turns = std::max(std::abs(w.gyro), std::abs(w.wheels)) > kTurns_rad_per_s;
+    if (!turns && w.speed_m_per_s < kMoves_m_per_s) continue;
+    ++moving;
+    const double size = std::abs(left[i]);
+    if (size > std::max(kLeast_rad_per_s, usual(w))) beyond.push_back(size);
+  }
+  if (moving < kFewestOfAll) return {};
+  const double part = static_cast<double>(beyond.size()) / static_cast<double>(moving);
+  if (part <= kMostPart) return {};
+  return Disagreement{part, eval::median(beyond)};
+}
+
 std::optional<Slip> find_slip(std::span<const TurnWindow> windows) {
   if (windows.size() < kFewestOfAll) return {};
   const std::vector<double> left = differences(windows);
   const std::vector<double> sizes = sizes_of(left);
-  constexpr double kNormal = 1.4826, kSigmas = 8., kLeast_rad_per_s = 0.08;
+  constexpr double kNormal = 1.4826, kSigmas = 8.;
   const double limit = std::max(kSigmas * kNormal * eval::median(sizes), kLeast_rad_per_s);
   Stretch longest, now;
   double beyond = 0.;
@@ -89,8 +111,8 @@ std::optional<Slip> find_slip(std::span<const TurnWindow> windows) {
     }
     if (std::abs(now.turn_rad) > std::abs(longest.turn_rad)) longest = now;
   }
-  // What is wrong more often is another fault; what is less is how wheels are.
-  constexpr double kMostPart = 0.35, kLeast_rad = 0.2;
+  // What is less is how wheels are.
+  constexpr double kLeast_rad = 0.2;
   constexpr std::size_t kLeastWindows = 2;
   if (longest.count < kLeastWindows || std::abs(longest.turn_rad) < kLeast_rad ||
       beyond > kMostPart * static_cast<double>(left.size())) {

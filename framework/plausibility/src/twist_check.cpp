@@ -66,6 +66,11 @@ void TwistCheck::add_imu(const ImuSample& sample) {
   advance();
 }
 
+void TwistCheck::finish() {
+  slip_ = find_slip(turns_);
+  disagreement_ = find_disagreement(turns_);
+}
+
 void TwistCheck::begin_anew() {
   lag_cells_ = lag_count_ = 0;
   lags_.fill({});
@@ -73,6 +78,7 @@ void TwistCheck::begin_anew() {
   turn_cells_ = 0;
   turns_.clear();
   slip_.reset();
+  disagreement_.reset();
 }
 
 /// As the rate of a gyro without an accelerometer.
@@ -98,6 +104,8 @@ void TwistCheck::add_wheels(const EncoderSample& sample, const Twist& xi,
   rate_squares_ += xi[2] * xi[2];
   if (rate_products_.size() == 0) rate_products_.setZero(rate_by_prior.size());
   rate_products_ += xi[2] * rate_by_prior;
+  prior_squares_ += rate_by_prior.squaredNorm();
+  ++rates_;
   if (!last_ && !last_heading_) return;  // nothing to be compared with, perhaps ever
   Eigen::Matrix<double, 3 + YawOrderCheck::kMost, 1> values;
   values << xi, order_.rates(sample, xi[2]);
@@ -162,7 +170,7 @@ void TwistCheck::add_to_turns(double gyro, const Twist& xi) {
   if (turns_.size() == kMostTurns) turns_.erase(turns_.begin(), turns_.begin() + kMostTurns / 2);
   turns_.push_back(turn_);
   constexpr std::size_t kLookedAfter = 20;
-  if (turns_.size() % kLookedAfter == 0) slip_ = find_slip(turns_);
+  if (turns_.size() % kLookedAfter == 0) finish();
 }
 
 /// Differences of the gyro's rates, half a second before to after it, and one of the wheels.

@@ -63,8 +63,8 @@ class TwistCheck {
   /// `xi`: twist of O over the time of the sample; `rate_by_prior`: by what each unit of the prior
   /// of the intrinsics changes its yaw rate.
   void add_wheels(const EncoderSample& sample, const Twist& xi, const Intrinsics& rate_by_prior);
-  /// Nothing more is to come.
-  void finish() { slip_ = find_slip(turns_); }
+  /// Nothing more is to come for now.
+  void finish();
   /// Whether the gyro says that channels are reversed or exchanged, of wheels that cannot say it of
   /// each other.
   bool finds_order(Findings& out) const { return order_.findings(out); }
@@ -96,6 +96,7 @@ class TwistCheck {
   void begin_anew();
   bool find_factor(double slope, double r, const Eigen::MatrixXd& C, Findings& out) const;
   bool finds_slip(std::int64_t zero_ns, Findings& out) const;
+  bool finds_disagreement(Findings& out) const;
   std::string opposite() const;
   void add_cell(const Eigen::Matrix<double, 6, 1>& imu, const Twist& xi);
   void add_to_lags(double gyro, const Twist& xi);
@@ -128,8 +129,10 @@ class TwistCheck {
   std::optional<HeadingSample> last_heading_;
   std::int64_t next_ = 0;  ///< cell
 
-  double rate_squares_ = 0.;  ///< of the wheels, sum over samples
-  Intrinsics rate_products_;  ///< likewise, of the rate with what a prior sigma changes it by
+  double rate_squares_ = 0.;   ///< of the wheels, sum over samples
+  Intrinsics rate_products_;   ///< likewise, of the rate with what a prior sigma changes it by
+  double prior_squares_ = 0.;  ///< likewise, of what all of the prior changes it by
+  long rates_ = 0;             ///< samples
 
   Window window_, before_;
   std::int64_t windows_ = 0;
@@ -137,6 +140,7 @@ class TwistCheck {
   int turn_cells_ = 0;
   std::vector<TurnWindow> turns_;  ///< the last ones
   std::optional<Slip> slip_;       ///< of them, as of a multiple of ten seconds or the end
+  std::optional<Disagreement> disagreement_;  ///< likewise
   Entries sum_ = Entries::Zero();
   Eigen::Matrix<double, kEntries, kEntries> products_ =
       Eigen::Matrix<double, kEntries, kEntries>::Zero();

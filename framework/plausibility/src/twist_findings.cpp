@@ -46,6 +46,24 @@ bool TwistCheck::finds_slip(std::int64_t zero_ns, Findings& out) const {
   return true;
 }
 
+/// They have little in common, and it is no lag, no sign, no unit and no slip.
+bool TwistCheck::finds_disagreement(Findings& out) const {
+  if (!disagreement_) return false;
+  // What the wheels may be off by, for all that is known of them before.
+  const double by_prior = std::sqrt(prior_squares_ / static_cast<double>(std::max(1L, rates_)));
+  out.push_back({wheels_ + " turn",
+                 wheels_ + ": turn otherwise than " + imu_ + " for " +
+                     significant(100. * disagreement_->part, 2) +
+                     " % of the time that they move, by " +
+                     significant(disagreement_->median_rad_per_s, 2) +
+                     " rad/s (median): a drive with another gear or other counts than the others, "
+                     "one that is not read, order or zeros of the channels, or the gyro",
+                 false,
+                 {},
+                 disagreement_->median_rad_per_s > 2. * by_prior});
+  return true;
+}
+
 void TwistCheck::findings(const Eigen::Vector3d& up, std::int64_t zero_ns, Findings& out) const {
   const double n = static_cast<double>(std::max<std::int64_t>(windows_, 1));
   const Entries mean = sum_ / n;
@@ -71,16 +89,21 @@ void TwistCheck::findings(const Eigen::Vector3d& up, std::int64_t zero_ns, Findi
   // A lag of tenths of a second, and they are not alike any more.
   if (turns && r > 0. && find_lag(C(kGyro, kGyro), out)) return;
   // It turns by next to nothing of what the wheels do.
-  constexpr double kStuck = 0.1;
+  constexpr double kStuck = 0.1, kNothing = 1e-9;
   const double gyro = std::sqrt(C(kGyro, kGyro)), wheels = std::sqrt(C(kWheels, kWheels));
   if (wheels > kLeastRate && gyro < kStuck * wheels) {
-    out.push_back({imu_ + " rate", imu_ + ": turns by " + significant(gyro, 2) +
-                                       " rad/s (standard deviation) where " + wheels_ +
-                                       " turn by " + significant(wheels, 2) +
-                                       ": it is stuck or not upright, or the wheels are wrong "
-                                       "(signs, order, zeros of the steering)"});
+    out.push_back({imu_ + " rate",
+                   imu_ + ": turns by " + significant(gyro, 2) +
+                       " rad/s (standard deviation) where " + wheels_ + " turn by " +
+                       significant(wheels, 2) +
+                       ": it is stuck or not upright, or the wheels are wrong "
+                       "(signs, order, zeros of the steering)",
+                   false,
+                   {},
+                   gyro < kNothing});
     return;
   }
+  if (finds_disagreement(out)) return;
   find_turned(C, out);
 }
 

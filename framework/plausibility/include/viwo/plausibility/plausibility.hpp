@@ -31,6 +31,12 @@ struct DeadReckoned {
 /// count from `zero_ns`.
 Findings implausible(const RunSetup& setup, const DeadReckoned& data, std::int64_t zero_ns);
 
+/// How far wheels say that they went, with their intrinsics as configured.
+struct WheelsWay {
+  std::int64_t samples = 0;
+  double length_m = 0.;
+};
+
 class Plausibility {
  public:
   /// Of a run with a filter; `live`: of what happens, in the order of arrival.
@@ -52,6 +58,9 @@ class Plausibility {
   const Findings& findings() const { return findings_; }
   /// Nothing more is to come.
   void finish();
+
+  /// Of the first wheel set.
+  WheelsWay way() const;
 
  private:
   struct Checks;

@@ -39,6 +39,15 @@ struct Slip {
 /// lasts for more than a third of the time, or of fewer than 40 windows.
 std::optional<Slip> find_slip(std::span<const TurnWindow> windows);
 
+/// Rates that have little in common.
+struct Disagreement {
+  double part = 0.;              ///< of the windows in which the base moves
+  double median_rad_per_s = 0.;  ///< of what they differ by in those
+};
+
+/// What is no slip, as it lasts for more than a third of the time.
+std::optional<Disagreement> find_disagreement(std::span<const TurnWindow> windows);
+
 /// The median of what the rates differ by, rad/s, factor and bias apart.
 double usual_difference(std::span<const TurnWindow> windows);
 
