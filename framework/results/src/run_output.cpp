@@ -8,14 +8,14 @@
 
 #include "viwo/config/yaml.hpp"
 #include "viwo/eval/json.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/text_stream.hpp"
 #include "viwo/report/html.hpp"
 #include "viwo/results/metrics.hpp"
 #include "viwo/results/run_stream.hpp"
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/setup/calibration_values.hpp"
 
 namespace viwo {
 
@@ -35,14 +35,14 @@ nlohmann::json stage_json(const StageTime& stage) {
 }
 
 void write_calibration(const std::filesystem::path& file, const RunResult& result) {
-  log::TextWriter out(file);
+  files::TextWriter out(file);
   write_calibration_head(out);
   for (std::size_t k = 0; k < result.epoch_t_s.size(); ++k) write_calibration_rows(out, result, k);
   out.close();
 }
 
 void write_timing(const std::filesystem::path& file, const RunResult& result) {
-  log::TextWriter out(file);
+  files::TextWriter out(file);
   write_timing_head(out);
   for (std::size_t k = 0; k < result.epoch_ms.size(); ++k) write_timing_row(out, result, k);
   out.close();
@@ -65,7 +65,7 @@ void write_start_of_next(const std::filesystem::path& file, const RunSetup& setu
     calibration.status = Status::kDoubtful;
     calibration.reasons = result.doubts;
   }
-  log::write_text(file, calibration_text(calibration, "viwo run"));
+  files::write_text(file, calibration_text(calibration, "viwo run"));
 }
 
 /// The trajectory of each piece of a run that has several.
@@ -218,8 +218,8 @@ nlohmann::json summary_of(const RunSetup& setup, const RunResult& result) {
 
 void write_run(const std::filesystem::path& folder, const RunSetup& setup,
                const RunResult& result) {
-  log::NewResults out(folder);
-  log::write_text(out.file("config.resolved.yaml"), config::to_yaml(setup.resolved));
+  files::NewResults out(folder);
+  files::write_text(out.file("config.resolved.yaml"), config::to_yaml(setup.resolved));
   if (!result.on_disk) {
     log::write_tum(out.file("trajectory.tum"), result.estimate);
     write_pieces(out.folder(), result);
@@ -228,8 +228,8 @@ void write_run(const std::filesystem::path& folder, const RunSetup& setup,
   }
   if (!result.reference.empty()) log::write_tum(out.file("reference.tum"), result.reference);
   write_start_of_next(out.file("calibration.yaml"), setup, result);
-  log::write_text(out.file("summary.json"), json_text(summary_of(setup, result)));
-  log::write_text(out.file("report.html"), report::to_html(report_of(setup, result)));
+  files::write_text(out.file("summary.json"), json_text(summary_of(setup, result)));
+  files::write_text(out.file("report.html"), report::to_html(report_of(setup, result)));
   if (!result.on_disk) remove_piece_files(folder);
   out.commit({"summary.json", "report.html", "calibration.yaml", "reference.tum"});
 }
@@ -279,9 +279,13 @@ std::string describe(const RunResult& result) {
         << " mm, " << significant(result.end_sigma.yaw_rad, 3) << " rad yaw\n";
   }
   if (std::isfinite(result.nees.pose)) {
-    constexpr double kHardlyItsOwn = 30.;
+    // Of an estimate that is not far off it is hardly its own.
+    constexpr double kHardlyItsOwn = 30., kPart = 0.02, kNear_deg = 2.;
+    const bool is_near = result.accuracy &&
+                         result.accuracy->ate_m < kPart * result.accuracy->path_length_m &&
+                         result.accuracy->ate_deg < kNear_deg;
     out << "NEES of the pose " << significant(result.nees.pose, 3) << " (6 is consistent"
-        << (result.nees.pose > kHardlyItsOwn
+        << (result.nees.pose > kHardlyItsOwn && is_near
                 ? "; how good the reference is, viwo inspect tells by the IMU"
                 : "")
         << "); epoch " << significant(result.total_ms.mean_ms, 3) << " ms mean, "

@@ -5,9 +5,9 @@
 
 namespace viwo {
 
-void write_calibration_head(log::TextWriter& out) { out << "time_s,name,estimate,sigma,truth\n"; }
+void write_calibration_head(files::TextWriter& out) { out << "time_s,name,estimate,sigma,truth\n"; }
 
-void write_calibration_rows(log::TextWriter& out, const RunResult& result, std::size_t k) {
+void write_calibration_rows(files::TextWriter& out, const RunResult& result, std::size_t k) {
   for (const CalibrationTrack& track : result.calibration) {
     out << result.epoch_t_s[k] << "," << track.name << "," << track.estimate[k] << ","
         << track.sigma[k] << ",";
@@ -16,9 +16,9 @@ void write_calibration_rows(log::TextWriter& out, const RunResult& result, std::
   }
 }
 
-void write_timing_head(log::TextWriter& out) { out << "time_s,epoch_ms\n"; }
+void write_timing_head(files::TextWriter& out) { out << "time_s,epoch_ms\n"; }
 
-void write_timing_row(log::TextWriter& out, const RunResult& result, std::size_t k) {
+void write_timing_row(files::TextWriter& out, const RunResult& result, std::size_t k) {
   out << result.epoch_ms[k].first << "," << result.epoch_ms[k].second << "\n";
 }
 
@@ -33,9 +33,9 @@ void remove_piece_files(const std::filesystem::path& folder) {
 
 RunStream::RunStream(const std::filesystem::path& folder)
     : folder_(folder),
-      trajectory_(folder / "trajectory.tum", log::Appears::kAtOnce),
-      calibration_(folder / "calibration.csv", log::Appears::kAtOnce),
-      timing_(folder / "timing.csv", log::Appears::kAtOnce) {
+      trajectory_(folder / "trajectory.tum", files::Appears::kAtOnce),
+      calibration_(folder / "calibration.csv", files::Appears::kAtOnce),
+      timing_(folder / "timing.csv", files::Appears::kAtOnce) {
   remove_piece_files(folder);
   write_calibration_head(calibration_);
   write_timing_head(timing_);
@@ -59,7 +59,7 @@ void RunStream::write(const RunResult& result) {
     }
     if (piece_) piece_->close();
     pieces_ = result.pieces.size();
-    piece_.emplace(piece_file(folder_, pieces_ - 1), log::Appears::kAtOnce);
+    piece_.emplace(piece_file(folder_, pieces_ - 1), files::Appears::kAtOnce);
   }
   const StampedPose& pose = result.estimate.back();
   if (!last_ns_ || pose.t_ns > *last_ns_) {

@@ -1,6 +1,7 @@
 // A run of the filter: feed, record, evaluate.
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <iterator>
 #include <memory>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "running_warnings.hpp"
 #include "viwo/feed/feed.hpp"
 #include "viwo/math/se2.hpp"
+#include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/plausibility/plausibility.hpp"
@@ -44,26 +46,43 @@ bool step(Estimator& estimator, std::string& cause) {
   }
 }
 
+/// ": no rest (12 of 14 attempts), ...", the most frequent one first.
+std::string obstacles_of(const Estimator& estimator) {
+  std::vector<StartObstacle> obstacles(estimator.start_obstacles().begin(),
+                                       estimator.start_obstacles().end());
+  std::ranges::stable_sort(obstacles, std::greater(), &StartObstacle::count);
+  std::int64_t attempts = 0;
+  for (const StartObstacle& obstacle : obstacles) attempts += obstacle.count;
+  std::string text;
+  for (const StartObstacle& obstacle : obstacles) {
+    text += (text.empty() ? ": " : ", ") + std::string(obstacle.text) + " (" +
+            std::to_string(obstacle.count) + " of " + std::to_string(attempts) + " attempts)";
+  }
+  return text;
+}
+
+/// A filter that has found its start in the second half of what there is.
+std::string late_start(const RunData& data, const Estimator& estimator, const RunResult& result) {
+  constexpr double kPart = 0.5;
+  const auto imu = data.imu();
+  if (imu.empty() || result.pieces.size() != 1) return "";
+  const double log_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
+  const double late_s = seconds_between(imu.front().t_ns, result.pieces.front().begin_ns);
+  const std::string obstacles = obstacles_of(estimator);
+  if (obstacles.empty() || late_s < kPart * log_s) return "";
+  return "a state to start from was found only after " + significant(late_s, 3) + " of " +
+         significant(log_s, 3) + " s" + obstacles;
+}
+
 /// Why a run did not begin: what was in the way of its start, the most frequent first.
 std::string no_epoch(const FilterSetup& setup, const Estimator& estimator) {
   if (setup.start.mode == StartMode::kReference || estimator.filter().initialized()) {
     return "the measurements do not make a single epoch";
   }
-  std::vector<StartObstacle> obstacles(estimator.start_obstacles().begin(),
-                                       estimator.start_obstacles().end());
-  std::stable_sort(obstacles.begin(), obstacles.end(),
-                   [](const auto& a, const auto& b) { return a.count > b.count; });
-  std::int64_t attempts = 0;
-  for (const StartObstacle& obstacle : obstacles) attempts += obstacle.count;
-  std::string text = "no state to start from was found in the measurements";
-  const char* separator = ": ";
-  for (const StartObstacle& obstacle : obstacles) {
-    text += separator + std::string(obstacle.text) + " (" + std::to_string(obstacle.count) +
-            " of " + std::to_string(attempts) + " attempts)";
-    separator = ", ";
-  }
+  std::string text =
+      "no state to start from was found in the measurements" + obstacles_of(estimator);
   // A start from motion would have no more to begin with.
-  const bool lacks_samples = !obstacles.empty() && obstacles.front().text.starts_with("fewer ");
+  const bool lacks_samples = text.find(": fewer ") != std::string::npos;
   if (setup.start.mode == StartMode::kStandstill) {
     const bool sees_motion = !lacks_samples && (!setup.wheels.empty() || !setup.cameras.empty());
     text += sees_motion ? " - choose start: moving, or reference" : " - choose start: reference";
@@ -84,8 +103,20 @@ void refer_to_imu(const RunSetup& setup, Trajectory& reference) {
   }
 }
 
+/// What sensors and filter have refused, named by the sensor.
+std::vector<RejectionCount> with_sources(
+    const std::vector<std::pair<std::string, RejectionCount>>& rejections) {
+  std::vector<RejectionCount> all;
+  for (const auto& [source, count] : rejections) {
+    all.push_back(count);
+    if (source != "estimator") all.back().reason = source + ": " + count.reason;
+  }
+  return all;
+}
+
 /// How a run has ended, and how accurate it was.
-void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& result) {
+void conclude(const RunSetup& setup, const RunData& data, const Estimator& estimator,
+              RunResult& result) {
   if (!result.epoch_t_s.empty()) result.duration_s = result.epoch_t_s.back();
   const auto lost = std::find_if(result.pieces.begin(), result.pieces.end(),
                                  [](const RunPiece& piece) { return !piece.failure.empty(); });
@@ -104,7 +135,10 @@ void conclude(const RunSetup& setup, const Estimator& estimator, RunResult& resu
     result.status = RunStatus::kFailed;
     result.cause = no_epoch(*setup.filter, estimator);
   }
-  const std::vector<RejectionCount> rejections = estimator.rejections();
+  if (std::string line = late_start(data, estimator, result); !line.empty()) {
+    result.warnings.push_back(std::move(line));
+  }
+  const std::vector<RejectionCount> rejections = with_sources(result.rejections);
   const std::int64_t begin_ns = result.pieces.empty() ? 0 : result.pieces.front().begin_ns;
   for (std::string& line : refused_altogether(rejections, begin_ns)) {
     result.doubts.push_back(std::move(line));
@@ -163,8 +197,10 @@ class FilterRun {
     // Beside sensors that work while it runs, the filter's own time says little.
     result_.wall_s = data_.streams.empty() && !live_ ? wall_s_ : seconds_since(begin);
     plausibility_.finish();
+    result_.total.samples = plausibility_.way().samples;
+    result_.total.path_length_m = plausibility_.way().length_m;
     add_findings(plausibility_.findings(), result_);
-    conclude(setup_, *estimator_, result_);
+    conclude(setup_, data_, *estimator_, result_);
     return std::move(result_);
   }
 

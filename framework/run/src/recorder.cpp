@@ -16,6 +16,7 @@
 #include "viwo/math/time_text.hpp"
 #include "viwo/run/calibration_track.hpp"
 #include "viwo/run/thin.hpp"
+#include "viwo/setup/calibration_values.hpp"
 
 namespace viwo {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "viwo/math/so3.hpp"
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/setup/calibration_values.hpp"
 
 namespace viwo {
 namespace {

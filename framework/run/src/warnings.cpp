@@ -39,7 +39,7 @@ std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& update
   // Gates reject five percent at most (gate_probability) of what is good. A fifth, and seven sigmas
   // of the count more than that, is not by chance; of less than forty it may be the first seconds
   // of a start that is off.
-  constexpr std::int64_t kFewest = 40;
+  constexpr std::int64_t kFewest = 40, kFewestOfMost = 20;
   constexpr double kGated = 0.05, kSigmas = 7.;
   std::vector<Contradiction> found;
   for (const UpdateTrack& update : updates) {
@@ -47,7 +47,8 @@ std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& update
     const std::int64_t of = applied + rejected;
     const double n = static_cast<double>(of);
     const double chance = kGated * n + kSigmas * std::sqrt(kGated * (1. - kGated) * n);
-    if (of < kFewest || 5 * rejected <= of || static_cast<double>(rejected) <= chance) continue;
+    const std::int64_t fewest = 2 * rejected > of ? kFewestOfMost : kFewest;
+    if (of < fewest || 5 * rejected <= of || static_cast<double>(rejected) <= chance) continue;
     found.push_back({update.name,
                      update.name + ": " + std::to_string(rejected) + " of " + std::to_string(of) +
                          " rejected: what it measures and the rest contradict each other - check "
@@ -59,8 +60,6 @@ std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& update
 }
 
 namespace {
-
-constexpr std::int64_t kFewestCounted = 20;  ///< rejections, or measurements of a noise
 
 /// What is found of a noise by what is configured; 0 where it is of too little.
 double factor_of(const NoiseFound& noise) {
@@ -104,19 +103,14 @@ std::vector<std::string> suspicions(std::span<const RejectionCount> rejections,
   return lines;
 }
 
-namespace {
-
-/// The filter has found by itself that something is wrong with the configuration.
-bool is_contradicted(const RunResult& result) {
+bool has_gross_noise(const RunResult& result) {
   constexpr double kContradicts = 10.;  // no guess of a noise is so bad
   return std::ranges::any_of(
       result.noises, [](const NoiseFound& noise) { return factor_of(noise) > kContradicts; });
 }
 
-}  // namespace
-
 void add_findings(const Findings& findings, RunResult& result) {
-  const bool contradicted = is_contradicted(result);
+  const bool contradicted = has_gross_noise(result);
   for (const Finding& finding : findings) {
     const bool is_doubt = finding.is_doubt || (contradicted && !finding.remedies.empty());
     (is_doubt ? result.doubts : result.warnings).push_back(finding.text);
@@ -160,7 +154,7 @@ std::map<std::string, double> sigmas_from_prior(const FilterSetup& filter,
 
 void add_far_from_prior(const std::map<std::string, double>& sigmas_of, RunResult& result) {
   constexpr double kFar = 5., kHopeless = 10.;
-  const bool contradicted = is_contradicted(result);
+  const bool contradicted = has_gross_noise(result);
   for (const CalibrationTrack& track : result.calibration) {
     if (track.estimate.empty() || !(track.sigma.front() > 0.)) continue;
     const auto known = sigmas_of.find(track.name);
@@ -216,157 +210,6 @@ std::vector<std::string> too_sure(const RunResult& result) {
     text += "; wheels.intrinsics_wander: 0.5 lets the filter reckon with wheels that give way";
   }
   return {text};
-}
-
-namespace {
-
-/// Root mean square distance of a trajectory from its middle.
-double extent_m(const Trajectory& poses) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  const auto n = static_cast<double>(poses.size());
-  for (const StampedPose& pose : poses) mean += pose.p_BinW / n;
-  double squares = 0.;
-  for (const StampedPose& pose : poses) squares += (pose.p_BinW - mean).squaredNorm() / n;
-  return std::sqrt(squares);
-}
-
-/// One goes many times as far as the other, as in other units; "" if they do not. Of poses that
-/// both have.
-std::string size_contradiction(const RunResult& result) {
-  constexpr double kFar_m = 0.5, kMany = 5., kMostGap_s = 0.5;
-  Trajectory reference, estimate;
-  for (const StampedPose& pose : result.estimate) {
-    const auto at = interpolate(result.reference, pose.t_ns, kMostGap_s);
-    if (!at) continue;
-    reference.push_back(*at);
-    estimate.push_back(pose);
-  }
-  const double reference_m = extent_m(reference), estimate_m = extent_m(estimate);
-  const double larger = std::max(reference_m, estimate_m);
-  if (!(larger > kFar_m && larger > kMany * std::min(reference_m, estimate_m))) return "";
-  return "it goes " + significant(reference_m, 3) +
-         " m from its middle, root mean square, and the estimate " + significant(estimate_m, 3) +
-         " m";
-}
-
-/// The error on segments by their length: the least of all lengths, and the largest.
-struct SegmentParts {
-  double least = 0., most = 0.;
-  const eval::SegmentErrors* shortest = nullptr;  ///< null where no length has enough segments
-};
-SegmentParts segment_parts(const eval::Accuracy& accuracy) {
-  constexpr std::int64_t kFewest = 10;
-  SegmentParts parts;
-  for (const eval::SegmentErrors& segment : accuracy.rpe) {
-    if (segment.count < kFewest) continue;
-    const double part = segment.mean_m / segment.length_m;
-    const bool is_first = parts.shortest == nullptr;
-    parts.least = is_first ? part : std::min(parts.least, part);
-    parts.most = std::max(parts.most, part);
-    if (is_first || segment.length_m < parts.shortest->length_m) parts.shortest = &segment;
-  }
-  return parts;
-}
-
-}  // namespace
-
-namespace {
-
-/// Updates that were given measurements and could use none of them; a doubt where no other could.
-void doubt_useless(RunResult& result) {
-  const auto is_used = [](const UpdateTrack& update) { return update.total.applied > 0; };
-  const bool is_alone = std::ranges::none_of(result.updates, is_used);
-  for (const UpdateTrack& update : result.updates) {
-    if (is_used(update)) continue;
-    const RejectionCount* most = nullptr;
-    for (const auto& [sensor, rejection] : result.rejections) {
-      if (!rejection.reason.starts_with(update.name + ": ")) continue;
-      if (rejection.count < (most == nullptr ? kFewestCounted : most->count)) continue;
-      most = &rejection;
-    }
-    if (most == nullptr) continue;
-    (is_alone ? result.doubts : result.warnings)
-        .push_back("nothing of what " + update.name + " was given could be used; " +
-                   std::to_string(most->count) + " x " +
-                   most->reason.substr(update.name.size() + 2) +
-                   (is_alone ? ": the estimate is that of the IMU alone" : ""));
-  }
-}
-
-/// An estimate that the filter itself knows no better than half of the way that it tells.
-void doubt_by_itself(RunResult& result) {
-  constexpr double kLeast_m = 0.1, kPart = 0.5;
-  const double sigma_m = result.end_sigma.grown_m;
-  if (result.updates.empty() || sigma_m < kLeast_m) return;
-  double way_m = 0.;
-  for (std::size_t i = 1; i < result.estimate.size(); ++i) {
-    way_m += (result.estimate[i].p_BinW - result.estimate[i - 1].p_BinW).norm();
-  }
-  if (sigma_m < kPart * way_m) return;
-  result.doubts.push_back("the filter itself knows the position at the end to " +
-                          significant(sigma_m, 2) + " m only, of a way of " +
-                          significant(way_m, 2) +
-                          " m: nothing tells how fast it goes - one camera without parallax (it "
-                          "stands, or only turns), or updates that were given nothing");
-}
-
-}  // namespace
-
-void doubt(RunResult& result) {
-  const bool is_done = result.status == RunStatus::kOk;
-  SegmentParts parts;
-  if (result.accuracy) parts = segment_parts(*result.accuracy);
-  constexpr double kAgrees = 0.1, kContradicts = 0.5, kPartOfExtent = 0.3;
-  const bool agrees = parts.shortest != nullptr && parts.most < kAgrees;
-  for (Contradiction& found : contradictions(result.updates)) {
-    const bool is_doubt = is_done && found.is_most && !agrees;
-    (is_doubt ? result.doubts : result.warnings).push_back(std::move(found.text));
-  }
-  if (!is_done) return;
-  for (const UpdateTrack& update : result.updates) {
-    if (!update.failures.disabled) continue;
-    result.doubts.push_back("update '" + update.name +
-                            "' was disabled: what it measures is missing from there on");
-  }
-  doubt_useless(result);
-  const PreintegratedPose& wheels = result.total;
-  if (result.updates.empty() && 2 * wheels.rejected > wheels.samples) {
-    result.doubts.push_back(std::to_string(wheels.rejected) + " of " +
-                            std::to_string(wheels.samples) +
-                            " encoder samples are refused by the kinematic model");
-  }
-  constexpr double kMostUnseen = 0.2;
-  if (result.updates.empty() && wheels.bridged_s > kMostUnseen * wheels.duration_s) {
-    result.doubts.push_back("the wheels were not seen for " + significant(wheels.bridged_s, 3) +
-                            " s of " + significant(wheels.duration_s, 3) +
-                            " s, in which the mean of the readings before and after is taken: gaps "
-                            "of the log, readings that are refused, or a log of what changes only");
-  }
-  doubt_by_itself(result);
-  if (parts.shortest == nullptr) return;
-  const double ate_m = result.accuracy->ate_m, extent = extent_m(result.reference);
-  std::string text;
-  // A body that is turned on the other, or has no orientation, goes where it goes all the same.
-  if (parts.least >= kContradicts && ate_m >= kPartOfExtent * extent) {
-    text = "after " + eval::length_text(parts.shortest->length_m) + " m it is off by " +
-           significant(parts.shortest->mean_m, 3) + " m, mean of " +
-           std::to_string(parts.shortest->count) + " segments";
-  } else if (ate_m > extent && ate_m > kAgrees * result.accuracy->path_length_m) {
-    text = "it is off by " + significant(ate_m, 3) +
-           " m, root mean square, and who had stayed in the middle by " + significant(extent, 3) +
-           " m";
-  } else if (!result.updates.empty() && parts.least >= kAgrees &&
-             result.accuracy->end_m > std::max(1., kAgrees * result.accuracy->path_length_m)) {
-    // With a gyro, whatever the wheels are.
-    text = "after " + eval::length_text(std::round(result.accuracy->path_length_m)) +
-           " m it is off by " + eval::length_text(std::round(result.accuracy->end_m)) + " m";
-  } else if (!agrees) {
-    text = size_contradiction(result);
-  }
-  if (text.empty()) return;
-  result.doubts.push_back("the reference contradicts the estimate: " + text +
-                          " - units, signs, order or mount of a sensor are wrong, or of "
-                          "the reference: viwo inspect tells which");
 }
 
 void compare(const Trajectory& reference, const RunSetup& setup, RunResult& result) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -23,6 +24,7 @@ namespace viwo {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::InMemory;
@@ -124,6 +126,45 @@ TEST(FilterRun, AStartFromMotionHasTheWheelsWithoutAnyUpdate) {
   const RunResult result = viwo::run(setup, collect(setup));
   EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
   EXPECT_GT(result.epochs, 30);
+}
+
+TEST(FilterRun, SaysThatItsStartCameLateAndWhatWasInTheWay) {
+  const config::Node run =
+      config::parse(testing::swerve_with_camera(10) +
+                        "updates: {wheel_odometry: {}}\nestimator: {start: standstill}\n",
+                    "run.yaml");
+  RunSetup setup = read_run(run, registry(), 1);
+  const RunData driven = collect(setup);
+  // GIVEN a drive that ends in a rest from 6 s on, or begins with one
+  const auto with_rest = [&](double from_s, double to_s) {
+    std::vector<Measurement> samples;
+    const std::int64_t begin_ns = driven.imu().front().t_ns;
+    const auto rests = [&](std::int64_t t_ns) {
+      const double t_s = seconds_between(begin_ns, t_ns);
+      return t_s >= from_s && t_s < to_s;
+    };
+    for (ImuSample sample : driven.imu()) {
+      if (rests(sample.t_ns)) {
+        sample.gyro_rad_per_s = {0., 0., 0.};
+        sample.accel_m_per_s2 = {0., 0., 9.81};
+      }
+      samples.emplace_back(sample);
+    }
+    for (EncoderSample sample : driven.wheels()) {
+      if (rests(sample.end_ns)) sample.drive_rad_per_s.fill(0.);
+      samples.emplace_back(sample);
+    }
+    std::ranges::stable_sort(samples, std::less(), &Measurement::t_ns);
+    RunSetup again = read_run(run, registry(), 1);
+    set_sensors(
+        again,
+        {{"robot", std::make_shared<InMemory>(sample_types<ImuSample, EncoderSample>(), samples)}});
+    return viwo::run(again, collect(again)).warnings;
+  };
+  EXPECT_THAT(with_rest(6., 10.),
+              Contains(AllOf(HasSubstr("a state to start from was found only after 7"),
+                             HasSubstr(" of 10 s: a wheel turns faster than 0.05 rad/s ("))));
+  EXPECT_THAT(with_rest(0., 2.), Not(Contains(HasSubstr("a state to start from"))));
 }
 
 /// B is off the IMU by the lever arm, which a circle turns into another radius.

@@ -13,7 +13,7 @@
 
 #include "live_device.hpp"
 #include "viwo/feed/bounded_series.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/results/run_record.hpp"
@@ -262,7 +262,7 @@ TEST(LiveRun, EndsThoughItsSensorDoesNotAndKeepsTheResults) {
 TEST(RunStream, HasEveryEpochInItsFilesAsSoonAsItIsDone) {
   namespace fs = std::filesystem;
   const fs::path folder = fs::path(::testing::TempDir()) / "viwo_run_stream";
-  log::make_folder(folder);
+  files::make_folder(folder);
   const Robot robot(12.);
   auto all = robot.measurements;
   const std::int64_t begin_ns = stamp_ns(all.front());
@@ -306,7 +306,7 @@ TEST(RunStream, SaysWhatCouldNotBeWrittenAndDoesNotEndTheRun) {
   namespace fs = std::filesystem;
   const fs::path folder = fs::path(::testing::TempDir()) / "viwo_run_stream_full";
   fs::remove_all(folder);
-  log::make_folder(folder);
+  files::make_folder(folder);
   fs::create_symlink("/dev/full", folder / "timing.csv");
   const Robot robot;
   RunStream files(folder);

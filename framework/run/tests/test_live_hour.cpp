@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "live_device.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/results/run_stream.hpp"
 
 namespace viwo {
@@ -40,7 +40,7 @@ class Forgetful final : public testing::Device {
 
 TEST(LiveRun, OfAnHourAtFullRatesNeedsConstantMemory) {
   const auto folder = std::filesystem::path(::testing::TempDir()) / "viwo_live_hour";
-  log::make_folder(folder);
+  files::make_folder(folder);
   RunSetup setup = testing::standing_then_driving(3600.);
   std::vector<Measurement> measurements;
   {

@@ -6,18 +6,18 @@
 #include <optional>
 #include <string>
 
-#include "viwo/log/text_writer.hpp"
+#include "viwo/files/text_writer.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/run/run.hpp"
 
 namespace viwo {
 
 /// Rows of calibration.csv and timing.csv.
-void write_calibration_head(log::TextWriter& out);
+void write_calibration_head(files::TextWriter& out);
 /// The k-th epoch of the result.
-void write_calibration_rows(log::TextWriter& out, const RunResult& result, std::size_t k);
-void write_timing_head(log::TextWriter& out);
-void write_timing_row(log::TextWriter& out, const RunResult& result, std::size_t k);
+void write_calibration_rows(files::TextWriter& out, const RunResult& result, std::size_t k);
+void write_timing_head(files::TextWriter& out);
+void write_timing_row(files::TextWriter& out, const RunResult& result, std::size_t k);
 
 /// The trajectory of piece `k` (0, ...) of a run that has several, beside trajectory.tum.
 std::filesystem::path piece_file(const std::filesystem::path& folder, std::size_t k);
@@ -45,7 +45,7 @@ class RunStream {
 
   std::filesystem::path folder_;
   log::TumWriter trajectory_;
-  log::TextWriter calibration_, timing_;
+  files::TextWriter calibration_, timing_;
   std::optional<log::TumWriter> piece_;  ///< the present one, if it is not the first
   std::size_t pieces_ = 1;
   std::optional<std::int64_t> last_ns_;

@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "viwo/calibration_file/calibration_file.hpp"
 #include "viwo/run/run_result.hpp"
-#include "viwo/setup/calibration_file.hpp"
 
 namespace viwo {
 

@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "viwo/calibration_file/calibration_file.hpp"
 #include "viwo/estimator/estimator.hpp"
 #include "viwo/eval/accuracy.hpp"
 #include "viwo/feed/stage_time.hpp"
 #include "viwo/math/trajectory.hpp"
-#include "viwo/setup/calibration_file.hpp"
 #include "viwo/wheel/preintegration.hpp"
 
 namespace viwo {
@@ -113,7 +113,9 @@ struct RunResult {
   std::optional<eval::Accuracy> accuracy;
   double nees_planar =
       std::numeric_limits<double>::quiet_NaN();  ///< mean over epochs, 3 = consistent
-  PreintegratedPose total;  ///< from the first to the last epoch, without the parity information
+  /// From the first to the last epoch, without the parity information; of a run of the filter
+  /// samples and path alone, by the wheels as configured.
+  PreintegratedPose total;
   std::vector<std::pair<double, double>> epoch_ms;        ///< time since start [s], time spent [ms]
   std::vector<std::pair<std::string, StageTime>> stages;  ///< without the total
   StageTime total_ms;                                     ///< of an epoch

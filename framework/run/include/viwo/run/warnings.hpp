@@ -22,11 +22,19 @@ struct Contradiction {
 };
 std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& updates);
 
+/// Rejections of one reason, and measurements of a noise, of which fewer tell nothing.
+inline constexpr std::int64_t kFewestCounted = 20;
+
+/// A noise was found more than ten times what is configured: the filter has found by itself that
+/// something is wrong with the configuration.
+bool has_gross_noise(const RunResult& result);
+
 /// Of a run that came to its end, with its accuracy: contradictions are doubts where they are of
-/// most of an update, but warnings where a reference agrees with the estimate. An estimate that has
+/// most of an update, or beside a gross noise, but warnings where a reference agrees with the estimate. An estimate that has
 /// little to do with how the reference moves is doubted, too: off by more than half of the way on
 /// segments of every length, and aligned by a good part of where the reference went. So are wheels
-/// most of whose samples cannot be used.
+/// most of whose samples cannot be used, and wheels alone that end up elsewhere: off by a quarter
+/// of the way, or half a turn.
 void doubt(RunResult& result);
 
 /// Doubts of what all samples were left out for. Stamps become times since `begin_ns`.
