@@ -301,8 +301,7 @@ int close(int fd) {
 
 int fclose(std::FILE* stream) {
   static const auto kReal = real<int (*)(std::FILE*)>("fclose");
-  State& s = state();
-  const std::scoped_lock lock(s.mutex);
+  const std::scoped_lock lock(state().mutex);
   const bool fails = close_fails(fileno(stream));
   const int result = kReal(stream);
   if (!fails) return result;
@@ -359,8 +358,7 @@ void* mmap(void* at, size_t size, int protection, int flags, int fd, off_t offse
 
 int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*run)(void*),
                    void* argument) {
-  using Create = int (*)(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*);
-  static const auto kReal = real<Create>("pthread_create");
+  static const auto kReal = real<decltype(&pthread_create)>("pthread_create");
   if (is_to_fail(Kind::kThread, EAGAIN, "creation", "a thread")) return EAGAIN;
   return kReal(thread, attributes, run, argument);
 }

@@ -8,6 +8,7 @@
 #include "checksum.hpp"
 #include "experiment_file.hpp"
 #include "message_of.hpp"
+#include "odd_result.hpp"
 #include "peak_memory.hpp"
 #include "run_journal.hpp"
 #include "viwo/results/run_record.hpp"
@@ -21,129 +22,13 @@ using namespace experiment;
 using testing::error_of;
 using ::testing::HasSubstr;
 using testing::kVariants;
+using testing::odd_result;
 using testing::registry;
 using testing::text_of;
 
 int files_in(const fs::path& folder) {
   if (!fs::exists(folder)) return 0;
   return static_cast<int>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
-}
-
-/// A result with one of everything, and with numbers that text does not carry.
-RunResult odd_result() {
-  RunResult run;
-  run.status = RunStatus::kDiverged;
-  run.cause = "a \"cause\",\nof two lines";
-  run.epochs = 7;
-  run.duration_s = 0.1;
-  run.wall_s = 1e-300;
-  run.estimate = {{-5, {0.1, -0., 1. / 3.}, Eigen::Quaterniond(0.5, -0.5, 0.5, 0.1)}};
-  run.reference = run.estimate;
-  run.accuracy.emplace();
-  run.accuracy->alignment = eval::Alignment::kSe3;
-  run.accuracy->ate_m = std::numeric_limits<double>::infinity();
-  run.accuracy->rpe = {{10., 3, 0.1, 0.2, 0.3, 0.4}};
-  run.accuracy->series = {{0., 0.1}, {0., 1.}, {0.3, 0.4}, {0.1, 0.2}};
-  run.nees_planar = 3.3;
-  run.total.g = {0.7, 0.1, 0.2};
-  run.total.samples = 11;
-  run.epoch_ms = {{0.1, 0.2}};
-  run.stages = {{"propagate", {0.1, 0.2, 0.3}}};
-  run.total_ms = {0.4, 0.5, 0.6};
-  run.rejections = {{"wheels0", {"late", 3, "odom.csv:17"}}};
-  run.nees.pose = std::numeric_limits<double>::quiet_NaN();
-  run.nees.series = {{0.1, 6.1}};
-  run.errors = {{0.1, {0.1, 0.2, 0.3}, {0.4, 0.5, 0.6}, 0.7, 0.8}};
-  run.epoch_t_s = {0., 0.1};
-  run.calibration = {{"r_1", "m", {0.1, 0.2}, {0.3, 0.4}, 0.5, 0.6}};
-  run.updates = {{"parity", {8, 9}, {1, 2}, {3, 4}, {2, true, "lost"}}};
-  run.monitor.t_s = {0.5};
-  run.monitor.parameters = {"r_1"};
-  run.monitor.sigma_ratio = {{0.25}};
-  run.monitor.held = {1};
-  run.monitor.warnings = {{0.5, "turn", {"r_1"}}};
-  return run;
-}
-
-TEST(RunRecord, ComesBackBitForBit) {
-  const RunResult run = odd_result();
-  const auto bytes = nlohmann::json::to_cbor(to_record(run));
-  const RunResult back = from_record(nlohmann::json::from_cbor(bytes));
-  EXPECT_EQ(nlohmann::json::to_cbor(to_record(back)), bytes);
-  EXPECT_EQ(back.status, RunStatus::kDiverged);
-  EXPECT_EQ(back.cause, run.cause);
-  EXPECT_EQ(back.wall_s, 1e-300);
-  EXPECT_EQ(back.estimate[0].t_ns, -5);
-  EXPECT_EQ(back.estimate[0].p_BinW, run.estimate[0].p_BinW);
-  EXPECT_TRUE(std::signbit(back.estimate[0].p_BinW.y()));
-  EXPECT_EQ(back.estimate[0].q_BtoW.coeffs(), run.estimate[0].q_BtoW.coeffs());
-  ASSERT_TRUE(back.accuracy);
-  EXPECT_EQ(back.accuracy->alignment, eval::Alignment::kSe3);
-  EXPECT_TRUE(std::isinf(back.accuracy->ate_m));
-  EXPECT_EQ(back.accuracy->rpe[0].mean_deg, 0.3);
-  EXPECT_TRUE(std::isnan(back.nees.pose));
-  EXPECT_EQ(back.errors[0].position_sigma_m, run.errors[0].position_sigma_m);
-  EXPECT_EQ(back.calibration[0].sigma, run.calibration[0].sigma);
-  EXPECT_EQ(back.calibration[0].final_error, 0.6);
-  EXPECT_EQ(back.updates[0].total.rejected, 9);
-  EXPECT_EQ(back.rejections[0].second.first, "odom.csv:17");
-  EXPECT_EQ(back.monitor.warnings[0].parameters, std::vector<std::string>{"r_1"});
-  EXPECT_FALSE(from_record(to_record(RunResult())).accuracy);
-}
-
-TEST(RunRecord, IsRefusedWhereNoRunCanHaveMadeIt) {
-  const nlohmann::json whole = to_record(odd_result());
-  EXPECT_NO_THROW(from_record(whole));
-  const std::vector<std::pair<const char*, nlohmann::json>> changes{
-      {"/status", 99},
-      {"/epochs", -5},
-      {"/epochs", 7.5},
-      {"/epochs", 1e300},
-      {"/duration_s", true},
-      {"/a_member_of_nobody", 1},
-      {"/estimate/0/1/0", std::numeric_limits<double>::quiet_NaN()},
-      {"/estimate/1", whole.at("estimate").at(0)},
-      {"/accuracy/alignment", 99},
-      {"/accuracy/n_poses", -1},
-      {"/accuracy/series/t_s/2", 0.3},
-      {"/epoch_t_s/2", 0.3},
-      {"/epoch_t_s/1", -1.},
-      {"/calibration/0/estimate/2", 0.3},
-      {"/updates/0/applied/2", 1},
-      {"/updates/0/total/rejected", -1},
-      {"/monitor/held/1", 1},
-      {"/monitor/parameters/1", "r_2"},
-  };
-  for (const auto& [at, value] : changes) {
-    nlohmann::json changed = whole;
-    changed[nlohmann::json::json_pointer(at)] = value;
-    EXPECT_ANY_THROW(from_record(changed)) << at << ": " << value;
-  }
-}
-
-TEST(RunRecord, IsThinnedToItsEndsAndEveryNthPointWithCountsSummed) {
-  RunResult run;
-  run.updates = {{"parity", {}, {}, {}}};
-  run.calibration.emplace_back();
-  run.calibration.back().name = "r_1";
-  for (int i = 0; i < 1001; ++i) {
-    run.epoch_t_s.push_back(i);
-    run.calibration[0].estimate.push_back(i);
-    run.updates[0].applied.push_back(1);
-  }
-  thin(run);
-  ASSERT_LE(run.epoch_t_s.size(), kRecordPoints + 1);
-  ASSERT_GE(run.epoch_t_s.size(), kRecordPoints * 9 / 10);
-  EXPECT_EQ(run.epoch_t_s.front(), 0.);
-  EXPECT_EQ(run.epoch_t_s[1], 7.);  // 1001 / 150, rounded up
-  EXPECT_EQ(run.epoch_t_s.back(), 1000.);
-  EXPECT_EQ(run.calibration[0].estimate, run.epoch_t_s);
-  ASSERT_EQ(run.updates[0].applied.size(), run.epoch_t_s.size());
-  EXPECT_EQ(run.updates[0].applied[0], 1);
-  EXPECT_EQ(run.updates[0].applied[1], 7);
-  int sum = 0;
-  for (const int count : run.updates[0].applied) sum += count;
-  EXPECT_EQ(sum, 1001);
 }
 
 class Journal : public testing::ExperimentFile {

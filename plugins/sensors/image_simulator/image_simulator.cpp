@@ -15,9 +15,9 @@
 #include "viwo/api/plugin.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/stamp.hpp"
-#include "viwo/sim/image_renderer.hpp"
+#include "viwo/rendering/image_renderer.hpp"
+#include "viwo/rendering/textured_room.hpp"
 #include "viwo/sim/rig_simulator.hpp"
-#include "viwo/sim/textured_room.hpp"
 #include "viwo/sim/true_cameras.hpp"
 
 namespace viwo {
@@ -130,7 +130,7 @@ struct Options {
   std::vector<CameraView> cameras;       ///< as they truly are
   std::vector<CameraView> file_cameras;  ///< as the file says
   bool skip_first;
-  sim::RoomOptions room;                 ///< without size and centre
+  rendering::RoomOptions room;           ///< without size and centre
   std::vector<double> size_m, centre_m;  ///< along x and y, or nothing
   double margin_m;
   double sigma_grey, vignette, exposure_swing, exposure_period_s;
@@ -167,11 +167,11 @@ Options::Options(const Params& params, const HostServices& services)
 }
 
 /// (IMG-8); `w_IinI`, rad/s, is for its motion (IMG-11).
-sim::CameraPose camera_pose(const StateSample& state, const CameraView& camera,
-                            const Eigen::Vector3d& w_IinI = Eigen::Vector3d::Zero()) {
+rendering::CameraPose camera_pose(const StateSample& state, const CameraView& camera,
+                                  const Eigen::Vector3d& w_IinI = Eigen::Vector3d::Zero()) {
   const Eigen::Matrix3d R_ItoG = to_quaternion(state.q_ItoG_xyzw).toRotationMatrix();
   const Eigen::Vector3d p_CinI = -camera.R_ItoC.transpose() * camera.p_IinC;
-  sim::CameraPose pose;
+  rendering::CameraPose pose;
   pose.R_CtoG = R_ItoG * camera.R_ItoC.transpose();
   pose.p_CinG = to_vector(state.p_IinG_m) - pose.R_CtoG * camera.p_IinC;
   pose.v_CinG = to_vector(state.v_IinG_m_per_s) + R_ItoG * w_IinI.cross(p_CinI);
@@ -201,15 +201,15 @@ Eigen::Vector3d rate_at(const StateSample& state, const std::vector<ImuSample>& 
 /// An image that is made when it is read.
 class RenderedImage final : public ImageSource {
  public:
-  RenderedImage(std::shared_ptr<const sim::ImageRenderer> renderer, const sim::CameraPose& pose,
-                const sim::Exposure& exposure)
+  RenderedImage(std::shared_ptr<const rendering::ImageRenderer> renderer,
+                const rendering::CameraPose& pose, const rendering::Exposure& exposure)
       : renderer_(std::move(renderer)), pose_(pose), exposure_(exposure) {}
   void read(Image& out) const override { renderer_->render(pose_, exposure_, out); }
 
  private:
-  std::shared_ptr<const sim::ImageRenderer> renderer_;
-  sim::CameraPose pose_;
-  sim::Exposure exposure_;
+  std::shared_ptr<const rendering::ImageRenderer> renderer_;
+  rendering::CameraPose pose_;
+  rendering::Exposure exposure_;
 };
 
 class ImageSimulator final : public Sensor {
@@ -271,7 +271,7 @@ class ImageSimulator final : public Sensor {
     }
     const auto& size = options_.size_m;
     const auto& centre = options_.centre_m;
-    sim::RoomOptions& room = options_.room;
+    rendering::RoomOptions& room = options_.room;
     room.centre_m = 0.5 * (low + high).head<2>();
     if (!centre.empty()) room.centre_m << centre[0], centre[1];
     // Around its centre, wherever that is.
@@ -279,17 +279,18 @@ class ImageSimulator final : public Sensor {
         2. * (high.head<2>() - room.centre_m).cwiseMax(room.centre_m - low.head<2>()).array() +
         2. * options_.margin_m;
     if (!size.empty()) room.size_m << size[0], size[1];
-    const auto made = std::make_shared<const sim::TexturedRoom>(sim::make_room(room, path));
+    const auto made =
+        std::make_shared<const rendering::TexturedRoom>(rendering::make_room(room, path));
     for (const CameraView& camera : options_.cameras) {
       renderers_.push_back(
-          std::make_shared<const sim::ImageRenderer>(camera, made, options_.vignette));
+          std::make_shared<const rendering::ImageRenderer>(camera, made, options_.vignette));
     }
   }
 
   void add_images(const StateSample& state, const std::vector<ImuSample>& imu) {
     const double t_s = seconds_between(first_ns_, state.t_ns);
     if (options_.dropped.contain(t_s)) return;
-    sim::Exposure exposure;
+    rendering::Exposure exposure;
     exposure.noise_sigma = options_.sigma_grey;
     exposure.gain = 1. + options_.exposure_swing *  // (IMG-9)
                              std::sin(2. * M_PI * t_s / options_.exposure_period_s);
@@ -323,7 +324,7 @@ class ImageSimulator final : public Sensor {
   std::uint64_t seed_;
   Sensor* input_ = nullptr;  ///< until it has been read
   std::int64_t first_ns_ = 0;
-  std::vector<std::shared_ptr<const sim::ImageRenderer>> renderers_;
+  std::vector<std::shared_ptr<const rendering::ImageRenderer>> renderers_;
   std::vector<Measurement> samples_;
   std::size_t next_ = 0;
 };

@@ -1,98 +1,16 @@
 // The image simulator as the host loads it, on the true states of sensor simulator or of a test.
 #include <cmath>
-#include <deque>
-#include <map>
 #include <thread>
 
 #include <Eigen/Geometry>
 
-#include "message_of.hpp"
-#include "support.hpp"
+#include "image_simulator_fixture.hpp"
 #include "viwo/log/kalibr.hpp"
 #include "viwo/math/so3.hpp"
-#include "viwo/sim/image_renderer.hpp"
+#include "viwo/rendering/image_renderer.hpp"
 
 namespace viwo {
 namespace {
-
-const std::string kCameraFile =
-    std::string(VIWO_TEST_SOURCE_DIR) + "/configs/cameras/t265_like.yaml";
-
-/// Small textures: quick to make.
-std::string config(const std::string& rest, const std::string& cameras = kCameraFile) {
-  return "{type: image_simulator, cameras: " + cameras + ", texture_size_px: 256, boxes: 10" +
-         (rest.empty() ? "" : ", " + rest) + "}";
-}
-
-/// Gives what it was made with.
-class Given final : public Sensor {
- public:
-  explicit Given(std::vector<Measurement> all) : all_(all.begin(), all.end()) {}
-  SampleTypes yields() const override { return sample_types<StateSample, ImuSample>(); }
-  Status next(Measurement& out) override {
-    if (all_.empty()) return Status::kEnd;
-    out = all_.front();
-    all_.pop_front();
-    return Status::kOk;
-  }
-
- private:
-  std::deque<Measurement> all_;
-};
-
-/// True states of a robot that turns while it drives, n of them 0.1 s apart.
-std::vector<Measurement> states(int n) {
-  std::vector<Measurement> out;
-  for (int i = 0; i < n; ++i) {
-    StateSample state;
-    state.t_ns = 2'000'000'000 + i * std::int64_t{100'000'000};
-    state.p_IinG_m = {0.1 * i, 0.03 * i, 0.15};
-    const Eigen::Quaterniond q = Eigen::AngleAxisd(0.05 * i, Eigen::Vector3d::UnitZ()) *
-                                 Eigen::AngleAxisd(0.02 * i, Eigen::Vector3d::UnitX());
-    state.q_ItoG_xyzw = {q.x(), q.y(), q.z(), q.w()};
-    out.emplace_back(ImuSample{state.t_ns, {}, {}});
-    out.emplace_back(state);
-  }
-  return out;
-}
-
-std::vector<Measurement> play_on(const std::shared_ptr<Sensor>& sensor,
-                                 std::vector<Measurement> input) {
-  EXPECT_TRUE(sensor->takes_input());
-  Given given(std::move(input));
-  sensor->connect(given);
-  return play(*sensor);
-}
-
-std::vector<ImageSample> images(const std::string& yaml, std::vector<Measurement> input,
-                                std::uint64_t seed = 1) {
-  return only<ImageSample>(play_on(make_sensor(yaml, seed), std::move(input)));
-}
-
-std::string refusal(const std::string& yaml, const std::vector<Measurement>& input) {
-  return testing::error_of([&] { images(yaml, input); });
-}
-
-Image pixels_of(const ImageSample& sample) {
-  Image out;
-  sample.source->read(out);
-  return out;
-}
-
-double mean_of(const Image& image) {
-  double sum = 0.;
-  for (const std::uint8_t value : image.pixels) sum += static_cast<double>(value);
-  return sum / static_cast<double>(image.pixels.size());
-}
-
-/// Pixels that differ by more than one grey level.
-int different_pixels(const Image& a, const Image& b) {
-  int out = a.pixels.size() == b.pixels.size() ? 0 : 1'000'000;
-  for (std::size_t k = 0; k < a.pixels.size() && out < 1'000'000; ++k) {
-    out += std::abs(static_cast<int>(a.pixels[k]) - b.pixels[k]) > 1 ? 1 : 0;
-  }
-  return out;
-}
 
 TEST(ImageSimulator, ImagesStandAtTheStampsOfTheSimulatorsCameras) {
   const std::string simulator =
@@ -101,7 +19,7 @@ TEST(ImageSimulator, ImagesStandAtTheStampsOfTheSimulatorsCameras) {
       "uneven";
   const auto tracked = play_only<FeatureSample>(simulator + ", features: 5, n_cameras: 2, " +
                                                 "cameras: " + kCameraFile + "}");
-  const auto sensor = make_sensor(config("n_cameras: 2"));
+  const auto sensor = make_sensor(section("n_cameras: 2"));
   const auto input = make_sensor(simulator + ", features: 0}");
   sensor->connect(*input);
   const auto rendered = only<ImageSample>(play(*sensor));
@@ -175,18 +93,18 @@ TEST(ImageSimulator, RowsOfARollingShutterAreSeenOneAfterTheOther) {
 }
 
 TEST(ImageSimulator, TheFirstStateHasImagesOnlyIfAskedFor) {
-  EXPECT_EQ(images(config(""), states(4)).size(), 3U);
-  EXPECT_EQ(images(config("n_cameras: 2"), states(4)).size(), 6U);
-  const auto all = images(config("skip_first: false"), states(4));
+  EXPECT_EQ(images(section(""), states(4)).size(), 3U);
+  EXPECT_EQ(images(section("n_cameras: 2"), states(4)).size(), 6U);
+  const auto all = images(section("skip_first: false"), states(4));
   ASSERT_EQ(all.size(), 4U);
   EXPECT_EQ(all[0].t_ns, 2'000'000'000);
 }
 
 TEST(ImageSimulator, CamerasAreWhereTheirChainPutsThemOnTheImu) {
   const auto rendered =
-      images(config("n_cameras: 2, sigma_grey: 0, room_size_m: [8, 7], room_centre_m: [0.2, 0.1]"),
+      images(section("n_cameras: 2, sigma_grey: 0, room_size_m: [8, 7], room_centre_m: [0.2, 0.1]"),
              states(5));
-  sim::RoomOptions options;
+  rendering::RoomOptions options;
   options.size_m = {8., 7.};
   options.centre_m = {0.2, 0.1};
   options.texture_size = 256;
@@ -195,7 +113,7 @@ TEST(ImageSimulator, CamerasAreWhereTheirChainPutsThemOnTheImu) {
   const auto cameras = log::read_kalibr_cameras(kCameraFile);
   // Homogeneous matrices, inverted by Eigen.
   std::vector<Eigen::Vector3d> path;
-  std::vector<sim::CameraPose> poses;
+  std::vector<rendering::CameraPose> poses;
   for (std::size_t k = 1; k < input.size(); ++k) {
     Eigen::Isometry3d T_GfromI = Eigen::Isometry3d::Identity();
     T_GfromI.translate(Eigen::Vector3d(input[k].p_IinG_m.data()));
@@ -210,10 +128,11 @@ TEST(ImageSimulator, CamerasAreWhereTheirChainPutsThemOnTheImu) {
       path.push_back(T_GfromC.translation());
     }
   }
-  const auto room = std::make_shared<const sim::TexturedRoom>(sim::make_room(options, path));
+  const auto room =
+      std::make_shared<const rendering::TexturedRoom>(rendering::make_room(options, path));
   ASSERT_EQ(rendered.size(), poses.size());
   for (const std::size_t i : {0, 1, 6, 7}) {
-    const sim::ImageRenderer renderer(cameras[i % 2], room);
+    const rendering::ImageRenderer renderer(cameras[i % 2], room);
     Image expected;
     renderer.render(poses[i], {}, expected);
     const Image image = pixels_of(rendered[i]);
@@ -232,7 +151,7 @@ TEST(ImageSimulator, StampsAreInTheClocksOfTheCamerasAndStayInOrder) {
         << "\n  T_cam_imu: [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]\n";
   }
   out.close();
-  const auto all = images(config("n_cameras: 2, sigma_grey: 0", file), states(6));
+  const auto all = images(section("n_cameras: 2, sigma_grey: 0", file), states(6));
   ASSERT_EQ(all.size(), 10U);
   std::vector<ImageSample> of_camera[2];
   for (const ImageSample& image : all) of_camera[image.camera].push_back(image);
@@ -246,72 +165,13 @@ TEST(ImageSimulator, StampsAreInTheClocksOfTheCamerasAndStayInOrder) {
   }
 }
 
-/// A Kalibr file of one radtan camera with the true values that a sensor told.
-std::string write_chain(const std::vector<CalibrationSample>& truth) {
-  std::map<std::string, double> value;
-  for (const CalibrationSample& sample : truth) value[sample.name] = sample.value;
-  const Eigen::Matrix3d R = exp_so3({value.at("cam0.theta_ItoC_x"), value.at("cam0.theta_ItoC_y"),
-                                     value.at("cam0.theta_ItoC_z")});
-  std::string file = ::testing::TempDir() + "/viwo_image_simulator_truth.yaml";
-  std::ofstream out(file);
-  out.precision(17);
-  out << "cam0:\n  camera_model: pinhole\n  intrinsics: [" << value.at("cam0.fx") << ", "
-      << value.at("cam0.fy") << ", " << value.at("cam0.cx") << ", " << value.at("cam0.cy")
-      << "]\n  distortion_model: radtan\n  distortion_coeffs: [" << value.at("cam0.d1") << ", "
-      << value.at("cam0.d2") << ", " << value.at("cam0.d3") << ", " << value.at("cam0.d4")
-      << "]\n  resolution: [80, 60]\n  timeshift_cam_imu: " << value.at("cam0.t_CtoI")
-      << "\n  T_cam_imu: [";
-  for (int i = 0; i < 3; ++i) {
-    out << "[" << R(i, 0) << ", " << R(i, 1) << ", " << R(i, 2) << ", "
-        << value.at(std::string("cam0.p_IinC_") + "xyz"[i]) << "], ";
-  }
-  out << "[0, 0, 0, 1]]\n";
-  return file;
-}
-
-TEST(ImageSimulator, ImagesAreThoseOfTheTrueCameraWhichItTells) {
-  const std::string nominal = ::testing::TempDir() + "/viwo_image_simulator_nominal.yaml";
-  std::ofstream(nominal)
-      << "cam0:\n  camera_model: pinhole\n  intrinsics: [60, 61, 39.5, 29.5]\n"
-         "  distortion_model: radtan\n  distortion_coeffs: [0.01, 0, 0, 0]\n"
-         "  resolution: [80, 60]\n  timeshift_cam_imu: 0.002\n"
-         "  T_cam_imu: [[0, -1, 0, 0.1], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]\n";
-  // The room follows from the motion of the file's camera, which differs.
-  const std::string room = "sigma_grey: 0, boxes: 0, room_size_m: [8, 7], room_centre_m: [0, 0]";
-  const auto config_of = [&room](const std::string& file, const std::string& rest) {
-    return "{type: image_simulator, texture_size_px: 256, cameras: " + file + ", " + room + rest +
-           "}";
-  };
-  const auto all =
-      play_on(make_sensor(config_of(
-                  nominal,
-                  ", camera_clock_error_s: [0.0105], sigma_true_camera_orientation_rad: 0.02, "
-                  "sigma_true_camera_position_m: 0.05, sigma_true_camera_focal_px: 2, "
-                  "sigma_true_camera_distortion: 0.01")),
-              states(4));
-  const auto wrong = only<ImageSample>(all);
-  const auto truth = only<CalibrationSample>(all);
-  ASSERT_EQ(truth.size(), 15U);
-  EXPECT_EQ(truth[14].value, 0.0125);
-  EXPECT_EQ(truth[0].t_ns, 2'000'000'000);
-  const auto expected = images(config_of(write_chain(truth), ""), states(4));
-  const auto as_the_file_says = images(config_of(nominal, ""), states(4));
-  ASSERT_EQ(wrong.size(), 3U);
-  for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(wrong[i].t_ns, expected[i].t_ns);
-    const Image image = pixels_of(wrong[i]);
-    EXPECT_LT(different_pixels(image, pixels_of(expected[i])), 10) << i;  // rounding, at edges
-    EXPECT_GT(different_pixels(image, pixels_of(as_the_file_says[i])), 2000) << i;
-  }
-}
-
 TEST(ImageSimulator, IsExactWhenThatIsAskedForWhateverItsParametersSay) {
   const auto sensor = make_sensor(
-      config("sigma_grey: 5, camera_clock_error_s: [0.01], sigma_true_camera_focal_px: 5"), 1,
+      section("sigma_grey: 5, camera_clock_error_s: [0.01], sigma_true_camera_focal_px: 5"), 1,
       true);
   EXPECT_TRUE(sensor->can_be_exact());
   const auto exact = only<ImageSample>(play_on(sensor, states(3)));
-  const auto quiet = images(config("sigma_grey: 0"), states(3));
+  const auto quiet = images(section("sigma_grey: 0"), states(3));
   ASSERT_EQ(exact.size(), quiet.size());
   for (std::size_t i = 0; i < exact.size(); ++i) {
     EXPECT_EQ(exact[i].t_ns, quiet[i].t_ns);
@@ -320,12 +180,12 @@ TEST(ImageSimulator, IsExactWhenThatIsAskedForWhateverItsParametersSay) {
 }
 
 TEST(ImageSimulator, NoiseIsThatOfTheImageWhateverElseIsSimulatedOrRead) {
-  const auto clean = images(config("sigma_grey: 0"), states(4));
-  const auto noisy = images(config("sigma_grey: 5"), states(4));
-  const auto both = images(config("sigma_grey: 5, n_cameras: 2, drop_start_s: [0.05], "
-                                  "drop_duration_s: 0.1"),
+  const auto clean = images(section("sigma_grey: 0"), states(4));
+  const auto noisy = images(section("sigma_grey: 5"), states(4));
+  const auto both = images(section("sigma_grey: 5, n_cameras: 2, drop_start_s: [0.05], "
+                                   "drop_duration_s: 0.1"),
                            states(4));
-  const auto other = images(config("sigma_grey: 5"), states(4), 2);
+  const auto other = images(section("sigma_grey: 5"), states(4), 2);
   ASSERT_EQ(both.size(), 4U);
   const Image reference = pixels_of(clean[2]), last = pixels_of(noisy[2]);
   EXPECT_EQ(last.pixels, pixels_of(noisy[2]).pixels);
@@ -340,13 +200,13 @@ TEST(ImageSimulator, NoiseIsThatOfTheImageWhateverElseIsSimulatedOrRead) {
   EXPECT_NEAR(residual(reference, last), 5., 0.1);
   EXPECT_NEAR(residual(last, pixels_of(other[2])), 5. * std::sqrt(2.), 0.15);
   const auto alone =
-      images(config("sigma_grey: 5, drop_start_s: [0.05], drop_duration_s: 0.1"), states(4));
+      images(section("sigma_grey: 5, drop_start_s: [0.05], drop_duration_s: 0.1"), states(4));
   ASSERT_EQ(alone.size(), 2U);
   EXPECT_EQ(pixels_of(alone[1]).pixels, last.pixels);
 }
 
 TEST(ImageSimulator, ReadingFromSeveralThreadsGivesTheSameBits) {
-  const auto all = images(config("n_cameras: 2"), states(3));
+  const auto all = images(section("n_cameras: 2"), states(3));
   std::vector<Image> alone, together(8);
   for (std::size_t i = 0; i < 8; ++i) alone.push_back(pixels_of(all[i % 4]));
   std::vector<std::thread> threads;
@@ -358,8 +218,8 @@ TEST(ImageSimulator, ReadingFromSeveralThreadsGivesTheSameBits) {
 }
 
 TEST(ImageSimulator, DarknessAndMissingImagesComeWhenTheyWereAskedFor) {
-  const auto all = images(config("dark_start_s: [0.3, 0.85], dark_duration_s: 0.2, "
-                                 "drop_start_s: [0.6], drop_duration_s: 0.2"),
+  const auto all = images(section("dark_start_s: [0.3, 0.85], dark_duration_s: 0.2, "
+                                  "drop_start_s: [0.6], drop_duration_s: 0.2"),
                           states(11));
   std::map<std::int64_t, double> brightness;  // by tenths of a second from the first state
   for (const ImageSample& image : all) {
@@ -378,7 +238,7 @@ TEST(ImageSimulator, DarknessAndMissingImagesComeWhenTheyWereAskedFor) {
 
 TEST(ImageSimulator, TheBrightnessSwings) {
   const auto all = images(
-      config("exposure_swing: 0.5, exposure_period_s: 0.4, sigma_grey: 0, skip_first: false"),
+      section("exposure_swing: 0.5, exposure_period_s: 0.4, sigma_grey: 0, skip_first: false"),
       states(4));
   const double middle = mean_of(pixels_of(all[0]));
   EXPECT_GT(mean_of(pixels_of(all[1])), 1.3 * middle);
@@ -387,15 +247,15 @@ TEST(ImageSimulator, TheBrightnessSwings) {
 }
 
 TEST(ImageSimulator, TheRoomFollowsFromTheWorldSeedAndNotFromThatOfTheRun) {
-  const auto reference = pixels_of(images(config("sigma_grey: 0"), states(2), 1)[0]);
-  EXPECT_EQ(pixels_of(images(config("sigma_grey: 0"), states(2), 99)[0]).pixels, reference.pixels);
-  EXPECT_NE(pixels_of(images(config("sigma_grey: 0, world_seed: 2"), states(2), 1)[0]).pixels,
+  const auto reference = pixels_of(images(section("sigma_grey: 0"), states(2), 1)[0]);
+  EXPECT_EQ(pixels_of(images(section("sigma_grey: 0"), states(2), 99)[0]).pixels, reference.pixels);
+  EXPECT_NE(pixels_of(images(section("sigma_grey: 0, world_seed: 2"), states(2), 1)[0]).pixels,
             reference.pixels);
 }
 
 TEST(ImageSimulator, SaysWhatItRefusesAndWhy) {
   const auto message = [](const std::string& rest) {
-    const std::string text = error_of(config(rest));
+    const std::string text = error_of(section(rest));
     return text.substr(std::min(text.find("sensor."), text.size()));
   };
   EXPECT_EQ(message("room_size_m: [5]"),
@@ -405,15 +265,15 @@ TEST(ImageSimulator, SaysWhatItRefusesAndWhy) {
   EXPECT_NE(error_of("{type: image_simulator, cameras: " + kCameraFile + ", texture_size_px: 100}")
                 .find("sensor.texture_size_px: 100 is not a power of two: 512, 1024, 2048, ..."),
             std::string::npos);
-  EXPECT_EQ(refusal(config(""), {ImuSample{}}),
+  EXPECT_EQ(refusal(section(""), {ImuSample{}}),
             "the input gives no true states, which sensors simulator and asl_state do");
-  EXPECT_NE(refusal(config("room_size_m: [2, 4], room_centre_m: [0, 0]"), states(12))
+  EXPECT_NE(refusal(section("room_size_m: [2, 4], room_centre_m: [0, 0]"), states(12))
                 .find("the cameras leave the room or come closer than 0.1 m to it: along x they "
                       "move from 0.1"),
             std::string::npos);
-  EXPECT_NE(refusal(config("floor_m: 0.3"), states(12)).find("along z they move"),
+  EXPECT_NE(refusal(section("floor_m: 0.3"), states(12)).find("along z they move"),
             std::string::npos);
-  EXPECT_TRUE(images(config(""), states(1)).empty());
+  EXPECT_TRUE(images(section(""), states(1)).empty());
 }
 
 }  // namespace
