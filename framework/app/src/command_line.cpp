@@ -1,9 +1,13 @@
 #include "command_line.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <iostream>
+#include <iterator>
 #include <sstream>
+#include <stdexcept>
+#include <string_view>
 
 #include "viwo/api/status.hpp"
 #include "viwo/config/suggest.hpp"
@@ -16,79 +20,94 @@ namespace po = boost::program_options;
 /// Each is a thread.
 constexpr int kMostJobs = 1024;
 
-/// Every option of any command, by name.
-void add_option(const std::string& name, po::options_description& options) {
-  auto add = options.add_options();
-  if (name == "out") {
-    add("out,o", po::value<std::string>()->value_name("DIR"), "folder for the results");
-  } else if (name == "out!") {
-    add("out,o", po::value<std::string>()->value_name("DIR")->required(), "folder for the log");
-  } else if (name == "out-file") {
-    add("out,o", po::value<std::string>()->value_name("FILE"),
-        "the file to write (default: the terminal)");
-  } else if (name == "to!") {
-    add("to", po::value<std::string>()->value_name("FORMAT")->required(),
-        "urdf, ros2_control, wpilib (Java), kalibr (cameras) or csv");
-  } else if (name == "seed") {
-    add("seed", po::value<std::int64_t>()->value_name("N"), "overrules the configured seed");
-  } else if (name == "seeds") {
-    add("seeds", po::value<int>()->value_name("N"), "overrules the configured number of seeds");
-  } else if (name == "jobs") {
-    add("jobs,j", po::value<int>()->value_name("N"), "runs in parallel (default: one per core)");
-  } else if (name == "set") {
-    add("set", po::value<std::vector<std::string>>()->composing()->value_name("KEY=VALUE"),
-        "overrides a value of the run configuration, e.g. --set odometry.epoch_s=0.05");
-  } else if (name == "keep-runs") {
-    add("keep-runs", "one folder with all files for each run");
-  } else if (name == "resume") {
-    add("resume", "goes on with an experiment that was interrupted");
-  } else if (name == "shard") {
-    add("shard", po::value<std::string>()->value_name("I/N"),
-        "runs the cells k with k mod N = I only, again what failed, and leaves them in the folder; "
-        "I and N may be environment variables: SLURM_ARRAY_TASK_ID/SLURM_ARRAY_TASK_COUNT");
-  } else if (name == "collect") {
-    add("collect", "runs nothing: tables and page of the runs that shards have left in the folder");
-  } else if (name == "figures") {
-    add("figures", po::value<std::string>()->value_name("FORMAT"),
-        "every plot also as a static figure for a paper: svg or pdf (needs gnuplot)");
-  } else if (name == "fix") {
-    add("fix", po::value<std::string>()->value_name("FILE"),
-        "the configuration with all that is to be written into it, as a file of its own");
-  } else if (name == "plan") {
-    add("plan", po::value<std::string>()->value_name("PLAN"),
-        "a plan file of this base (viwo plan): which piece of motion the calibration lacks most, "
-        "and what it would tell; said at the end, of live sensors also when it changes");
-  } else if (name == "lockstep") {
-    add("lockstep",
-        "live sensors that can (ros2_topics) are played: the run waits for what comes, nothing is "
-        "dropped, and the results are those of the same messages in a bag");
-  } else if (name == "show") {
-    add("show", "a window with the tracks in the images, the trajectory and the calibration");
-  } else if (name == "video") {
-    add("video", po::value<std::string>()->value_name("FILE"),
-        "the same pictures, one for each epoch, as a video file: .mp4 or .avi");
-  } else if (name == "mcap") {
-    add("mcap", po::value<std::string>()->value_name("FILE"),
-        "while the run goes on: odometry, path, tf, tracks, calibration and diagnostics as ROS 2 "
-        "messages in an MCAP file, for Foxglove, PlotJuggler and RViz");
-  } else if (name == "reference") {
-    add("reference", po::value<std::string>()->value_name("A.tum")->required(), "true trajectory");
-  } else if (name == "estimate") {
-    add("estimate", po::value<std::string>()->value_name("B.tum")->required(),
-        "trajectory to evaluate");
-  } else if (name == "align") {
-    add("align", po::value<std::string>()->value_name("MODE")->default_value("yaw_position"),
-        "alignment for the ATE: none, start, yaw_position or se3");
-  } else if (name == "max-gap") {
-    add("max-gap", po::value<double>()->value_name("SECONDS")->default_value(0.5, "0.5"),
-        "between poses of the reference that are further apart nothing is compared");
+enum class Takes { kNothing, kText, kRequired, kTexts, kInteger, kLong, kNumber };
+
+struct Option {
+  std::string_view name;  ///< in Command::options
+  const char* spelled;
+  Takes takes;
+  const char *value_name, *help;
+  const char* fallback = nullptr;
+};
+
+/// Every option of any command.
+constexpr Option kOptions[] = {
+    {"out", "out,o", Takes::kText, "DIR", "folder for the results"},
+    {"out!", "out,o", Takes::kRequired, "DIR", "folder for the log"},
+    {"out-file", "out,o", Takes::kText, "FILE", "the file to write (default: the terminal)"},
+    {"to!", "to", Takes::kRequired, "FORMAT",
+     "urdf, ros2_control, wpilib (Java), kalibr (cameras) or csv"},
+    {"seed", "seed", Takes::kLong, "N", "overrules the configured seed"},
+    {"seeds", "seeds", Takes::kInteger, "N", "overrules the configured number of seeds"},
+    {"jobs", "jobs,j", Takes::kInteger, "N", "runs in parallel (default: one per core)"},
+    {"set", "set", Takes::kTexts, "KEY=VALUE",
+     "overrides a value of the run configuration, e.g. --set odometry.epoch_s=0.05"},
+    {"keep-runs", "keep-runs", Takes::kNothing, "", "one folder with all files for each run"},
+    {"resume", "resume", Takes::kNothing, "", "goes on with an experiment that was interrupted"},
+    {"shard", "shard", Takes::kText, "I/N",
+     "runs the cells k with k mod N = I only, again what failed, and leaves them in the folder; "
+     "I and N may be environment variables: SLURM_ARRAY_TASK_ID/SLURM_ARRAY_TASK_COUNT"},
+    {"collect", "collect", Takes::kNothing, "",
+     "runs nothing: tables and page of the runs that shards have left in the folder"},
+    {"figures", "figures", Takes::kText, "FORMAT",
+     "every plot also as a static figure for a paper: svg or pdf (needs gnuplot)"},
+    {"fix", "fix", Takes::kText, "FILE",
+     "the configuration with all that is to be written into it, as a file of its own"},
+    {"plan", "plan", Takes::kText, "PLAN",
+     "a plan file of this base (viwo plan): which piece of motion the calibration lacks most, "
+     "and what it would tell; said at the end, of live sensors also when it changes"},
+    {"lockstep", "lockstep", Takes::kNothing, "",
+     "live sensors that can (ros2_topics) are played: the run waits for what comes, nothing is "
+     "dropped, and the results are those of the same messages in a bag"},
+    {"show", "show", Takes::kNothing, "",
+     "a window with the tracks in the images, the trajectory and the calibration"},
+    {"video", "video", Takes::kText, "FILE",
+     "the same pictures, one for each epoch, as a video file: .mp4 or .avi"},
+    {"mcap", "mcap", Takes::kText, "FILE",
+     "while the run goes on: odometry, path, tf, tracks, calibration and diagnostics as ROS 2 "
+     "messages in an MCAP file, for Foxglove, PlotJuggler and RViz"},
+    {"reference", "reference", Takes::kRequired, "A.tum", "true trajectory"},
+    {"estimate", "estimate", Takes::kRequired, "B.tum", "trajectory to evaluate"},
+    {"align", "align", Takes::kText, "MODE",
+     "alignment for the ATE: none, start, yaw_position or se3", "yaw_position"},
+    {"max-gap", "max-gap", Takes::kNumber, "SECONDS",
+     "between poses of the reference that are further apart nothing is compared", "0.5"}};
+
+template <class T>
+po::typed_value<T>* value_of(const Option& option) {
+  return po::value<T>()->value_name(option.value_name);
+}
+
+const po::value_semantic* semantic_of(const Option& option) {
+  switch (option.takes) {
+    case Takes::kText: {
+      auto* const text = value_of<std::string>(option);
+      return option.fallback != nullptr ? text->default_value(option.fallback) : text;
+    }
+    case Takes::kRequired:
+      return value_of<std::string>(option)->required();
+    case Takes::kTexts:
+      return value_of<std::vector<std::string>>(option)->composing();
+    case Takes::kInteger:
+      return value_of<int>(option);
+    case Takes::kLong:
+      return value_of<std::int64_t>(option);
+    case Takes::kNumber:
+      return value_of<double>(option)->default_value(std::stod(option.fallback), option.fallback);
+    case Takes::kNothing:
+      break;
   }
+  return new po::untyped_value(true);  // the description owns it, like the others
 }
 
 po::options_description options_of(const Command& command) {
   po::options_description options("Options");
   std::istringstream names(command.options);
-  for (std::string name; names >> name;) add_option(name, options);
+  for (std::string name; names >> name;) {
+    const auto* const option = std::ranges::find(kOptions, name, &Option::name);
+    if (option == std::end(kOptions)) throw std::logic_error("no option " + name);
+    options.add_options()(option->spelled, semantic_of(*option), option->help);
+  }
   options.add_options()("plugin-path",
                         po::value<std::vector<std::string>>()->composing()->value_name("DIR"),
                         "folder with plugins, searched first (then VIWO_PLUGIN_PATH)");
