@@ -42,7 +42,10 @@ void ImuBuffer::add(const ImuSample& sample, Rejections& rejections) {
   }
   if (!is_within(sample.gyro_rad_per_s, limits_.max_gyro_rad_per_s) ||
       !is_within(sample.accel_m_per_s2, limits_.max_accel_m_per_s2)) {
-    rejections.add("imu: out of range (range_gyro_rad_per_s, range_accel_m_per_s2)", sample.t_ns);
+    rejections.add(
+        "imu: out of range (range_gyro_rad_per_s, range_accel_m_per_s2): saturated, or of other "
+        "units",
+        sample.t_ns);
     return;
   }
   if (!is_after_the_last(sample.t_ns)) {

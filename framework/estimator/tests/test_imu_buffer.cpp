@@ -179,7 +179,7 @@ TEST(ImuBuffer, LeavesOutReadingsBeyondTheRange) {
   bench.buffer.add(sample, bench.rejections);
   EXPECT_EQ(bench.buffer.samples().size(), 2u);
   EXPECT_EQ(bench.rejected(),
-            (Counts{{"imu: out of range (range_gyro_rad_per_s, range_accel_m_per_s2)", 2}}));
+            (Counts{{"imu: out of range (range_gyro_rad_per_s, range_accel_m_per_s2): saturated, or of other units", 2}}));
 }
 
 TEST(ImuBuffer, SaysWhichPartsOfACutLieInAGap) {

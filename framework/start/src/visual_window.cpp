@@ -19,7 +19,8 @@ constexpr std::size_t kMostTracks = 100;
 constexpr std::size_t kFewestTracks = 15;
 constexpr std::size_t kFewestSharedKeys = 4;
 constexpr double kMaxImuGapS = 0.05;
-constexpr std::string_view kTooFewImages = "fewer images than start_window_s asks for";
+static_assert(kFewestKeys == 6);
+constexpr std::string_view kTooFewImages = "fewer than 6 images within start_window_s";
 
 std::int64_t imu_stamp(const FeatureSample& sample, std::span<const CameraPrior> cameras) {
   const auto camera = static_cast<std::size_t>(sample.camera);

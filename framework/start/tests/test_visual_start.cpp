@@ -179,9 +179,9 @@ std::string_view obstacle(int n_cameras, const FlightOptions& flown, std::uint64
 }
 
 TEST(VisualStart, WaitsForAWindowOfImages) {
-  EXPECT_EQ(obstacle(1, {.duration_s = 1.}), "fewer images than start_window_s asks for");
+  EXPECT_EQ(obstacle(1, {.duration_s = 1.}), "fewer than 6 images within start_window_s");
   EXPECT_EQ(start_from_images({}, {}, with_cameras(1)).obstacle,
-            "fewer images than start_window_s asks for");
+            "fewer than 6 images within start_window_s");
 }
 
 constexpr std::string_view kUncertain =
