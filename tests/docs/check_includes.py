@@ -15,7 +15,8 @@ import sys
 PAGE = "docs/architecture.md"
 # | `module` | what it is for | modules that it includes: "a, b", or "-" |
 ROW = re.compile(r"^\| `(\w+)` \|[^|]*\| (-|\w+(?:, \w+)*) \|$", re.MULTILINE)
-PLUGIN_MODULES = {"plugin_api", "math", "config", "image", "log", "asl", "sim", "wheel", "camera"}
+PLUGIN_MODULES = {"plugin_api", "math", "config", "image", "files", "log", "asl", "sim", "rendering", "wheel",
+                  "camera"}
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*["<]([^">\n]+)[">]', re.MULTILINE)
 SOURCES = {".cpp", ".hpp", ".h", ".cc"}
 

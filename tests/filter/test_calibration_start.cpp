@@ -11,7 +11,7 @@
 #include "in_folder.hpp"
 #include "message_of.hpp"
 #include "viwo/results/run_output.hpp"
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/setup/calibration_values.hpp"
 
 namespace viwo {
 namespace {

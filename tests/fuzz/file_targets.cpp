@@ -14,6 +14,7 @@
 #include "run_journal.hpp"
 #include "target.hpp"
 #include "viwo/calibration/calibrate.hpp"
+#include "viwo/calibration_file/calibration_file.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/image/image_file.hpp"
@@ -23,7 +24,6 @@
 #include "viwo/plan/plan.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
 #include "viwo/results/run_record.hpp"
-#include "viwo/setup/calibration_file.hpp"
 #include "viwo/setup/configuration.hpp"
 #include "viwo/setup/run_setup.hpp"
 #ifdef VIWO_FUZZ_ROS1
@@ -212,7 +212,7 @@ std::vector<Target> file_targets() {
         {"experiment", experiment_file, "framework/experiment/src/experiment.cpp"},
         {"calibrate", calibrate, "framework/calibration/src/calibration_setup.cpp"},
         {"plan", plan_file, "framework/plan/src/plan_setup.cpp"},
-        {"calibration", calibration_file, "framework/setup/src/calibration_file.cpp"},
+        {"calibration", calibration_file, "framework/calibration_file/src"},
         {"journal", journal,
          "framework/experiment/src/run_journal.cpp framework/results/src/run_record.cpp"},
         {"plugin", plugin,

@@ -26,8 +26,8 @@
 #include "viwo/asl/asl.hpp"
 #include "viwo/asl/asl_columns.hpp"
 #include "viwo/asl/asl_images.hpp"
+#include "viwo/files/printable_output.hpp"
 #include "viwo/image/image_file.hpp"
-#include "viwo/log/printable_output.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"
 
@@ -373,7 +373,7 @@ int dispatch(const std::vector<std::string>& words) {
 }  // namespace viwo
 
 int main(int argc, char** argv) {
-  const viwo::log::PrintableOutput out(std::cout), err(std::cerr);
+  const viwo::files::PrintableOutput out(std::cout), err(std::cerr);
   try {
     return viwo::dispatch({argv + 1, argv + argc});
   } catch (const viwo::InputError& error) {

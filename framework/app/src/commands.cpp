@@ -13,14 +13,16 @@
 #include "live_output.hpp"
 #include "progress.hpp"
 #include "viwo/calibration/calibrate.hpp"
+#include "viwo/calibration_report/calibration_output.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/eval/accuracy.hpp"
+#include "viwo/eval/hints.hpp"
 #include "viwo/eval/json.hpp"
 #include "viwo/experiment/experiment.hpp"
 #include "viwo/export/export_calibration.hpp"
+#include "viwo/files/files.hpp"
+#include "viwo/files/folder_lock.hpp"
 #include "viwo/inspect/inspection.hpp"
-#include "viwo/log/files.hpp"
-#include "viwo/log/folder_lock.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/observability/observability.hpp"
@@ -36,8 +38,8 @@ namespace viwo::app {
 namespace {
 
 using namespace experiment;
-using log::make_folder;
-using log::write_text;
+using files::make_folder;
+using files::write_text;
 
 /// The folder asked for, or results/<name of the configuration file>; what makes no run of it has
 /// its own, with the name of the `command` behind.
@@ -62,7 +64,7 @@ class OutFolder {
   }
 
   std::filesystem::path folder_;
-  log::FolderLock lock_;
+  files::FolderLock lock_;
 };
 
 /// --figures: the plots of a page, beside it.
@@ -75,7 +77,7 @@ class Figures {
                                            : report::FigureFormat::kSvg),
         folder_(folder / "figures") {
     if (!wanted_) return;
-    log::make_folder_in(folder, "figures");
+    files::make_folder_in(folder, "figures");
     report::write_figures(folder_, {}, format_);
   }
   void write(const report::Document& document) const {
@@ -225,7 +227,7 @@ int experiment_command(const Arguments& arguments) {
   options.interrupted = [&interrupt] { return interrupt.raised(); };
   const ExperimentSetup setup = read_experiment(arguments.positional[0], options);
   const auto folder = out_folder(arguments);
-  std::optional<log::FolderLock> lock;
+  std::optional<files::FolderLock> lock;
   options.folder_is_there = [&] { lock.emplace(folder, options.shard.has_value()); };
   const Figures figures(arguments, folder);
   const ExperimentResult result = [&] {
@@ -367,6 +369,9 @@ int evaluate_command(const Arguments& arguments) {
   const eval::Accuracy accuracy = eval::evaluate(reference, estimate, options);
   const std::string text = json_text(eval::to_json(accuracy));
   std::cout << text;
+  for (const std::string& line : eval::hints(reference, estimate, options, accuracy)) {
+    std::cerr << "warning: " << line << "\n";
+  }
   if (arguments.out) {
     make_folder(*arguments.out);
     write_text(*arguments.out / "evaluation.json", text);

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "viwo/feed/estimate_sample.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/plugin_host/part.hpp"
 
 namespace viwo::app {
@@ -30,7 +30,7 @@ std::unique_ptr<log::EstimateLog> open_mcap(const std::filesystem::path& file) {
         "libviwo_mcap.so", log::kMcapLibraryEntry, "MCAP cannot be written",
         "it comes with the Debian package viwo-ros; a build of one's own needs libsqlite3-dev, "
         "libfastcdr-dev, liblz4-dev and libzstd-dev");
-    if (file.has_parent_path()) log::make_folder(file.parent_path());
+    if (file.has_parent_path()) files::make_folder(file.parent_path());
     return std::unique_ptr<log::EstimateLog>(reinterpret_cast<log::EstimateLogMaker>(make)(file));
   } catch (const std::runtime_error& error) {
     throw InputError(std::string("--mcap: ") + error.what());

@@ -5,7 +5,7 @@
 
 #include "viwo/math/significant.hpp"
 #include "viwo/run/calibration_track.hpp"
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/setup/calibration_values.hpp"
 
 namespace viwo::app {
 namespace {

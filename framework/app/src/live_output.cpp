@@ -4,7 +4,7 @@
 #include <string>
 
 #include "viwo/config/yaml.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/results/run_output.hpp"
 
@@ -12,8 +12,8 @@ namespace viwo::app {
 namespace {
 
 const std::filesystem::path& begun(const RunSetup& setup, const std::filesystem::path& folder) {
-  log::remove_results(folder, kResultsOfRun);
-  log::write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
+  files::remove_results(folder, kResultsOfRun);
+  files::write_text(folder / "config.resolved.yaml", config::to_yaml(setup.resolved));
   return folder;
 }
 

@@ -16,7 +16,7 @@
 #include "out_of_memory.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/config/suggest.hpp"
-#include "viwo/log/printable_output.hpp"
+#include "viwo/files/printable_output.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
 #include "viwo/plugin_host/installation.hpp"
 
@@ -124,7 +124,7 @@ bool reader_is_gone() {
 int main(int argc, char** argv) {
   viwo::app::end_well_without_memory();
   std::signal(SIGPIPE, SIG_IGN);
-  const viwo::log::PrintableOutput out(std::cout), err(std::cerr);
+  const viwo::files::PrintableOutput out(std::cout), err(std::cerr);
   try {
     viwo::become_faster_copy(argv);
     if (!viwo::host_record_is_consistent()) {

@@ -13,7 +13,7 @@
 #include "viwo/api/build_record.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/config/suggest.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/plugin_host/installation.hpp"
 
 namespace viwo::app {
@@ -94,7 +94,7 @@ void copy_template(const fs::path& from, const fs::path& to, const Replacements&
   std::ifstream source(from, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(source), {}};
   if (!source) throw std::runtime_error("cannot read " + from.string());
-  log::write_bytes(to, replaced(text, replacements));
+  files::write_bytes(to, replaced(text, replacements));
 }
 
 }  // namespace

@@ -9,10 +9,10 @@
 
 #include "viwo/api/status.hpp"
 #include "viwo/asl/asl.hpp"
+#include "viwo/files/files.hpp"
+#include "viwo/files/text_writer.hpp"
 #include "viwo/image/image_file.hpp"
-#include "viwo/log/files.hpp"
 #include "viwo/log/text.hpp"
-#include "viwo/log/text_writer.hpp"
 
 namespace viwo::log {
 namespace {
@@ -113,7 +113,7 @@ void check_is_ours(const fs::path& folder, bool is_marked) {
 }
 
 template <std::size_t N>
-void append(TextWriter& out, const std::array<double, N>& values) {
+void append(files::TextWriter& out, const std::array<double, N>& values) {
   for (const double value : values) out << "," << value;
 }
 
@@ -125,16 +125,16 @@ bool fits_a_field(const std::string& name) {
 
 struct AslWriter::Tables {
   fs::path folder;  ///< of the log that is not whole yet
-  std::array<std::optional<TextWriter>, kTables> writers;
+  std::array<std::optional<files::TextWriter>, kTables> writers;
   int n_drive = 0;
   int n_steer = 0;
   bool has_poses = false;
   bool has_states = false;
 
-  TextWriter& open(Table table, std::string_view header);
+  files::TextWriter& open(Table table, std::string_view header);
   /// Of the truth, which is written for poses and for states.
-  TextWriter& truth_row(std::int64_t t_ns, const std::array<double, 3>& p,
-                        const std::array<double, 4>& q_xyzw);
+  files::TextWriter& truth_row(std::int64_t t_ns, const std::array<double, 3>& p,
+                               const std::array<double, 4>& q_xyzw);
 
   void write(const EncoderSample& sample);
   void write(const PoseSample& pose);
@@ -152,14 +152,14 @@ struct AslWriter::Tables {
                                     [this](const auto& sample) { this->write(sample); });
   }
 
-  std::vector<std::optional<TextWriter>> image_tables;  ///< by camera
+  std::vector<std::optional<files::TextWriter>> image_tables;  ///< by camera
   Image pixels;
 };
 
-TextWriter& AslWriter::Tables::open(Table table, std::string_view header) {
+files::TextWriter& AslWriter::Tables::open(Table table, std::string_view header) {
   auto& writer = writers[table];
   if (!writer) {
-    make_folder(folder / kFolders[table]);
+    files::make_folder(folder / kFolders[table]);
     writer.emplace(folder / kFolders[table] / kData);
     *writer << header;
   }
@@ -170,7 +170,7 @@ void AslWriter::Tables::write(const EncoderSample& sample) {
   if (!writers[kWheels]) {
     n_drive = sample.n_drive;
     n_steer = sample.n_steer;
-    TextWriter& header = open(kWheels, "timestamp_ns");
+    files::TextWriter& header = open(kWheels, "timestamp_ns");
     for (int i = 1; i <= n_drive; ++i) header << ",drive_" << std::int64_t{i} << " [rad/s]";
     for (int i = 1; i <= n_steer; ++i) header << ",steer_" << std::int64_t{i} << " [rad]";
     header << "\n";
@@ -178,7 +178,7 @@ void AslWriter::Tables::write(const EncoderSample& sample) {
   if (sample.n_drive != n_drive || sample.n_steer != n_steer) {
     throw std::logic_error("encoder samples of one log differ in their number of channels");
   }
-  TextWriter& out = *writers[kWheels];
+  files::TextWriter& out = *writers[kWheels];
   out << sample.t_ns;
   for (int i = 0; i < n_drive; ++i) {
     out << "," << sample.drive_rad_per_s[static_cast<std::size_t>(i)];
@@ -189,14 +189,14 @@ void AslWriter::Tables::write(const EncoderSample& sample) {
   out << "\n";
 }
 
-TextWriter& AslWriter::Tables::truth_row(std::int64_t t_ns, const std::array<double, 3>& p,
-                                         const std::array<double, 4>& q_xyzw) {
+files::TextWriter& AslWriter::Tables::truth_row(std::int64_t t_ns, const std::array<double, 3>& p,
+                                                const std::array<double, 4>& q_xyzw) {
   if (has_poses && has_states) {
     throw InputError(
         "reference poses and reference states share a table of a log: keep the sensors of one "
         "kind only");
   }
-  TextWriter& out = open(kTruth, kTruthHeader);
+  files::TextWriter& out = open(kTruth, kTruthHeader);
   out << t_ns;
   append(out, p);
   out << "," << q_xyzw[3] << "," << q_xyzw[0] << "," << q_xyzw[1] << "," << q_xyzw[2];
@@ -205,14 +205,14 @@ TextWriter& AslWriter::Tables::truth_row(std::int64_t t_ns, const std::array<dou
 
 void AslWriter::Tables::write(const PoseSample& pose) {
   has_poses = true;
-  TextWriter& out = truth_row(pose.t_ns, pose.p_BinW_m, pose.q_BtoW_xyzw);
+  files::TextWriter& out = truth_row(pose.t_ns, pose.p_BinW_m, pose.q_BtoW_xyzw);
   for (int i = 0; i < 9; ++i) out << "," << kNotKnown;
   out << "\n";
 }
 
 void AslWriter::Tables::write_measured(const PoseSample& pose) {
   const auto& q = pose.q_BtoW_xyzw;
-  TextWriter& out = open(kPoses, kPosesHeader);
+  files::TextWriter& out = open(kPoses, kPosesHeader);
   out << pose.t_ns;
   append(out, pose.p_BinW_m);
   out << "," << q[3] << "," << q[0] << "," << q[1] << "," << q[2] << "\n";
@@ -220,7 +220,7 @@ void AslWriter::Tables::write_measured(const PoseSample& pose) {
 
 void AslWriter::Tables::write(const StateSample& state) {
   has_states = true;
-  TextWriter& out = truth_row(state.t_ns, state.p_IinG_m, state.q_ItoG_xyzw);
+  files::TextWriter& out = truth_row(state.t_ns, state.p_IinG_m, state.q_ItoG_xyzw);
   append(out, state.v_IinG_m_per_s);
   append(out, state.gyro_bias_rad_per_s);
   append(out, state.accel_bias_m_per_s2);
@@ -228,14 +228,14 @@ void AslWriter::Tables::write(const StateSample& state) {
 }
 
 void AslWriter::Tables::write(const GnssSample& fix) {
-  TextWriter& out = open(kGnss, kGnssHeader);
+  files::TextWriter& out = open(kGnss, kGnssHeader);
   out << fix.t_ns << "," << fix.latitude_deg << "," << fix.longitude_deg << "," << fix.altitude_m;
   append(out, fix.covariance_ENU_m2);
   out << "\n";
 }
 
 void AslWriter::Tables::write(const ImuSample& imu) {
-  TextWriter& out = open(kImu, kImuHeader);
+  files::TextWriter& out = open(kImu, kImuHeader);
   out << imu.t_ns;
   append(out, imu.gyro_rad_per_s);
   append(out, imu.accel_m_per_s2);
@@ -243,7 +243,7 @@ void AslWriter::Tables::write(const ImuSample& imu) {
 }
 
 void AslWriter::Tables::write(const FeatureSample& image) {
-  TextWriter& out = open(kFeatures, "timestamp_ns,camera,id,u [px],v [px]\n");
+  files::TextWriter& out = open(kFeatures, "timestamp_ns,camera,id,u [px],v [px]\n");
   const std::int64_t camera = image.camera;
   if (image.points.empty()) out << image.t_ns << "," << camera << ",,,\n";
   for (const FeaturePoint& point : image.points) {
@@ -257,7 +257,7 @@ void AslWriter::Tables::write(const CalibrationSample& parameter) {
     throw std::logic_error("the name of a calibration parameter does not fit into a table: " +
                            log::quoted(parameter.name));
   }
-  TextWriter& out = open(kCalibration, "timestamp_ns,name,value\n");
+  files::TextWriter& out = open(kCalibration, "timestamp_ns,name,value\n");
   out << parameter.t_ns << "," << parameter.name << "," << parameter.value << "\n";
 }
 
@@ -267,14 +267,14 @@ void AslWriter::Tables::write(const ImageSample& image) {
   if (image_tables.size() <= camera) image_tables.resize(camera + 1);
   auto& table = image_tables[camera];
   if (!table) {
-    make_folder(place / kImages);
+    files::make_folder(place / kImages);
     table.emplace(place / kData);
     *table << "#timestamp [ns],filename\n";
   }
   const std::string name = std::to_string(image.t_ns) + ".png";
   image.source->read(pixels);
   const std::vector<std::uint8_t> png = encode_png(pixels);
-  FileWriter file(place / kImages / name, Appears::kAtOnce);
+  files::FileWriter file(place / kImages / name, files::Appears::kAtOnce);
   file.write({reinterpret_cast<const char*>(png.data()), png.size()});
   file.commit();
   *table << image.t_ns << "," << name << "\n";
@@ -285,13 +285,13 @@ AslWriter::AslWriter(const fs::path& folder)
   if (fs::exists(folder) && !fs::is_directory(folder)) {
     throw InputError(folder.string() + "  is a file, not a folder");
   }
-  make_folder(folder);
+  files::make_folder(folder);
   check_is_ours(folder, fs::exists(folder / kMark));
-  write_text(folder / kMark,
-             "A log of viwo. The next one that is written to this folder replaces it.\n");
+  files::write_text(folder / kMark,
+                    "A log of viwo. The next one that is written to this folder replaces it.\n");
   tables_->folder = folder / kPart;
   fs::remove_all(tables_->folder);
-  make_folder(tables_->folder);
+  files::make_folder(tables_->folder);
 }
 
 AslWriter::~AslWriter() {

@@ -167,6 +167,12 @@ double TurnAgreement::correlation() const {
   return size > 0. ? product_rad2 / size : 0.;
 }
 
+double TurnAgreement::sigmas() const {
+  // By chance atanh of the correlation of n segments is normal, of sigma 1/sqrt(n - 3).
+  const double size = std::min(std::abs(correlation()), 1. - 1e-12);
+  return std::atanh(size) * std::sqrt(std::max(0., static_cast<double>(segments - 3)));
+}
+
 double TurnAgreement::ratio() const {
   return wheels_rad2 > 0. ? std::sqrt(reference_rad2 / wheels_rad2) : 0.;
 }

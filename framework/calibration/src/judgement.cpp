@@ -8,9 +8,6 @@
 #include "recording_name.hpp"
 #include "segment_choice.hpp"
 #include "viwo/math/significant.hpp"
-#include "viwo/wheel/contradicted_channels.hpp"
-#include "viwo/wheel/drive_ranges.hpp"
-#include "viwo/wheel/twist_solver.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -19,16 +16,19 @@ namespace {
 constexpr double kStrange = 3., kUnbelievable = 5.;
 /// A solution of the search is the only one when every other is worse by this factor.
 constexpr double kOnlyOne = 1.2;
-/// Sigmas of the model that the wheels may contradict each other by.
-constexpr double kQuiet = 3.;
-/// What the worst bases have of them is two thirds of that; a drive that is off by 2 % has twice
-/// it.
-constexpr double kNoNoise = 100.;
-/// Encoders that are read by themselves are never so much better than the model says.
-constexpr double kCopies = 0.05;
 
 const std::vector<IntrinsicSpec>& specs_of(const CalibrationResult& result) {
   return result.setup->recordings.front().setup.model->description().intrinsics;
+}
+
+/// What else it may be where poses are of a body that is not known to be at O.
+std::string or_elsewhere(const CalibrationResult& result) {
+  const CalibrationSetup& setup = *result.setup;
+  const bool has_poses = std::ranges::any_of(setup.recordings, [](const auto& recording) {
+    return recording.motion.kind == ReferenceKind::kPoses;
+  });
+  if (!has_poses || setup.options.estimate_extrinsics) return "";
+  return ", or the body of the poses is not at O (estimate_extrinsics: true)";
 }
 
 /// Strange is a warning, unbelievable a doubt.
@@ -88,101 +88,6 @@ void judge_what_was_given(CalibrationResult& result) {
                     " rad/s: it turns where the wheels do not, or "
                     "prior_sigma_gyro_bias_rad_per_s is too narrow",
                 result);
-  }
-}
-
-/// How much of their motion the wheels contradict each other by, at the estimate.
-double contradiction(const CalibrationResult& result) {
-  double left = 0., moved = 0.;
-  TwistSolution solution;
-  for (const CalibrationRecording& recording : result.setup->recordings) {
-    TwistSolver solver(recording.setup.model, {});
-    solver.set_intrinsics(result.all.x_WI);
-    for (const EncoderSample& sample : recording.data.wheels()) {
-      if (solver.solve(sample, solution) != Status::kOk) continue;
-      // As if a metre from O: of a spin it is too much, so that no doubt is raised without reason.
-      moved += solution.xi.squaredNorm();
-      left += solution.e.squaredNorm() /
-              static_cast<double>(std::max<Eigen::Index>(1, solution.e.size()));
-    }
-  }
-  return moved > 0. ? std::sqrt(left / moved) : 0.;
-}
-
-/// Wheels that could contradict each other, and do by `part` of their speed: not at all.
-bool are_setpoints(const CalibrationResult& result, double part) {
-  const auto is_one = [](const CalibrationRecording& recording) {
-    const ModelDescription& model = recording.setup.model->description();
-    return model.n_rows > 3 && !has_copies(recording.data.wheels(), model.n_drive);
-  };
-  const auto& recordings = result.setup->recordings;
-  return std::all_of(recordings.begin(), recordings.end(), is_one) && part < kExactly;
-}
-
-/// A drive that gives one number all the time while another turns.
-void judge_channels(CalibrationResult& result) {
-  constexpr double kTurns_rad_per_s = 0.1;
-  const auto& recordings = result.setup->recordings;
-  DriveRanges ranges(recordings.front().setup.model->description().n_drive);
-  for (const CalibrationRecording& recording : recordings) {
-    for (const EncoderSample& sample : recording.data.wheels()) ranges.add(sample);
-  }
-  if (!(ranges.largest_change() > kTurns_rad_per_s)) return;
-  for (const auto& [drive, value] : ranges.stuck()) {
-    result.doubts.push_back("drive_" + std::to_string(drive + 1) + " reads " +
-                            significant(value, 3) +
-                            " rad/s all the time, while another turns: not connected, or not read");
-  }
-}
-
-/// Covariance of the intrinsics at the estimate.
-IntrinsicMatrix covariance_of(const CalibrationEstimate& estimate) {
-  const auto sigma = estimate.sigma.asDiagonal();
-  return sigma * estimate.correlations * sigma;
-}
-
-/// A channel that the others contradict is in the fit all the same.
-void judge_contradicted(CalibrationResult& result) {
-  constexpr double kMost = 0.02;
-  const IntrinsicMatrix P = covariance_of(result.all);
-  for (const CalibrationRecording& recording : result.setup->recordings) {
-    const auto& wheels = recording.data.wheels();
-    for (const ContradictedChannel& channel :
-         contradicted_channels(wheels, recording.setup.model, result.all.x_WI, P)) {
-      auto& lines = channel.share > kMost ? result.doubts : result.warnings;
-      lines.push_back(name_of(recording.label) + ": " + text_of(channel, wheels.front().begin_ns));
-    }
-  }
-}
-
-void judge_wheels(CalibrationResult& result) {
-  constexpr double kPart = 0.3;
-  const double part = contradiction(result);
-  if (part > kPart) {
-    result.doubts.push_back(
-        "calibrated, the wheels still contradict each other by " + significant(100. * part, 2) +
-        " % of their speed: drives or steerings that are exchanged or reversed, units, gears, or "
-        "wheels that are elsewhere");
-    return;
-  }
-  if (are_setpoints(result, part)) {
-    result.doubts.push_back(std::string("the wheels agree ") + kSetpoints);
-    return;
-  }
-  const double scale = result.all.noise.parity_scale;
-  const std::string by = significant(scale, 2) + " times what the model's sigmas say";
-  if (scale > kNoNoise) {
-    result.doubts.push_back("calibrated, the wheels still contradict each other by " + by +
-                            ", and no noise is like that: a gear, radius or unit of one of them, "
-                            "zeros of the steering, or a prior that is too narrow for what is "
-                            "wrong");
-  } else if (scale > kQuiet) {
-    result.warnings.push_back("the wheels contradict each other by " + by +
-                              ": slip, play, or sigmas that are too small for this base");
-  } else if (scale < kCopies) {
-    result.warnings.push_back("the wheels contradict each other by no more than " + by +
-                              ": channels that are copies of each other tell nothing of their "
-                              "noise (leave wheel_noise_scale of a plan at 1)");
   }
 }
 
@@ -293,7 +198,8 @@ void judge_change(CalibrationResult& result) {
     add_by_size(change,
                 specs[i].name + " is " + significant(std::abs(change), 2) +
                     " prior sigmas from its nominal value: a wrong nominal value, a prior that is "
-                    "too narrow, or joints, units or clocks that are wrong",
+                    "too narrow, or joints, units or clocks that are wrong" +
+                    or_elsewhere(result),
                 result);
   }
 }
@@ -308,7 +214,8 @@ void judge_left_over(CalibrationResult& result) {
                             significant(moved, 2) + " in a segment " + significant(left, 2) +
                             " is left - drives that turn backwards, zeros, units, channels that "
                             "are exchanged, or clocks (find_drive_signs, find_steering_zeros, "
-                            "prior_sigma_clock_offset_s)");
+                            "prior_sigma_clock_offset_s)" +
+                            or_elsewhere(result));
   };
   if (all.noise.yaw_is_found) {
     doubt(all.noise.yaw_rad, all.turn_rms_rad, kLeast_rad, "of turns [rad]");
@@ -320,13 +227,10 @@ void judge_left_over(CalibrationResult& result) {
 
 /// What turns the other way, or so many times as far, is no calibration: however little it turns.
 void judge_turns(CalibrationResult& result) {
-  // By chance atanh of the correlation of n segments is normal, of sigma 1/sqrt(n - 3).
   constexpr double kSigmas = 5., kLeast = 0.5, kMostRatio = 2.;
   const TurnAgreement& turns = result.all.turns;
   const double correlation = turns.correlation(), ratio = turns.ratio();
-  const double size = std::min(std::abs(correlation), 1. - 1e-12);
-  const double spare = std::max(0., static_cast<double>(turns.segments - 3));
-  if (size < kLeast || std::atanh(size) * std::sqrt(spare) < kSigmas) return;
+  if (std::abs(correlation) < kLeast || turns.sigmas() < kSigmas) return;
   if (correlation < 0.) {
     result.doubts.push_back(
         "the reference turns the other way than the wheels (correlation " +
@@ -390,8 +294,6 @@ void judge(CalibrationResult& result) {
   judge_signs(result);
   judge_left_over(result);
   judge_turns(result);
-  judge_channels(result);
-  judge_contradicted(result);
   judge_wheels(result);
   judge_change(result);
   judge_ends(result);

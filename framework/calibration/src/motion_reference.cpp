@@ -10,6 +10,8 @@
 #include "recording_name.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/median.hpp"
+#include "viwo/math/significant.hpp"
+#include "viwo/run/run.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -38,6 +40,18 @@ StampedPose turned(std::int64_t t_ns, double yaw_rad) {
   pose.t_ns = t_ns;
   pose.q_BtoW = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ());
   return pose;
+}
+
+/// By how much the wheels alone have the base turn where the reference gives the same orientation
+/// all the time, as positions alone do; 0 where it gives orientations.
+double turn_unseen_by_poses(const RunSetup& setup, const RunData& data) {
+  if (are_turned(data.reference)) return 0.;
+  RunSetup wheels_alone = setup;
+  double turn_rad = 0.;
+  for (const StampedPose& pose : run_odometry(wheels_alone, data).estimate) {
+    turn_rad = std::max(turn_rad, std::abs(yaw(pose)));
+  }
+  return turn_rad;
 }
 
 }  // namespace
@@ -110,6 +124,20 @@ MotionReference motion_reference(const Recording& label, const RunSetup& setup, 
            "with distance_m or turn_deg as labels of the recordings, are reference: none");
     }
     out.kind = data.reference.empty() ? ReferenceKind::kGyro : ReferenceKind::kPoses;
+  }
+  if (out.kind == ReferenceKind::kPoses && !data.reference.empty()) {
+    constexpr double kTurns_rad = 0.5;
+    const double turn_rad = turn_unseen_by_poses(setup, data);
+    if (turn_rad > kTurns_rad && kind == ReferenceKind::kAuto && has_gyro) {
+      out.kind = ReferenceKind::kGyro;
+    } else if (turn_rad > kTurns_rad) {
+      fail(label,
+           " has reference poses of one orientation all the time, while the wheels turn the "
+           "base by " +
+               significant(turn_rad, 2) +
+               " rad: positions alone tell no turns - reference: gyro, where the log has "
+               "one, or poses with their orientations");
+    }
   }
   if (out.kind == ReferenceKind::kPoses) {
     if (data.reference.empty()) fail(label, " has no reference poses to calibrate against");

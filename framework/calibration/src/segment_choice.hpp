@@ -17,7 +17,4 @@ double pose_interval_s(const CalibrationSetup& setup);
 CalibrationOptions choose_segments(const CalibrationSetup& setup, const FitStart& start,
                                    CalibrationResult& result, WorkProgress& progress);
 
-/// "2 s", "whole recordings", ...
-std::string segments_text(const CalibrationEstimate& estimate);
-
 }  // namespace viwo::calibration

@@ -8,7 +8,8 @@
 #include "registry.hpp"
 #include "simulated_calibration.hpp"
 #include "viwo/calibration/calibrate.hpp"
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/calibration_file/calibration_file.hpp"
+#include "viwo/calibration_report/calibration_output.hpp"
 
 namespace viwo {
 namespace {

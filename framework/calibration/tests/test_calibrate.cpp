@@ -11,6 +11,7 @@
 #include "calibration_text.hpp"
 #include "simulated_calibration.hpp"
 #include "told.hpp"
+#include "viwo/calibration_report/calibration_output.hpp"
 #include "viwo/eval/consistency.hpp"
 #include "viwo/math/chi2.hpp"
 #include "viwo/math/so3.hpp"

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "calibration_problem.hpp"
+#include "message_of.hpp"
 #include "motion_reference.hpp"
 #include "simulated.hpp"
 #include "viwo/math/arrays.hpp"
@@ -275,6 +276,19 @@ TEST(MotionReferenceOfAGyro, HasGapsByItsOwnRate) {
   const MotionReference motion =
       motion_reference({"gyro", {}}, recording.setup, recording.data, ReferenceKind::kGyro);
   EXPECT_NEAR(motion.max_gap_s, 2.5 * 0.125, 1e-6);
+}
+
+/// Poses of a prism, or of a receiver: one orientation all the time tells no turns.
+TEST(MotionReferenceOfPoses, HasOrientations) {
+  CalibrationRecording driven = recording();
+  const Recording label{"drive", {}};
+  EXPECT_EQ(motion_reference(label, driven.setup, driven.data, ReferenceKind::kAuto).kind,
+            ReferenceKind::kPoses);
+  for (StampedPose& pose : driven.data.reference) pose.q_BtoW.setIdentity();
+  EXPECT_THAT(testing::error_of([&] {
+                motion_reference(label, driven.setup, driven.data, ReferenceKind::kAuto);
+              }),
+              ::testing::HasSubstr("positions alone tell no turns"));
 }
 
 TEST(YawOfGyro, IsTheIntegralOfTheTurn) {

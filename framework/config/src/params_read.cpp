@@ -13,6 +13,7 @@
 #include "viwo/api/status.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::config {
 namespace {

@@ -8,6 +8,7 @@
 #include "scalars.hpp"
 #include "viwo/config/params.hpp"
 #include "viwo/config/yaml.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::config {
 namespace {

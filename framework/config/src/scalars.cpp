@@ -1,9 +1,10 @@
 #include "scalars.hpp"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
+
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::config {
 namespace {
@@ -66,12 +67,6 @@ Parsed<bool> parse_bool(const std::string& text) {
   if (text == "true" || text == "True" || text == "TRUE") return true;
   if (text == "false" || text == "False" || text == "FALSE") return false;
   return "'" + text + "' is not true or false";
-}
-
-std::string number_text(double value) {
-  std::array<char, 32> buffer{};
-  const auto result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
-  return {buffer.data(), result.ptr};
 }
 
 std::string bounds_text(const ParamSpec& spec) {

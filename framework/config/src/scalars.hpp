@@ -20,7 +20,6 @@ Parsed<std::int64_t> parse_integer(const std::string& text, const ParamSpec& spe
 Parsed<bool> parse_bool(const std::string& text);
 
 /// Shortest text that reads back to the same bits.
-std::string number_text(double value);
 
 /// "track_m > 0", "0 <= track_m < 1", ...; "" without bounds.
 std::string bounds_text(const ParamSpec& spec);

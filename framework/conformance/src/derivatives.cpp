@@ -8,6 +8,13 @@
 #include <Eigen/QR>
 
 namespace viwo::conformance {
+
+using robot::Answer;
+using robot::Bench;
+using robot::noise_name;
+using robot::Probe;
+using robot::Signal;
+
 namespace {
 
 using Eigen::MatrixXd;

@@ -10,9 +10,18 @@
 #include "derivatives.hpp"
 
 namespace viwo::conformance {
+
+using robot::Answer;
+using robot::Bench;
+using robot::noise_name;
+using robot::Probe;
+using robot::Signal;
+
 namespace {
 
 using config::Node;
+
+Bench bench_of(const Subject& subject) { return Bench(subject.make<KinematicModel>().object); }
 
 /// The section with the numbers of one parameter a little larger; null if it has none.
 Node varied(const Node& resolved, const ParamSpec& spec) {
@@ -57,7 +66,7 @@ bool equal_values(const Answer& a, const Answer& b) {
 }  // namespace
 
 void check_description(const Subject& subject, Findings& findings) {
-  const Bench bench(subject);  // sizes and row ranges
+  const Bench bench = bench_of(subject);  // sizes and row ranges
   const ModelDescription& d = bench.description();
   std::set<std::string> names;
   for (const IntrinsicSpec& spec : d.intrinsics) {
@@ -154,7 +163,7 @@ void check_constant_A(const Bench& bench, Findings& findings) {
 }
 
 void check_repeatable(const Subject& subject, Findings& findings) {
-  const Bench bench(subject), other(subject);
+  const Bench bench = bench_of(subject), other = bench_of(subject);
   const std::vector<Probe> probes = bench.probes();
   std::vector<Answer> first;
   for (const Probe& probe : probes) first.push_back(bench.answer(probe));
@@ -253,7 +262,7 @@ void check_concurrent(const Bench& bench, Findings& findings) {
 
 std::vector<NamedCheck> kinematics_checks(const Subject& subject) {
   const auto on_bench = [&subject](void (*check)(const Bench&, Findings&)) -> Check {
-    return [&subject, check](Findings& findings) { check(Bench(subject), findings); };
+    return [&subject, check](Findings& findings) { check(bench_of(subject), findings); };
   };
   const auto on_subject = [&subject](void (*check)(const Subject&, Findings&)) -> Check {
     return [&subject, check](Findings& findings) { check(subject, findings); };

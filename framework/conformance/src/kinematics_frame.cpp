@@ -10,6 +10,12 @@
 #include "viwo/math/se2.hpp"
 
 namespace viwo::conformance {
+
+using robot::Answer;
+using robot::Bench;
+using robot::Probe;
+using robot::Signal;
+
 namespace {
 
 using Eigen::MatrixXd;

@@ -6,6 +6,11 @@
 #include "kinematics.hpp"
 
 namespace viwo::conformance {
+
+using robot::Answer;
+using robot::Bench;
+using robot::Probe;
+
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();

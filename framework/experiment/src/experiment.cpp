@@ -13,7 +13,7 @@
 
 #include "run_identity.hpp"
 #include "run_journal.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/run/parallel_for.hpp"
@@ -275,8 +275,8 @@ class Runner {
     if (!options_.keep_runs) return;
     try {
       const std::filesystem::path folder = run_folder(run);
-      log::require_no_link(folder.parent_path());
-      log::require_no_link(folder);
+      files::require_no_link(folder.parent_path());
+      files::require_no_link(folder);
       write_run(folder, setup, run.result);
     } catch (const std::exception& error) {
       throw Unwritable{error.what()};
@@ -307,7 +307,7 @@ ExperimentResult run_experiment(const ExperimentSetup& setup, const ExperimentOp
   Runner runner(options, plugins, folder, result);
   runner.check();
   // Whether results can be written shows before the work, too.
-  if (!folder.empty()) log::make_folder(folder);
+  if (!folder.empty()) files::make_folder(folder);
   if (options.folder_is_there) options.folder_is_there();
   const auto begin = std::chrono::steady_clock::now();
   result.jobs = options.jobs > 0 ? options.jobs : tbb::this_task_arena::max_concurrency();

@@ -4,7 +4,7 @@
 #include "experiment_statistics.hpp"
 #include "run_journal.hpp"
 #include "viwo/eval/json.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/math/text_stream.hpp"
 #include "viwo/report/html.hpp"
 #include "viwo/results/run_output.hpp"
@@ -164,10 +164,10 @@ std::string runs_csv(const ExperimentResult& result) {
 }  // namespace
 
 void write_experiment(const std::filesystem::path& folder, const ExperimentResult& result) {
-  log::NewResults out(folder);
-  log::write_text(out.file("runs.csv"), runs_csv(result));
-  log::write_text(out.file("summary.json"), json_text(summary_of(result)));
-  log::write_text(out.file("report.html"), report::to_html(report_of(result)));
+  files::NewResults out(folder);
+  files::write_text(out.file("runs.csv"), runs_csv(result));
+  files::write_text(out.file("summary.json"), json_text(summary_of(result)));
+  files::write_text(out.file("report.html"), report::to_html(report_of(result)));
   out.commit(kResults);
   RunJournal(folder).remove();
 }

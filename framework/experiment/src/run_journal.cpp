@@ -9,7 +9,7 @@
 
 #include "checksum.hpp"
 #include "viwo/api/status.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/results/run_record.hpp"
 
 namespace viwo::experiment {
@@ -126,8 +126,8 @@ std::optional<RunResult> RunJournal::read(const RunKey& key) const {
 void RunJournal::keep_for_shards() const {
   if (is_of_shards()) return;
   require_own_folder();
-  log::make_folder(folder_);
-  log::FileWriter(folder_ / kOfShards, log::Appears::kWholeBesideOthers).commit();
+  files::make_folder(folder_);
+  files::FileWriter(folder_ / kOfShards, files::Appears::kWholeBesideOthers).commit();
 }
 
 bool RunJournal::is_of_shards() const {
@@ -137,7 +137,7 @@ bool RunJournal::is_of_shards() const {
 
 void RunJournal::write(const RunKey& key, const RunResult& run) const {
   require_own_folder();
-  log::make_folder(folder_);
+  files::make_folder(folder_);
   const nlohmann::json entry = {{"variant", key.variant},
                                 {"recording", key.recording},
                                 {"seed", key.seed},
@@ -147,7 +147,7 @@ void RunJournal::write(const RunKey& key, const RunResult& run) const {
   nlohmann::json::to_cbor(entry, bytes);
   bytes += checksum(bytes);
   // The same shard may run twice.
-  log::FileWriter out(file_of(key), log::Appears::kWholeBesideOthers);
+  files::FileWriter out(file_of(key), files::Appears::kWholeBesideOthers);
   out.write(bytes);
   out.commit();
 }

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/run/run.hpp"
 
 namespace viwo::experiment {
@@ -49,7 +49,7 @@ class RunJournal {
   void remove() const;
 
   /// Throws InputError for a folder that is a link: what is in it may be somebody else's.
-  void require_own_folder() const { log::require_no_link(folder_); }
+  void require_own_folder() const { files::require_no_link(folder_); }
 
  private:
   std::filesystem::path file_of(const RunKey& key) const;

@@ -7,6 +7,7 @@
 #include "formats.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 #include "viwo/math/significant.hpp"
 
 namespace viwo::exports {
@@ -122,7 +123,7 @@ void Lost::radii_but_the_mean(const std::vector<Wheel>& wheels) {
 }
 
 config::Node real_number(double value) {
-  std::string text = log::number_text(value);
+  std::string text = number_text(value);
   if (text.find('.') == std::string::npos) {
     text.insert(std::min(text.find('e'), text.size()), ".0");
   }

@@ -3,7 +3,7 @@
 
 #include "formats.hpp"
 #include "viwo/config/yaml.hpp"
-#include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::exports {
 namespace {
@@ -90,8 +90,8 @@ Exported to_csv(const Robot& robot) {
   for (const auto* entries :
        {&file.intrinsics, &file.mount, &file.clock, &file.reference, &file.cameras}) {
     for (const CalibrationEntry& entry : *entries) {
-      text += field(entry.name) + "," + log::number_text(entry.estimate) + "," +
-              log::number_text(entry.sigma) + "," + field(entry.unit) + "\n";
+      text += field(entry.name) + "," + number_text(entry.estimate) + "," +
+              number_text(entry.sigma) + "," + field(entry.unit) + "\n";
     }
   }
   for (std::size_t i = 0; i < file.drive_signs.size(); ++i) {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "viwo/config/errors.hpp"
-#include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo::exports {
@@ -147,7 +147,7 @@ void check_sizes(const CalibrationFile& file) {
         name.starts_with("r_") || name == "baseline" || name == "track" || name == "wheel_base";
     if (!is_size || entry.estimate > 0.) continue;
     config::fail(entry.mark, "intrinsics." + entry.name + ".estimate: " +
-                                 log::number_text(entry.estimate) + " m is no size of a robot");
+                                 number_text(entry.estimate) + " m is no size of a robot");
   }
 }
 

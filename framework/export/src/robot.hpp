@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "viwo/api/rig.hpp"
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/calibration_file/calibration_file.hpp"
 
 namespace viwo::exports {
 

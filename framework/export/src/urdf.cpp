@@ -2,14 +2,14 @@
 #include <cmath>
 
 #include "formats.hpp"
-#include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 #include "viwo/math/rpy.hpp"
 
 namespace viwo::exports {
 namespace {
 
 std::string triple(const Eigen::Vector3d& v) {
-  return log::number_text(v[0]) + " " + log::number_text(v[1]) + " " + log::number_text(v[2]);
+  return number_text(v[0]) + " " + number_text(v[1]) + " " + number_text(v[2]);
 }
 
 std::string joint(const std::string& name, const char* type, const std::string& parent,
@@ -26,10 +26,10 @@ std::string empty_link(const std::string& name) { return "  <link name=\"" + nam
 
 std::string wheel_link(const std::string& name, double radius_m) {
   // A cylinder stands along z.
-  const std::string shape = "      <origin xyz=\"0 0 0\" rpy=\"" + log::number_text(M_PI_2) +
+  const std::string shape = "      <origin xyz=\"0 0 0\" rpy=\"" + number_text(M_PI_2) +
                             " 0 0\"/>\n      <geometry><cylinder radius=\"" +
-                            log::number_text(radius_m) + "\" length=\"" +
-                            log::number_text(0.5 * radius_m) + "\"/></geometry>\n";
+                            number_text(radius_m) + "\" length=\"" + number_text(0.5 * radius_m) +
+                            "\"/></geometry>\n";
   return "  <link name=\"" + name + "\">\n    <visual>\n" + shape +
          "    </visual>\n    <collision>\n" + shape + "    </collision>\n  </link>\n";
 }

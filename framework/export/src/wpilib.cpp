@@ -2,14 +2,14 @@
 #include <cmath>
 
 #include "formats.hpp"
-#include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::exports {
 namespace {
 
 std::string numbers(const std::vector<double>& values) {
   std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + log::number_text(value);
+  for (const double value : values) text += (text.empty() ? "" : ", ") + number_text(value);
   return text;
 }
 
@@ -18,7 +18,7 @@ std::string constant(const std::string& type, const std::string& name, const std
 }
 
 std::string place(double x_m, double y_m) {
-  return "new Translation2d(" + log::number_text(x_m) + ", " + log::number_text(y_m) + ")";
+  return "new Translation2d(" + number_text(x_m) + ", " + number_text(y_m) + ")";
 }
 
 std::string radii(const std::vector<Wheel>& wheels) {
@@ -75,7 +75,7 @@ std::string mecanum(const Robot& robot) {
 
 std::string differential(const Robot& robot) {
   return "  // Left, right.\n" + radii(robot.wheels) + inverted(robot, robot.wheels) +
-         constant("double", "kTrackWidthMeters", log::number_text(robot.track_m)) +
+         constant("double", "kTrackWidthMeters", number_text(robot.track_m)) +
          kinematics("DifferentialDriveKinematics", "kTrackWidthMeters");
 }
 
@@ -113,8 +113,8 @@ Exported to_wpilib(const Robot& robot) {
       "where rotations become metres");
   return {head(robot, lost.texts(), "// ") + "\n" + imports +
               "\npublic final class ViwoConstants {\n" +
-              constant("double", "kWheelRadiusMeters", log::number_text(robot.mean_radius_m())) +
-              body + "\n  private ViwoConstants() {}\n}\n",
+              constant("double", "kWheelRadiusMeters", number_text(robot.mean_radius_m())) + body +
+              "\n  private ViwoConstants() {}\n}\n",
           lost.texts()};
 }
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/calibration_file/calibration_file.hpp"
 
 namespace viwo::exports {
 

@@ -21,6 +21,7 @@
 #include "viwo/export/export_calibration.hpp"
 #include "viwo/log/kalibr.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo::exports {
@@ -111,7 +112,7 @@ TEST(Export, RefusesWhatIsNoRobot) {
     CalibrationFile file = differential();
     file.intrinsics[1].estimate = size;
     EXPECT_THAT(error_of([&] { export_calibration(file, "urdf"); }),
-                HasSubstr("intrinsics.r_right.estimate: " + log::number_text(size) +
+                HasSubstr("intrinsics.r_right.estimate: " + number_text(size) +
                           " m is no size of a robot"));
   }
   CalibrationFile file = differential();

@@ -6,9 +6,10 @@
 #include <string_view>
 #include <utility>
 
-#include "checks.hpp"
 #include "plots.hpp"
 #include "remedies.hpp"
+#include "viwo/checks/checks.hpp"
+#include "viwo/wheel_checks/wheel_checks.hpp"
 
 namespace viwo::inspect {
 
@@ -171,22 +172,6 @@ void demote_consequences(const Recording& recording, Findings& findings) {
 }
 
 }  // namespace
-
-bool is_fault(const Findings& findings, std::string_view sensor, std::string_view check) {
-  return is_fault_of(findings, sensor, {&check, 1});
-}
-
-const char* name(Severity severity) {
-  switch (severity) {
-    case Severity::kFits:
-      return "fits";
-    case Severity::kNote:
-      return "note";
-    case Severity::kFault:
-      break;
-  }
-  return "fault";
-}
 
 bool Inspection::has_faults() const {
   return std::any_of(findings.begin(), findings.end(),

@@ -11,8 +11,8 @@
 #include "viwo/config/overrides.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/eval/json.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/inspect/inspection.hpp"
-#include "viwo/log/files.hpp"
 #include "viwo/report/html.hpp"
 
 namespace viwo::inspect {
@@ -155,9 +155,9 @@ report::Document report_of(const Inspection& inspection) {
 }
 
 void write_inspection(const std::filesystem::path& folder, const Inspection& inspection) {
-  log::NewResults out(folder);
-  log::write_text(out.file("inspection.json"), json_text(to_json(inspection)));
-  log::write_text(out.file("report.html"), report::to_html(report_of(inspection)));
+  files::NewResults out(folder);
+  files::write_text(out.file("inspection.json"), json_text(to_json(inspection)));
+  files::write_text(out.file("report.html"), report::to_html(report_of(inspection)));
   out.commit({"inspection.json", "report.html"});
 }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "checks.hpp"
+#include "viwo/checks/checks.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/report/curves.hpp"
 #include "viwo/series/rate_grid.hpp"

@@ -12,7 +12,7 @@
 #include <zlib.h>
 
 #include "viwo/api/status.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/config/regular_file.hpp"
 
 namespace viwo::log {
 namespace {
@@ -73,7 +73,7 @@ void ByteReader::Closer::operator()(Source* source) const {
 }
 
 ByteReader::ByteReader(const std::filesystem::path& file) : source_(new Source) {
-  require_regular_file(file);
+  config::require_regular_file(file);
   Source& source = *source_;
   source.fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   source.stream.next_in = source.bytes.data();

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "viwo/api/status.hpp"
-#include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::log {
 namespace {

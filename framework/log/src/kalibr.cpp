@@ -15,6 +15,7 @@
 #include "viwo/config/yaml.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_reader.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::log {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "quaternion.hpp"
 #include "viwo/api/status.hpp"
-#include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 #include "viwo/math/stamp.hpp"
 
 namespace viwo::log {

@@ -8,6 +8,7 @@
 
 #include "viwo/api/stamp_order.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::log {
 namespace {
@@ -20,13 +21,6 @@ std::optional<T> parse_whole(std::string_view text) {
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc{} || result.ptr != text.data() + text.size()) return std::nullopt;
   return value;
-}
-
-template <class T>
-void append_whole(std::string& out, T value) {
-  std::array<char, 32> digits{};
-  const auto result = std::to_chars(digits.data(), digits.data() + digits.size(), value);
-  out.append(digits.data(), result.ptr);
 }
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -148,15 +142,6 @@ std::optional<std::int64_t> parse_time_ns(std::string_view text, TimeUnit unit) 
   const bool round_up = decimal->digits.size() > kept && decimal->digits[kept] >= '5';
   const std::int64_t rounded = *value + (round_up ? 1 : 0);
   return decimal->negative ? -rounded : rounded;
-}
-
-void append_number(std::string& out, double value) { append_whole(out, value); }
-void append_number(std::string& out, std::int64_t value) { append_whole(out, value); }
-
-std::string number_text(double value) {
-  std::string out;
-  append_number(out, value);
-  return out;
 }
 
 std::string quoted(std::string_view text) {

@@ -11,6 +11,7 @@
 #include "viwo/log/stamp_filter.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_reader.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::log {
 namespace {
@@ -88,7 +89,8 @@ Trajectory read_tum(const std::filesystem::path& file) {
   return trajectory;
 }
 
-TumWriter::TumWriter(const std::filesystem::path& file, Appears appears) : out_(file, appears) {
+TumWriter::TumWriter(const std::filesystem::path& file, files::Appears appears)
+    : out_(file, appears) {
   out_ << "# t[s] x[m] y[m] z[m] qx qy qz qw\n";
 }
 

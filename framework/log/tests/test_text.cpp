@@ -2,18 +2,14 @@
 #include <cmath>
 #include <cstring>
 #include <random>
-#include <sstream>
 
 #include <gmock/gmock.h>
-#include <sys/stat.h>
 
 #include "log_files.hpp"
-#include "viwo/log/files.hpp"
-#include "viwo/log/printable_output.hpp"
 #include "viwo/log/table_reader.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/log/text_reader.hpp"
-#include "viwo/log/text_writer.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::log {
 namespace {
@@ -23,7 +19,6 @@ using ::testing::EndsWith;
 
 class TextReaderTest : public InFolder {};
 class TableReaderTest : public InFolder {};
-class TextWriterTest : public InFolder {};
 
 std::vector<std::string> lines_of(const std::filesystem::path& file) {
   TextReader reader(file);
@@ -174,6 +169,8 @@ TEST(Suggestions, OfManyNamesBeginWithTheNearestAndEndAtAWholeName) {
 
 TEST(Texts, ShowBytesThatAreNoTextAsTheirNumbers) {
   EXPECT_EQ(quoted("a\x01 \xc3\xb6 \xff\xc3"), "'a? \xc3\xb6 \\xff\\xc3'");
+  EXPECT_EQ(printable("\x1b[2J\n\xc2\x9b|\xe2\x80\xa8|\xe2\x80\xa6\xff"),
+            "?[2J??|?|\xe2\x80\xa6\\xff");
 }
 
 TEST_F(TableReaderTest, ReadsEitherSeparatorAndAHeaderBehindAHash) {
@@ -272,71 +269,6 @@ TEST_F(TableReaderTest, RefusesAQuantityThatIsThereTwice) {
   EXPECT_EQ(error_of([&] { table.column("w", "rad s^-1"); }), both);
   EXPECT_EQ(error_of([&] { table.column_in_any_unit("w"); }), both);
   EXPECT_EQ(table.column("v", "m s^-1"), 2U);
-}
-
-TEST_F(TextWriterTest, ReportsAFullDiskAndAMissingFolder) {
-  EXPECT_EQ(error_of<std::runtime_error>([] {
-              TextWriter out("/dev/full");
-              out << "text";
-              out.close();
-            }),
-            "cannot write /dev/full: No space left on device");
-  EXPECT_EQ(error_of<std::runtime_error>([&] { TextWriter{folder_ / "none" / "a"}; }),
-            "cannot write " + (folder_ / "none" / "a").string() + ": No such file or directory");
-}
-
-TEST_F(TextWriterTest, WritesIntoNoFileThatALinkLeadsTo) {
-  const auto others = folder_ / "others.txt", file = folder_ / "file.txt";
-  write_text(others, "of somebody else");
-  for (const Appears appears : {Appears::kWhole, Appears::kAtOnce}) {
-    for (const char* end : {"", ".tmp"}) {
-      const auto link = file.string() + end;
-      std::filesystem::remove(link);
-      std::filesystem::create_symlink(others, link);
-      FileWriter out(file, appears);
-      out.write("text");
-      out.commit();
-      EXPECT_EQ(text_of(file), "text");
-      EXPECT_EQ(text_of(others), "of somebody else");
-      EXPECT_FALSE(std::filesystem::is_symlink(file));
-      std::filesystem::remove(link);
-    }
-  }
-}
-
-TEST_F(TextWriterTest, DoesNotWaitForThoseWhoReadAPipe) {
-  const auto pipe = folder_ / "pipe", file = folder_ / "beside.txt";
-  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_EQ(error_of<std::runtime_error>([&] { write_text(pipe, "text"); }),
-            "cannot write " + pipe.string() + ": No such device or address");
-  ASSERT_EQ(::mkfifo((file.string() + ".tmp").c_str(), 0600), 0);
-  write_text(file, "text");
-  EXPECT_EQ(text_of(file), "text");
-}
-
-TEST_F(TextWriterTest, WritesUtf8WhateverTheTexts) {
-  const auto file = folder_ / "names.csv";
-  TextWriter out(file);
-  out << "caf\xe9,"
-      << "caf\xc3\xa9\n";
-  out.close();
-  EXPECT_EQ(text_of(file), "caf\xef\xbf\xbd,caf\xc3\xa9\n");
-  write_text(file, "na\xefve");
-  EXPECT_EQ(text_of(file), "na\xef\xbf\xbdve");
-  write_bytes(file, "na\xefve");
-  EXPECT_EQ(text_of(file), "na\xefve");
-}
-
-TEST(PrintableOutput, LetsNoControlCharacterThrough) {
-  std::ostringstream terminal;
-  {
-    const PrintableOutput guard(terminal);
-    terminal << "\x1b]0;title\x07\tcaf\xc3\xa9 \xc2\xa0|\xc2" << std::flush << "\x9b"
-             << "2J\r\x7f\n";
-  }
-  EXPECT_EQ(terminal.str(), "?]0;title?\tcaf\xc3\xa9 \xc2\xa0|?2J??\n");
-  EXPECT_EQ(printable("\x1b[2J\n\xc2\x9b|\xe2\x80\xa8|\xe2\x80\xa6\xff"),
-            "?[2J??|?|\xe2\x80\xa6\\xff");
 }
 
 }  // namespace

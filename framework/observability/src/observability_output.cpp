@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "viwo/eval/json.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/text_stream.hpp"
 #include "viwo/observability/observability.hpp"
@@ -246,9 +246,9 @@ report::Document report_of(const ObservabilityReport& report) {
 }
 
 void write_observability(const std::filesystem::path& folder, const ObservabilityReport& report) {
-  log::NewResults out(folder);
-  log::write_text(out.file("observability.json"), json_text(to_json(report)));
-  log::write_text(out.file("report.html"), report::to_html(report_of(report)));
+  files::NewResults out(folder);
+  files::write_text(out.file("observability.json"), json_text(to_json(report)));
+  files::write_text(out.file("report.html"), report::to_html(report_of(report)));
   out.commit({"observability.json", "report.html"});
 }
 

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "viwo/eval/json.hpp"
-#include "viwo/log/files.hpp"
-#include "viwo/log/text_writer.hpp"
+#include "viwo/files/files.hpp"
+#include "viwo/files/text_writer.hpp"
 #include "viwo/log/tum.hpp"
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
@@ -53,7 +53,7 @@ std::string result_text(const PlanSetup& setup, const Plan& plan) {
 void write_motion(const std::filesystem::path& folder, const Plan& plan) {
   const auto twist = twist_of(plan);
   sim::PoseIntegrator integrator(sim::PlanarMotion("plan", twist), 0.005);
-  log::TextWriter table(folder / "plan.csv");
+  files::TextWriter table(folder / "plan.csv");
   table << "time_s,x_m,y_m,yaw_rad,v_x_m_per_s,v_y_m_per_s,omega_rad_per_s\n";
   Trajectory trajectory;
   const auto rows = static_cast<int>(std::ceil(plan.duration_s() / kRow_s));
@@ -168,10 +168,10 @@ std::string pad(const std::string& text, std::size_t width) {
 }  // namespace
 
 void write_plan(const std::filesystem::path& folder, const PlanSetup& setup, const Plan& plan) {
-  log::NewResults out(folder);
+  files::NewResults out(folder);
   write_motion(out.folder(), plan);
-  log::write_text(out.file("summary.json"), json_text(summary_of(setup, plan)));
-  log::write_text(out.file("report.html"), report::to_html(page_of(setup, plan)));
+  files::write_text(out.file("summary.json"), json_text(summary_of(setup, plan)));
+  files::write_text(out.file("report.html"), report::to_html(page_of(setup, plan)));
   out.commit({"summary.json", "report.html"});
 }
 

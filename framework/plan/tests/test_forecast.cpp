@@ -9,6 +9,7 @@
 #include "viwo/config/yaml.hpp"
 #include "viwo/plan/forecast.hpp"
 #include "viwo/run/run.hpp"
+#include "viwo/setup/calibration_values.hpp"
 #include "viwo/setup/configuration.hpp"
 
 namespace viwo {

@@ -190,7 +190,7 @@ std::optional<Lag> find_lag(const RateGrid& a, const RateGrid& b, double most_s)
   const double r = near ? std::abs(near->correlation) : 0.;
   if (r >= kAlike) return near;
   const std::optional<Lag> far = far_lag(a, b);
-  const bool is_found = far && std::abs(far->lag_s) > most_s &&
+  const bool is_found = far && (!near || std::abs(far->lag_s) > most_s) &&
                         std::abs(far->correlation) > std::max(kAlike, 1.25 * r);
   return is_found ? far : near;
 }

@@ -8,6 +8,7 @@
 #include "viwo/config/regular_file.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo {
@@ -105,10 +106,10 @@ void CalibrationStart::take_intrinsics(const std::string& set, const WheelModel&
                  entry->name + ": its unit is '" + entry->unit + "', not '" + spec.unit + "'");
     }
     if (!(entry->estimate >= spec.lowest && entry->estimate <= spec.highest)) {
-      errors.add(entry->mark, entry->name + ": " + log::number_text(entry->estimate) +
+      errors.add(entry->mark, entry->name + ": " + number_text(entry->estimate) +
                                   " is beyond what the model '" + model_name + "' takes, " +
-                                  log::number_text(spec.lowest) + " to " +
-                                  log::number_text(spec.highest) + " " + spec.unit);
+                                  number_text(spec.lowest) + " to " + number_text(spec.highest) +
+                                  " " + spec.unit);
     }
     const auto k = static_cast<Eigen::Index>(i);
     x_WI[k] = entry->estimate;

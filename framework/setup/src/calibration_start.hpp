@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/calibration_file/calibration_file.hpp"
 #include "viwo/setup/run_setup.hpp"
 
 namespace viwo {

@@ -1,4 +1,6 @@
 // What a filter knows of its calibration, by name, and as a calibration.yaml.
+#include "viwo/setup/calibration_values.hpp"
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -7,7 +9,6 @@
 #include <vector>
 
 #include "viwo/math/so3.hpp"
-#include "viwo/setup/calibration_file.hpp"
 #include "viwo/setup/filter_setup.hpp"
 #include "viwo/setup/run_setup.hpp"
 

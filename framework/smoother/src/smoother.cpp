@@ -15,7 +15,7 @@
 #include "viwo/config/overrides.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/run/parallel_for.hpp"
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/setup/calibration_values.hpp"
 
 namespace viwo::smoother {
 namespace {

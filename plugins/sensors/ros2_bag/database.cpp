@@ -9,7 +9,7 @@
 
 #include "viwo/api/stamp_order.hpp"
 #include "viwo/api/status.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 
 namespace viwo::bag {
 
@@ -55,7 +55,7 @@ void defend(sqlite3* database) {
 }  // namespace
 
 Database::Database(const fs::path& link) : name_(link.string()) {
-  log::require_regular_file(link);
+  files::require_regular_file(link);
   std::error_code error;
   // SQLite looks for what is beside the file that a link leads to.
   const fs::path file = fs::weakly_canonical(link, error);
@@ -63,7 +63,7 @@ Database::Database(const fs::path& link) : name_(link.string()) {
   if (error) throw InputError(name_ + "  cannot be read: " + error.message());
   if (size == 0) throw InputError(name_ + "  is empty");
   for (const char* const beside : {"-journal", "-wal", "-shm"}) {
-    log::require_regular_file(file.string() + beside);
+    files::require_regular_file(file.string() + beside);
   }
   // Of a recorder that was killed most may still be in the log beside it.
   const auto size_of = [&file](const char* beside) {

@@ -10,7 +10,7 @@
 
 #include "mcap_records.hpp"
 #include "viwo/api/status.hpp"
-#include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::bag {
 
@@ -262,7 +262,7 @@ class McapFile::Reading {
       const double by_time = read_messages_ * span_ns(chunk) / read_ns_;
       const auto most = static_cast<double>(chunk.whole_bytes / mcap::kMessageHead);
       n = std::max(n, std::min(by_time, most));
-      more = ", which has " + log::number_text(1e-9 * span_ns(chunk)) +
+      more = ", which has " + number_text(1e-9 * span_ns(chunk)) +
              " s: their number is that of others in this time";
     }
     damage_.add(

@@ -9,7 +9,7 @@
 
 #include "cdr_message.hpp"
 #include "ros2_definitions.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 
 namespace viwo::bag {
 
@@ -121,7 +121,7 @@ void Ros2Writer::write_metadata() const {
   times(out);
   out << YAML::Key << "message_count" << n << YAML::EndMap << YAML::EndSeq;
   out << YAML::EndMap << YAML::EndMap;
-  log::write_text(file_.parent_path() / "metadata.yaml", std::string(out.c_str()) + "\n");
+  files::write_text(file_.parent_path() / "metadata.yaml", std::string(out.c_str()) + "\n");
 }
 
 }  // namespace viwo::bag

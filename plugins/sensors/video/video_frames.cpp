@@ -7,8 +7,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "viwo/api/status.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/image/silent_opencv.hpp"
-#include "viwo/log/files.hpp"
 
 namespace viwo::video {
 namespace {
@@ -21,7 +21,7 @@ Frames::Frames(std::filesystem::path file) : file_(std::move(file)) {
   if (!std::filesystem::exists(file_)) {
     throw InputError(file_.string() + "  cannot be read: No such file or directory");
   }
-  log::require_regular_file(file_);
+  files::require_regular_file(file_);
   open();
 }
 

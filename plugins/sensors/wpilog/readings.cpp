@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "viwo/api/status.hpp"
-#include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::wpilog {
 namespace {
@@ -82,7 +82,7 @@ class Track {
       return;
     }
     throw InputError(contents_.file() + "  the entry '" + entry_.name + "' has two values within " +
-                     log::number_text(1e-6 * static_cast<double>(options.spread_us)) + " s " +
+                     number_text(1e-6 * static_cast<double>(options.spread_us)) + " s " +
                      std::to_string(count) + " times in " + std::to_string(events_.size()) +
                      " records (first at byte " + std::to_string(first) +
                      "): are two things written under one name? They cannot be told apart here; "

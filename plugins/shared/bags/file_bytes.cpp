@@ -8,12 +8,12 @@
 #include <unistd.h>
 
 #include "viwo/api/status.hpp"
-#include "viwo/log/files.hpp"
+#include "viwo/files/files.hpp"
 
 namespace viwo::bag {
 
 FileBytes::FileBytes(std::string name) : name_(std::move(name)) {
-  log::require_regular_file(name_);
+  files::require_regular_file(name_);
   fd_ = ::open(name_.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd_ < 0) fail(std::strerror(errno));
   const off_t end = ::lseek(fd_, 0, SEEK_END);

@@ -7,8 +7,8 @@
 
 #include <Eigen/Geometry>
 
-#include "viwo/log/text.hpp"
 #include "viwo/math/arrays.hpp"
+#include "viwo/math/number_text.hpp"
 #include "viwo/math/so3.hpp"
 
 namespace viwo::live {
@@ -80,7 +80,7 @@ Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health)
     trouble += (trouble.empty() ? "" : "; ") + text;
   };
   if (estimate.latency_s > health.warn_latency_s) {
-    warn("latency " + log::number_text(std::round(estimate.latency_s * 1e3) * 1e-3) + " s");
+    warn("latency " + number_text(std::round(estimate.latency_s * 1e3) * 1e-3) + " s");
   }
   if (!health.trouble.empty()) warn(health.trouble);
   for (const std::string& topic : health.silent_topics) warn("nothing on topic '" + topic + "'");
@@ -95,7 +95,7 @@ Diagnostics diagnostics_of(const EstimateSample& estimate, const Health& health)
   message.warns = !trouble.empty();
   message.message = trouble.empty() ? "ok" : trouble;
   const auto add = [&message](const std::string& key, double value) {
-    message.values.emplace_back(key, log::number_text(value));
+    message.values.emplace_back(key, number_text(value));
   };
   if (std::isfinite(estimate.latency_s)) add("latency_s", estimate.latency_s);
   add("started anew", estimate.piece);

@@ -10,6 +10,7 @@
 
 #include "viwo/api/status.hpp"
 #include "viwo/log/text.hpp"
+#include "viwo/math/number_text.hpp"
 
 namespace viwo::live {
 namespace {
@@ -96,7 +97,7 @@ Status TopicSensor::next(Measurement& out) {
     hurries_ = !last_use;  // who hears nothing is to know of which topics, before it ends
     if (!hurries_ || named_missing_ || idle > idle_timeout_ + kNamingWait) {
       end(LogLevel::kInfo, "nothing has come for " +
-                               log::number_text(1e-3 * double(idle_timeout_.count())) +
+                               number_text(1e-3 * double(idle_timeout_.count())) +
                                " s (idle_timeout_s)");
     }
   }

@@ -125,6 +125,8 @@ struct TurnAgreement {
   void add(double wheels_rad, double reference_rad);
   /// Correlation about zero, -1 .. 1; 0 where nothing turns.
   double correlation() const;
+  /// By how many sigmas that is more than chance.
+  double sigmas() const;
   /// How many times as much the reference turns.
   double ratio() const;
 };
@@ -249,14 +251,11 @@ CalibrationEstimate fit(const CalibrationSetup& setup, const std::vector<std::si
 /// The wheels of a recording alone, with an estimate.
 RunResult dead_reckon(const CalibrationRecording& recording, const CalibrationEstimate& estimate);
 
+/// "2 s", "whole recordings", ...
+std::string segments_text(const CalibrationEstimate& estimate);
+
 /// All of the data, and without what is left out in turn. Drives that turn backwards are put right
 /// in `setup`. Throws InputError where nothing is left to fit.
 CalibrationResult calibrate(CalibrationSetup& setup, WorkProgress& progress = no_progress());
-
-/// Writes calibration.yaml, summary.json and report.html.
-void write_calibration(const std::filesystem::path& folder, const CalibrationResult& result);
-
-/// Tables for the terminal.
-std::string describe(const CalibrationResult& result);
 
 }  // namespace viwo::calibration

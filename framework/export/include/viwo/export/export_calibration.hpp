@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "viwo/setup/calibration_file.hpp"
+#include "viwo/calibration_file/calibration_file.hpp"
 
 namespace viwo::exports {
 

@@ -8,35 +8,11 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "viwo/plausibility/finding.hpp"
+#include "viwo/checks/finding.hpp"
 #include "viwo/report/document.hpp"
 #include "viwo/setup/run_setup.hpp"
 
 namespace viwo::inspect {
-
-enum class Severity {
-  kFits,   ///< as it should be
-  kNote,   ///< worth knowing, nothing that spoils a run
-  kFault,  ///< a run with it is worse than it need be, or wrong
-};
-const char* name(Severity severity);
-
-struct Figure {
-  std::string name;
-  double value = 0.;  ///< NaN: there is none
-  std::string unit;   ///< "" for none
-};
-
-/// What one check says of one sensor.
-struct Finding {
-  std::string sensor;
-  Severity severity = Severity::kFits;
-  std::string check;  ///< "stamps", "gravity", ...: the same for the same thing in every recording
-  std::string what;   ///< in words
-  std::vector<Figure> figures = {};
-  std::vector<Remedy> remedies = {};
-};
-using Findings = std::vector<Finding>;
 
 struct Inspection {
   std::string name;

@@ -31,11 +31,6 @@ inline std::optional<std::int64_t> parse_seconds_ns(std::string_view text) {
   return parse_time_ns(text, TimeUnit::kSecond);
 }
 
-/// Shortest text that reads back to the same bits.
-void append_number(std::string& out, double value);
-void append_number(std::string& out, std::int64_t value);
-std::string number_text(double value);
-
 /// For messages: control characters are '?', bytes that are no UTF-8 "\xff".
 std::string printable(std::string_view text);
 /// The same in quotes, cut after 40 characters.

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "viwo/log/text_writer.hpp"
+#include "viwo/files/text_writer.hpp"
 #include "viwo/math/trajectory.hpp"
 
 namespace viwo::log {
@@ -17,7 +17,8 @@ Trajectory read_tum(const std::filesystem::path& file);
 /// Writes a trajectory pose by pose. std::runtime_error when that fails.
 class TumWriter {
  public:
-  explicit TumWriter(const std::filesystem::path& file, Appears appears = Appears::kWhole);
+  explicit TumWriter(const std::filesystem::path& file,
+                     files::Appears appears = files::Appears::kWhole);
   /// Seconds with nine decimals and shortest numbers that read back to the same bits.
   void add(const StampedPose& pose);
   /// What was added is in the file.
@@ -26,7 +27,7 @@ class TumWriter {
   void close() { out_.close(); }
 
  private:
-  TextWriter out_;
+  files::TextWriter out_;
 };
 
 /// All of it.

@@ -42,6 +42,13 @@ inline Eigen::Vector3d planar(const StampedPose& pose) {
   return {yaw(pose), pose.p_BinW.x(), pose.p_BinW.y()};
 }
 
+/// Whether it has orientations: a prism has none, and gives the same all the time.
+inline bool are_turned(const Trajectory& poses) {
+  return std::any_of(poses.begin(), poses.end(), [&](const StampedPose& pose) {
+    return pose.q_BtoW.angularDistance(poses.front().q_BtoW) > 1e-6;
+  });
+}
+
 /// The pose at `t_ns`: linear in position, slerp in orientation. Nothing outside of the trajectory,
 /// and nothing between two poses that are more than `max_gap_s` apart.
 inline std::optional<StampedPose> interpolate(const Trajectory& trajectory, std::int64_t t_ns,
