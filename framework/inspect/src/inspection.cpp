@@ -116,6 +116,12 @@ std::string cause_of(const Finding& finding, const Findings& all, const std::str
     return !is_one_of(check, causes) && is_fault_of(all, sensor, causes);
   };
   if (check == "steer offsets" && is_fault_of(all, sensor, kOrder)) return sensor;
+  // Whatever else is wrong with wheels is why they turn otherwise.
+  if (check == "yaw" && std::ranges::any_of(all, [&](const Finding& other) {
+        return other.severity == Severity::kFault && other.sensor == sensor && other.check != check;
+      })) {
+    return sensor;
+  }
   if (sensor != imu && follows(kWheelCauses)) {
     return is_of_stamps(check) && check != "clock" ? "" : sensor;
   }
@@ -125,7 +131,7 @@ std::string cause_of(const Finding& finding, const Findings& all, const std::str
   const bool compares = check == "parity" || check == "speed" || check == "clock";
   if (compares && follows(kContradicted)) return sensor;
   if (gyro.empty()) return "";
-  if (check == "clock" || check == "turns") return gyro;
+  if (check == "clock" || check == "turns" || check == "yaw") return gyro;
   const bool shows = sensor == gyro && check != "axes";
   return shows && !is_one_of(check, kImuCauses) && !is_of_stamps(check) ? gyro : "";
 }

@@ -14,6 +14,9 @@ namespace viwo {
 
 namespace {
 
+/// No base goes so fast.
+constexpr double kImpossible_m_per_s = 60.;
+
 /// Symmetric; of what is held, too.
 IntrinsicMatrix root_of(const Eigen::MatrixXd& P) {
   if (P.size() == 0) return {};
@@ -57,6 +60,11 @@ std::optional<Twist> EncoderCheck::add(const EncoderSample& sample) {
     if (was_gross && is_solved) add_by_prior(sample);
   }
   if (!is_solved || solution_.rank_deficient) return {};
+  const double speed = solution_.xi.head<2>().norm();
+  if (speed > kImpossible_m_per_s) {
+    if (impossible_++ == 0) first_impossible_ns_ = sample.t_ns;
+    fastest_m_per_s_ = std::max(fastest_m_per_s_, speed);
+  }
   return solution_.xi;
 }
 
@@ -93,6 +101,7 @@ void EncoderCheck::watch_steering(const EncoderSample& sample) {
 
 void EncoderCheck::findings(std::int64_t zero_ns, Findings& out) const {
   find_stuck(zero_ns, out);
+  find_jumps(zero_ns, out);
   const std::size_t before = out.size();
   find_change(out);
   if (out.size() == before) find_degrees(out);
@@ -116,6 +125,18 @@ void EncoderCheck::find_stuck(std::int64_t zero_ns, Findings& out) const {
          {},
          are_all});
   }
+}
+
+/// Now and then: what is so all the time is a unit.
+void EncoderCheck::find_jumps(std::int64_t zero_ns, Findings& out) const {
+  if (impossible_ == 0 || 5 * impossible_ > samples_) return;
+  out.push_back({name_ + " jumps",
+                 name_ + ": " + std::to_string(impossible_) +
+                     (impossible_ == 1 ? " sample says" : " samples say") + " that the base goes " +
+                     significant(fastest_m_per_s_, 3) + " m/s (the fastest), first at " +
+                     time_text(first_impossible_ns_ - zero_ns) +
+                     ": a counter or an angle that began anew (drive_turn of tables: where it "
+                     "does), or readings that are none"});
 }
 
 /// Angles beyond a turn are right where an encoder counts turns, but not so fast.

@@ -36,6 +36,7 @@ class EncoderCheck {
   void add_by_prior(const EncoderSample& sample);
   void watch_steering(const EncoderSample& sample);
   void find_stuck(std::int64_t zero_ns, Findings& out) const;
+  void find_jumps(std::int64_t zero_ns, Findings& out) const;
   void find_degrees(Findings& out) const;
   void find_change(Findings& out) const;
   void find_gross(std::int64_t zero_ns, Findings& out) const;
@@ -53,6 +54,8 @@ class EncoderCheck {
   std::optional<EncoderSample> last_;
   std::int64_t beyond_turn_ = 0, too_fast_ = 0;  ///< samples with such steering angles
   double largest_steer_ = 0.;
+  std::int64_t impossible_ = 0, first_impossible_ns_ = 0;  ///< samples of impossible speeds
+  double fastest_m_per_s_ = 0.;
 };
 
 }  // namespace viwo

@@ -94,6 +94,7 @@ class TwistCheck {
 
   void advance();
   void begin_anew();
+  bool accelerates_as_wheels(const Eigen::MatrixXd& C) const;
   bool find_factor(double slope, double r, const Eigen::MatrixXd& C, Findings& out) const;
   bool finds_slip(std::int64_t zero_ns, Findings& out) const;
   bool finds_disagreement(Findings& out) const;
@@ -117,6 +118,7 @@ class TwistCheck {
   std::string gyro_unit_, drive_scale_;  ///< keys of the configuration
   Gyro gyro_is_;
   int n_drive_, n_steer_;
+  bool is_redundant_;  ///< the wheels can contradict each other
   Eigen::Matrix3d R_ItoO_;
   Eigen::Vector2d p_IinO_;
   double t_OtoI_s_, sigma_t_OtoI_s_;

@@ -49,9 +49,10 @@ bool TwistCheck::finds_slip(std::int64_t zero_ns, Findings& out) const {
 /// They have little in common, and it is no lag, no sign, no unit and no slip.
 bool TwistCheck::finds_disagreement(Findings& out) const {
   if (!disagreement_) return false;
-  // What the wheels may be off by, for all that is known of them before.
+  // What the wheels may be off by, for all that is known of them before. Of those that can
+  // contradict each other a filter leaves out the one that is wrong.
   const double by_prior = std::sqrt(prior_squares_ / static_cast<double>(std::max(1L, rates_)));
-  out.push_back({wheels_ + " turn",
+  out.push_back({wheels_ + " yaw",
                  wheels_ + ": turn otherwise than " + imu_ + " for " +
                      significant(100. * disagreement_->part, 2) +
                      " % of the time that they move, by " +
@@ -60,7 +61,7 @@ bool TwistCheck::finds_disagreement(Findings& out) const {
                      "one that is not read, order or zeros of the channels, or the gyro",
                  false,
                  {},
-                 disagreement_->median_rad_per_s > 2. * by_prior});
+                 !is_redundant_ && disagreement_->median_rad_per_s > 2. * by_prior});
   return true;
 }
 
@@ -107,6 +108,20 @@ void TwistCheck::findings(const Eigen::Vector3d& up, std::int64_t zero_ns, Findi
   find_turned(C, out);
 }
 
+/// Whether the accelerometer feels what the velocity of the wheels tells, in size.
+bool TwistCheck::accelerates_as_wheels(const Eigen::MatrixXd& C) const {
+  if (gyro_is_ != Gyro::kMounted) return false;
+  constexpr double kPart = 0.5;
+  double covariance = 0., variance = 0.;
+  for (int i = 0; i < 2; ++i) {
+    Entries told = Entries::Zero();
+    told[kChange + i] = told[kTurn + i] = 1.;
+    covariance += C.row(kForce + i).dot(told);
+    variance += told.dot(C * told);
+  }
+  return covariance > kPart * variance;
+}
+
 /// The rates are alike but for a factor.
 bool TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
                              Findings& out) const {
@@ -122,6 +137,13 @@ bool TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
                                                    : ": it is in deg/s"),
                    false,
                    {{gyro_unit_, "deg"}}});
+  } else if (is_about(std::abs(slope), 1. / kDeg) && accelerates_as_wheels(C)) {
+    out.push_back({key,
+                   imu_ + ": turns " + significant(std::abs(slope), 3) +
+                       " times as fast as the wheels, which accelerate as it does: its gyro is in "
+                       "rad/s, not in deg/s",
+                   false,
+                   {{gyro_unit_, "rad"}}});
   } else if (is_about(std::abs(slope), 1. / kDeg)) {
     out.push_back({key,
                    wheels_ + ": turn " + slow + ": drives are in deg/s",

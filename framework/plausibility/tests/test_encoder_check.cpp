@@ -67,7 +67,7 @@ TEST(EncoderCheck, NamesASteeringThatIsReversedThoughItStays) {
 TEST(EncoderCheck, DoesNotTakeAnglesForDegreesWhereNoneFitAsWell) {
   EXPECT_THAT(texts(driven(kCrab_rad,
                            [k = 0](EncoderSample& s) mutable {
-                             s.steer_rad[2] = std::sin(0.01 * ++k);  // whatever it is
+                             s.steer_rad[2] = 2. * std::sin(0.01 * ++k);  // whatever it is
                            })),
               ElementsAre(HasSubstr("contradict each other grossly")));
 }

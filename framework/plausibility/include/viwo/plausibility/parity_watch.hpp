@@ -19,8 +19,8 @@ struct Parity {
   bool is_gross() const;
 };
 
-/// Sums it up over the samples of a base, and by their means over pieces of half a second in which it
-/// drives: of those neither the noise of a sample nor the steps of a counter are part.
+/// Sums it up over the samples of a base, and by their means over pieces of half a second in which
+/// it drives: of those neither the noise of a sample nor the steps of a counter are part.
 class ParityWatch {
  public:
   explicit ParityWatch(std::shared_ptr<const WheelModel> model);
