@@ -113,6 +113,39 @@ bool check_sides(const Wheels& wheels, const Poses& poses, const std::string& la
   return true;
 }
 
+/// Why wheels go `ratio` times as far as poses say: the unit of one of them, if that explains it.
+void name_unit(double ratio, const Wheels& wheels, const Poses& poses, const std::string& other,
+               Finding& finding) {
+  // Of rates, and of speeds and positions that somebody has made metres of.
+  const std::array<Unit, 6> units = {Unit{180. / std::numbers::pi, "deg/s"},
+                                     Unit{30. / std::numbers::pi, "revolutions per minute"},
+                                     Unit{0.5 / std::numbers::pi, "revolutions per second"},
+                                     Unit{3.6, "km/h, taken for m/s"},
+                                     Unit{100., "cm/s, taken for m/s"},
+                                     Unit{1000., "mm/s, taken for m/s"}};
+  constexpr std::array<std::pair<double, const char*>, 2> kOfPoses = {
+      {{0.01, "cm"}, {0.001, "mm"}}};
+  const auto unit = std::find_if(units.begin(), units.end(), [&](const Unit& u) {
+    return std::abs(ratio / u.factor - 1.) < most_off(u.factor);
+  });
+  const auto* const of_poses = std::find_if(kOfPoses.begin(), kOfPoses.end(), [&](const auto& one) {
+    return std::abs(ratio / one.first - 1.) < most_off(1. / one.first);
+  });
+  if (of_poses != kOfPoses.end()) {
+    finding.what += ": positions of " + other + " are in " + of_poses->second;
+    finding.remedies = {{"sensors." + poses.sensor + ".position_unit", of_poses->second}};
+  } else if (unit != units.end()) {
+    finding.what += std::string(": drives are in ") + unit->name;
+    const auto entry = [&](std::size_t) { return significant(1. / unit->factor, 10); };
+    const auto n = static_cast<std::size_t>(wheels.model->description().n_drive);
+    finding.remedies = {{"sensors." + wheels.sensor + ".drive_scale", yaml_list(n, entry)}};
+  } else {
+    finding.what +=
+        ": radius of the wheels (a diameter?), gear ratio or counts per turn, or "
+        "their unit";
+  }
+}
+
 /// How far the wheels say that the base went, by how far the poses say.
 void check_speed(const Recording& recording, const Wheels& wheels, const Poses& poses,
                  const std::string& other, Findings& out) {
@@ -134,15 +167,6 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
                   {{"wheels by poses", ratio, ""},
                    {"windows", static_cast<double>(speeds.ratio.size()), ""},
                    {"path", speeds.path_m, "m"}}};
-  // Of rates, and of speeds and positions that somebody has made metres of.
-  const std::array<Unit, 6> units = {Unit{180. / std::numbers::pi, "deg/s"},
-                                     Unit{30. / std::numbers::pi, "revolutions per minute"},
-                                     Unit{0.5 / std::numbers::pi, "revolutions per second"},
-                                     Unit{3.6, "km/h, taken for m/s"},
-                                     Unit{100., "cm/s, taken for m/s"},
-                                     Unit{1000., "mm/s, taken for m/s"}};
-  constexpr std::array<std::pair<double, const char*>, 2> kOfPoses = {
-      {{0.01, "cm"}, {0.001, "mm"}}};
   const double spread = 1.2 *
                         (eval::quantile(speeds.ratio, 0.75) - eval::quantile(speeds.ratio, 0.25)) /
                         std::sqrt(static_cast<double>(speeds.ratio.size()));
@@ -152,26 +176,7 @@ void check_speed(const Recording& recording, const Wheels& wheels, const Poses& 
     // A gyro tells it, if there is one.
     const bool has_gyro = !recording.imu.empty() || !recording.headings.empty();
     if (!has_gyro && check_sides(wheels, poses, label, other, out)) return;
-    const auto unit = std::find_if(units.begin(), units.end(), [&](const Unit& u) {
-      return std::abs(ratio / u.factor - 1.) < most_off(u.factor);
-    });
-    const auto* const of_poses =
-        std::find_if(kOfPoses.begin(), kOfPoses.end(), [&](const auto& one) {
-          return std::abs(ratio / one.first - 1.) < most_off(1. / one.first);
-        });
-    if (of_poses != kOfPoses.end()) {
-      finding.what += ": positions of " + other + " are in " + of_poses->second;
-      finding.remedies = {{"sensors." + poses.sensor + ".position_unit", of_poses->second}};
-    } else if (unit != units.end()) {
-      finding.what += std::string(": drives are in ") + unit->name;
-      const auto entry = [&](std::size_t) { return significant(1. / unit->factor, 10); };
-      const auto n = static_cast<std::size_t>(wheels.model->description().n_drive);
-      finding.remedies = {{"sensors." + wheels.sensor + ".drive_scale", yaml_list(n, entry)}};
-    } else {
-      finding.what +=
-          ": radius of the wheels (a diameter?), gear ratio or counts per turn, or "
-          "their unit";
-    }
+    name_unit(ratio, wheels, poses, other, finding);
   }
   out.push_back(finding);
   if (has_heading && speeds.direction.size() >= kFewestWindows)

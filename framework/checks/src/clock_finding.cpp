@@ -73,13 +73,38 @@ std::optional<ClockDrift> clock_drift(const std::vector<std::pair<double, double
   return drift;
 }
 
+std::string ms(double seconds) { return significant(1e3 * seconds, 3) + " ms"; }
+
+/// A clock that was set on the way, or goes at another rate: that is what there is to be said.
+bool is_unsteady(const ClockWords& words, const Lag& lag, Finding& finding) {
+  if (const auto change = clock_change(lag.parts)) {
+    finding.severity = Severity::kFault;
+    finding.what = "its clock against that of " + words.other + " is " + ms(change->first_s) +
+                   " until about " + significant(change->at_s, 3) + " s, and " +
+                   ms(change->then_s) +
+                   " from then on: one of the two was set, or lost samples without their time";
+    finding.figures.push_back({"change", change->then_s - change->first_s, "s"});
+    return true;
+  }
+  if (const auto drift = clock_drift(lag.parts)) {
+    finding.severity = Severity::kFault;
+    finding.what = "its clock against that of " + words.other + " moves from " +
+                   ms(drift->first_s) + " to " + ms(drift->last_s) + ", by " +
+                   significant(100. * std::abs(drift->per_s), 2) +
+                   " %: one of the two counts other seconds, or its stamps are made from a rate "
+                   "that it does not have";
+    finding.figures.push_back({"drift", drift->per_s, ""});
+    return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 bool drifts(const Lag& lag) { return clock_drift(lag.parts).has_value(); }
 
 Finding clock_finding(const std::string& label, const ClockWords& words, const Lag& lag,
                       double sigma_prior_s, double period_s) {
-  const auto ms = [](double seconds) { return significant(1e3 * seconds, 3) + " ms"; };
   Finding finding{label,
                   Severity::kFits,
                   words.check,
@@ -90,25 +115,7 @@ Finding clock_finding(const std::string& label, const ClockWords& words, const L
                    {"correlation without lag", lag.at_zero, ""},
                    {"rate, standard deviation", lag.rate_rad_per_s, "rad/s"},
                    {"configured clock", words.configured_s, "s"}}};
-  if (const auto change = clock_change(lag.parts)) {
-    finding.severity = Severity::kFault;
-    finding.what = "its clock against that of " + words.other + " is " + ms(change->first_s) +
-                   " until about " + significant(change->at_s, 3) + " s, and " +
-                   ms(change->then_s) +
-                   " from then on: one of the two was set, or lost samples without their time";
-    finding.figures.push_back({"change", change->then_s - change->first_s, "s"});
-    return finding;
-  }
-  if (const auto drift = clock_drift(lag.parts)) {
-    finding.severity = Severity::kFault;
-    finding.what = "its clock against that of " + words.other + " moves from " +
-                   ms(drift->first_s) + " to " + ms(drift->last_s) + ", by " +
-                   significant(100. * std::abs(drift->per_s), 2) +
-                   " %: one of the two counts other seconds, or its stamps are made from a rate "
-                   "that it does not have";
-    finding.figures.push_back({"drift", drift->per_s, ""});
-    return finding;
-  }
+  if (is_unsteady(words, lag, finding)) return finding;
   const std::string by = ms(std::abs(lag.lag_s)) + " +- " + ms(lag.sigma_s) + " (correlation " +
                          significant(lag.correlation, 3) + ")";
   // Beyond what the filter corrects by itself, from the prior it is given, and what stamps of
