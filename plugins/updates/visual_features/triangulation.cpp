@@ -158,8 +158,7 @@ FeatureStatus triangulate(std::span<const Ray> rays, double sigma_px, double min
     point = out.point;
     move(point, out.basis, step);
     if (std::hypot(step[0], step[1], step[2] * farthest_m) <= kStepTolerance) {
-      out.point = point;  // so small a step is an improvement for sure
-      out.basis = basis_across(point.direction);
+      out.point = point;  // so small a step is an improvement for sure, and A stays in its basis
       break;
     }
   }
