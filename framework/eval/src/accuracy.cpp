@@ -105,16 +105,26 @@ RigidTransform align_first(std::span<const PosePair> first, Alignment alignment)
   return align(first, alignment == Alignment::kSe3 ? Alignment::kStart : alignment);
 }
 
-/// Whether the reference gives the same orientation all the time, and the estimate does not.
+/// Whether the reference gives the same orientation all the time while the estimate turns, and goes
+/// where the reference goes: who goes straight on may well not turn, and then the two part.
 bool are_positions_alone(const std::vector<PosePair>& pairs) {
-  constexpr double kTurns_rad = 0.1;
+  constexpr double kTurns_rad = 0.5, kPart = 0.05;
   bool turns = false;
   for (const PosePair& pair : pairs) {
-    if (pair.reference.q_BtoW.angularDistance(pairs.front().reference.q_BtoW) > 1e-6) return false;
-    turns =
-        turns || pair.estimate.q_BtoW.angularDistance(pairs.front().estimate.q_BtoW) > kTurns_rad;
+    const PosePair& first = pairs.front();
+    if (pair.reference.q_BtoW.angularDistance(first.reference.q_BtoW) > 1e-6) return false;
+    turns = turns || pair.estimate.q_BtoW.angularDistance(first.estimate.q_BtoW) > kTurns_rad;
   }
-  return turns;
+  if (!turns) return false;
+  std::vector<double> errors_m, extents_m;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const PosePair& pair : pairs) middle += pair.reference.p_BinW;
+  middle /= static_cast<double>(pairs.size());
+  for (const PosePair& pair : transformed(pairs, align(pairs, Alignment::kYawPosition))) {
+    errors_m.push_back(position_error_m(pair));
+    extents_m.push_back((pair.reference.p_BinW - middle).norm());
+  }
+  return root_mean_square(errors_m) < kPart * root_mean_square(extents_m);
 }
 
 /// A reference without orientations gets those of the estimate, in its world.

@@ -89,8 +89,9 @@ TEST(Accuracy, MeanAndRmseOverSegmentsDifferWhereErrorsDo) {
 }
 
 TEST(Accuracy, DriftBeyondHalfATurnKeepsItsSign) {
-  const Trajectory reference = arc(0., 0.1, 401);
-  Trajectory estimate = reference;  // 40 m at -0.1 rad/m: -4 rad
+  Trajectory reference = arc(0., 0.1, 401);
+  Trajectory estimate = reference;        // 40 m at -0.1 rad/m: -4 rad
+  reference[200].q_BtoW = about_z(1e-5);  // it has orientations
   for (StampedPose& pose : estimate) pose.q_BtoW = about_z(-0.1 * pose.p_BinW.x());
   const Accuracy accuracy = evaluate(reference, estimate);
   EXPECT_NEAR(accuracy.end_yaw_deg, -4. * kDegPerRad, 1e-9);

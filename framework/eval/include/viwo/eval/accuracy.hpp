@@ -64,9 +64,10 @@ struct Accuracy {
 /// of ten (m) that the path of the reference has at least three of. Throws InputError for
 /// trajectories that cannot be compared (association.hpp, alignment.hpp) and for options out of
 /// range.
-/// A reference that has the same orientation all the time while the estimate turns has positions
-/// alone: they are compared as the estimate's orientations have them, aligned by yaw and position
-/// where `start` is asked for, and errors of the orientation are NaN.
+/// A reference that has the same orientation all the time while the estimate turns by half a radian
+/// and more, and that agrees with its positions (to 5 % of their extent), has positions alone: they
+/// are compared as the estimate's orientations have them, aligned by yaw and position where `start`
+/// is asked for, and errors of the orientation are NaN.
 Accuracy evaluate(const Trajectory& reference, const Trajectory& estimate,
                   const Options& options = {});
 
