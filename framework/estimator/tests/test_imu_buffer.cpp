@@ -178,8 +178,9 @@ TEST(ImuBuffer, LeavesOutReadingsBeyondTheRange) {
   sample.gyro_rad_per_s[2] = 35.;
   bench.buffer.add(sample, bench.rejections);
   EXPECT_EQ(bench.buffer.samples().size(), 2u);
-  EXPECT_EQ(bench.rejected(),
-            (Counts{{"imu: out of range (range_gyro_rad_per_s, range_accel_m_per_s2): saturated, or of other units", 2}}));
+  EXPECT_EQ(bench.rejected(), (Counts{{"imu: out of range (range_gyro_rad_per_s, "
+                                       "range_accel_m_per_s2): saturated, or of other units",
+                                       2}}));
 }
 
 TEST(ImuBuffer, SaysWhichPartsOfACutLieInAGap) {

@@ -103,9 +103,10 @@ TEST(Contradictions, AreUpdatesThatHaveMoreRejectedThanGatesDoByChance) {
   EXPECT_FALSE(warned(29, 11));
   EXPECT_TRUE(warned(799, 201));
   EXPECT_FALSE(warned(800, 200));
-  EXPECT_FALSE(warned(0, 39));
+  EXPECT_FALSE(warned(20, 19));
   EXPECT_FALSE(warned(12227, 12));
-  EXPECT_TRUE(warned(0, 40));
+  EXPECT_FALSE(warned(0, 19));
+  EXPECT_TRUE(warned(9, 11));  // of most of them half as many are enough
 }
 
 TEST(Contradictions, KnowWhereTheyAreMoreThanHalf) {

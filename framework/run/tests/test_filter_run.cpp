@@ -145,8 +145,9 @@ TEST(FilterRun, SaysThatItsStartCameLateAndWhatWasInTheWay) {
     };
     for (ImuSample sample : driven.imu()) {
       if (rests(sample.t_ns)) {
-        sample.gyro_rad_per_s = {0., 0., 0.};
-        sample.accel_m_per_s2 = {0., 0., 9.81};
+        const double noise = 1e-3 * std::sin(static_cast<double>(samples.size()));
+        sample.gyro_rad_per_s = {noise, -noise, noise};
+        sample.accel_m_per_s2 = {noise, -noise, 9.81 + noise};
       }
       samples.emplace_back(sample);
     }
@@ -159,7 +160,9 @@ TEST(FilterRun, SaysThatItsStartCameLateAndWhatWasInTheWay) {
     set_sensors(
         again,
         {{"robot", std::make_shared<InMemory>(sample_types<ImuSample, EncoderSample>(), samples)}});
-    return viwo::run(again, collect(again)).warnings;
+    const RunResult result = viwo::run(again, collect(again));
+    EXPECT_EQ(result.status, RunStatus::kOk) << result.cause;
+    return result.warnings;
   };
   EXPECT_THAT(with_rest(6., 10.),
               Contains(AllOf(HasSubstr("a state to start from was found only after 7"),
@@ -343,8 +346,19 @@ TEST(Doubts, AreOfAnEstimateThatTheFilterItselfHardlyKnows) {
     doubt(result);
     return result.doubts;
   };
-  EXPECT_THAT(doubts(0.6), ElementsAre(HasSubstr("to 0.6 m only, of a way of 1 m")));
-  EXPECT_THAT(doubts(0.4), ElementsAre());
+  EXPECT_THAT(doubts(0.4), ElementsAre(HasSubstr("to 0.4 m only, of a way of 1 m")));
+  EXPECT_THAT(doubts(0.25), ElementsAre());
+  for (StampedPose& pose : result.estimate) pose.p_BinW *= 100.;
+  EXPECT_THAT(doubts(10.), ElementsAre());
+  // One that has run away has gone far: the wheels say how far it was.
+  result.total.samples = 100;
+  result.total.path_length_m = 2.;
+  EXPECT_THAT(doubts(10.), ElementsAre(HasSubstr("to 10 m only, of a way of 2 m")));
+  result.total = {};
+  result.accuracy.emplace();
+  result.accuracy->path_length_m = 3.;
+  EXPECT_THAT(doubts(10.), ElementsAre(HasSubstr("to 10 m only, of a way of 3 m")));
+  result.accuracy.reset();
   result.estimate.resize(1);  // who stands, and knows it
   EXPECT_THAT(doubts(0.05), ElementsAre());
 }

@@ -23,7 +23,7 @@ ONLY_HEARD = {
 def read_definitions(sources):
     """Fields of each type, 'KIND NAME, KIND NAME, ...', without constants and defaults."""
     text = pathlib.Path(sources, 'plugins/sensors/ros2_bag/ros2_definitions.cpp').read_text()
-    found = re.findall(r'\{"(\w+/\w+)",\s*((?:"[^"]*\\n"\s*)+),', text)
+    found = re.findall(r'\{"(\w+/\w+)",\s*((?:"[^"]*\\n"\s*)+)\}', text)
     fields = {name: ''.join(re.findall(r'"([^"]*)"', parts)).split('\\n') for name, parts in found}
     return {name: ', '.join(' '.join(line.split()[:2]) for line in lines if line and '=' not in line)
             for name, lines in fields.items()} | ONLY_HEARD

@@ -30,11 +30,11 @@ inline constexpr std::int64_t kFewestCounted = 20;
 bool has_gross_noise(const RunResult& result);
 
 /// Of a run that came to its end, with its accuracy: contradictions are doubts where they are of
-/// most of an update, or beside a gross noise, but warnings where a reference agrees with the estimate. An estimate that has
-/// little to do with how the reference moves is doubted, too: off by more than half of the way on
-/// segments of every length, and aligned by a good part of where the reference went. So are wheels
-/// most of whose samples cannot be used, and wheels alone that end up elsewhere: off by a quarter
-/// of the way, or half a turn.
+/// most of an update, or beside a gross noise, but warnings where a reference agrees with the
+/// estimate. An estimate that has little to do with how the reference moves is doubted, too: off by
+/// more than half of the way on segments of every length, and aligned by a good part of where the
+/// reference went. So are wheels most of whose samples cannot be used, and wheels alone that end up
+/// elsewhere: off by a quarter of the way, or half a turn.
 void doubt(RunResult& result);
 
 /// Doubts of what all samples were left out for. Stamps become times since `begin_ns`.
