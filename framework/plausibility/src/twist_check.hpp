@@ -134,7 +134,7 @@ class TwistCheck {
   double rate_squares_ = 0.;   ///< of the wheels, sum over samples
   Intrinsics rate_products_;   ///< likewise, of the rate with what a prior sigma changes it by
   double prior_squares_ = 0.;  ///< likewise, of what all of the prior changes it by
-  long rates_ = 0;             ///< samples
+  std::int64_t rates_ = 0;     ///< samples
 
   Window window_, before_;
   std::int64_t windows_ = 0;

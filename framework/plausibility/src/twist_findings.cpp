@@ -51,7 +51,7 @@ bool TwistCheck::finds_disagreement(Findings& out) const {
   if (!disagreement_) return false;
   // What the wheels may be off by, for all that is known of them before. Of those that can
   // contradict each other a filter leaves out the one that is wrong.
-  const double by_prior = std::sqrt(prior_squares_ / static_cast<double>(std::max(1L, rates_)));
+  const double by_prior = std::sqrt(prior_squares_ / std::max(1., static_cast<double>(rates_)));
   out.push_back({wheels_ + " yaw",
                  wheels_ + ": turn otherwise than " + imu_ + " for " +
                      significant(100. * disagreement_->part, 2) +
@@ -82,6 +82,7 @@ void TwistCheck::findings(const Eigen::Vector3d& up, std::int64_t zero_ns, Findi
   const bool slips = finds_slip(zero_ns, out);
   if (slope != 0.) {
     if (find_factor(slope, r, C, out)) return;
+    if (!slips && finds_disagreement(out)) return;  // by more than a factor and a bias
     find_axes(C, out);
     if (!slips) find_lag(C(kGyro, kGyro), out);  // which slip looks like
     return;

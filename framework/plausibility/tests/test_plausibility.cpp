@@ -84,6 +84,24 @@ TEST(Plausibility, NamesAGyroInDegrees) {
       ElementsAre("imu0: the gyro turns 57.3 times as fast as the wheels: it is in deg/s"));
 }
 
+// Drives in deg/s would turn as many times as fast, and accelerate so, too.
+TEST(Plausibility, NamesAGyroThatIsInRadiansAlready) {
+  EXPECT_THAT(found({.imu = [](ImuSample& s) { scale(s.gyro_rad_per_s, M_PI / 180.); }}),
+              ElementsAre(AllOf(HasSubstr("imu0: turns 0.0175 times as fast as the wheels"),
+                                HasSubstr("its gyro is in rad/s, not in deg/s"))));
+}
+
+TEST(Plausibility, NamesAnAxisThatIsNotRead) {
+  const char* const text = "all the time, while the other axes change: it is not read";
+  EXPECT_THAT(found({.imu = [](ImuSample& s) { s.accel_m_per_s2[0] = 0.; }}),
+              Contains(AllOf(HasSubstr("accelerometer's x"), HasSubstr(text))));
+  EXPECT_THAT(found({.imu = [](ImuSample& s) { s.gyro_rad_per_s[2] = 0.; }}),
+              Contains(AllOf(HasSubstr("gyro's z"), HasSubstr(text))));
+  // A gyro about z alone has no other axes.
+  EXPECT_THAT(found({.imu = [](ImuSample& s) { s.gyro_rad_per_s[0] = s.gyro_rad_per_s[1] = 0.; }}),
+              ::testing::Not(Contains(HasSubstr(text))));
+}
+
 TEST(Plausibility, NamesAnImuThatIsMountedUpsideDown) {
   EXPECT_THAT(found({.imu =
                          [](ImuSample& s) {

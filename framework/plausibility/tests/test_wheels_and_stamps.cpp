@@ -129,6 +129,14 @@ TEST(Plausibility, NamesAWheelThatSlippedForAWhile) {
   EXPECT_THAT(slips_for(20., 1.5), ::testing::Not(Contains(HasSubstr("slipped"))));
 }
 
+// A counter that runs over.
+TEST(Plausibility, NamesSpeedsThatNoBaseHas) {
+  const auto texts = found(robot("viwo_skid_steer"), {.wheels = [k = 0](EncoderSample& s) mutable {
+                             if (++k == 500) s.drive_rad_per_s[1] -= 1e4;
+                           }});
+  EXPECT_THAT(texts, ElementsAre(HasSubstr("wheels0: 1 sample says that the base goes ")));
+}
+
 TEST(FindSlip, TellsWhenHowLongAndByHowMuch) {
   std::vector<TurnWindow> windows;
   for (int i = 0; i < 100; ++i) {
@@ -150,6 +158,45 @@ TEST(FindSlip, TellsWhenHowLongAndByHowMuch) {
   ASSERT_TRUE(shorter);
   EXPECT_EQ(shorter->length_s, 1.);
   EXPECT_FALSE(find_slip(std::span(windows).first(39)));
+}
+
+// What lasts is no slip. One of two drives has other counts than the other, or is not read: the
+// faster the base goes, the more it turns by the wheels.
+TEST(FindDisagreement, TellsHowMuchOfTheTimeAndByHowMuch) {
+  const auto found_with = [](double by_speed, std::size_t from) {
+    std::vector<TurnWindow> windows;
+    for (std::size_t i = 0; i < 100; ++i) {
+      const double rate = 0.4 * std::sin(0.1 * static_cast<double>(i)), speed = 0.5;
+      const double off = i >= from ? by_speed * speed : 0.;
+      windows.push_back({static_cast<std::int64_t>(i) * to_ns(kTurnWindow_s), 1.1 * rate + 0.02,
+                         rate + off, speed});
+    }
+    return find_disagreement(windows);
+  };
+  const auto all = found_with(1., 0);
+  ASSERT_TRUE(all);
+  // A bias and a factor take a part of it.
+  EXPECT_GT(all->part, 0.5);
+  EXPECT_GT(all->median_rad_per_s, 0.2);
+  EXPECT_LT(all->median_rad_per_s, 0.5);
+  const auto half = found_with(1., 50);
+  ASSERT_TRUE(half);
+  EXPECT_NEAR(half->part, 0.5, 0.2);
+  EXPECT_FALSE(found_with(1., 70));  // slip, perhaps
+  EXPECT_FALSE(found_with(0., 0));   // another width, and a bias
+}
+
+TEST(Plausibility, NamesWheelsThatHaveLittleInCommonWithTheGyro) {
+  const auto with = [](double factor) {
+    return found(robot("viwo_skid_steer", {"placeholders.motion=figure_eight"}),
+                 {.wheels = [=](EncoderSample& s) {
+                   for (int i = 0; i < s.n_drive; i += 2) {
+                     s.drive_rad_per_s[static_cast<std::size_t>(i)] *= factor;
+                   }
+                 }});
+  };
+  EXPECT_THAT(with(0.), Contains(HasSubstr("turn otherwise than imu0 for ")));
+  EXPECT_THAT(with(1.), IsEmpty());
 }
 
 TEST(Plausibility, NamesTheLagOfTheWheels) {
