@@ -93,8 +93,8 @@ TEST_F(PicturesTest, OfAFullDiskAreAnErrorAfterTheResultsAreWritten) {
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   EXPECT_EQ(outcome.code, 1);
-  EXPECT_NE(outcome.err.find("video run.avi: not all of it was written (120 pictures; is the disk "
-                             "full?)\n"),
+  EXPECT_NE(outcome.err.find("video run.avi: it cannot be read back whole, or not all of it was "
+                             "written (120 pictures; is the disk full?)\n"),
             std::string::npos)
       << outcome.err;
   EXPECT_EQ(summary().at("status"), "ok");

@@ -32,7 +32,7 @@ RUNS = SOURCE / "configs/runs"
 # What a message says of the failing call. Of a file it may say no more than which one it is.
 REASONS = {
     # Libraries do not tell why a video is not all there.
-    "disk": "No space left on device|video .*: (cannot be written|not all of it was written)",
+    "disk": "No space left on device|video .*: (cannot be written|it cannot be read back whole)",
     "open": "Too many open files|cannot|not found|missing",
     "read": "Input/output error|cannot|read|truncated",
     "mmap": "memory|alloc|mmap",

@@ -205,7 +205,8 @@ TEST_F(VideoFileTest, SaysSoWhenTheDiskIsFullAndLeavesNoHalfOne) {
       message = testing::error_of<std::runtime_error>([&] { video.close(); });
     }
     EXPECT_EQ(message, "video " + at(name).string() +
-                           ": not all of it was written (60 pictures; is the disk full?)");
+                           ": it cannot be read back whole, or not all of it was written (60 "
+                           "pictures; is the disk full?)");
     EXPECT_EQ(files(), 0U) << name;
   }
 }

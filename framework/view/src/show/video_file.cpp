@@ -148,7 +148,7 @@ void VideoFile::close() {
   if (writer_ == nullptr) start();
   writer_->close();
   if (failure_.empty() && !(is_whole(part_, pictures_) && sync_to_disk(part_))) {
-    failure_ = "not all of it was written";
+    failure_ = "it cannot be read back whole, or not all of it was written";
   }
   writer_.reset();
   const std::int64_t pictures = std::exchange(pictures_, 0);
