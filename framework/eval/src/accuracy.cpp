@@ -13,6 +13,7 @@
 #include "viwo/api/measurement.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/eval/association.hpp"
+#include "viwo/eval/hints.hpp"
 #include "viwo/eval/json.hpp"
 #include "viwo/eval/statistics.hpp"
 
@@ -116,15 +117,13 @@ bool are_positions_alone(const std::vector<PosePair>& pairs) {
     turns = turns || pair.estimate.q_BtoW.angularDistance(first.estimate.q_BtoW) > kTurns_rad;
   }
   if (!turns) return false;
-  std::vector<double> errors_m, extents_m;
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const PosePair& pair : pairs) middle += pair.reference.p_BinW;
-  middle /= static_cast<double>(pairs.size());
+  Trajectory reference;
+  std::vector<double> errors_m;
   for (const PosePair& pair : transformed(pairs, align(pairs, Alignment::kYawPosition))) {
+    reference.push_back(pair.reference);
     errors_m.push_back(position_error_m(pair));
-    extents_m.push_back((pair.reference.p_BinW - middle).norm());
   }
-  return root_mean_square(errors_m) < kPart * root_mean_square(extents_m);
+  return root_mean_square(errors_m) < kPart * extent_m(reference);
 }
 
 /// A reference without orientations gets those of the estimate, in its world.
