@@ -19,6 +19,12 @@ function(viwo_add_module name)
   add_library(viwo::${name} ALIAS ${target})
 endfunction()
 
+# viwo_for_plugins(TARGET): a library that plugins link. What they carry of it must stay their own.
+function(viwo_for_plugins target)
+  target_compile_options(${target} PRIVATE -fvisibility=hidden -fvisibility-inlines-hidden
+    $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
+endfunction()
+
 # viwo_add_test(NAME [WHOLE] SOURCES a.cpp ... LINKS target ... LABELS label ... DEPENDS target ...)
 # A GoogleTest executable, each of its tests known to ctest, in a process of its own; with WHOLE all of
 # them are one, which share what is expensive. Temporary files are the program's own. Plugins of this
