@@ -127,6 +127,28 @@ void check_tracks(const Recording& recording, const CameraTurns& camera, const s
   }
 }
 
+/// A camera that turns as the gyro does once it is turned by R, `angle` degrees.
+bool is_mounted_otherwise(const Eigen::Matrix3d& R, double angle, const std::vector<Turn>& gyro,
+                          const std::vector<Turn>& turns, const Span& span,
+                          const std::string& label, const std::string& imu, Findings& out) {
+  // Points that are near spoil the axes by less than that.
+  constexpr double kMostAngle = 15.;
+  if (angle <= kMostAngle) return false;
+  const auto turned = find_lag(RateGrid(span.begin_ns, span.end_ns, gyro),
+                               RateGrid(span.begin_ns, span.end_ns, rotated(turns, R.transpose())));
+  if (!turned || turned->correlation <= 0.8) return false;
+  out.push_back({label,
+                 Severity::kFault,
+                 "axes",
+                 "turns as " + imu + " does only if it is mounted " + significant(angle, 3) +
+                     " deg otherwise than the calibration says (correlation " +
+                     significant(turned->correlation, 3) +
+                     "): T_cam_imu in the file of section cameras is inverted, of another "
+                     "camera, or of another IMU",
+                 {{"angle", angle, "deg"}, {"correlation", turned->correlation, ""}}});
+  return true;
+}
+
 }  // namespace
 
 /// A gyro of which another axis turns as the wheels do than the vertical. `vertically`: the largest
@@ -252,29 +274,6 @@ std::vector<Turn> turns_in_imu(const Recording& recording, const CameraTurns& ca
   return shifted(rotated(camera.turns, view.R_ItoC.transpose()), view.image_offset_s());
 }
 
-/// A camera that turns as the gyro does once it is turned by R.
-static bool is_mounted_otherwise(const Eigen::Matrix3d& R, const std::vector<Turn>& gyro,
-                                 const std::vector<Turn>& turns, const Span& span,
-                                 const std::string& label, const std::string& imu, Findings& out) {
-  // Points that are near spoil the axes by less than that.
-  constexpr double kMostAngle = 15.;
-  const double angle = log_so3(R).norm() * 180. / std::numbers::pi;
-  if (angle <= kMostAngle) return false;
-  const auto turned = find_lag(RateGrid(span.begin_ns, span.end_ns, gyro),
-                               RateGrid(span.begin_ns, span.end_ns, rotated(turns, R.transpose())));
-  if (!turned || turned->correlation <= 0.8) return false;
-  out.push_back({label,
-                 Severity::kFault,
-                 "axes",
-                 "turns as " + imu + " does only if it is mounted " + significant(angle, 3) +
-                     " deg otherwise than the calibration says (correlation " +
-                     significant(turned->correlation, 3) +
-                     "): T_cam_imu in the file of section cameras is inverted, of another "
-                     "camera, or of another IMU",
-                 {{"angle", angle, "deg"}, {"correlation", turned->correlation, ""}}});
-  return true;
-}
-
 void check_camera_clocks(const Recording& recording, Findings& out) {
   if (recording.imu.empty() || !recording.setup->filter) return;
   const std::string imu = recording.label<ImuSample>(recording.imu_sensor);
@@ -295,7 +294,7 @@ void check_camera_clocks(const Recording& recording, Findings& out) {
     const RateGrid a(span.begin_ns, span.end_ns, gyro), b(span.begin_ns, span.end_ns, turns);
     const auto R = rotation_between(a, b);
     const double angle = R ? log_so3(*R).norm() * 180. / std::numbers::pi : NAN;
-    if (R && is_mounted_otherwise(*R, gyro, turns, span, label, imu, out)) continue;
+    if (R && is_mounted_otherwise(*R, angle, gyro, turns, span, label, imu, out)) continue;
     const std::optional<Lag> lag = find_lag(a, b, 0.5);
     if (!lag) {
       out.push_back({label, Severity::kNote, "clock",

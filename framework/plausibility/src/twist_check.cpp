@@ -67,7 +67,7 @@ void TwistCheck::add_imu(const ImuSample& sample) {
   advance();
 }
 
-void TwistCheck::finish() {
+void TwistCheck::look_at_turns() {
   slip_ = find_slip(turns_);
   disagreement_ = find_disagreement(turns_);
 }
@@ -171,7 +171,7 @@ void TwistCheck::add_to_turns(double gyro, const Twist& xi) {
   if (turns_.size() == kMostTurns) turns_.erase(turns_.begin(), turns_.begin() + kMostTurns / 2);
   turns_.push_back(turn_);
   constexpr std::size_t kLookedAfter = 20;
-  if (turns_.size() % kLookedAfter == 0) finish();
+  if (turns_.size() % kLookedAfter == 0) look_at_turns();
 }
 
 /// Differences of the gyro's rates, half a second before to after it, and one of the wheels.

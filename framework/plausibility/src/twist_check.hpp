@@ -63,8 +63,8 @@ class TwistCheck {
   /// `xi`: twist of O over the time of the sample; `rate_by_prior`: by what each unit of the prior
   /// of the intrinsics changes its yaw rate.
   void add_wheels(const EncoderSample& sample, const Twist& xi, const Intrinsics& rate_by_prior);
-  /// Nothing more is to come for now.
-  void finish();
+  /// Nothing more is to come.
+  void finish() { look_at_turns(); }
   /// Whether the gyro says that channels are reversed or exchanged, of wheels that cannot say it of
   /// each other.
   bool finds_order(Findings& out) const { return order_.findings(out); }
@@ -93,6 +93,7 @@ class TwistCheck {
   static constexpr double kLeastForce = 0.1;  // m/s^2, standard deviation about the mean
 
   void advance();
+  void look_at_turns();
   void begin_anew();
   bool accelerates_as_wheels(const Eigen::MatrixXd& C) const;
   bool find_factor(double slope, double r, const Eigen::MatrixXd& C, Findings& out) const;
