@@ -21,6 +21,9 @@ namespace {
 constexpr std::size_t kMinMatches = 20;
 constexpr double kContradictingShare = 0.7;
 constexpr const char* kContradicts = "stereo pair that contradicts the extrinsics";
+constexpr const char* kBlank = "image without contrast: dark, overexposed or covered";
+constexpr const char* kRepeats = "image that repeats the one before to the last bit";
+constexpr const char* kAlone = "right image without its left one";
 constexpr const char* kShowsNothing = "stereo pair whose second image shows nothing of the first";
 /// Pairs in a row that contradict the extrinsics before it is said.
 constexpr int kContradictingPairs = 10;
@@ -118,7 +121,7 @@ KltTracker::KltTracker(const Params& params, const HostServices& services)
 }
 
 void KltTracker::read_one(const ImageSource* source, std::size_t camera, Eye& eye) const {
-  eye.is_read = false;
+  eye.is_read = eye.repeats = false;
   eye.unreadable.clear();
   eye.other_size.clear();
   eye.failure = nullptr;
@@ -134,6 +137,9 @@ void KltTracker::read_one(const ImageSource* source, std::size_t camera, Eye& ey
       eye.other_size = size_text(image.width_px, image.height_px);
       return;
     }
+    // Sensors have noise: it was sent twice, or the camera hangs. (Darkness may well be the same.)
+    eye.repeats = !eye.before.blank && image.pixels == eye.before.pixels.pixels;
+    if (eye.repeats) return;
     eye.maker.make(eye.now);
     eye.is_read = true;
   } catch (const InputError& error) {
@@ -161,10 +167,15 @@ void KltTracker::check(const ImageGroup& group) {
       rejections_.add("image that cannot be read", [&] { return where + ": " + eye.unreadable; });
     }
     check_size(i, where);
-    if (eye.matcher && eye.is_read && !eyes_[i - 1].is_read) {
-      rejections_.add("right image without its left one", [&where] { return where; });
-      eye.is_read = false;
-    }
+    const auto refuse = [&](const char* why) { rejections_.add(why, [&where] { return where; }); };
+    if (eye.repeats) refuse(kRepeats);
+    if (eye.is_read || eye.repeats) ++images_;
+    if (eye.is_read && eye.now.blank) refuse(kBlank);
+    if (!eye.matcher || !eye.is_read) continue;
+    ++right_images_;
+    if (eyes_[i - 1].is_read) continue;
+    refuse(kAlone);
+    eye.is_read = false;
   }
 }
 
@@ -346,6 +357,8 @@ Status KltTracker::next(Measurement& out) {
 void KltTracker::rejections(std::vector<RejectionCount>& out) const {
   for (const RejectionCount& one : rejections_.counts()) {
     out.push_back(one);
+    if (one.reason == kBlank || one.reason == kRepeats) out.back().of = images_;
+    if (one.reason == kAlone) out.back().of = right_images_;
     if (one.reason == kContradicts) out.back().of = pairs_with_matches_;
     if (one.reason == kShowsNothing) out.back().of = pairs_with_points_;
   }

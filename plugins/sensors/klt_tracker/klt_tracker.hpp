@@ -37,6 +37,7 @@ class KltTracker final : public Sensor {
     Frame now, before;
     std::optional<std::int64_t> before_ns;  ///< none: nothing to follow points from
     bool is_read = false;                   ///< `now` is of this group
+    bool repeats = false;                   ///< the image of this group is the one before
     std::string unreadable;
     std::exception_ptr failure;
     std::string other_size;        ///< of this image, when it is not the camera's
@@ -86,6 +87,7 @@ class KltTracker final : public Sensor {
   Sensor* input_ = nullptr;
   std::optional<ImageGroups> groups_;
   Rejections rejections_;
+  std::int64_t images_ = 0, right_images_ = 0;  ///< that could be read
   /// Stereo pairs whose first image has points, and those of them with matches.
   std::int64_t pairs_with_points_ = 0, pairs_with_matches_ = 0;
   std::int64_t next_id_ = 0;

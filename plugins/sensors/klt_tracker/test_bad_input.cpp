@@ -50,6 +50,26 @@ TEST(KltTracker, CountsARightImageWithoutItsLeftOne) {
   EXPECT_GT(common(played.of(0)[0], played.of(0)[1]), 170U);
 }
 
+// A driver that sends each image twice, or hangs: the camera did not stand still meanwhile.
+TEST(KltTracker, LeavesOutImagesThatRepeatTheOneBefore) {
+  const std::vector<Measurement> once = drive(4, 1);
+  std::vector<Measurement> twice;
+  for (const Measurement& one : once) {
+    ImageSample image = *one.view().get_if<ImageSample>();
+    twice.push_back(one);
+    image.t_ns += 30'000'000;
+    twice.emplace_back(image);
+  }
+  const Played played = track(twice, section({}, 1));
+  const Played expected = track(once, section({}, 1));
+  ASSERT_EQ(played.samples.size(), expected.samples.size());
+  EXPECT_EQ(common(played.of(0)[0], played.of(0)[3]), common(expected.of(0)[0], expected.of(0)[3]));
+  const RejectionCount& count =
+      played.rejections.at("image that repeats the one before to the last bit");
+  EXPECT_EQ(count.count, 4);
+  EXPECT_EQ(count.of, 8);
+}
+
 TEST(ImageGroups, DoNotWaitForACameraThatIsSilentForLong) {
   // GIVEN a camera 1 that is gone from 0.3 s to 2.7 s
   std::vector<Measurement> images;
