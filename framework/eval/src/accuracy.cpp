@@ -106,8 +106,8 @@ RigidTransform align_first(std::span<const PosePair> first, Alignment alignment)
   return align(first, alignment == Alignment::kSe3 ? Alignment::kStart : alignment);
 }
 
-/// Whether the reference gives the same orientation all the time while the estimate turns, and goes
-/// where the reference goes: who goes straight on may well not turn, and then the two part.
+/// Whether the reference gives the same orientation all the time while the estimate turns, and
+/// bends or goes where the estimate goes: who goes straight on may well not turn.
 bool are_positions_alone(const std::vector<PosePair>& pairs) {
   constexpr double kTurns_rad = 0.5, kPart = 0.05;
   bool turns = false;
@@ -123,7 +123,7 @@ bool are_positions_alone(const std::vector<PosePair>& pairs) {
     reference.push_back(pair.reference);
     errors_m.push_back(position_error_m(pair));
   }
-  return root_mean_square(errors_m) < kPart * extent_m(reference);
+  return bends(reference) || root_mean_square(errors_m) < kPart * extent_m(reference);
 }
 
 /// A reference without orientations gets those of the estimate, in its world.

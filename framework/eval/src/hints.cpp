@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
+
+#include "viwo/api/status.hpp"
 #include "viwo/math/significant.hpp"
 
 namespace viwo::eval {
@@ -31,6 +34,26 @@ std::string order_hint(const Trajectory& reference, const Trajectory& estimate,
          " are w x y z: TUM files have x y z w";
 }
 
+/// Of worlds of which one is not level, as a motion capture whose y is up.
+std::string tilt_hint(const Trajectory& reference, const Trajectory& estimate,
+                      const Options& options, double ate_m) {
+  constexpr double kPart = 0.2, kPartOfExtent = 0.1;
+  if (options.alignment == Alignment::kSe3 || !(ate_m > kPartOfExtent * extent_m(reference))) {
+    return "";
+  }
+  Options free = options;
+  free.alignment = Alignment::kSe3;
+  double best_m = ate_m;
+  try {
+    best_m = evaluate(reference, estimate, free).ate_m;
+  } catch (const InputError&) {  // what is on one line tells no tilt
+    return "";
+  }
+  if (!(best_m < kPart * ate_m)) return "";
+  return "positions differ by " + significant(ate_m, 3) + " m, and by " + significant(best_m, 3) +
+         " m once the two worlds may be tilted: the z of one of them is not up";
+}
+
 }  // namespace
 
 double extent_m(const Trajectory& poses) {
@@ -40,6 +63,18 @@ double extent_m(const Trajectory& poses) {
   double squares = 0.;
   for (const StampedPose& pose : poses) squares += (pose.p_BinW - mean).squaredNorm() / n;
   return std::sqrt(squares);
+}
+
+bool bends(const Trajectory& path) {
+  constexpr double kPart = 0.05;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const StampedPose& pose : path) mean += pose.p_BinW / static_cast<double>(path.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const StampedPose& pose : path) {
+    scatter += (pose.p_BinW - mean) * (pose.p_BinW - mean).transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues()[1] > kPart * kPart * solver.eigenvalues()[2];
 }
 
 std::string size_contradiction(const Trajectory& of_reference, const Trajectory& of_estimate) {
@@ -59,11 +94,19 @@ std::string size_contradiction(const Trajectory& of_reference, const Trajectory&
          " m";
 }
 
-std::vector<std::string> hints(const Trajectory& reference, const Trajectory& estimate,
-                               const Options& options, const Accuracy& accuracy) {
+std::vector<std::string> world_hints(const Trajectory& reference, const Trajectory& estimate,
+                                     const Options& options, const Accuracy& accuracy) {
   std::vector<std::string> lines;
   std::string order = order_hint(reference, estimate, options, accuracy.ate_deg);
   if (!order.empty()) lines.push_back(std::move(order));
+  std::string tilt = tilt_hint(reference, estimate, options, accuracy.ate_m);
+  if (!tilt.empty()) lines.push_back(std::move(tilt));
+  return lines;
+}
+
+std::vector<std::string> hints(const Trajectory& reference, const Trajectory& estimate,
+                               const Options& options, const Accuracy& accuracy) {
+  std::vector<std::string> lines = world_hints(reference, estimate, options, accuracy);
   const std::string size = size_contradiction(reference, estimate);
   if (!size.empty()) {
     lines.push_back("the reference: " + size + " - another unit of one, or another recording");

@@ -203,6 +203,10 @@ TEST(Accuracy, OfPositionsAloneIsThatOfPositions) {
     EXPECT_TRUE(std::isnan(accuracy.end_yaw_deg));
     EXPECT_TRUE(to_json(accuracy).at("end").at("yaw_deg").is_null());
   }
+  // However far off: a circle is not gone round without turning.
+  for (StampedPose& pose : reference) pose.p_BinW *= 1.3;
+  EXPECT_GT(evaluate(reference, estimate).ate_m, 0.5);
+  EXPECT_TRUE(std::isnan(evaluate(reference, estimate).end_yaw_deg));
   // What does not turn either has the orientation that it has.
   const Trajectory straight = arc(0., 0.1, 401);
   EXPECT_NEAR(evaluate(straight, moved(straight, about_z(0.1), {0., 0., 0.})).ate_deg, 0., 1e-6);

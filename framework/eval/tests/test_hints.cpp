@@ -44,6 +44,22 @@ TEST(Hints, AreNoneWhereOrientationsAgreeOrNothingMakesThem) {
   EXPECT_THAT(hints_of(truth, unlike), IsEmpty());
 }
 
+TEST(Hints, AreOfAWorldWhoseZIsNotUp) {
+  const Trajectory truth = arc(0.3, 0.1, 100);
+  const Eigen::Quaterniond lying(Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d::UnitX()));
+  Trajectory y_up = truth, off = truth;
+  for (StampedPose& pose : y_up) {
+    pose.p_BinW = lying * pose.p_BinW;
+    pose.q_BtoW = lying * pose.q_BtoW;
+  }
+  EXPECT_THAT(hints_of(y_up, truth), ElementsAre(HasSubstr("the z of one of them is not up")));
+  for (std::size_t i = 0; i < off.size(); ++i) off[i].p_BinW.x() *= 1.5;
+  EXPECT_THAT(hints_of(truth, off), IsEmpty());
+  Trajectory straight = arc(0., 0.1, 100), far = straight;  // which no tilt makes fit
+  for (StampedPose& pose : far) pose.p_BinW *= 2.;
+  EXPECT_THAT(hints_of(straight, far), IsEmpty());
+}
+
 TEST(Hints, AreOfOtherUnits) {
   const Trajectory truth = arc(0.3, 0.1, 100);
   Trajectory millimetres = truth;
