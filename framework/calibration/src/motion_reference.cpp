@@ -8,6 +8,7 @@
 #include <Eigen/Dense>
 
 #include "recording_name.hpp"
+#include "viwo/eval/hints.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/median.hpp"
 #include "viwo/math/significant.hpp"
@@ -43,9 +44,9 @@ StampedPose turned(std::int64_t t_ns, double yaw_rad) {
 }
 
 /// By how much the wheels alone have the base turn where the reference gives the same orientation
-/// all the time, as positions alone do; 0 where it gives orientations.
+/// all the time, as positions alone do; 0 where it gives orientations, or goes straight on.
 double turn_unseen_by_poses(const RunSetup& setup, const RunData& data) {
-  if (are_turned(data.reference)) return 0.;
+  if (are_turned(data.reference) || !eval::bends(data.reference)) return 0.;
   RunSetup wheels_alone = setup;
   double turn_rad = 0.;
   for (const StampedPose& pose : run_odometry(wheels_alone, data).estimate) {

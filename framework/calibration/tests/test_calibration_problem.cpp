@@ -289,6 +289,12 @@ TEST(MotionReferenceOfPoses, HasOrientations) {
                 motion_reference(label, driven.setup, driven.data, ReferenceKind::kAuto);
               }),
               ::testing::HasSubstr("positions alone tell no turns"));
+  // Who goes straight on does not turn, whatever wheels say that are still to be calibrated.
+  for (std::size_t i = 0; i < driven.data.reference.size(); ++i) {
+    driven.data.reference[i].p_BinW = {0.01 * static_cast<double>(i), 0., 0.};
+  }
+  EXPECT_EQ(motion_reference(label, driven.setup, driven.data, ReferenceKind::kAuto).kind,
+            ReferenceKind::kPoses);
 }
 
 TEST(YawOfGyro, IsTheIntegralOfTheTurn) {
