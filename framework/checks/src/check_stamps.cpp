@@ -223,13 +223,16 @@ void check_rejections(const Recording& recording, Findings& out) {
     }
     // Gaps have been told, with more of them.
     if (rejection.reason.find("gap longer than") != std::string::npos) continue;
-    const double share = static_cast<double>(rejection.count) /
-                         static_cast<double>(std::max<std::int64_t>(
-                             static_cast<std::int64_t>(of) + rejection.count, 1));
+    const double share =
+        static_cast<double>(rejection.count) /
+        static_cast<double>(rejection.of > 0 ? rejection.of
+                                             : static_cast<std::int64_t>(of) + rejection.count);
     // A row that a power loss has cut short is none of weight; one of a thousand is a fault, and so
     // is damage behind which nothing can be read.
     const bool loses_the_rest = rejection.reason.find("the rest is not read") != std::string::npos;
-    const bool is_fault = loses_the_rest || (rejection.count >= 5 && share > 1e-3);
+    // Of what is suspicious when it is most a fifth, as in a run.
+    const double most = rejection.of > 0 ? 0.2 : 1e-3;
+    const bool is_fault = loses_the_rest || (rejection.count >= 5 && share > most);
     out.push_back({sensor,
                    is_fault ? Severity::kFault : Severity::kNote,
                    "rejected",
@@ -239,10 +242,6 @@ void check_rejections(const Recording& recording, Findings& out) {
   }
   for (const auto& [sensor, text] : recording.broken) {
     out.push_back({sensor, Severity::kFault, "readable", "cannot be read to its end: " + text});
-  }
-  for (const std::string& sensor : recording.unread) {
-    out.push_back({sensor, Severity::kNote, "readable",
-                   "not looked at: it works on images, whose pixels are not read here"});
   }
   for (const SensorEntry& entry : recording.setup->sensors) {
     const bool gave = std::any_of(recording.stamps.begin(), recording.stamps.end(),

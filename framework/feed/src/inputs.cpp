@@ -16,11 +16,15 @@ void Inputs::keep(const SensorEntry& entry, const Measurement& measurement) {
   if (found != kept_.end()) found->second->push_back(measurement);
 }
 
+std::shared_ptr<Sensor> Inputs::replay(const std::string& input) const {
+  return std::make_shared<Replay>(kept_.at(input));
+}
+
 std::shared_ptr<Sensor> Inputs::connect(const SensorEntry& entry) {
   if (entry.input.empty()) return nullptr;
-  auto replay = std::make_shared<Replay>(kept_.at(entry.input));
-  guarded(entry.sensor.info, "connect", [&] { entry.sensor.object->connect(*replay); });
-  return replay;
+  auto input = replay(entry.input);
+  guarded(entry.sensor.info, "connect", [&] { entry.sensor.object->connect(*input); });
+  return input;
 }
 
 bool is_live(const SensorEntry& entry) {

@@ -38,22 +38,6 @@ Finding of_plausibility(const viwo::Finding& found) {
   return finding;
 }
 
-/// That nothing has come of what was not read.
-bool is_of_unread(const Recording& recording, const viwo::Finding& found) {
-  if (!found.key.ends_with(" none")) return false;
-  const auto& sensors = recording.setup->sensors;
-  for (std::string name : recording.unread) {
-    for (bool goes_on = true; goes_on;) {
-      const auto entry = std::find_if(sensors.begin(), sensors.end(),
-                                      [&](const SensorEntry& s) { return s.name == name; });
-      goes_on = entry != sensors.end() && !entry->input.empty();
-      if (goes_on) name = entry->input;
-    }
-    if (found.key.ends_with(name + " none")) return true;
-  }
-  return false;
-}
-
 bool is_fault_of(const Findings& findings, std::string_view sensor, Checks checks) {
   return std::any_of(findings.begin(), findings.end(), [&](const Finding& f) {
     return f.severity == Severity::kFault && f.sensor == sensor &&
@@ -209,7 +193,7 @@ Inspection inspect(RunSetup& setup) {
     Finding finding = of_plausibility(found);
     const bool is_told = is_one_of(finding.check, kToldWithMore) ||
                          (finding.check == "order" && is_fault(findings, finding.sensor, "order"));
-    if (!is_told && !is_of_unread(recording, found)) {
+    if (!is_told) {
       findings.push_back(std::move(finding));
     }
   }

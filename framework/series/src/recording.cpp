@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <unordered_map>
 
@@ -11,6 +12,7 @@
 #include <Eigen/SVD>
 
 #include "viwo/camera/camera_model.hpp"
+#include "viwo/feed/inputs.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/math/so3.hpp"
 #include "viwo/math/stamp.hpp"
@@ -143,6 +145,8 @@ class TurnFinder {
 struct Head {
   SensorEntry* entry = nullptr;
   Measurement next;
+  std::shared_ptr<Sensor> replay;  ///< of what has been read; null: from the sensor
+  std::shared_ptr<Sensor> input;   ///< what the sensor reads, if it works on another one
 };
 
 class Gatherer {
@@ -166,17 +170,18 @@ class Gatherer {
 
   Recording gather() {
     std::vector<Head> heads;
+    Inputs inputs(setup_.sensors);
     for (SensorEntry& entry : setup_.sensors) {
-      if (!entry.input.empty()) {
-        recording_.unread.push_back(entry.name);
-        continue;
-      }
-      if (guarded(entry.sensor.info, "live", [&] { return entry.sensor.object->live(); })) {
+      if (is_live(entry)) {
         config::fail(setup_.sensors_mark,
                      "sensor '" + entry.name + "' is live, without an end: record it first");
       }
-      heads.push_back({&entry, {}});
-      if (!advance(heads.back())) heads.pop_back();
+      Head head{&entry, {}, nullptr, inputs.connect(entry)};
+      if (inputs.is_input(entry)) {
+        while (advance(head)) inputs.keep(entry, head.next);
+        head.replay = inputs.replay(entry.name);
+      }
+      if (advance(head)) heads.push_back(std::move(head));
     }
     while (!heads.empty()) {
       const auto first = std::min_element(
@@ -195,6 +200,7 @@ class Gatherer {
   /// False at the end, and where a sensor breaks off.
   bool advance(Head& head) {
     const Loaded<Sensor>& sensor = head.entry->sensor;
+    if (head.replay) return head.replay->next(head.next) == Status::kOk;
     try {
       const bool more = guarded(sensor.info, "next",
                                 [&] { return sensor.object->next(head.next); }) == Status::kOk;
@@ -239,12 +245,13 @@ class Gatherer {
       add_pose(sensor, true, {state->t_ns, to_vector(state->p_IinG_m), state->q_ItoG_xyzw});
     } else if (const auto* tracks = sample.get_if<FeatureSample>()) {
       add_tracks(sensor, *tracks);
-    } else if (const auto* image = sample.get_if<ImageSample>()) {
-      add_image(sensor, *image);
     }
   }
 
   void add_stamp(const std::string& sensor, SampleView sample) {
+    // Tracks have the stamps of their images.
+    const auto entry = std::ranges::find(setup_.sensors, sensor, &SensorEntry::name);
+    if (entry != setup_.sensors.end() && !entry->input.empty()) return;
     const int channel = sample.type().channel(sample.data());
     for (Stamps& stamps : recording_.stamps) {
       if (stamps.sensor != sensor || !(*stamps.type == sample.type())) continue;
@@ -308,14 +315,6 @@ class Gatherer {
     }
     Finder& finder = finders_.at(key);
     finder.turns.add(tracks, recording_.cameras[finder.place]);
-  }
-
-  /// Who makes tracks of images is not asked to: each image stands for the tracks in it.
-  void add_image(const std::string& sensor, const ImageSample& image) {
-    for (const SensorEntry& entry : setup_.sensors) {
-      if (entry.input != sensor) continue;
-      plausibility_.add(entry.name, FeatureSample{image.t_ns, image.camera, {}});
-    }
   }
 
   struct Finder {

@@ -19,6 +19,8 @@ class Inputs {
   bool is_input(const SensorEntry& entry) const { return kept_.contains(entry.name); }
   /// Keeps a measurement of a sensor that is an input; of others, does nothing.
   void keep(const SensorEntry& entry, const Measurement& measurement);
+  /// What an input gave, which has been read to its end, once more.
+  std::shared_ptr<Sensor> replay(const std::string& input) const;
   /// Gives a sensor its input, which must have been read to its end; null if it takes none. It must
   /// live as long as the sensor is read.
   [[nodiscard]] std::shared_ptr<Sensor> connect(const SensorEntry& entry);

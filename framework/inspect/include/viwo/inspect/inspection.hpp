@@ -21,9 +21,8 @@ struct Inspection {
   bool has_faults() const;
 };
 
-/// Reads the sensors of a run to their end and checks what they gave. Sensors that work on images
-/// are not read, nor are pixels. A sensor that breaks off is a finding. Throws InputError for a
-/// live sensor.
+/// Reads the sensors of a run to their end and checks what they gave; those that work on images
+/// make their tracks. A sensor that breaks off is a finding. Throws InputError for a live sensor.
 Inspection inspect(RunSetup& setup);
 
 /// For the terminal: a verdict for each sensor, then what is wrong and what to write.

@@ -74,7 +74,6 @@ struct Recording {
   std::vector<CameraTurns> cameras;
   std::vector<std::pair<std::string, RejectionCount>> rejections;  ///< by sensor
   std::vector<std::pair<std::string, std::string>> broken;         ///< sensor, what it said
-  std::vector<std::string> unread;                                 ///< sensors that work on images
   viwo::Findings implausible;                                      ///< of Plausibility
 
   /// What texts call the samples of a kind: the sensor, and the kind if it gives several.
