@@ -169,16 +169,22 @@ void ImuCheck::find_stuck_channels(std::int64_t zero_ns, Findings& out) const {
   }
 }
 
-/// One axis that never changes while both others of its kind do. Two, of a gyro about z alone, may
-/// not be there.
+/// One axis that never changes while both others of its kind move. Two, of a gyro about z alone,
+/// may not be there; and the vertical one feels nothing else where a simulator's ground is flat.
 void ImuCheck::find_constant(Findings& out) const {
+  constexpr double kTurns_rad_per_s = 0.02, kShakes_m_per_s2 = 0.1, kUpright_m_per_s2 = 5.;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const std::size_t triad = i < 3 ? 0 : 3;
     const auto is_constant = [&](std::size_t one) {
       const Axis& axis = axes_[triad + one % 3];
       return axis.least == axis.most;
     };
-    if (!is_constant(i) || is_constant(i + 1) || is_constant(i + 2)) continue;
+    const auto moves = [&](std::size_t one) {
+      const Axis& axis = axes_[triad + one % 3];
+      return axis.most - axis.least > (triad == 0 ? kTurns_rad_per_s : kShakes_m_per_s2);
+    };
+    if (!is_constant(i) || !moves(i + 1) || !moves(i + 2)) continue;
+    if (triad > 0 && std::abs(axes_[i].last) > kUpright_m_per_s2) continue;
     out.push_back({name_ + " stuck " + kImuAxes[i],
                    name_ + ": the " + kImuAxes[i] + " reads " + significant(axes_[i].last, 3) +
                        unit_of(i) +

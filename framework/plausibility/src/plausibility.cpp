@@ -72,10 +72,10 @@ struct Plausibility::Checks {
       const std::optional<Twist> xi = check.encoders.add(sample);
       constexpr double kLeast = 0.05;  // m/s, rad/s
       moves = xi && xi->norm() > kLeast;
-      ++check.way.samples;
       if (xi) {
-        check.way.length_m +=
-            xi->head<2>().norm() * seconds_between(sample.begin_ns, sample.end_ns);
+        const double dt_s = seconds_between(sample.begin_ns, sample.end_ns);
+        check.way.duration_s += dt_s;
+        check.way.length_m += xi->head<2>().norm() * dt_s;
         check.twist.add_wheels(sample, *xi, check.encoders.rate_by_prior());
         check.heading.add_wheels(sample, *xi, check.encoders.rate_by_prior());
       }
@@ -122,7 +122,10 @@ Finding of_another_clock(const std::string& name, double ahead_s) {
           name + ": its stamps are " + significant(std::abs(ahead_s), 2) + " s " +
               (ahead_s > 0. ? "ahead of" : "behind") +
               " those of the IMU: of another clock, or of another recording - none of its samples "
-              "can be used"};
+              "can be used",
+          false,
+          {},
+          true};
 }
 
 }  // namespace

@@ -14,18 +14,19 @@ namespace {
 
 constexpr std::size_t kFewestOfAll = 40;
 constexpr double kLeast_rad_per_s = 0.08;
+constexpr double kMostOff = 1.5;    ///< a factor that wheels are wrong by
 constexpr double kMostPart = 0.35;  ///< what is wrong more often is another fault than slip
 
 /// By how much the gyro turns otherwise than wheels that may be wrong by a factor, and it by a
 /// bias.
-std::vector<double> differences(std::span<const TurnWindow> windows) {
-  constexpr double kTurns_rad_per_s = 0.1, kMostOff = 1.5, kMostBias_rad_per_s = 0.1;
+std::vector<double> differences(std::span<const TurnWindow> windows, double most_off = kMostOff) {
+  constexpr double kTurns_rad_per_s = 0.1, kMostBias_rad_per_s = 0.1;
   std::vector<double> factors, left;
   for (const TurnWindow& w : windows) {
     if (std::abs(w.wheels) > kTurns_rad_per_s) factors.push_back(w.gyro / w.wheels);
   }
   const double factor =
-      factors.empty() ? 1. : std::clamp(eval::median(factors), 1. / kMostOff, kMostOff);
+      factors.empty() ? 1. : std::clamp(eval::median(factors), 1. / most_off, most_off);
   for (const TurnWindow& w : windows) left.push_back(w.gyro - factor * w.wheels);
   const double bias = std::clamp(eval::median(left), -kMostBias_rad_per_s, kMostBias_rad_per_s);
   for (double& one : left) one -= bias;
@@ -69,10 +70,11 @@ double usual_difference(std::span<const TurnWindow> windows) {
   return eval::median(sizes_of(differences(windows)));
 }
 
-std::optional<Disagreement> find_disagreement(std::span<const TurnWindow> windows) {
+std::optional<Disagreement> find_disagreement(std::span<const TurnWindow> windows,
+                                              double tolerance) {
   if (windows.size() < kFewestOfAll) return {};
   constexpr double kTurns_rad_per_s = 0.1, kMoves_m_per_s = 0.05;
-  const std::vector<double> left = differences(windows);
+  const std::vector<double> left = differences(windows, std::max(kMostOff, 1. + tolerance));
   std::vector<double> beyond;
   std::size_t moving = 0;
   for (std::size_t i = 0; i < left.size(); ++i) {
@@ -80,7 +82,12 @@ std::optional<Disagreement> find_disagreement(std::span<const TurnWindow> window
     const bool turns = std::max(std::abs(w.gyro), std::abs(w.wheels)) > kTurns_rad_per_s;
     if (!turns && w.speed_m_per_s < kMoves_m_per_s) continue;
     ++moving;
-    const double size = std::abs(left[i]);
+    double size = std::abs(left[i]);
+    for (const std::size_t k : {i - 1, i + 1}) {  // clocks that are off are another fault
+      if (k >= left.size()) continue;
+      const double then = left[i] + windows[k].gyro - w.gyro;
+      size = then * left[i] < 0. ? 0. : std::min(size, std::abs(then));
+    }
     if (size > std::max(kLeast_rad_per_s, usual(w))) beyond.push_back(size);
   }
   if (moving < kFewestOfAll) return {};

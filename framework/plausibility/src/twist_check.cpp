@@ -69,7 +69,7 @@ void TwistCheck::add_imu(const ImuSample& sample) {
 
 void TwistCheck::look_at_turns() {
   slip_ = find_slip(turns_);
-  disagreement_ = find_disagreement(turns_);
+  disagreement_ = find_disagreement(turns_, factor_tolerance());
 }
 
 void TwistCheck::begin_anew() {

@@ -1,5 +1,6 @@
 // What the sums of TwistCheck say.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
@@ -82,17 +83,18 @@ void TwistCheck::findings(const Eigen::Vector3d& up, std::int64_t zero_ns, Findi
   const bool slips = finds_slip(zero_ns, out);
   if (slope != 0.) {
     if (find_factor(slope, r, C, out)) return;
-    if (!slips && finds_disagreement(out)) return;  // by more than a factor and a bias
+    const bool lags = !slips && find_lag(C(kGyro, kGyro), out);  // which slip looks like
+    if (!slips && !lags && finds_disagreement(out)) return;      // by more than a factor and a bias
     find_axes(C, out);
-    if (!slips) find_lag(C(kGyro, kGyro), out);  // which slip looks like
     return;
   }
   if (slips) return;
   // A lag of tenths of a second, and they are not alike any more.
   if (turns && r > 0. && find_lag(C(kGyro, kGyro), out)) return;
   // It turns by next to nothing of what the wheels do.
-  constexpr double kStuck = 0.1, kNothing = 1e-9;
-  const double gyro = std::sqrt(C(kGyro, kGyro)), wheels = std::sqrt(C(kWheels, kWheels));
+  constexpr double kStuck = 0.1, kRounding = 1e-6;
+  const double gyro = std::sqrt(std::max(0., C(kGyro, kGyro))),
+               wheels = std::sqrt(C(kWheels, kWheels));
   if (wheels > kLeastRate && gyro < kStuck * wheels) {
     out.push_back({imu_ + " rate",
                    imu_ + ": turns by " + significant(gyro, 2) +
@@ -102,7 +104,7 @@ void TwistCheck::findings(const Eigen::Vector3d& up, std::int64_t zero_ns, Findi
                        "(signs, order, zeros of the steering)",
                    false,
                    {},
-                   gyro < kNothing});
+                   gyro < kRounding * (1e-3 + std::abs(mean[kGyro]))});
     return;
   }
   if (finds_disagreement(out)) return;
@@ -130,6 +132,12 @@ bool TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
   const std::string slow = significant(1. / std::abs(slope), 3) + " times as fast as the gyro";
   constexpr double kDeg = 180. / std::numbers::pi;
   constexpr double kOpposite = 2.;  // a sign, and intrinsics that are to be found
+  constexpr std::array<std::pair<double, const char*>, 3> kUnits{
+      {{1. / kDeg, "deg/s"},
+       {std::numbers::pi / 30., "revolutions per minute"},
+       {2. * std::numbers::pi, "revolutions per second"}}};
+  const auto unit = std::ranges::find_if(
+      kUnits, [slope](const auto& one) { return is_about(std::abs(slope), one.first); });
   const std::string key = imu_ + " rate";
   if (is_about(std::abs(slope), kDeg)) {
     out.push_back({key,
@@ -145,21 +153,11 @@ bool TwistCheck::find_factor(double slope, double r, const Eigen::MatrixXd& C,
                        "rad/s, not in deg/s",
                    false,
                    {{gyro_unit_, "rad"}}});
-  } else if (is_about(std::abs(slope), 1. / kDeg)) {
+  } else if (unit != kUnits.end()) {
     out.push_back({key,
-                   wheels_ + ": turn " + slow + ": drives are in deg/s",
+                   wheels_ + ": turn " + slow + ": drives are in " + unit->second,
                    false,
-                   {drives_times(1. / kDeg)}});
-  } else if (is_about(std::abs(slope), std::numbers::pi / 30.)) {
-    out.push_back({key,
-                   wheels_ + ": turn " + slow + ": drives are in revolutions per minute",
-                   false,
-                   {drives_times(std::numbers::pi / 30.)}});
-  } else if (is_about(std::abs(slope), 2. * std::numbers::pi)) {
-    out.push_back({key,
-                   wheels_ + ": turn " + slow + ": drives are in revolutions per second",
-                   false,
-                   {drives_times(2. * std::numbers::pi)}});
+                   {drives_times(unit->first)}});
   } else if (slope < -1. / kOpposite && slope > -kOpposite) {
     find_reversed(C, out);
   } else if (std::abs(slope - 1.) > factor_tolerance() && std::abs(r) > kVeryAlike) {

@@ -41,9 +41,9 @@ std::vector<ChannelChange> changes_by_gyro(const std::shared_ptr<const WheelMode
 }
 
 std::size_t clear_change(std::span<const YawDifference> undone, const YawDifference& opposite) {
-  constexpr double kLeastRate = 0.05;  // rad/s
+  constexpr double kLeast_rad_per_s = 0.05;
   const auto best = std::ranges::min_element(undone, {}, &YawDifference::part);
-  if (best == undone.begin() || best->variance() < kLeastRate * kLeastRate) return 0;
+  if (best == undone.begin() || best->variance() < kLeast_rad_per_s * kLeast_rad_per_s) return 0;
   const double least = best->part();
   if (least > 0.1 || least > 0.1 * undone.front().part() || opposite.part() < 3. * least) return 0;
   for (auto other = undone.begin(); other != undone.end(); ++other) {

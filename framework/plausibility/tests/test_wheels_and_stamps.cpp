@@ -171,7 +171,7 @@ TEST(FindDisagreement, TellsHowMuchOfTheTimeAndByHowMuch) {
       windows.push_back({static_cast<std::int64_t>(i) * to_ns(kTurnWindow_s), 1.1 * rate + 0.02,
                          rate + off, speed});
     }
-    return find_disagreement(windows);
+    return find_disagreement(windows, 0.15);
   };
   const auto all = found_with(1., 0);
   ASSERT_TRUE(all);
@@ -184,6 +184,18 @@ TEST(FindDisagreement, TellsHowMuchOfTheTimeAndByHowMuch) {
   EXPECT_NEAR(half->part, 0.5, 0.2);
   EXPECT_FALSE(found_with(1., 70));  // slip, perhaps
   EXPECT_FALSE(found_with(0., 0));   // another width, and a bias
+}
+
+// Wheels that are late by a window turn as the gyro does.
+TEST(FindDisagreement, IsNoLag) {
+  std::vector<TurnWindow> windows;
+  const auto rate = [](int i) { return 1.2 * std::sin(0.9 * i); };
+  for (int i = 0; i < 100; ++i) {
+    windows.push_back({i * to_ns(kTurnWindow_s), rate(i), rate(i - 1), 0.5});
+  }
+  EXPECT_FALSE(find_disagreement(windows, 0.15));
+  for (TurnWindow& window : windows) window.wheels *= -1.;
+  EXPECT_TRUE(find_disagreement(windows, 0.15));
 }
 
 TEST(Plausibility, NamesWheelsThatHaveLittleInCommonWithTheGyro) {

@@ -33,7 +33,7 @@ Findings implausible(const RunSetup& setup, const DeadReckoned& data, std::int64
 
 /// How far wheels say that they went, with their intrinsics as configured.
 struct WheelsWay {
-  std::int64_t samples = 0;
+  double duration_s = 0.;  ///< of the samples
   double length_m = 0.;
 };
 

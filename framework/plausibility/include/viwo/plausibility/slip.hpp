@@ -45,8 +45,10 @@ struct Disagreement {
   double median_rad_per_s = 0.;  ///< of what they differ by in those
 };
 
-/// What is no slip, as it lasts for more than a third of the time.
-std::optional<Disagreement> find_disagreement(std::span<const TurnWindow> windows);
+/// What is no slip, as it lasts for more than a third of the time, and no lag. `tolerance`: by what
+/// part the wheels may turn otherwise for all that is known of them.
+std::optional<Disagreement> find_disagreement(std::span<const TurnWindow> windows,
+                                              double tolerance);
 
 /// The median of what the rates differ by, rad/s, factor and bias apart.
 double usual_difference(std::span<const TurnWindow> windows);
