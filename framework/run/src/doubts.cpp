@@ -31,7 +31,8 @@ SegmentParts segment_parts(const eval::Accuracy& accuracy) {
   return parts;
 }
 
-/// Updates that were given measurements and could use none of them; a doubt where no other could.
+/// Updates that were given measurements and could use none of them; a doubt where no other could
+/// (of a base that stands some have nothing to say).
 void doubt_useless(RunResult& result) {
   const auto is_used = [](const UpdateTrack& update) { return update.total.applied > 0; };
   const bool is_alone = std::ranges::none_of(result.updates, is_used);
@@ -62,14 +63,15 @@ double way_of(const Trajectory& poses) {
 
 /// An estimate that the filter itself knows no better than a fifth of the way: that of the wheels
 /// or of a reference, if it is shorter than its own. One that has run away has gone far.
-void doubt_by_itself(RunResult& result) {
-  constexpr double kLeast_m = 0.3, kPart = 0.2;
+void doubt_by_itself(const WheelsWay& wheels, RunResult& result) {
+  // What the noise of wheels adds up to beside one that stands.
+  constexpr double kLeast_m = 0.3, kPart = 0.2, kStanding_m_per_s = 0.002, kAll = 0.9;
   const double sigma_m = result.end_sigma.grown_m;
   if (result.updates.empty() || sigma_m < kLeast_m) return;
   double way_m = way_of(result.estimate);
   if (result.accuracy) way_m = std::min(way_m, result.accuracy->path_length_m);
-  if (result.total.samples > 0) way_m = std::min(way_m, result.total.path_length_m);
-  if (sigma_m < kPart * way_m) return;
+  if (wheels.duration_s > kAll * result.duration_s) way_m = std::min(way_m, wheels.length_m);
+  if (sigma_m < kPart * way_m + kStanding_m_per_s * result.duration_s) return;
   result.doubts.push_back("the filter itself knows the position at the end to " +
                           significant(sigma_m, 2) + " m only, of a way of " +
                           significant(way_m, 2) +
@@ -118,7 +120,7 @@ std::string reference_contradiction(const RunResult& result, const SegmentParts&
 
 }  // namespace
 
-void doubt(RunResult& result) {
+void doubt(RunResult& result, const WheelsWay& wheels_way) {
   const bool is_done = result.status == RunStatus::kOk;
   SegmentParts parts;
   if (result.accuracy) parts = segment_parts(*result.accuracy);
@@ -146,13 +148,14 @@ void doubt(RunResult& result) {
                             " s, in which the mean of the readings before and after is taken: gaps "
                             "of the log, readings that are refused, or a log of what changes only");
   }
-  doubt_by_itself(result);
+  doubt_by_itself(wheels_way, result);
   if (!result.accuracy) return;
   const std::string text = reference_contradiction(result, parts);
   if (text.empty()) return;
-  result.doubts.push_back("the reference contradicts the estimate: " + text +
-                          " - units, signs, order or mount of a sensor are wrong, or of "
-                          "the reference: viwo inspect tells which");
+  result.doubts.push_back(
+      "the reference contradicts the estimate: " + text +
+      " - units, signs, order or mount of a sensor are wrong, or of "
+      "the reference (viwo inspect tells which), or the calibration is far off");
 }
 
 }  // namespace viwo

@@ -116,7 +116,7 @@ std::vector<RejectionCount> with_sources(
 
 /// How a run has ended, and how accurate it was.
 void conclude(const RunSetup& setup, const RunData& data, const Estimator& estimator,
-              RunResult& result) {
+              const WheelsWay& wheels_way, RunResult& result) {
   if (!result.epoch_t_s.empty()) result.duration_s = result.epoch_t_s.back();
   const auto lost = std::find_if(result.pieces.begin(), result.pieces.end(),
                                  [](const RunPiece& piece) { return !piece.failure.empty(); });
@@ -153,7 +153,7 @@ void conclude(const RunSetup& setup, const RunData& data, const Estimator& estim
   if (result.status == RunStatus::kOk && !result.reference.empty()) {
     compare(result.reference, setup, result);
   }
-  doubt(result);
+  doubt(result, wheels_way);
 }
 
 /// One run, with as many estimators as it takes.
@@ -197,10 +197,8 @@ class FilterRun {
     // Beside sensors that work while it runs, the filter's own time says little.
     result_.wall_s = data_.streams.empty() && !live_ ? wall_s_ : seconds_since(begin);
     plausibility_.finish();
-    result_.total.samples = plausibility_.way().samples;
-    result_.total.path_length_m = plausibility_.way().length_m;
     add_findings(plausibility_.findings(), result_);
-    conclude(setup_, data_, *estimator_, result_);
+    conclude(setup_, data_, *estimator_, plausibility_.way(), result_);
     return std::move(result_);
   }
 

@@ -132,12 +132,14 @@ void Recorder::finish(const Estimator& estimator) {
       if (update.total.applied + update.total.rejected == 0) continue;
       updates += (updates.empty() ? "" : ", ") + update.name;
     }
-    result_.warnings.push_back("all updates contradicted the estimate, first at " +
-                               time_text(first_loosened_ns_ - begin_ns_) + "; it was loosened " +
-                               std::to_string(loosened_) +
-                               " times - look for faults of the IMU there, or of all that is "
-                               "measured by " +
-                               updates);
+    constexpr int kOften = 3;  // what comes back to where it was does not again and again
+    auto& lines = loosened_ < kOften ? result_.warnings : result_.doubts;
+    lines.push_back("all updates contradicted the estimate, first at " +
+                    time_text(first_loosened_ns_ - begin_ns_) + "; it was loosened " +
+                    std::to_string(loosened_) +
+                    " times - look for faults of the IMU there, or of all that is "
+                    "measured by " +
+                    updates);
   }
   if (n_nees_ > 0) {
     result_.nees.pose = sum_pose_ / n_nees_;

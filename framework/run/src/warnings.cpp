@@ -5,10 +5,13 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <string_view>
 
 #include <Eigen/Cholesky>
 
+#include "viwo/eval/hints.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/so3.hpp"
 #include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
 
@@ -38,7 +41,7 @@ std::string since(std::int64_t begin_ns, const std::string& place) {
 std::vector<Contradiction> contradictions(const std::vector<UpdateTrack>& updates) {
   // Gates reject five percent at most (gate_probability) of what is good. A fifth, and seven sigmas
   // of the count more than that, is not by chance; of less than forty it may be the first seconds
-  // of a start that is off.
+  // of a start that is off, unless it is most of them.
   constexpr std::int64_t kFewest = 40, kFewestOfMost = 20;
   constexpr double kGated = 0.05, kSigmas = 7.;
   std::vector<Contradiction> found;
@@ -152,16 +155,38 @@ std::map<std::string, double> sigmas_from_prior(const FilterSetup& filter,
   return all;
 }
 
+namespace {
+
+/// What a parameter has changed by; of a rotation, whose vector jumps at half a turn, by the angles
+/// that the filter counts as its error.
+double change_of(std::span<const CalibrationTrack> tracks, std::size_t i) {
+  const CalibrationTrack& track = tracks[i];
+  const std::size_t axis = std::string_view("xyz").find(track.name.back());
+  const bool is_rotation = track.name.find("theta_") != std::string::npos && axis < 3 &&
+                           i >= axis && i - axis + 3 <= tracks.size();
+  if (!is_rotation) return track.estimate.back() - track.estimate.front();
+  Eigen::Vector3d first, last;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::vector<double>& estimate = tracks[i - axis + k].estimate;
+    first[static_cast<Eigen::Index>(k)] = estimate.front();
+    last[static_cast<Eigen::Index>(k)] = estimate.back();
+  }
+  const Eigen::Matrix3d dR = exp_so3(last) * exp_so3(first).transpose();
+  return log_so3(dR)[static_cast<Eigen::Index>(axis)];
+}
+
+}  // namespace
+
 void add_far_from_prior(const std::map<std::string, double>& sigmas_of, RunResult& result) {
   constexpr double kFar = 5., kHopeless = 10.;
   const bool contradicted = has_gross_noise(result);
-  for (const CalibrationTrack& track : result.calibration) {
+  for (std::size_t i = 0; i < result.calibration.size(); ++i) {
+    const CalibrationTrack& track = result.calibration[i];
     if (track.estimate.empty() || !(track.sigma.front() > 0.)) continue;
     const auto known = sigmas_of.find(track.name);
-    const double sigmas =
-        known != sigmas_of.end()
-            ? known->second
-            : std::abs(track.estimate.back() - track.estimate.front()) / track.sigma.front();
+    const double sigmas = known != sigmas_of.end()
+                              ? known->second
+                              : std::abs(change_of(result.calibration, i)) / track.sigma.front();
     if (!(sigmas > kFar)) continue;
     auto& lines = contradicted || sigmas > kHopeless ? result.doubts : result.warnings;
     lines.push_back(track.name + ": " + significant(track.estimate.back(), 4) + " " + track.unit +
@@ -218,6 +243,10 @@ void compare(const Trajectory& reference, const RunSetup& setup, RunResult& resu
   } catch (const InputError& error) {
     result.warnings.push_back(std::string("no accuracy: ") + error.what());
     return;
+  }
+  for (std::string& line :
+       eval::world_hints(reference, result.estimate, setup.evaluation, *result.accuracy)) {
+    result.warnings.push_back("the reference and the estimate: " + std::move(line));
   }
   if (result.accuracy->n_in_gap <= result.accuracy->n_poses) return;
   result.warnings.push_back("accuracy is of " + std::to_string(result.accuracy->n_poses) + " of " +

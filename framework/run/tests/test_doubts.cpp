@@ -73,21 +73,24 @@ TEST(Doubts, AreOfAnEstimateThatTheFilterItselfHardlyKnows) {
   result.updates.resize(1);
   result.updates[0].total.applied = 100;
   for (int i = 0; i <= 10; ++i) result.estimate.push_back({i, {0.1 * i, 0., 0.}});
-  const auto doubts = [&result](double grown_m) {
+  const auto doubts = [&result](double grown_m, const WheelsWay& wheels_way = {}) {
     result.doubts.clear();
     result.end_sigma.grown_m = grown_m;
-    doubt(result);
+    doubt(result, wheels_way);
     return result.doubts;
   };
   EXPECT_THAT(doubts(0.4), ElementsAre(HasSubstr("to 0.4 m only, of a way of 1 m")));
   EXPECT_THAT(doubts(0.25), ElementsAre());
   for (StampedPose& pose : result.estimate) pose.p_BinW *= 100.;
   EXPECT_THAT(doubts(10.), ElementsAre());
-  // One that has run away has gone far: the wheels say how far it was.
-  result.total.samples = 100;
-  result.total.path_length_m = 2.;
-  EXPECT_THAT(doubts(10.), ElementsAre(HasSubstr("to 10 m only, of a way of 2 m")));
-  result.total = {};
+  // One that has run away has gone far: the wheels say how far it was, if they were there.
+  result.duration_s = 10.;
+  EXPECT_THAT(doubts(10., {10., 2.}), ElementsAre(HasSubstr("to 10 m only, of a way of 2 m")));
+  EXPECT_THAT(doubts(10., {5., 2.}), ElementsAre());
+  // What is not known better after ten minutes at rest.
+  EXPECT_THAT(doubts(0.6, {10., 2.}), ElementsAre(HasSubstr("to 0.6 m only")));
+  result.duration_s = 600.;
+  EXPECT_THAT(doubts(0.6, {600., 2.}), ElementsAre());
   result.accuracy.emplace();
   result.accuracy->path_length_m = 3.;
   EXPECT_THAT(doubts(10.), ElementsAre(HasSubstr("to 10 m only, of a way of 3 m")));

@@ -5,11 +5,13 @@
 #include <gtest/gtest.h>
 
 #include "simulated.hpp"
+#include "viwo/math/so3.hpp"
 #include "viwo/run/warnings.hpp"
 
 namespace viwo {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -73,6 +75,28 @@ TEST(Warnings, OfCalibrationFarFromItsPriorAreDoubtsWhereANoiseIsFarOffToo) {
   result.noises = {{"wheels.noise_scale", "", 1., 50., 1000}};
   add_far_from_prior({}, result);
   EXPECT_THAT(result.doubts, ElementsAre(HasSubstr("r_1: 0.16 m was found")));
+}
+
+// The vector of a rotation by half a turn jumps, the rotation does not.
+TEST(Warnings, OfARotationFarFromItsPriorCountTheAnglesBetween) {
+  const auto with = [](const Eigen::Vector3d& by) {
+    const Eigen::Vector3d first(3.141, 0.02, -0.01);
+    const Eigen::Vector3d last = log_so3(exp_so3(by) * exp_so3(first));
+    RunResult result;
+    for (const int axis : {0, 1, 2}) {
+      result.calibration.push_back({std::string("cam0.theta_ItoC_") + "xyz"[axis],
+                                    "rad",
+                                    {first[axis], last[axis]},
+                                    {0.005, 0.001}});
+    }
+    EXPECT_LT(last.x(), 0.);
+    add_far_from_prior({}, result);
+    return result;
+  };
+  EXPECT_THAT(with({0.004, 0.004, -0.004}).doubts, IsEmpty());
+  EXPECT_THAT(with({0.004, 0.004, -0.004}).warnings, IsEmpty());
+  EXPECT_THAT(with({0.004, 0.06, -0.004}).doubts,
+              ElementsAre(AllOf(HasSubstr("theta_ItoC_y"), HasSubstr("12 prior sigmas"))));
 }
 
 TEST(Warnings, OfCalibrationTenSigmasFromItsPriorAreDoubts) {

@@ -9,6 +9,7 @@
 
 #include "viwo/math/trajectory.hpp"
 #include "viwo/plausibility/finding.hpp"
+#include "viwo/plausibility/plausibility.hpp"
 #include "viwo/run/run_result.hpp"
 #include "viwo/setup/run_setup.hpp"
 
@@ -35,7 +36,7 @@ bool has_gross_noise(const RunResult& result);
 /// more than half of the way on segments of every length, and aligned by a good part of where the
 /// reference went. So are wheels most of whose samples cannot be used, and wheels alone that end up
 /// elsewhere: off by a quarter of the way, or half a turn.
-void doubt(RunResult& result);
+void doubt(RunResult& result, const WheelsWay& wheels_way = {});
 
 /// Doubts of what all samples were left out for. Stamps become times since `begin_ns`.
 std::vector<std::string> refused_altogether(std::span<const RejectionCount> rejections,
