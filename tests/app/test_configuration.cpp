@@ -132,8 +132,10 @@ TEST_F(ConfigurationTest, RefusesMissingPlugins) {
              "ackermann, body_twist, differential, four_wis_wid, four_wis_wid_drive_only, mecanum, "
              "skid_steer" +
                  kSearched);
-  refuse_run("kinematics: *robot\n", "",
-             "run.yaml:1:1  'kinematics' is missing: the section of the kinematic model");
+  refuse_run(
+      "kinematics: *robot\n", "",
+      "run.yaml:1:1  'kinematics' is missing: the section of the kinematic model (a filter, with "
+      "'updates', does without)");
 }
 
 TEST_F(ConfigurationTest, RefusesSensorsThatDoNotFitTheModel) {

@@ -189,7 +189,7 @@ std::optional<Eigen::Isometry3d> read_place(const Section& section, const Node& 
   return std::nullopt;
 }
 
-void read_intrinsics(const Section& section, CameraView& camera) {
+void read_intrinsics(const Section& section, bool is_distorted, CameraView& camera) {
   const Node* node = section.required("intrinsics");
   if (node != nullptr) {
     if (const auto f = section.numbers(*node, "intrinsics", 4, "[fx, fy, cx, cy]")) {
@@ -198,6 +198,13 @@ void read_intrinsics(const Section& section, CameraView& camera) {
         section.error(*node, "intrinsics", "the focal lengths fx and fy must be positive");
       }
     }
+  }
+  if (!is_distorted) {
+    node = section.find("distortion_coeffs");
+    if (node != nullptr && !node->items().empty()) {
+      section.error(*node, "distortion_coeffs", "distortion_model: none has none");
+    }
+    return;
   }
   node = section.required("distortion_coeffs");
   if (node == nullptr) return;
@@ -249,10 +256,9 @@ void read_line_delay(const Section& section, CameraView& camera) {
 CameraView read_camera(const Section& section) {
   CameraView camera;
   section.choice("camera_model", {"pinhole"});
-  if (const auto model = section.choice("distortion_model", {"radtan", "equidistant"})) {
-    camera.distortion = *model == 0 ? CameraDistortion::kRadtan : CameraDistortion::kEquidistant;
-  }
-  read_intrinsics(section, camera);
+  const auto model = section.choice("distortion_model", {"radtan", "equidistant", "none"});
+  camera.distortion = model == 1U ? CameraDistortion::kEquidistant : CameraDistortion::kRadtan;
+  read_intrinsics(section, model != 2U, camera);  // none: radtan of zeros
   read_resolution(section, camera);
   if (const Node* shift = section.find("timeshift_cam_imu")) {
     if (const auto s = section.number(*shift, "timeshift_cam_imu")) camera.t_CtoI_s = *s;

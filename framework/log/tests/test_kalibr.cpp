@@ -116,6 +116,17 @@ TEST_F(Kalibr, TakesOpenCvsFirstLineAndMakesRoundedRotationsExact) {
   EXPECT_NEAR(std::atan2(R(1, 0), R(0, 0)), std::atan2(s, c), 1e-15);
 }
 
+TEST_F(Kalibr, TakesACameraWithoutDistortion) {
+  std::string text = camera(std::string("  T_cam_imu:\n") + kQuarter);
+  text.replace(text.find("radtan"), 6, "none");
+  EXPECT_THAT(refusal(text),
+              ::testing::HasSubstr("distortion_coeffs: distortion_model: none has none"));
+  text.replace(text.find("[0.1, 0.2, 0.3, 0.4]\n"), 20, "[]");
+  const auto cameras = read_kalibr_cameras(write("none.yaml", text));
+  EXPECT_EQ(cameras[0].distortion, CameraDistortion::kRadtan);
+  EXPECT_EQ(cameras[0].intrinsics.tail<4>(), Eigen::Vector4d::Zero());
+}
+
 TEST_F(Kalibr, RefusesUnknownModelsWithWhatThereIs) {
   std::string text = camera(std::string("  T_cam_imu:\n") + kQuarter);
   text.replace(text.find("radtan"), 6, "equidistnt");

@@ -115,7 +115,9 @@ void read_kinematics(const Node& run, PluginRegistry& plugins, CalibrationStart*
   const Node* section = run.find("kinematics");
   if (section == nullptr) {
     if (!wants_filter(run)) {
-      errors.add(run.mark(), "'kinematics' is missing: the section of the kinematic model");
+      errors.add(run.mark(),
+                 "'kinematics' is missing: the section of the kinematic model (a filter, with "
+                 "'updates', does without)");
     }
     return;
   }
