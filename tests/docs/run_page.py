@@ -73,7 +73,8 @@ def main():
             print(f"$ {command}\n{done.stdout}[{time.monotonic() - begin:.1f} s, exit {done.returncode}]\n")
             if done.returncode != (1 if command.startswith("viwo inspect") else 0):
                 sys.exit(f"'{command}' ended with {done.returncode}")
-        check_calibration(pathlib.Path(folder), order[0] if order else None)
+        if (pathlib.Path(folder) / "calibrated").exists():  # the status of a run is that of its command
+            check_calibration(pathlib.Path(folder), order[0] if order else None)
 
 
 if __name__ == "__main__":
