@@ -86,6 +86,8 @@ std::string no_epoch(const FilterSetup& setup, const Estimator& estimator) {
   if (setup.start.mode == StartMode::kStandstill) {
     const bool sees_motion = !lacks_samples && (!setup.wheels.empty() || !setup.cameras.empty());
     text += sees_motion ? " - choose start: moving, or reference" : " - choose start: reference";
+  } else if (!lacks_samples) {
+    text += " (viwo inspect looks for wrong units, axes, clocks and mounts)";
   }
   return text;
 }

@@ -178,8 +178,12 @@ double change_of(std::span<const CalibrationTrack> tracks, std::size_t i) {
 }  // namespace
 
 void add_far_from_prior(const std::map<std::string, double>& sigmas_of, RunResult& result) {
-  constexpr double kFar = 5., kHopeless = 10.;
-  const bool contradicted = has_gross_noise(result);
+  constexpr double kFar = 5., kHopeless = 10., kMuchScatter = 10.;
+  const bool contradicted =
+      has_gross_noise(result) ||
+      std::ranges::any_of(result.calibration, [](const CalibrationTrack& track) {
+        return track.scatter > kMuchScatter;
+      });
   for (std::size_t i = 0; i < result.calibration.size(); ++i) {
     const CalibrationTrack& track = result.calibration[i];
     if (track.estimate.empty() || !(track.sigma.front() > 0.)) continue;

@@ -99,6 +99,18 @@ TEST(Warnings, OfARotationFarFromItsPriorCountTheAnglesBetween) {
               ElementsAre(AllOf(HasSubstr("theta_ItoC_y"), HasSubstr("12 prior sigmas"))));
 }
 
+TEST(Warnings, OfCalibrationFarFromItsPriorAreDoubtsWhereOneMovesAsItIsLearned) {
+  RunResult result;
+  result.calibration = {{"r_1", "m", {0.1, 0.16}, {0.01, 0.01}},
+                        {"y_1", "m", {0.1, 0.1}, {0.01, 0.01}}};
+  result.calibration[1].scatter = 8.;
+  add_far_from_prior({}, result);
+  EXPECT_THAT(result.doubts, IsEmpty());
+  result.calibration[1].scatter = 12.;
+  add_far_from_prior({}, result);
+  EXPECT_THAT(result.doubts, ElementsAre(HasSubstr("r_1: 0.16 m was found")));
+}
+
 TEST(Warnings, OfCalibrationTenSigmasFromItsPriorAreDoubts) {
   RunResult result;
   result.calibration = {{"r_1", "m", {0.1, 0.199}, {0.01, 0.01}},

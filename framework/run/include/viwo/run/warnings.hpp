@@ -58,8 +58,9 @@ void add_findings(const Findings& findings, RunResult& result);
 std::map<std::string, double> sigmas_from_prior(const FilterSetup& filter,
                                                 std::span<const CalibrationTrack> tracks);
 /// Calibration that has gone where its prior does not reach, beyond five sigmas: doubts beyond ten,
-/// and where a noise, too, is far above what is configured, else warnings. By how many sigmas says
-/// `sigmas_of` where it has the name, else the track.
+/// and where a noise, too, is far above what is configured or one moves by ten of its own sigmas as
+/// it is learned, else warnings. By how many sigmas says `sigmas_of` where it has the name, else
+/// the track.
 void add_far_from_prior(const std::map<std::string, double>& sigmas_of, RunResult& result);
 /// Of a calibration that is much surer than it ought to be, one line.
 std::vector<std::string> too_sure(const RunResult& result);
