@@ -73,7 +73,7 @@ def main():
             print(f"$ {command}\n{done.stdout}[{time.monotonic() - begin:.1f} s, exit {done.returncode}]\n")
             if done.returncode != (1 if command.startswith("viwo inspect") else 0):
                 sys.exit(f"'{command}' ended with {done.returncode}")
-        if (pathlib.Path(folder) / "calibrated").exists():  # the status of a run is that of its command
+        if any("viwo calibrate" in command for command in commands(pathlib.Path(page), section)):
             check_calibration(pathlib.Path(folder), order[0] if order else None)
 
 

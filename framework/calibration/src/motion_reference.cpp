@@ -43,10 +43,21 @@ StampedPose turned(std::int64_t t_ns, double yaw_rad) {
   return pose;
 }
 
+/// Whether the way goes on along a line: who goes to and fro may well turn at its ends.
+bool goes_straight_on(const Trajectory& poses) {
+  constexpr double kDetour = 1.5;
+  double way_m = 0.;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    way_m += (poses[i].p_BinW - poses[i - 1].p_BinW).norm();
+  }
+  return !eval::bends(poses) &&
+         way_m < kDetour * (poses.back().p_BinW - poses.front().p_BinW).norm();
+}
+
 /// By how much the wheels alone have the base turn where the reference gives the same orientation
 /// all the time, as positions alone do; 0 where it gives orientations, or goes straight on.
 double turn_unseen_by_poses(const RunSetup& setup, const RunData& data) {
-  if (are_turned(data.reference) || !eval::bends(data.reference)) return 0.;
+  if (are_turned(data.reference) || goes_straight_on(data.reference)) return 0.;
   RunSetup wheels_alone = setup;
   double turn_rad = 0.;
   for (const StampedPose& pose : run_odometry(wheels_alone, data).estimate) {

@@ -295,6 +295,14 @@ TEST(MotionReferenceOfPoses, HasOrientations) {
   }
   EXPECT_EQ(motion_reference(label, driven.setup, driven.data, ReferenceKind::kAuto).kind,
             ReferenceKind::kPoses);
+  for (std::size_t i = driven.data.reference.size() / 2; i < driven.data.reference.size(); ++i) {
+    driven.data.reference[i].p_BinW.x() =
+        driven.data.reference[driven.data.reference.size() - 1 - i].p_BinW.x();
+  }
+  EXPECT_THAT(testing::error_of([&] {
+                motion_reference(label, driven.setup, driven.data, ReferenceKind::kAuto);
+              }),
+              ::testing::HasSubstr("positions alone tell no turns"));
 }
 
 TEST(YawOfGyro, IsTheIntegralOfTheTurn) {

@@ -230,8 +230,7 @@ void check_rejections(const Recording& recording, Findings& out) {
     // A row that a power loss has cut short is none of weight; one of a thousand is a fault, and so
     // is damage behind which nothing can be read.
     const bool loses_the_rest = rejection.reason.find("the rest is not read") != std::string::npos;
-    // Of what is suspicious when it is most a fifth, as in a run.
-    const double most = rejection.of > 0 ? 0.2 : 1e-3;
+    const double most = rejection.of > 0 ? 0.5 : 1e-3;  // of what is suspicious when it is most
     const bool is_fault = loses_the_rest || (rejection.count >= 5 && share > most);
     out.push_back({sensor,
                    is_fault ? Severity::kFault : Severity::kNote,

@@ -109,7 +109,7 @@ RigidTransform align_first(std::span<const PosePair> first, Alignment alignment)
 /// Whether the reference gives the same orientation all the time while the estimate turns, and
 /// bends or goes where the estimate goes: who goes straight on may well not turn.
 bool are_positions_alone(const std::vector<PosePair>& pairs) {
-  constexpr double kTurns_rad = 0.5, kPart = 0.05;
+  constexpr double kTurns_rad = 0.5, kPart = 0.05, kLeast_m = 0.5;
   bool turns = false;
   for (const PosePair& pair : pairs) {
     const PosePair& first = pairs.front();
@@ -123,7 +123,8 @@ bool are_positions_alone(const std::vector<PosePair>& pairs) {
     reference.push_back(pair.reference);
     errors_m.push_back(position_error_m(pair));
   }
-  return bends(reference) || root_mean_square(errors_m) < kPart * extent_m(reference);
+  const double extent = extent_m(reference);
+  return (bends(reference) && extent > kLeast_m) || root_mean_square(errors_m) < kPart * extent;
 }
 
 /// A reference without orientations gets those of the estimate, in its world.

@@ -34,24 +34,23 @@ std::string order_hint(const Trajectory& reference, const Trajectory& estimate,
          " are w x y z: TUM files have x y z w";
 }
 
-/// Of worlds of which one is not level, as a motion capture whose y is up.
+/// Of worlds of which one is not level, as a motion capture whose y is up: once one is tilted,
+/// positions and orientations agree.
 std::string tilt_hint(const Trajectory& reference, const Trajectory& estimate,
-                      const Options& options, double ate_m) {
-  constexpr double kPart = 0.2, kPartOfExtent = 0.1;
-  if (options.alignment == Alignment::kSe3 || !(ate_m > kPartOfExtent * extent_m(reference))) {
-    return "";
-  }
+                      const Options& options, const Accuracy& level) {
+  constexpr double kPart = 0.2, kMuch_deg = 20.;
+  if (options.alignment != Alignment::kYawPosition || !(level.ate_deg > kMuch_deg)) return "";
   Options free = options;
   free.alignment = Alignment::kSe3;
-  double best_m = ate_m;
   try {
-    best_m = evaluate(reference, estimate, free).ate_m;
+    const Accuracy tilted = evaluate(reference, estimate, free);
+    if (!(tilted.ate_m < kPart * level.ate_m && tilted.ate_deg < kPart * level.ate_deg)) return "";
+    return "positions differ by " + significant(level.ate_m, 3) + " m, and by " +
+           significant(tilted.ate_m, 3) +
+           " m once the two worlds may be tilted: the z of one of them is not up";
   } catch (const InputError&) {  // what is on one line tells no tilt
     return "";
   }
-  if (!(best_m < kPart * ate_m)) return "";
-  return "positions differ by " + significant(ate_m, 3) + " m, and by " + significant(best_m, 3) +
-         " m once the two worlds may be tilted: the z of one of them is not up";
 }
 
 }  // namespace
@@ -99,7 +98,7 @@ std::vector<std::string> world_hints(const Trajectory& reference, const Trajecto
   std::vector<std::string> lines;
   std::string order = order_hint(reference, estimate, options, accuracy.ate_deg);
   if (!order.empty()) lines.push_back(std::move(order));
-  std::string tilt = tilt_hint(reference, estimate, options, accuracy.ate_m);
+  std::string tilt = tilt_hint(reference, estimate, options, accuracy);
   if (!tilt.empty()) lines.push_back(std::move(tilt));
   return lines;
 }

@@ -170,7 +170,7 @@ void ImuCheck::find_stuck_channels(std::int64_t zero_ns, Findings& out) const {
 }
 
 /// One axis that never changes while both others of its kind move. Two, of a gyro about z alone,
-/// may not be there; and the vertical one feels nothing else where a simulator's ground is flat.
+/// may not be there; and the vertical one feels nothing else on the flat ground of a simulator.
 void ImuCheck::find_constant(Findings& out) const {
   constexpr double kTurns_rad_per_s = 0.02, kShakes_m_per_s2 = 0.1, kUpright_m_per_s2 = 5.;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
@@ -179,12 +179,14 @@ void ImuCheck::find_constant(Findings& out) const {
       const Axis& axis = axes_[triad + one % 3];
       return axis.least == axis.most;
     };
-    const auto moves = [&](std::size_t one) {
-      const Axis& axis = axes_[triad + one % 3];
-      return axis.most - axis.least > (triad == 0 ? kTurns_rad_per_s : kShakes_m_per_s2);
+    const auto moves = [&](std::size_t one, std::size_t of) {
+      const Axis& axis = axes_[of + one % 3];
+      return axis.most - axis.least > (of == 0 ? kTurns_rad_per_s : kShakes_m_per_s2);
     };
-    if (!is_constant(i) || !moves(i + 1) || !moves(i + 2)) continue;
-    if (triad > 0 && std::abs(axes_[i].last) > kUpright_m_per_s2) continue;
+    if (!is_constant(i) || !moves(i + 1, triad) || !moves(i + 2, triad)) continue;
+    if (triad > 0 && std::abs(axes_[i].last) > kUpright_m_per_s2 && !moves(i + 1, 0) &&
+        !moves(i + 2, 0))
+      continue;
     out.push_back({name_ + " stuck " + kImuAxes[i],
                    name_ + ": the " + kImuAxes[i] + " reads " + significant(axes_[i].last, 3) +
                        unit_of(i) +

@@ -196,6 +196,13 @@ TEST(FindDisagreement, IsNoLag) {
   EXPECT_FALSE(find_disagreement(windows, 0.15));
   for (TurnWindow& window : windows) window.wheels *= -1.;
   EXPECT_TRUE(find_disagreement(windows, 0.15));
+  // Quick turns are near to something a window later, each to something else.
+  for (int i = 0; i < 100; ++i) {
+    TurnWindow& window = windows[static_cast<std::size_t>(i)];
+    window.gyro = 0.8 * std::sin(0.36 * i);
+    window.wheels = 0.4 * std::sin(0.36 * i) + 0.3 * std::sin(0.44 * i + 2.);
+  }
+  EXPECT_TRUE(find_disagreement(windows, 0.15));
 }
 
 TEST(Plausibility, NamesWheelsThatHaveLittleInCommonWithTheGyro) {

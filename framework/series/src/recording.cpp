@@ -249,9 +249,10 @@ class Gatherer {
   }
 
   void add_stamp(const std::string& sensor, SampleView sample) {
-    // Tracks have the stamps of their images.
+    // Tracks that are made of images have their stamps.
     const auto entry = std::ranges::find(setup_.sensors, sensor, &SensorEntry::name);
-    if (entry != setup_.sensors.end() && !entry->input.empty()) return;
+    const bool is_made = entry != setup_.sensors.end() && !entry->input.empty();
+    if (is_made && sample.type() == sample_type<FeatureSample>()) return;
     const int channel = sample.type().channel(sample.data());
     for (Stamps& stamps : recording_.stamps) {
       if (stamps.sensor != sensor || !(*stamps.type == sample.type())) continue;

@@ -137,8 +137,12 @@ void KltTracker::read_one(const ImageSource* source, std::size_t camera, Eye& ey
       eye.other_size = size_text(image.width_px, image.height_px);
       return;
     }
-    // Sensors have noise: it was sent twice, or the camera hangs. (Darkness may well be the same.)
-    eye.repeats = !eye.before.blank && image.pixels == eye.before.pixels.pixels;
+    // Sensors have noise: it was sent more than once. After so many the camera may hang, or stand
+    // still and have none (rendered, a video): then it is taken for what it shows.
+    constexpr int kMostRepeats = 3;
+    const bool is_same = !eye.before.blank && image.pixels == eye.before.pixels.pixels;
+    eye.repeats_in_a_row = is_same ? eye.repeats_in_a_row + 1 : 0;
+    eye.repeats = is_same && eye.repeats_in_a_row <= kMostRepeats;
     if (eye.repeats) return;
     eye.maker.make(eye.now);
     eye.is_read = true;
@@ -174,7 +178,7 @@ void KltTracker::check(const ImageGroup& group) {
     if (!eye.matcher || !eye.is_read) continue;
     ++right_images_;
     if (eyes_[i - 1].is_read) continue;
-    refuse(kAlone);
+    if (!eyes_[i - 1].repeats) refuse(kAlone);
     eye.is_read = false;
   }
 }

@@ -38,6 +38,7 @@ class KltTracker final : public Sensor {
     std::optional<std::int64_t> before_ns;  ///< none: nothing to follow points from
     bool is_read = false;                   ///< `now` is of this group
     bool repeats = false;                   ///< the image of this group is the one before
+    int repeats_in_a_row = 0;
     std::string unreadable;
     std::exception_ptr failure;
     std::string other_size;        ///< of this image, when it is not the camera's

@@ -70,6 +70,24 @@ TEST(KltTracker, LeavesOutImagesThatRepeatTheOneBefore) {
   EXPECT_EQ(count.of, 8);
 }
 
+// Rendered without noise, or a video: whoever stands sees the same for long, and has not gone.
+TEST(KltTracker, FollowsWhatStandsInImagesThatAreTheSameForLong) {
+  const std::vector<Measurement> once = drive(3, 1);
+  std::vector<Measurement> rest(once.begin(), once.begin() + 2);
+  ImageSample image = *once[1].view().get_if<ImageSample>();
+  for (int i = 0; i < 20; ++i) {
+    image.t_ns += 50'000'000;
+    rest.emplace_back(image);
+  }
+  ImageSample last = *once[2].view().get_if<ImageSample>();
+  last.t_ns = image.t_ns + 100'000'000;
+  rest.emplace_back(last);
+  const Played played = track(rest, section({}, 1));
+  ASSERT_EQ(played.samples.size(), 3U + 17U);
+  EXPECT_EQ(played.rejections.begin()->second.count, 3);
+  EXPECT_GT(common(played.samples[1], played.samples.back()), 150U);
+}
+
 TEST(ImageGroups, DoNotWaitForACameraThatIsSilentForLong) {
   // GIVEN a camera 1 that is gone from 0.3 s to 2.7 s
   std::vector<Measurement> images;
