@@ -161,15 +161,18 @@ namespace {
 /// that the filter counts as its error.
 double change_of(std::span<const CalibrationTrack> tracks, std::size_t i) {
   const CalibrationTrack& track = tracks[i];
+  const double change = track.estimate.back() - track.estimate.front();
   const std::size_t axis = std::string_view("xyz").find(track.name.back());
-  const bool is_rotation = track.name.find("theta_") != std::string::npos && axis < 3 &&
-                           i >= axis && i - axis + 3 <= tracks.size();
-  if (!is_rotation) return track.estimate.back() - track.estimate.front();
+  if (track.name.find("theta_") == std::string::npos || axis > std::min<std::size_t>(i, 2)) {
+    return change;
+  }
+  const std::string stem = track.name.substr(0, track.name.size() - 1);
   Eigen::Vector3d first, last;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::vector<double>& estimate = tracks[i - axis + k].estimate;
-    first[static_cast<Eigen::Index>(k)] = estimate.front();
-    last[static_cast<Eigen::Index>(k)] = estimate.back();
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const std::size_t at = i - axis + static_cast<std::size_t>(k);
+    if (at >= tracks.size() || tracks[at].name != stem + "xyz"[k]) return change;
+    first[k] = tracks[at].estimate.front();
+    last[k] = tracks[at].estimate.back();
   }
   const Eigen::Matrix3d dR = exp_so3(last) * exp_so3(first).transpose();
   return log_so3(dR)[static_cast<Eigen::Index>(axis)];
