@@ -46,12 +46,8 @@ StampedPose turned(std::int64_t t_ns, double yaw_rad) {
 /// Whether the way goes on along a line: who goes to and fro may well turn at its ends.
 bool goes_straight_on(const Trajectory& poses) {
   constexpr double kDetour = 1.5;
-  double way_m = 0.;
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    way_m += (poses[i].p_BinW - poses[i - 1].p_BinW).norm();
-  }
   return !eval::bends(poses) &&
-         way_m < kDetour * (poses.back().p_BinW - poses.front().p_BinW).norm();
+         eval::way_m(poses) < kDetour * (poses.back().p_BinW - poses.front().p_BinW).norm();
 }
 
 /// By how much the wheels alone have the base turn where the reference gives the same orientation

@@ -11,6 +11,19 @@
 namespace viwo::eval {
 namespace {
 
+/// Of the positions about their middle: the mean of the outer products.
+Eigen::Matrix3d scatter_of(const Trajectory& poses) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  const auto n = static_cast<double>(poses.size());
+  for (const StampedPose& pose : poses) middle += pose.p_BinW / n;
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const StampedPose& pose : poses) {
+    const Eigen::Vector3d off = pose.p_BinW - middle;
+    scatter += off * off.transpose() / n;
+  }
+  return scatter;
+}
+
 /// What was read as x y z w has been w x y z.
 Trajectory reordered(Trajectory trajectory) {
   for (StampedPose& pose : trajectory) {
@@ -55,24 +68,20 @@ std::string tilt_hint(const Trajectory& reference, const Trajectory& estimate,
 
 }  // namespace
 
-double extent_m(const Trajectory& poses) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  const auto n = static_cast<double>(poses.size());
-  for (const StampedPose& pose : poses) mean += pose.p_BinW / n;
-  double squares = 0.;
-  for (const StampedPose& pose : poses) squares += (pose.p_BinW - mean).squaredNorm() / n;
-  return std::sqrt(squares);
+double extent_m(const Trajectory& poses) { return std::sqrt(scatter_of(poses).trace()); }
+
+double way_m(const Trajectory& poses) {
+  double way = 0.;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    way += (poses[i].p_BinW - poses[i - 1].p_BinW).norm();
+  }
+  return way;
 }
 
 bool bends(const Trajectory& path) {
   constexpr double kPart = 0.05;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const StampedPose& pose : path) mean += pose.p_BinW / static_cast<double>(path.size());
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const StampedPose& pose : path) {
-    scatter += (pose.p_BinW - mean) * (pose.p_BinW - mean).transpose();
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter, Eigen::EigenvaluesOnly);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter_of(path),
+                                                              Eigen::EigenvaluesOnly);
   return solver.eigenvalues()[1] > kPart * kPart * solver.eigenvalues()[2];
 }
 

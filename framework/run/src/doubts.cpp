@@ -53,14 +53,6 @@ void doubt_useless(RunResult& result) {
   }
 }
 
-double way_of(const Trajectory& poses) {
-  double way_m = 0.;
-  for (std::size_t i = 1; i < poses.size(); ++i) {
-    way_m += (poses[i].p_BinW - poses[i - 1].p_BinW).norm();
-  }
-  return way_m;
-}
-
 /// An estimate that the filter itself knows no better than a fifth of the way: that of the wheels
 /// or of a reference, if it is shorter than its own. One that has run away has gone far.
 void doubt_by_itself(const WheelsWay& wheels, RunResult& result) {
@@ -68,7 +60,7 @@ void doubt_by_itself(const WheelsWay& wheels, RunResult& result) {
   constexpr double kLeast_m = 0.3, kPart = 0.2, kStanding_m_per_s = 0.002, kAll = 0.9;
   const double sigma_m = result.end_sigma.grown_m;
   if (result.updates.empty() || sigma_m < kLeast_m) return;
-  double way_m = way_of(result.estimate);
+  double way_m = eval::way_m(result.estimate);
   if (result.accuracy) way_m = std::min(way_m, result.accuracy->path_length_m);
   if (wheels.duration_s > kAll * result.duration_s) way_m = std::min(way_m, wheels.length_m);
   if (sigma_m < kPart * way_m + kStanding_m_per_s * result.duration_s) return;

@@ -11,6 +11,9 @@ namespace viwo::eval {
 /// Root mean square distance of a trajectory from its middle.
 double extent_m(const Trajectory& poses);
 
+/// From pose to pose.
+double way_m(const Trajectory& poses);
+
 /// Whether a path is no straight line, by its scatter across.
 bool bends(const Trajectory& path);
 
