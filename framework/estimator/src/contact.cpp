@@ -50,8 +50,7 @@ std::string Contact::epoch(std::span<const UpdateCounts> counts, Filter& filter)
     std::snprintf(text, sizeof text, "%.1f s", seconds_between(lost_since_ns_, t_ns));
     return std::string("all updates have contradicted the estimate for ") + text +
            ": check units, axes and clock of the IMU, then mount, calibration and noise of the "
-           "other "
-           "sensors (viwo inspect looks for what is wrong with them)";
+           "other sensors (viwo inspect looks for what is wrong with them)";
   }
   if (loosened_++ == 0) first_ns_ = begin_ns;
   filter.loosen(lost_periods_);

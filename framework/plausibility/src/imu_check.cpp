@@ -183,10 +183,9 @@ void ImuCheck::find_constant(Findings& out) const {
       const Axis& axis = axes_[of + one % 3];
       return axis.most - axis.least > (of == 0 ? kTurns_rad_per_s : kShakes_m_per_s2);
     };
-    if (!is_constant(i) || !moves(i + 1, triad) || !moves(i + 2, triad)) continue;
-    if (triad > 0 && std::abs(axes_[i].last) > kUpright_m_per_s2 && !moves(i + 1, 0) &&
-        !moves(i + 2, 0))
-      continue;
+    const bool stays_level = triad > 0 && std::abs(axes_[i].last) > kUpright_m_per_s2 &&
+                             !moves(i + 1, 0) && !moves(i + 2, 0);
+    if (!is_constant(i) || !moves(i + 1, triad) || !moves(i + 2, triad) || stays_level) continue;
     out.push_back({name_ + " stuck " + kImuAxes[i],
                    name_ + ": the " + kImuAxes[i] + " reads " + significant(axes_[i].last, 3) +
                        unit_of(i) +

@@ -51,6 +51,26 @@ struct Stretch {
   double turn_rad = 0.;
 };
 
+/// Of clocks as they are.
+std::optional<Disagreement> disagreement(std::span<const TurnWindow> windows, double most_off) {
+  constexpr double kTurns_rad_per_s = 0.1, kMoves_m_per_s = 0.05;
+  const std::vector<double> left = differences(windows, most_off);
+  std::vector<double> beyond;
+  std::size_t moving = 0;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const TurnWindow& w = windows[i];
+    const bool turns = std::max(std::abs(w.gyro), std::abs(w.wheels)) > kTurns_rad_per_s;
+    if (!turns && w.speed_m_per_s < kMoves_m_per_s) continue;
+    ++moving;
+    const double size = std::abs(left[i]);
+    if (size > std::max(kLeast_rad_per_s, usual(w))) beyond.push_back(size);
+  }
+  if (moving < kFewestOfAll) return {};
+  const double part = static_cast<double>(beyond.size()) / static_cast<double>(moving);
+  if (part <= kMostPart) return {};
+  return Disagreement{part, eval::median(beyond)};
+}
+
 }  // namespace
 
 bool Slip::is_fault() const {
@@ -70,30 +90,12 @@ double usual_difference(std::span<const TurnWindow> windows) {
   return eval::median(sizes_of(differences(windows)));
 }
 
-static std::optional<Disagreement> disagreement(std::span<const TurnWindow> windows,
-                                                double most_off) {
-  constexpr double kTurns_rad_per_s = 0.1, kMoves_m_per_s = 0.05;
-  const std::vector<double> left = differences(windows, most_off);
-  std::vector<double> beyond;
-  std::size_t moving = 0;
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    const TurnWindow& w = windows[i];
-    const bool turns = std::max(std::abs(w.gyro), std::abs(w.wheels)) > kTurns_rad_per_s;
-    if (!turns && w.speed_m_per_s < kMoves_m_per_s) continue;
-    ++moving;
-    const double size = std::abs(left[i]);
-    if (size > std::max(kLeast_rad_per_s, usual(w))) beyond.push_back(size);
-  }
-  if (moving < kFewestOfAll) return {};
-  const double part = static_cast<double>(beyond.size()) / static_cast<double>(moving);
-  if (part <= kMostPart) return {};
-  return Disagreement{part, eval::median(beyond)};
-}
-
 std::optional<Disagreement> find_disagreement(std::span<const TurnWindow> windows,
                                               double tolerance) {
   if (windows.size() < kFewestOfAll) return {};
   const double most_off = std::max(kMostOff, 1. + tolerance);
+  const std::optional<Disagreement> found = disagreement(windows, most_off);
+  if (!found) return {};
   std::vector<TurnWindow> shifted(windows.begin(), windows.end());
   for (const bool is_early : {true, false}) {  // clocks that are off by a window
     for (std::size_t i = 1; i < windows.size(); ++i) {
@@ -101,7 +103,7 @@ std::optional<Disagreement> find_disagreement(std::span<const TurnWindow> window
     }
     if (!disagreement(shifted, most_off)) return {};
   }
-  return disagreement(windows, most_off);
+  return found;
 }
 
 std::optional<Slip> find_slip(std::span<const TurnWindow> windows) {

@@ -250,9 +250,13 @@ class Gatherer {
 
   void add_stamp(const std::string& sensor, SampleView sample) {
     // Tracks that are made of images have their stamps.
-    const auto entry = std::ranges::find(setup_.sensors, sensor, &SensorEntry::name);
-    const bool is_made = entry != setup_.sensors.end() && !entry->input.empty();
-    if (is_made && sample.type() == sample_type<FeatureSample>()) return;
+    const auto is_maker = [&](const SensorEntry& entry) {
+      return entry.name == sensor && !entry.input.empty();
+    };
+    if (sample.type() == sample_type<FeatureSample>() &&
+        std::ranges::any_of(setup_.sensors, is_maker)) {
+      return;
+    }
     const int channel = sample.type().channel(sample.data());
     for (Stamps& stamps : recording_.stamps) {
       if (stamps.sensor != sensor || !(*stamps.type == sample.type())) continue;
