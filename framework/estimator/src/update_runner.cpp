@@ -247,6 +247,7 @@ void UpdateRunner::run(std::size_t index, const EpochData& data, Filter& filter,
   has_moved_ = false;
   apply_residuals(context);
   apply_information(context);
+  filter.rebase();
   if (has_room) settle(context);
 }
 

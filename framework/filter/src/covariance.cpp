@@ -118,6 +118,23 @@ void Covariance::propagate(const ImuTransition& transition) {
   P_.topRightCorner(kImuSize, rest) = product.transpose();
 }
 
+void Covariance::move(std::span<const ErrorMove> moves) {
+  for (int half = 0; half < 2; ++half) {  // T P, then T (T P)^T
+    for (Index j = 0; j < P_.cols(); ++j) {
+      auto errors = P_.col(j);
+      for (const ErrorMove& move : moves) {
+        const Eigen::Vector3d theta = errors.segment<3>(move.column);
+        errors.segment<3>(move.column).noalias() = move.turn * theta;
+        errors.segment<3>(move.column + 3).noalias() += move.position_by_theta * theta;
+        if (!move.velocity_by_theta) continue;
+        errors.segment<3>(move.column + 6).noalias() += *move.velocity_by_theta * theta;
+      }
+    }
+    P_.transposeInPlace();
+  }
+  mirror_lower(P_);
+}
+
 void Covariance::clone_pose(int column) {
   P_.middleCols<kPoseSize>(column) = P_.middleCols<kPoseSize>(kThetaColumn);
   P_.middleRows<kPoseSize>(column) = P_.middleRows<kPoseSize>(kThetaColumn);

@@ -58,12 +58,14 @@ Filter::Filter(const FilterOptions& options, std::vector<BlockSpec> blocks,
             blocks_.first_column() + blocks_.columns() - blocks_.first_watched()),
       dx_(Eigen::VectorXd::Zero(covariance_.size())) {
   clones_.reserve(slots_.size());
+  moves_.reserve(slots_.size() + 1);
   new_columns_.reserve(static_cast<std::size_t>(room_columns(blocks_)));
   blocks_.set_prior(covariance_, options_.correlations);
 }
 
 void Filter::initialize(const ImuPrior& prior) {
   t_ns_ = prior.t_ns;
+  has_moved_ = false;
   set_imu(prior.state);
   clones_.clear();
   std::fill(slots_.begin(), slots_.end(), false);
@@ -73,10 +75,38 @@ void Filter::initialize(const ImuPrior& prior) {
 }
 
 void Filter::set_imu(const ImuState& state) {
+  rebase();
   imu_ = state;
   imu_.R_GtoI_fej = imu_.R_GtoI;
   imu_.p_IinG_fej = imu_.p_IinG;
   imu_.v_IinG_fej = imu_.v_IinG;
+}
+
+void Filter::rebase() {
+  if (!std::exchange(has_moved_, false) || options_.consistency == Consistency::kFirstEstimates) {
+    return;
+  }
+  if (options_.consistency == Consistency::kTransform) {  // (F-45)
+    moves_.clear();
+    const auto move = [this](int column, const auto& pose) -> ErrorMove& {
+      const Eigen::Matrix3d R_ItoG = pose.R_GtoI_fej.transpose();
+      return moves_.emplace_back(
+          ErrorMove{column, pose.R_GtoI * R_ItoG, -skew(pose.p_IinG - pose.p_IinG_fej) * R_ItoG});
+    };
+    move(kThetaColumn, imu_).velocity_by_theta =
+        -skew(imu_.v_IinG - imu_.v_IinG_fej) * imu_.R_GtoI_fej.transpose();
+    for (const CloneState& clone : clones_) move(clone.column, clone);
+    covariance_.move(moves_);
+  }
+  imu_.R_GtoI_fej = imu_.R_GtoI;
+  imu_.p_IinG_fej = imu_.p_IinG;
+  imu_.v_IinG_fej = imu_.v_IinG;
+  for (CloneState& clone : clones_) {
+    // Of a clone it is the velocity in I that is held.
+    clone.v_IinG = clone.R_GtoI.transpose() * (clone.R_GtoI_fej * clone.v_IinG);
+    clone.R_GtoI_fej = clone.R_GtoI;
+    clone.p_IinG_fej = clone.p_IinG;
+  }
 }
 
 ImuMatrix Filter::imu_covariance() const {
@@ -88,7 +118,7 @@ ImuMatrix Filter::imu_covariance() const {
 ImuTransition Filter::propagate(std::span<const ImuSample> samples,
                                 std::span<const double> gaps_s) {
   if (samples.empty()) return {ImuMatrix::Identity(), ImuMatrix::Zero()};
-  if (!options_.first_estimates) set_imu(ImuState(imu_));
+  rebase();
   const ImuTransition transition =
       viwo::propagate(samples, options_.imu_noise, options_.gravity_m_per_s2, imu_, gaps_s);
   covariance_.propagate(transition);
@@ -98,6 +128,7 @@ ImuTransition Filter::propagate(std::span<const ImuSample> samples,
 }
 
 void Filter::loosen(double times) {
+  rebase();
   ImuTransition unknown{ImuMatrix::Identity(), ImuMatrix::Zero()};
   const auto add = [&](int column, double sigma) {
     unknown.Q.diagonal().segment<3>(column).setConstant(times * times * sigma * sigma);
@@ -109,6 +140,7 @@ void Filter::loosen(double times) {
 }
 
 void Filter::clone(const ImuSample& sample) {
+  rebase();
   const auto free = std::find(slots_.begin(), slots_.end(), false);
   if (free == slots_.end()) throw std::logic_error("no room for another clone");
   *free = true;
@@ -125,6 +157,7 @@ void Filter::clone(const ImuSample& sample) {
 }
 
 void Filter::drop_oldest_clone() {
+  rebase();
   if (clones_.empty()) return;
   const CloneState& oldest = clones_.front();
   slots_[static_cast<std::size_t>(oldest.slot)] = false;
@@ -183,31 +216,22 @@ void Filter::drop(BlockId id) {
 }
 
 void Filter::rewrite(const BlockRewrite& block) {
+  rebase();
   covariance_.rewrite(blocks_.view(block.id).column(), block.columns, block.J);
   blocks_.rewrite(block);
 }
 
 void Filter::correct() {
+  if (dx_.isZero(0.)) return;
+  has_moved_ = true;
   turn(imu_.R_GtoI, dx_.segment<3>(kThetaColumn));
   imu_.p_IinG += dx_.segment<3>(kPositionColumn);
   imu_.v_IinG += dx_.segment<3>(kVelocityColumn);
   imu_.gyro_bias += dx_.segment<3>(kGyroBiasColumn);
   imu_.accel_bias += dx_.segment<3>(kAccelBiasColumn);
-  if (!options_.first_estimates) {
-    imu_.R_GtoI_fej = imu_.R_GtoI;
-    imu_.p_IinG_fej = imu_.p_IinG;
-    imu_.v_IinG_fej = imu_.v_IinG;
-  }
   for (CloneState& clone : clones_) {
     turn(clone.R_GtoI, dx_.segment<3>(clone.column));
     clone.p_IinG += dx_.segment<3>(clone.column + 3);
-    if (!options_.first_estimates) {
-      // Of the clone it is the velocity in I that is held.
-      const Eigen::Vector3d v_IinI = clone.R_GtoI_fej * clone.v_IinG;
-      clone.v_IinG = clone.R_GtoI.transpose() * v_IinI;
-      clone.R_GtoI_fej = clone.R_GtoI;
-      clone.p_IinG_fej = clone.p_IinG;
-    }
   }
   // What its own epoch tells of how the latest clone moves.
   if (!clones_.empty() && clones_.back().t_ns == t_ns_) {
@@ -215,10 +239,11 @@ void Filter::correct() {
     now.w_IinI -= dx_.segment<3>(kGyroBiasColumn);
     now.v_IinG = now.R_GtoI_fej.transpose() * (imu_.R_GtoI * imu_.v_IinG);
   }
-  blocks_.correct(dx_, options_.first_estimates);
+  blocks_.correct(dx_, options_.consistency != Consistency::kNone);
 }
 
 FilterView Filter::view() const {
+  if (has_moved_) throw std::logic_error("errors are not those of the estimate");
   FilterView view;
   view.imu = imu_;
   view.clones = clones_;

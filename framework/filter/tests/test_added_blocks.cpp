@@ -200,6 +200,7 @@ TEST(AddedBlocks, WrittenAnewHaveTheirJacobianTimesTheCovariance) {  // (F-24)
   const Rows rows = random_rows(random, 30, {{kPoints, 6}, {kClones, 12}});
   InformationFactor factor = rows.factor(filter.size());
   ASSERT_EQ(filter.apply(factor, added), FactorResult::kApplied);
+  filter.rebase();
   const MatrixXd P = filter.covariance();
   // Of its own old error (that of a block in the middle), of a clone, and of the other block.
   BlockRewrite anew;

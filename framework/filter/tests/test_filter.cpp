@@ -83,12 +83,21 @@ TEST(Filter, DroppingACloneOfAnEmptyWindowDoesNothing) {
   EXPECT_TRUE(filter.clones().empty());
 }
 
+FilterOptions with(Consistency consistency) {
+  FilterOptions options = kOptions;
+  options.consistency = consistency;
+  return options;
+}
+
 TEST(Filter, FirstEstimatesStayWhenAnUpdateMovesTheEstimate) {
   Random random(4);
-  Filter filter = running_filter(random, 3);
+  Filter filter = running_filter(random, 3, with(Consistency::kFirstEstimates));
   const std::vector<CloneState> before(filter.clones().begin(), filter.clones().end());
   const ImuState imu = filter.imu();
   ASSERT_EQ(filter.apply(random_factor(random)), FactorResult::kApplied);
+  const MatrixXd P = filter.covariance();
+  filter.rebase();
+  EXPECT_EQ(filter.covariance(), P);
   for (std::size_t i = 0; i < before.size(); ++i) {
     EXPECT_NE(filter.clones()[i].R_GtoI, before[i].R_GtoI);
     EXPECT_NE(filter.clones()[i].p_IinG, before[i].p_IinG);
@@ -107,13 +116,16 @@ TEST(Filter, FirstEstimatesStayWhenAnUpdateMovesTheEstimate) {
   EXPECT_EQ(filter.imu().v_IinG_fej, imu.v_IinG);
 }
 
-TEST(Filter, WithoutFirstEstimatesTheyFollowTheEstimate) {
+TEST(Filter, WithoutFirstEstimatesTheyFollowTheEstimateOnceAllFactorsAreApplied) {
   Random random(5);
-  FilterOptions options = kOptions;
-  options.first_estimates = false;
+  const FilterOptions options = with(Consistency::kNone);
   Filter filter = running_filter(random, 3, options);
   const std::vector<CloneState> before(filter.clones().begin(), filter.clones().end());
   ASSERT_EQ(filter.apply(random_factor(random)), FactorResult::kApplied);
+  EXPECT_EQ(filter.clones()[0].R_GtoI_fej, before[0].R_GtoI);
+  const MatrixXd P = filter.covariance();
+  filter.rebase();
+  EXPECT_EQ(filter.covariance(), P);
   for (std::size_t i = 0; i < before.size(); ++i) {
     const CloneState& clone = filter.clones()[i];
     EXPECT_EQ(clone.R_GtoI_fej, clone.R_GtoI);
@@ -140,6 +152,64 @@ TEST(Filter, WithoutFirstEstimatesTheyFollowTheEstimate) {
     return f.covariance().topLeftCorner<kImuSize, kImuSize>();
   };
   EXPECT_EQ(imu_block(filter), imu_block(fresh));
+}
+
+/// What a turn of the world about the vertical does to the errors about an estimate.
+VectorXd world_turn(const Filter& filter) {
+  const Vector3d up = Vector3d::UnitZ();
+  VectorXd turn = VectorXd::Zero(filter.size());
+  turn.segment<3>(kThetaColumn) = filter.imu().R_GtoI * up;
+  turn.segment<3>(kPositionColumn) = up.cross(filter.imu().p_IinG);
+  turn.segment<3>(kVelocityColumn) = up.cross(filter.imu().v_IinG);
+  for (const CloneState& clone : filter.clones()) {
+    turn.segment<3>(clone.column) = clone.R_GtoI * up;
+    turn.segment<3>(clone.column + 3) = up.cross(clone.p_IinG);
+  }
+  return turn;
+}
+
+/// A filter that knows the yaw of the world to `sigma_rad`, after factors at its estimates that do
+/// not see it.
+Filter after_factors_blind_for_the_yaw(Consistency consistency, double sigma_rad) {
+  Random random(5);
+  Filter filter = make_filter(with(consistency));
+  ImuPrior prior = imu_prior(random);
+  filter.initialize(prior);
+  const VectorXd turn = sigma_rad * world_turn(filter).head(kImuSize);
+  prior.P += turn * turn.transpose();
+  filter.initialize(prior);
+  for (int epoch = 0; epoch < 3; ++epoch) {
+    step(filter, random);
+    const VectorXd unseen = world_turn(filter);
+    for (int k = 0; k < 2; ++k) {  // of one linearisation
+      const MatrixXd H = random.matrix(3, filter.size());
+      ResidualFactor factor;
+      factor.columns.add(0, filter.size());
+      factor.set_rows(3);
+      factor.H = H - H * unseen * unseen.transpose() / unseen.squaredNorm();
+      factor.residual = 0.5 * random.matrix(3, 1);
+      factor.R.setIdentity();
+      EXPECT_EQ(filter.apply(factor), FactorResult::kApplied);
+    }
+    filter.rebase();
+    EXPECT_EQ(filter.covariance(), filter.covariance().transpose());
+  }
+  return filter;
+}
+
+/// How far from that of a yaw at the estimate what another yaw at the start adds to the covariance
+/// is then.
+double what_is_seen_of_the_yaw(Consistency consistency) {
+  constexpr double kSigma = 0.3;
+  const Filter sure = after_factors_blind_for_the_yaw(consistency, 0.);
+  const Filter unsure = after_factors_blind_for_the_yaw(consistency, kSigma);
+  const VectorXd turn = kSigma * world_turn(unsure);
+  return (unsure.covariance() - sure.covariance() - turn * turn.transpose()).norm();
+}
+
+TEST(Filter, ItsCovarianceGoesWithTheEstimateAndDoesNotSeeTheYawOfTheWorld) {
+  EXPECT_LT(what_is_seen_of_the_yaw(Consistency::kTransform), 1e-9);
+  EXPECT_GT(what_is_seen_of_the_yaw(Consistency::kNone), 1e-2) << "a plain Kalman filter does";
 }
 
 /// The rotation that a filter must have after an error dtheta is found in `R`.

@@ -48,7 +48,7 @@ TEST(Filter, LaysOutInertialStateClonesAndBlocks) {
 
 TEST(Filter, ShowsUpdatesItsStateAndNothingElse) {
   Random random(10);
-  const Filter filter = running_filter(random, 2);
+  Filter filter = running_filter(random, 2);
   const FilterView view = filter.view();
   EXPECT_EQ(view.P(), filter.covariance());
   EXPECT_EQ(view.size, kSize);

@@ -31,7 +31,7 @@ using Eigen::Vector3d;
 
 void read_estimator(const EstimatorParams& p, FilterSetup& setup) {
   setup.options.filter.clones = p.clones;
-  setup.options.filter.first_estimates = p.first_estimates;
+  setup.options.filter.consistency = p.consistency;
   setup.options.filter.gravity_m_per_s2 = p.gravity_m_per_s2;
   setup.options.growing_window = p.growing_window;
   setup.options.schedule.max_epoch_s = p.max_epoch_s;

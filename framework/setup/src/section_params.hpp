@@ -94,7 +94,7 @@ struct EstimatorParams {
 
   std::string type = "auto";
   int clones = 11;
-  bool first_estimates = true;
+  Consistency consistency = Consistency::kTransform;
   bool growing_window = true;
   double gravity_m_per_s2 = 9.81;
   double max_epoch_s = 0.25;
@@ -122,8 +122,13 @@ struct EstimatorParams {
     b(VIWO_PARAM(type), {.choices = "auto|msckf|dead_reckoning",
                          .help = "auto: msckf if the run has updates, else wheel odometry alone"});
     b(VIWO_PARAM(clones), {.min = 2., .max = 100., .help = "past poses kept in the state"});
-    b(VIWO_PARAM(first_estimates),
-      {.help = "Jacobians at first estimates (FEJ), which keeps the filter consistent"});
+    b(VIWO_PARAM(consistency),
+      {{"transform", Consistency::kTransform},
+       {"first_estimates", Consistency::kFirstEstimates},
+       {"none", Consistency::kNone}},
+      {.help = "what keeps place and yaw of the world unseen: the covariance goes with each "
+               "correction of the poses; Jacobians are at first estimates (FEJ); nothing, as in a "
+               "plain extended Kalman filter"});
     b(VIWO_PARAM(growing_window),
       {.help = "begin with three clones, one more every third epoch: for a start that may be "
                "wrong; false: for one that is right"});

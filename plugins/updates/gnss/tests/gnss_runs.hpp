@@ -46,7 +46,7 @@ struct GnssDrive {
   /// Noise and first errors of the inertial state, in those of a cheap IMU: without wheels it is
   /// the odometry between fixes.
   double inertia = 0.03;
-  bool first_estimates = true;
+  Consistency consistency = Consistency::kTransform;
   std::string update;  ///< further parameters of the update: ", sigma_scale: 2"
   /// What is done to the fixes, and to the factors of the update before they are applied.
   std::function<void(std::vector<GnssSample>&)> edit;
@@ -308,7 +308,7 @@ inline GnssRun run_gnss(const GnssDrive& drive, std::uint64_t seed) {
   if (drive.edit) drive.edit(fixes);
 
   EstimatorOptions options;
-  options.filter.first_estimates = drive.first_estimates;
+  options.filter.consistency = drive.consistency;
   options.filter.imu_noise = imu.densities;
   options.schedule.max_epoch_s = 0.1;
   options.schedule.max_wait_s = 0.;

@@ -48,10 +48,12 @@ TEST(GnssRuns, AreConsistentWithAReceiverOfCentimetresOnAPoorOdometry) {
   EXPECT_THAT(inconsistency(run_gnss_seeds(drive, kSeeds)), HasSubstr("lever arm"));
 }
 
-TEST(GnssRuns, AreConsistentWithoutFirstEstimatesToo) {
-  for (GnssDrive drive : {poor_receiver(), poor_odometry()}) {
-    drive.first_estimates = false;
-    EXPECT_EQ(inconsistency(run_gnss_seeds(drive, kSeeds)), "");
+TEST(GnssRuns, AreConsistentWithFirstEstimatesAndAsAPlainKalmanFilter) {
+  for (const Consistency consistency : {Consistency::kFirstEstimates, Consistency::kNone}) {
+    for (GnssDrive drive : {poor_receiver(), poor_odometry()}) {
+      drive.consistency = consistency;
+      EXPECT_EQ(inconsistency(run_gnss_seeds(drive, kSeeds)), "");
+    }
   }
 }
 

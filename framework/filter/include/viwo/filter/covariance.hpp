@@ -2,6 +2,7 @@
 // Equations: docs/math/filter.md.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,6 +28,15 @@ inline bool is_applied(FactorResult result) {
   return result == FactorResult::kApplied || result == FactorResult::kWeakened;
 }
 
+/// Errors of a pose, and maybe of its velocity, that become those of another estimate: that of the
+/// orientation is turned, the others gain a part of what it was.
+struct ErrorMove {
+  int column = 0;  ///< of the orientation; position and velocity follow
+  Eigen::Matrix3d turn;
+  Eigen::Matrix3d position_by_theta;
+  std::optional<Eigen::Matrix3d> velocity_by_theta = {};
+};
+
 class Covariance {
  public:
   /// `max_new`: most columns that are initialised at a time.
@@ -41,6 +51,8 @@ class Covariance {
   void clear_block(int first, int count);
   /// P <- Phi P Phi^T + Q for the inertial state, Phi P for what it shares with the rest.
   void propagate(const ImuTransition& transition);
+  /// P <- T P T^T, where T is the identity but for the errors that move (F-45).
+  void move(std::span<const ErrorMove> moves);
   /// The pose at `column` becomes a copy of the inertial one.
   void clone_pose(int column);
 

@@ -19,9 +19,16 @@
 
 namespace viwo {
 
+/// What keeps the place and the yaw of the world unseen while estimates move.
+enum class Consistency : std::uint8_t {
+  kTransform,       ///< the covariance goes with each correction of the poses (F-45)
+  kFirstEstimates,  ///< Jacobians stay where a pose was when it was first used (F-6)
+  kNone,            ///< nothing: a plain extended Kalman filter
+};
+
 struct FilterOptions {
   int clones = 11;  ///< kept between epochs; one more exists during an update
-  bool first_estimates = true;
+  Consistency consistency = Consistency::kTransform;
   ImuNoise imu_noise;
   double gravity_m_per_s2 = 9.81;
   PriorCorrelations correlations = {};  ///< of the entries of blocks
@@ -61,12 +68,16 @@ class Filter {
   /// Makes the window shorter than there is room for; at least 2.
   void limit_window(std::size_t clones) { window_limit_ = std::max<std::size_t>(clones, 2); }
 
-  /// Applies a factor and corrects the estimate.
+  /// Applies a factor and corrects the estimate. The errors stay those of the estimate at which the
+  /// factor was linearised, so that others of the same linearisation can follow, until rebase().
   FactorResult apply(const ResidualFactor& factor);
   FactorResult apply(const InformationFactor& factor);
   /// The same for a factor that determines blocks that are new; they exist if it was applied. What
   /// it says of the others is left in `factor`.
   FactorResult apply(InformationFactor& factor, std::span<const AddedBlock> added);
+  /// Errors become those of the corrected estimate, and Jacobians are taken there. What propagates,
+  /// clones, drops or rewrites does so first.
+  void rebase();
   /// Of blocks in rooms that exist.
   void drop(BlockId id);
   void rewrite(const BlockRewrite& block);
@@ -92,6 +103,7 @@ class Filter {
   void estimates(BlockId id, std::vector<BlockEstimate>& out) const {
     blocks_.estimates(id, covariance_, out);
   }
+  /// std::logic_error between apply() and rebase().
   FilterView view() const;
 
  private:
@@ -114,6 +126,8 @@ class Filter {
   HeldDirections held_;
   Eigen::VectorXd dx_;
   std::vector<int> new_columns_;
+  bool has_moved_ = false;  // since rebase()
+  std::vector<ErrorMove> moves_;
   bool covariance_failed_ = false;
 };
 
