@@ -207,6 +207,7 @@ FeatureStatus Feature::linearize(Window& window) {
     row.H_f.col(2) = row.by_rho;
   }
   has_plain_noise_ = true;
+  second_order_ = 0.;
   if (!exact_) leave_to_noise(window);
   return FeatureStatus::kOk;
 }
@@ -218,8 +219,10 @@ void Feature::leave_to_noise(Window& window) {
   for (LinearSight& row : linear_) {
     const double sigma_m2 =
         window.way_variance(row.clone) + window.way_variance(linear_.front().clone);
-    const double variance =
-        0.5 * met_.sigma_rho * met_.sigma_rho * sigma_m2 * (row.H_f.leftCols<2>()).squaredNorm();
+    const double gain = row.H_f.leftCols<2>().norm();
+    const double rho = met_.point.rho;
+    second_order_ = std::max(second_order_, rho * rho * sigma_m2 * gain);  // (VF-30)
+    const double variance = 0.5 * met_.sigma_rho * met_.sigma_rho * sigma_m2 * gain * gain;
     if (variance < kLeastNoise) continue;
     if (variance > kPlain) has_plain_noise_ = false;
     const double weight = 1. / std::sqrt(1. + variance);

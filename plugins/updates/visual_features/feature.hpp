@@ -79,6 +79,8 @@ class Feature {
   Eigen::Ref<const Eigen::VectorXd> rho_by_poses(const Window& window);
   /// It was used: others will be about as far.
   void remember_distance();
+  /// After linearize(): what is left out of a row, in sigmas of a pixel, where it is most (VF-30).
+  double second_order() const { return second_order_; }
   /// Whether its rows have the noise of pixels alone (VF-27).
   bool has_plain_noise() const { return has_plain_noise_; }
   void set_point(const Eigen::Vector3d& p_FinG);
@@ -100,6 +102,7 @@ class Feature {
   FoundDistances distances_;
   double found_rho_ = 0., found_variance_ = 0.;  ///< of the last track
   bool is_of_scene_ = false, has_plain_noise_ = true;
+  double second_order_ = 0.;
   Eigen::VectorXd by_clones_, P_by_clones_;  ///< derivatives of rho
   std::vector<Sight> sights_;
   std::vector<Ray> rays_;

@@ -48,6 +48,8 @@ struct RunOptions {
   bool knows_shutter = true;
   double sigma_velocity_m_per_s = 5e-3;  ///< of the start
   double far = 1.;                       ///< times as far as they are usually
+  double sigma_orientation_rad = 2e-3;   ///< of the start
+  Consistency consistency = Consistency::kTransform;
 };
 
 /// Takes from new anchors what depends on their clones.
@@ -97,6 +99,7 @@ class FilterRun {
     EstimatorOptions estimator;
     estimator.growing_window = false;
     estimator.filter.imu_noise = imu_options().densities;
+    estimator.filter.consistency = options.consistency;
     estimator_ = std::make_unique<Estimator>(
         estimator, std::vector{UpdateEntry{"visual_features", update,
                                            std::make_shared<Rig>(priors, std::nullopt), ""}});
@@ -204,8 +207,8 @@ class FilterRun {
   void start() {
     const StateSample truth = truth_at(kStartNs);
     Eigen::VectorXd sigma(kImuSize);
-    sigma << Eigen::Vector3d::Constant(2e-3), Eigen::Vector3d::Constant(5e-3),
-        Eigen::Vector3d::Constant(options_.sigma_velocity_m_per_s),
+    sigma << Eigen::Vector3d::Constant(options_.sigma_orientation_rad),
+        Eigen::Vector3d::Constant(5e-3), Eigen::Vector3d::Constant(options_.sigma_velocity_m_per_s),
         Eigen::VectorXd::Constant(6, 2e-3);
     const Eigen::VectorXd e = sigma.cwiseProduct(testing::normals(random_, kImuSize));
     ImuPrior prior;
@@ -324,6 +327,18 @@ TEST(VisualRuns, AStartWhoseVelocityIsHardlyKnownIsConsistent) {
   EXPECT_EQ(inconsistency({.n_cameras = 2, .sigma_velocity_m_per_s = 0.3}, 8), "");
   // What was found with another scale is not expected of those that are found later.
   EXPECT_EQ(inconsistency({.sigma_velocity_m_per_s = 0.6, .far = 2.}, 8), "");
+}
+
+TEST(VisualRuns, RoughStartsAmongNearPointsAreConsistentIfTheCovarianceGoesWithTheEstimate) {
+  for (const int n_cameras : {1, 2}) {
+    RunOptions options{.n_cameras = n_cameras,
+                       .sigma_velocity_m_per_s = 0.3,
+                       .far = 0.1,
+                       .sigma_orientation_rad = 0.03};
+    EXPECT_EQ(inconsistency(options, 12), "") << n_cameras;
+    options.consistency = Consistency::kNone;
+    EXPECT_NE(inconsistency(options, 12), "") << n_cameras;
+  }
 }
 
 TEST(VisualRuns, PointsThatAreTooFarForParallaxDoNoHarm) {

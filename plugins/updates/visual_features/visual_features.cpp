@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "relinearisation.hpp"
 #include "viwo/camera/camera_model.hpp"
 #include "viwo/math/chi2.hpp"
 
@@ -31,6 +32,8 @@ constexpr const char* kStray = "observation left out: the others of its track se
 constexpr std::size_t kReasons = 13;
 /// In an epoch: their covariance is worked out, which most others do not need.
 constexpr int kTracksThatTellNoise = 2;
+/// Where rows leave out more than this, in sigmas of a pixel, they are linearised again (VF-30).
+constexpr double kRough = 1.;
 /// Times as many tracks are tried in an epoch as may be used: what a try costs is bounded, too.
 constexpr std::size_t kTries = 3;
 constexpr int kMotionDof = 3;  ///< of a velocity
@@ -86,6 +89,7 @@ void VisualFeatures::start(const UpdateSetup& setup) {
   equations_.start(setup.max_clones, n_cameras);
   gate_.start(setup.max_clones, n_cameras);
   candidates_.reserve(static_cast<std::size_t>(params_.max_tracks));
+  used_.reserve(static_cast<std::size_t>(params_.max_features));
   seconds_.reserve(static_cast<std::size_t>(params_.max_tracks));
   seen_epoch_.assign(static_cast<std::size_t>(params_.max_tracks), -1);
   const auto thresholds = [&](double probability) {
@@ -132,6 +136,8 @@ void VisualFeatures::update(const FilterView& filter, const EpochData& data, Fac
   if (filter.clones.empty()) return;
   window_.set(filter);
   gate_.begin();
+  used_.clear();
+  second_order_ = 0.;
   weighed_ = 0;
   feature_.set_sigma(noise_.scale() * params_.sigma_px);
   landmarks_.set_sigma(noise_.scale() * params_.sigma_px);
@@ -152,10 +158,43 @@ void VisualFeatures::update(const FilterView& filter, const EpochData& data, Fac
     reject(kTooMany, candidates_[i].id);
     if (candidates_[i].lost) tracks_.remove(candidates_[i].track);
   }
-  if (landmarks_.look(tracks_, images_now_)) {
-    landmarks_.use_sights(window_, tracks_, factor(sink), sink);
-  }
+  const bool sees_landmarks = landmarks_.look(tracks_, images_now_);
+  if (sees_landmarks) landmarks_.use_sights(window_, tracks_, factor(sink), sink);
   if (factor_ != nullptr) equations_.finish(window_, *factor_);
+  const bool has_tracks_alone = !sees_landmarks && sink.added().empty();
+  if (second_order_ > kRough && has_tracks_alone) linearise_again(filter);
+  for (const Used& used : used_) tracks_.remove(used.track);
+}
+
+/// A track that cannot be linearised there is left as it is, and so are all: they are one factor.
+void VisualFeatures::linearise_again(const FilterView& prior) {
+  const InformationFactor first = *factor_;
+  const Relinearisation there(prior, window_, first);
+  window_.set(there.view());
+  window_.set_poses();
+  equations_.begin(window_, *factor_);
+  for (const Used& used : used_) {
+    feature_.collect(tracks_, used.track, window_);
+    bool is_fit = feature_.triangulate(window_) == FeatureStatus::kOk;
+    if (is_fit && used.has_strays && feature_.leave_out_strays() > 0) {
+      is_fit = feature_.triangulate(window_) == FeatureStatus::kOk;
+    }
+    if (!is_fit || feature_.linearize(window_) != FeatureStatus::kOk ||
+        !equations_.prepare(feature_)) {
+      *factor_ = first;
+      return;
+    }
+    equations_.add(feature_, window_, *factor_);
+  }
+  equations_.finish(window_, *factor_);
+  there.move_back(*factor_);
+}
+
+void VisualFeatures::add(const Candidate& candidate, bool has_strays, FactorSink& sink) {
+  equations_.add(feature_, window_, factor(sink));
+  sink.count(1, 0);
+  used_.push_back({candidate.track, has_strays});
+  second_order_ = std::max(second_order_, feature_.second_order());
 }
 
 void VisualFeatures::settle(const FilterView& filter, BlockEdits& edits) {
@@ -325,12 +364,11 @@ bool VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
         landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) {
       return true;
     }
-    equations_.add(feature_, window_, factor(sink));
-    sink.count(1, 0);
-  } else {
-    reject(moves_ ? kMoves : kGate, candidate.id);
-    sink.count(0, 1);
+    add(candidate, strays > 0, sink);
+    return true;
   }
+  reject(moves_ ? kMoves : kGate, candidate.id);
+  sink.count(0, 1);
   tracks_.remove(candidate.track);
   return true;
 }

@@ -60,6 +60,8 @@ class VisualFeatures final : public Update {
   void choose_landmarks();
   /// Whether it had a point, and was taken or left to the gate.
   bool use(const Candidate& candidate, FactorSink& sink);
+  /// Puts the prepared track into the factor.
+  void add(const Candidate& candidate, bool has_strays, FactorSink& sink);
   bool passes_gate();
   void tell_noise();
   /// Of the gate.
@@ -68,6 +70,8 @@ class VisualFeatures final : public Update {
                                : thresholds_[static_cast<std::size_t>(dof)];
   }
   FeatureStatus try_feature(bool& passes);
+  /// Linearises the tracks of this epoch where their factor puts the clones.
+  void linearise_again(const FilterView& prior);
   /// The factor of this epoch, with the columns of the window.
   InformationFactor& factor(FactorSink& sink);
 
@@ -94,6 +98,12 @@ class VisualFeatures final : public Update {
   };
   std::optional<Told> told_;
   InformationFactor* factor_ = nullptr;  ///< of this epoch, once there is a feature
+  struct Used {
+    int track;
+    bool has_strays;
+  };
+  std::vector<Used> used_;    ///< tracks that are in the factor, still in the store
+  double second_order_ = 0.;  ///< largest of them
   std::vector<Candidate> candidates_;
   std::vector<double> seconds_;           ///< in sight, of candidates
   std::vector<std::int64_t> seen_epoch_;  ///< per track
