@@ -162,7 +162,7 @@ class Skeletons(ConsumerTest):
         log = self.build_and_test(self.folder / name)
         for test in ('is_accepted', 'runs', 'conforms'):
             self.assertRegex(log, rf'Test +#\d: {test} \.+ +Passed')
-        plugins = self.folder / name / 'build/lib/viwo/plugins/v10'
+        plugins = self.folder / name / 'build/lib/viwo/plugins/v11'
         listing = self.run_command('viwo', 'plugins', 'list', '--plugin-path', plugins)
         self.assertRegex(listing, rf'(?m)^{kind}  {name}  0\.1\.0  ')
         return self.folder / name
@@ -173,7 +173,7 @@ class Skeletons(ConsumerTest):
             self.run_command(Installation.cmake, '--install', folder / 'build', '--prefix',
                              self.folder / 'mine')
             self.run_command('viwo', 'plugins', 'describe', 'a_new_kinematics_2', '--plugin-path',
-                             self.folder / 'mine/lib/viwo/plugins/v10')
+                             self.folder / 'mine/lib/viwo/plugins/v11')
 
     def test_update(self):
         folder = self.write_and_try('update')
@@ -200,7 +200,7 @@ class RecordedLog(ConsumerTest):
         build = self.folder / 'swerve_auto/build'
         self.run_command(Installation.cmake, '-S', 'swerve_auto', '-B', build)
         self.run_command(Installation.cmake, '--build', build)
-        plugins = build / 'lib/viwo/plugins/v10'
+        plugins = build / 'lib/viwo/plugins/v11'
         listing = self.run_command('viwo', 'plugins', 'list', '--plugin-path', plugins)
         self.assertRegex(listing, r'(?m)^kinematics  swerve_auto  1\.0\.0  ')
         conformance = self.folder / 'conformance.yaml'
@@ -255,7 +255,7 @@ class Package(ConsumerTest):
         self.run_command(Installation.cmake, '-S', 'fast', '-B', 'fast/build',
                          '-DCMAKE_CXX_FLAGS=-ffast-math')
         self.run_command(Installation.cmake, '--build', 'fast/build')
-        library = 'fast/build/lib/viwo/plugins/v10/libviwo_kinematics_fast.so'
+        library = 'fast/build/lib/viwo/plugins/v11/libviwo_kinematics_fast.so'
         log = self.run_command('viwo', 'plugins', 'check', library, code=2)
         self.assertIn('fast_math: host 0, plugin 1\n  -> rebuild it without -ffast-math', log)
 

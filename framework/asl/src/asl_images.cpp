@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -109,6 +110,9 @@ class CameraTable {
 
 fs::path image_name(const TableReader& table, std::size_t column) {
   if (table.text(column).empty()) table.fail(column, "is empty");
+  if (table.text(column).find('\0') != std::string_view::npos) {  // another file would be opened
+    table.fail(column, quoted(table.text(column)) + " has a zero byte");
+  }
   fs::path name = table.text(column);
   if (name.is_absolute() || std::find(name.begin(), name.end(), "..") != name.end()) {
     table.fail(column, quoted(table.text(column)) + " leads out of the folder of the images");

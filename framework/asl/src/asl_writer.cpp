@@ -9,6 +9,7 @@
 
 #include "viwo/api/status.hpp"
 #include "viwo/asl/asl.hpp"
+#include "viwo/files/delayed_signals.hpp"
 #include "viwo/files/files.hpp"
 #include "viwo/files/text_writer.hpp"
 #include "viwo/image/image_file.hpp"
@@ -326,6 +327,7 @@ void AslWriter::close() {
     if (table) table->close();
   }
   const fs::path part = tables_->folder;
+  const files::DelayedSignals until_it_is_there;
   // A table that the new log does not have must not stay behind.
   state_ = State::kReplacing;
   remove_tables();

@@ -154,6 +154,8 @@ TEST_F(AslImagesTest, WrongTablesAreRefusedWithTheirLine) {
   EXPECT_EQ(message("#timestamp [ns],filename\nx,a.png\n"),
             ":2  column 'timestamp [ns]': 'x' is not an integer");
   EXPECT_EQ(message("#timestamp [ns],filename\n1,\n"), ":2  column 'filename': is empty");
+  EXPECT_EQ(message(std::string("#timestamp [ns],filename\n1,a") + '\0' + "b.png\n"),
+            ":2  column 'filename': 'a?b.png' has a zero byte");
 }
 
 }  // namespace

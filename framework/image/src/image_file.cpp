@@ -1,7 +1,6 @@
 #include "viwo/image/image_file.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -12,12 +11,11 @@
 #include "image_header.hpp"
 #include "jpeg.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/config/regular_file.hpp"
 
 namespace viwo {
 namespace {
 
-/// Cameras have fewer: 7680 x 4320 fit. A file of some KB could ask for GB.
-constexpr std::uint64_t kMostPixels = 1ULL << 25, kLongestSide = 1ULL << 15;
 constexpr std::uint64_t kMostBytes = 1ULL << 28;
 
 /// What a few bytes ask for is known before a pixel is decoded.
@@ -27,13 +25,13 @@ ImageSize size_of(std::span<const std::uint8_t> bytes, const std::string& name) 
     throw InputError(name + ": is no PNG, JPEG, BMP, PGM or PPM, or its header is damaged");
   }
   const auto [width, height] = *size;
-  if (width > 0 && height > 0 && width <= kLongestSide && height <= kLongestSide &&
-      width * height <= kMostPixels) {
+  if (width > 0 && height > 0 && width <= kLongestImageSide && height <= kLongestImageSide &&
+      width * height <= kMostImagePixels) {
     return *size;
   }
   throw InputError(name + ": an image of " + std::to_string(width) + " x " +
                    std::to_string(height) + " pixels, at most " +
-                   std::to_string(kMostPixels >> 20U) + " Mi are read");
+                   std::to_string(kMostImagePixels >> 20U) + " Mi are read");
 }
 
 /// OpenCV decodes what it finds of a PNG that was cut short and leaves the rest black: look at the
@@ -48,22 +46,26 @@ bool lacks_its_end(std::span<const std::uint8_t> png) {
   return std::search(tail.begin(), tail.end(), kMark.begin(), kMark.end(), same) == tail.end();
 }
 
-}  // namespace
+bool is_png(std::span<const std::uint8_t> bytes) { return begins(bytes, "\x89PNG"); }
 
-void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out) {
+/// Of what is whole, as far as that shows without its pixels.
+ImageSize size_of_whole(std::span<const std::uint8_t> bytes, const std::string& name) {
   if (bytes.empty()) throw InputError(name + ": the image is empty");
-  const bool is_png = begins(bytes, "\x89PNG");
-  if (is_png && lacks_its_end(bytes)) throw InputError(name + ": the image is cut short");
-  const ImageSize size = size_of(bytes, name);
+  if (is_png(bytes) && lacks_its_end(bytes)) throw InputError(name + ": the image is cut short");
+  return size_of(bytes, name);
+}
+
+void decode(std::span<const std::uint8_t> bytes, const ImageSize& size, const std::string& name,
+            Image& out) {
   if (begins(bytes, "\xff\xd8")) {
     decode_jpeg(bytes, size, name, out);
     return;
   }
 #if VIWO_HAS_LIBDEFLATE
-  if (is_png && decode_grey_png(bytes, out)) return;
+  if (is_png(bytes) && decode_grey_png(bytes, out)) return;
 #endif
   std::vector<std::uint8_t> pixels_alone;
-  if (is_png) bytes = pixels_alone = without_texts(bytes);
+  if (is_png(bytes)) bytes = pixels_alone = needed_for_pixels(bytes);
   const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1,
                     const_cast<std::uint8_t*>(bytes.data()));
   cv::Mat grey;
@@ -79,20 +81,42 @@ void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, 
   out.pixels.assign(grey.datastart, grey.dataend);
 }
 
-void read_image(const std::filesystem::path& file, Image& out) {
-  const auto refuse = [&] {
-    throw InputError(file.string() + ": the image is missing or cannot be read");
-  };
-  std::error_code error;
-  const auto size = std::filesystem::file_size(file, error);  // also refuses folders
-  if (error) refuse();
-  if (size > kMostBytes) throw InputError(file.string() + ": is larger than an image is (256 MiB)");
-  std::ifstream stream(file, std::ios::binary);
-  std::vector<std::uint8_t> bytes(size);
-  if (!stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size))) {
-    refuse();
+std::vector<std::uint8_t> bytes_of(const std::filesystem::path& file) {
+  try {
+    config::RegularFile opened(file);
+    const std::uintmax_t size = opened.size();
+    if (size > kMostBytes) {
+      throw InputError(file.string() + ": is larger than an image is (256 MiB)");
+    }
+    std::vector<std::uint8_t> bytes(size);
+    if (opened.read({reinterpret_cast<char*>(bytes.data()), bytes.size()}) == size) return bytes;
+  } catch (const std::system_error&) {  // as if it had become shorter
   }
-  decode_image(bytes, file.string(), out);
+  throw InputError(file.string() + ": the image is missing or cannot be read");
+}
+
+}  // namespace
+
+void decode_image(std::span<const std::uint8_t> bytes, const std::string& name, Image& out) {
+  decode(bytes, size_of_whole(bytes, name), name, out);
+}
+
+void decode_image_of_size(std::span<const std::uint8_t> bytes, const std::string& name,
+                          int width_px, int height_px, Image& out) {
+  const ImageSize size = size_of_whole(bytes, name);
+  out.width_px = static_cast<int>(size.width_px);
+  out.height_px = static_cast<int>(size.height_px);
+  out.pixels.clear();
+  if (out.width_px == width_px && out.height_px == height_px) decode(bytes, size, name, out);
+}
+
+void read_image(const std::filesystem::path& file, Image& out) {
+  decode_image(bytes_of(file), file.string(), out);
+}
+
+void read_image_of_size(const std::filesystem::path& file, int width_px, int height_px,
+                        Image& out) {
+  decode_image_of_size(bytes_of(file), file.string(), width_px, height_px, out);
 }
 
 }  // namespace viwo

@@ -87,6 +87,14 @@ std::optional<ImageSize> netpbm_size(Bytes bytes) {
   return ImageSize{*width, *height};
 }
 
+/// Whether what begins with the type of a chunk of a PNG changes pixels: those that libpng must
+/// know, or refuses; transparency; and by what powers colours are, before they are added to grey.
+bool is_needed(Bytes type) {
+  constexpr std::uint8_t kIsAncillary = 0x20;
+  return (type[0] & kIsAncillary) == 0 || begins(type, "tRNS") || begins(type, "gAMA") ||
+         begins(type, "sRGB");
+}
+
 }  // namespace
 
 bool begins(Bytes bytes, std::string_view magic) {
@@ -105,7 +113,7 @@ std::optional<ImageSize> image_size(Bytes bytes) {
   return std::nullopt;
 }
 
-std::vector<std::uint8_t> without_texts(Bytes png) {
+std::vector<std::uint8_t> needed_for_pixels(Bytes png) {
   constexpr std::size_t kMagic = 8, kAround = 12;  // length, type and checksum of a chunk
   std::vector<std::uint8_t> out;
   const auto take = [&](std::size_t n) {
@@ -122,12 +130,10 @@ std::vector<std::uint8_t> without_texts(Bytes png) {
       break;
     }
     const std::size_t size = kAround + static_cast<std::size_t>(length);
-    const bool is_text = begins(type, "tEXt") || begins(type, "zTXt") || begins(type, "iTXt") ||
-                         begins(type, "sPLT");
-    if (is_text) {
-      png = png.subspan(size);
-    } else {
+    if (is_needed(type)) {
       take(size);
+    } else {
+      png = png.subspan(size);
     }
   }
   take(png.size());

@@ -20,8 +20,9 @@ bool begins(std::span<const std::uint8_t> bytes, std::string_view magic);
 /// Of a PNG, JPEG, BMP, PGM or PPM; nothing for other formats, and for a header that is broken.
 std::optional<ImageSize> image_size(std::span<const std::uint8_t> bytes);
 
-/// A PNG without its texts and palettes that are proposed: libpng decompresses each, up to 8 MB of
-/// a few KB, and keeps them all.
-std::vector<std::uint8_t> without_texts(std::span<const std::uint8_t> png);
+/// A PNG without what changes no pixel. Texts, profiles and palettes that are proposed are
+/// decompressed by libpng, up to 8 MB of a few KB, and all kept; and what it does not like of them
+/// it prints by the name that they have, whatever bytes that is.
+std::vector<std::uint8_t> needed_for_pixels(std::span<const std::uint8_t> png);
 
 }  // namespace viwo

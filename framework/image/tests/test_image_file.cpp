@@ -102,7 +102,7 @@ TEST_F(ImageFileTest, AWholeFileMayBePadded) {
 }
 
 TEST_F(ImageFileTest, AFolderIsNoImage) {
-  EXPECT_EQ(failure(folder_), folder_.string() + ": the image is missing or cannot be read");
+  EXPECT_EQ(failure(folder_), folder_.string() + "  is a folder, not a file");
 }
 
 TEST_F(ImageFileTest, IsNotTurnedByWhatExifSays) {

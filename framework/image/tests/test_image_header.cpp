@@ -65,6 +65,35 @@ TEST(ImageHeader, TheSizeIsReadBeforeThePixels) {
   EXPECT_EQ(refusal({pgm.begin(), pgm.end()}), "a: an image of 30000 x 30000" + most);
 }
 
+TEST(ImageHeader, PixelsOfAnImageOfAnotherSizeAreNotDecoded) {
+  const cv::Mat grey(20, 30, CV_8UC1, cv::Scalar(90));
+  for (const char* const format : {".png", ".jpg", ".bmp", ".pgm"}) {
+    Bytes bytes;
+    cv::imencode(format, grey, bytes);
+    Image image;
+    decode_image_of_size(bytes, "a", 30, 20, image);
+    EXPECT_EQ(image.pixels.size(), 600U) << format;
+    for (const int height_px : {20, 21}) {
+      decode_image_of_size(bytes, "a", 31, height_px, image);
+      EXPECT_EQ(image.width_px, 30) << format;
+      EXPECT_EQ(image.height_px, 20) << format;
+      EXPECT_TRUE(image.pixels.empty()) << format;
+    }
+  }
+  // GIVEN one whose pixels are damaged
+  Bytes png;
+  cv::imencode(".png", grey, png);
+  const std::string_view data = "IDAT";
+  const auto pixels = std::search(png.begin(), png.end(), data.begin(), data.end());
+  ASSERT_LT(pixels, png.end() - 8);
+  std::fill(pixels + 4, pixels + 8, std::uint8_t{0xff});
+  // THEN that shows where they are asked for, and nowhere else
+  Image image;
+  EXPECT_NE(testing::error_of([&] { decode_image_of_size(png, "a", 30, 20, image); }), "");
+  decode_image_of_size(png, "a", 30, 21, image);
+  EXPECT_EQ(image.height_px, 20);
+}
+
 /// libjpeg skips the bytes FF 00 and goes on with what is behind them; who takes them for a segment
 /// skips that.
 TEST(ImageHeader, AJpegHasTheSizeThatLibjpegFinds) {
@@ -91,33 +120,72 @@ TEST(ImageHeader, AJpegHasTheSizeThatLibjpegFinds) {
   EXPECT_EQ(testing::error_of([&] { decode_image(bytes, "a", image); }), "a: has a damaged header");
 }
 
-/// Eight megabytes each.
-TEST(ImageHeader, TextsOfAPngAreNotRead) {
-  Bytes zeros(8'000'000), text(compressBound(zeros.size()));
-  uLongf size = text.size();
-  compress(text.data(), &size, zeros.data(), zeros.size());
-  text.resize(size);
+/// A chunk of a PNG that begins with its type.
+Bytes chunk_of(std::string_view begin, const Bytes& rest = {}) {
   Bytes chunk(4);
-  const std::string_view begin("zTXta\0\0", 7);
   chunk.insert(chunk.end(), begin.begin(), begin.end());
-  chunk.insert(chunk.end(), text.begin(), text.end());
+  chunk.insert(chunk.end(), rest.begin(), rest.end());
   const std::size_t typed = chunk.size() - 4;
   const auto sum = static_cast<std::uint32_t>(crc32(0, chunk.data() + 4, static_cast<uInt>(typed)));
   chunk = with_number(chunk, 0, static_cast<std::uint32_t>(typed - 4));
   chunk.resize(chunk.size() + 4);
-  chunk = with_number(chunk, chunk.size() - 4, sum);
+  return with_number(chunk, chunk.size() - 4, sum);
+}
 
+Bytes compressed_zeros(std::size_t count) {
+  const Bytes zeros(count);
+  Bytes out(compressBound(count));
+  uLongf size = out.size();
+  compress(out.data(), &size, zeros.data(), zeros.size());
+  out.resize(size);
+  return out;
+}
+
+/// In colours, with these chunks behind its header.
+Bytes png_with(const Bytes& chunk, int times = 1) {
   const cv::Mat colours(20, 30, CV_8UC3, cv::Scalar(10, 200, 90));
   Bytes png;
   cv::imencode(".png", colours, png);
-  Image expected, image;
-  decode_image(png, "a", expected);
   constexpr std::ptrdiff_t kHead = 8 + 25;  // the magic, IHDR
-  for (int i = 0; i < 60; ++i) png.insert(png.begin() + kHead, chunk.begin(), chunk.end());
+  for (int i = 0; i < times; ++i) png.insert(png.begin() + kHead, chunk.begin(), chunk.end());
+  return png;
+}
+
+/// Eight megabytes each.
+TEST(ImageHeader, TextsOfAPngAreNotRead) {
+  const Bytes text = chunk_of({"zTXta\0\0", 7}, compressed_zeros(8'000'000));
+  Image expected, image;
+  decode_image(png_with({}), "a", expected);
+  const Bytes png = png_with(text, 60);
   const long before_mb = testing::peak_mb();
   decode_image(png, "a", image);
   EXPECT_EQ(image.pixels, expected.pixels);
   EXPECT_LT(testing::peak_mb() - before_mb, 50);
+}
+
+/// Of a profile that is none libpng would print the name.
+TEST(ImageHeader, NoNameOfAPngReachesTheTerminal) {
+  Image expected, image;
+  decode_image(png_with({}), "a", expected);
+  const Bytes profile = chunk_of({"iCCP\x1b[31mred\0\0", 14}, compressed_zeros(200));
+  ::testing::internal::CaptureStderr();
+  decode_image(png_with(profile), "a", image);
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(image.pixels, expected.pixels);
+}
+
+/// Colours are added as libpng adds them, by the powers that the file says.
+TEST(ImageHeader, APngWithAGammaHasThePixelsThatOpenCvReads) {
+  for (const std::string_view gamma :
+       {std::string_view("gAMA\0\0\xb1\x8f", 8), std::string_view("gAMA\0\0\x20\0", 8),
+        std::string_view("sRGB\0", 5)}) {
+    const Bytes png = png_with(chunk_of(gamma));
+    Image image;
+    decode_image(png, "a", image);
+    const cv::Mat expected = cv::imdecode(png, cv::IMREAD_GRAYSCALE);
+    ASSERT_EQ(image.pixels.size(), expected.total());
+    EXPECT_TRUE(std::equal(image.pixels.begin(), image.pixels.end(), expected.datastart));
+  }
 }
 
 /// libpng would ask for its memory before it looks for it.
@@ -130,7 +198,7 @@ TEST(ImageHeader, AChunkOfAPngThatIsNotThereIsNotAskedFor) {
   for (const std::string_view type : {"zTXt", "eXIf", "abcd"}) {
     Bytes claims = with_number(png, kHead, 0x6f67000f);
     std::copy(type.begin(), type.end(), claims.begin() + kHead + 4);
-    EXPECT_EQ(without_texts(claims), head) << type;
+    EXPECT_EQ(needed_for_pixels(claims), head) << type;
     Image image;
     EXPECT_NE(testing::error_of([&] { decode_image(claims, "a", image); }), "") << type;
   }

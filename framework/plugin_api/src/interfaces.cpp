@@ -45,6 +45,11 @@ void Sensor::estimate(const EstimateSample& /*estimate*/) {}
 
 ImageSource::~ImageSource() = default;
 
+void ImageSource::read_of_size(int width_px, int height_px, Image& out) const {
+  read(out);
+  if (out.width_px != width_px || out.height_px != height_px) out.pixels.clear();
+}
+
 Declarations::~Declarations() = default;
 
 BlockEdits::~BlockEdits() = default;

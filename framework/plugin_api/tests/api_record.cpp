@@ -118,6 +118,7 @@ void measurements() {
   RECORD(ImageSource);
   SLOTS(ImageSource);
   VIRTUAL(ImageSource, read);
+  VIRTUAL(ImageSource, read_of_size);
   RECORD(ImageSample);
   MEMBER(ImageSample, t_ns);
   MEMBER(ImageSample, camera);

@@ -129,7 +129,7 @@ TEST_F(Registry, SearchesCommandLineThenEnvironmentThenInstallation) {
   EXPECT_EQ(folders[1], "/env/a");
   EXPECT_EQ(folders[2], "/env/b");
   EXPECT_EQ(folders[3], fs::read_symlink("/proc/self/exe").parent_path().parent_path() /
-                            "lib/viwo/plugins/v10");
+                            "lib/viwo/plugins/v11");
   EXPECT_EQ(error_of([] { PluginRegistry::default_search_path({"/no/such"}); }),
             "--plugin-path /no/such: no such folder");
 }
@@ -141,6 +141,7 @@ TEST_F(Registry, ListsEveryLibraryWithItsReason) {
   std::map<std::string, std::string> reasons;
   for (const PluginListing& listing : registry.list()) {
     EXPECT_EQ(listing.info.has_value(), listing.refusal.empty());
+    EXPECT_EQ(listing.is_unavailable, listing.refusal.starts_with("cannot be ")) << listing.file;
     reasons[listing.file.filename().string()] =
         listing.info ? "ok " + listing.info->name : listing.refusal.substr(0, 18);
   }
@@ -175,6 +176,29 @@ TEST_F(Registry, ListsEveryLibraryWithItsReason) {
     {"libviwo_update_range_order.so", "ok range_order"}
   };
   EXPECT_EQ(reasons, expected);
+}
+
+TEST_F(Registry, ListsWhatCannotBeReadAsUnavailable) {
+  const auto file = write("some/libviwo_kinematics_x.so", "");
+  const auto hidden = write("hidden/libviwo_kinematics_x.so", "");
+  fs::create_directory(folder_ / "empty");
+  fs::permissions(file, fs::perms::none);
+  fs::permissions(hidden.parent_path(), fs::perms::none);
+  PluginRegistry registry(
+      {file.parent_path(), hidden.parent_path(), folder_ / "empty", folder_ / "missing", file});
+  // Root may read everything, so somebody else has to try.
+  const bool is_root = ::geteuid() == 0;
+  constexpr uid_t kNobody = 65534;
+  ASSERT_EQ(is_root ? ::seteuid(kNobody) : 0, 0);
+  const std::vector<PluginListing> listings = registry.list();
+  ASSERT_EQ(is_root ? ::seteuid(0) : 0, 0);
+  fs::permissions(hidden.parent_path(), fs::perms::owner_all);
+  ASSERT_EQ(listings.size(), 2u);
+  EXPECT_EQ(listings[0].file, file);
+  EXPECT_EQ(listings[0].refusal, "cannot be read: Permission denied - check its permissions");
+  EXPECT_EQ(listings[1].file, hidden.parent_path());
+  EXPECT_EQ(listings[1].refusal, "cannot be read: Permission denied");
+  EXPECT_TRUE(listings[0].is_unavailable && listings[1].is_unavailable);
 }
 
 TEST_F(Registry, RefusesAFolder) {

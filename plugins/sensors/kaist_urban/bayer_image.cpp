@@ -9,6 +9,15 @@ namespace viwo::kaist {
 
 void BayerImage::read(Image& out) const {
   read_image(file_, out);
+  to_grey(out);
+}
+
+void BayerImage::read_of_size(int width_px, int height_px, Image& out) const {
+  read_image_of_size(file_, width_px, height_px, out);
+  if (!out.pixels.empty()) to_grey(out);
+}
+
+void BayerImage::to_grey(Image& out) const {
   if (out.width_px < 3 || out.height_px < 3) {
     throw InputError(file_.string() + ": the image is too small for a Bayer pattern");
   }

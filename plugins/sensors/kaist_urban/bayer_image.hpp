@@ -14,8 +14,11 @@ class BayerImage final : public ImageSource {
  public:
   explicit BayerImage(std::filesystem::path file) : file_(std::move(file)) {}
   void read(Image& out) const override;
+  void read_of_size(int width_px, int height_px, Image& out) const override;
 
  private:
+  void to_grey(Image& out) const;
+
   std::filesystem::path file_;
 };
 

@@ -128,15 +128,16 @@ void KltTracker::read_one(const ImageSource* source, std::size_t camera, Eye& ey
   if (source == nullptr) return;
   try {
     Image& image = eye.now.pixels;
-    source->read(image);
-    const auto pixels = static_cast<std::size_t>(std::max(image.width_px, 0)) *
-                        static_cast<std::size_t>(std::max(image.height_px, 0));
-    if (pixels == 0 || image.pixels.size() != pixels) throw InputError("no pixels");
     const CameraView& view = cameras_[camera];
+    source->read_of_size(view.width_px, view.height_px, image);
+    if (image.width_px <= 0 || image.height_px <= 0) throw InputError("no pixels");
     if (image.width_px != view.width_px || image.height_px != view.height_px) {
       eye.other_size = size_text(image.width_px, image.height_px);
       return;
     }
+    const auto pixels =
+        static_cast<std::size_t>(image.width_px) * static_cast<std::size_t>(image.height_px);
+    if (image.pixels.size() != pixels) throw InputError("no pixels");
     // Sensors have noise: it was sent more than once. After so many the camera may hang, or stand
     // still and have none (rendered, a video): then it is taken for what it shows.
     constexpr int kMostRepeats = 3;

@@ -213,6 +213,22 @@ TEST(KltTracker, TracksOverAnImageOfAnotherSize) {
   EXPECT_EQ(count.first, "camera 0 at 5.200000000 s: 320 x 240 pixels");
 }
 
+/// An image whose size is known, and whose pixels take hours.
+class LargeImage final : public ImageSource {
+ public:
+  void read(Image&) const override { ADD_FAILURE() << "nobody asked for the pixels"; }
+  void read_of_size(int, int, Image& out) const override { out = {32768, 1024, {}}; }
+};
+
+TEST(KltTracker, DecodesNoImageOfAnotherSize) {
+  std::vector<Measurement> input = drive(4, 1);
+  input[2] = ImageSample{stamp_of(2), 0, std::make_shared<LargeImage>()};
+  const Played played = track(input, section({}, 1));
+  EXPECT_EQ(played.samples.size(), 3U);
+  EXPECT_EQ(played.rejections.at("image of another size than the camera's").first,
+            "camera 0 at 5.200000000 s: 32768 x 1024 pixels");
+}
+
 TEST(KltTracker, RefusesImagesThatAreAllOrTenInARowOfAnotherSize) {
   const auto failure = [](int n, int from, int to) {
     return failure_of(drive_with_small_images(n, from, to), section({}, 1));

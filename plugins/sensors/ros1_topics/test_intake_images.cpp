@@ -87,6 +87,32 @@ TEST_F(IntakeTest, TakesImagesRawAndCompressedPixelForPixel) {
   }
 }
 
+TEST_F(IntakeTest, ImagesThatWaitTakeSoManyBytesAndNoMore) {
+  TopicOptions options;
+  options.image_topics = {"/cam0"};
+  Intake intake = make(options);
+  msg::CompressedImage image;
+  image.format = "png";
+  const auto send = [&](std::int64_t k, std::size_t megabytes) {
+    image.header.stamp = time_of(k * kSecond);
+    image.data.resize(megabytes << 20);
+    take(intake, 0, image);
+  };
+  for (std::int64_t k = 1; k <= 5; ++k) send(k, 120);  // the fifth has no room
+  auto all = taken();
+  EXPECT_EQ(all.size(), 4U);
+  EXPECT_THAT(
+      rejections_of(intake),
+      ElementsAre("/cam0: image beyond the 512 MiB that images may take while they wait | 1 | "
+                  "stamp 5000000000 ns"));
+  all.clear();
+  send(6, 120);
+  EXPECT_EQ(taken().size(), 1U) << "what is not held any more does not count";
+  send(7, 129);
+  EXPECT_EQ(rejections_of(intake).size(), 2U);
+  EXPECT_THAT(rejections_of(intake).back(), HasSubstr("/cam0: message of more than 128 MiB | 1"));
+}
+
 TEST_F(IntakeTest, SaysWhichImagesAreNotRead) {
   TopicOptions options;
   options.image_topics = {"/cam0"};

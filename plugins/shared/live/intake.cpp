@@ -16,29 +16,51 @@ namespace {
 
 using bag::Kind;
 
+/// What the images that wait anywhere, or are being looked at, may take together.
+constexpr std::size_t kMostHeldBytes = std::size_t{512} << 20;
+constexpr std::size_t kMostBytes = std::size_t{128} << 20;  ///< of a message
+
 /// The image in a message, decoded when it is needed.
 class MessageImage final : public ImageSource {
  public:
+  /// `held`: bytes of all such images that there are.
   MessageImage(std::shared_ptr<const bag::Bytes> message, MakeFields make_fields,
-               bool is_compressed, std::string where)
+               bool is_compressed, std::string where, std::shared_ptr<HeldBytes> held)
       : message_(std::move(message)),
         make_fields_(make_fields),
         is_compressed_(is_compressed),
-        where_(std::move(where)) {}
+        where_(std::move(where)),
+        held_(std::move(held)) {
+    *held_ += message_->size();
+  }
+  ~MessageImage() override { *held_ -= message_->size(); }
+  MessageImage(const MessageImage&) = delete;
+  MessageImage& operator=(const MessageImage&) = delete;
 
   void read(Image& out) const override {
+    with_fields([&](bag::FieldReader& in) { bag::read_image(in, is_compressed_, where_, out); });
+  }
+  void read_of_size(int width_px, int height_px, Image& out) const override {
+    with_fields([&](bag::FieldReader& in) {
+      bag::read_image_of_size(in, is_compressed_, where_, width_px, height_px, out);
+    });
+  }
+
+ private:
+  template <class Work>
+  void with_fields(const Work& work) const {
     try {
-      bag::read_image(*make_fields_(*message_), is_compressed_, where_, out);
+      work(*make_fields_(*message_));
     } catch (const bag::BrokenMessage& broken) {
       throw InputError(where_ + ": " + broken.what());
     }
   }
 
- private:
   std::shared_ptr<const bag::Bytes> message_;
   MakeFields make_fields_;
   bool is_compressed_;
   std::string where_;
+  std::shared_ptr<HeldBytes> held_;
 };
 
 /// Why a message gives no reading.
@@ -98,6 +120,7 @@ void Intake::take(std::size_t topic, const std::string& type, const std::string&
   if (md5 != "*" && md5 != bag::ros1_md5(*kind)) {
     return drop(topic, "another definition of " + type + " (md5 " + md5 + ")", 0);
   }
+  if (message->size() > kMostBytes) return drop(topic, "message of more than 128 MiB", 0);
   try {
     read(topic, *kind, message);
   } catch (const bag::BrokenMessage& broken) {
@@ -131,7 +154,7 @@ void Intake::read(std::size_t topic, Kind kind, const std::shared_ptr<const bag:
                         bag::known_encodings(),
                     head.t_ns);
       }
-      return take_image(topic, image_of(topic, head.t_ns, message, false));
+      return take_image(topic, head.t_ns, message, false);
     }
     case Kind::kCompressedImage: {
       const std::int64_t t_ns = in.header();
@@ -142,18 +165,9 @@ void Intake::read(std::size_t topic, Kind kind, const std::shared_ptr<const bag:
             "image of depth (format " + log::quoted(format) + "): grey or colour ones are needed",
             t_ns);
       }
-      return take_image(topic, image_of(topic, t_ns, message, true));
+      return take_image(topic, t_ns, message, true);
     }
   }
-}
-
-ImageSample Intake::image_of(std::size_t topic, std::int64_t t_ns,
-                             const std::shared_ptr<const bag::Bytes>& message,
-                             bool is_compressed) const {
-  const std::string where =
-      "image on topic '" + topics_[topic].name + "' of " + std::to_string(t_ns) + " ns";
-  return {t_ns, topics_[topic].camera,
-          std::make_shared<MessageImage>(message, make_fields_, is_compressed, where)};
 }
 
 void Intake::take_imu(std::size_t topic, const ImuSample& imu) {
@@ -190,8 +204,17 @@ void Intake::take_joints(std::size_t topic, const bag::Joints& joints) {
   if (cell) queue_.push(*cell, topic);
 }
 
-void Intake::take_image(std::size_t topic, const ImageSample& image) {
-  if (!accept(topic, image.t_ns)) return;
+void Intake::take_image(std::size_t topic, std::int64_t t_ns,
+                        const std::shared_ptr<const bag::Bytes>& message, bool is_compressed) {
+  if (!accept(topic, t_ns)) return;
+  if (*held_ + message->size() > kMostHeldBytes) {
+    return drop(topic, "image beyond the 512 MiB that images may take while they wait", t_ns);
+  }
+  const std::string where =
+      "image on topic '" + topics_[topic].name + "' of " + std::to_string(t_ns) + " ns";
+  const ImageSample image{
+      t_ns, topics_[topic].camera,
+      std::make_shared<MessageImage>(message, make_fields_, is_compressed, where, held_)};
   if (pace_ == Pace::kInStep) return queue_.push(image, topic);
   ready_.clear();
   if (!image_order_.add(image, ready_)) {

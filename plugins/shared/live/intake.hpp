@@ -2,6 +2,7 @@
 // once.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -38,6 +39,9 @@ struct Topic {
   std::vector<bag::Kind> kinds;  ///< what may be on it
   int camera = -1;               ///< index of its images
 };
+
+/// Images outlive the intake, and end in any thread.
+using HeldBytes = std::atomic<std::size_t>;
 
 std::vector<Topic> wanted_topics(const bag::TopicOptions& options);
 
@@ -77,13 +81,12 @@ class Intake {
   };
 
   void read(std::size_t topic, bag::Kind kind, const std::shared_ptr<const bag::Bytes>& message);
-  ImageSample image_of(std::size_t topic, std::int64_t t_ns,
-                       const std::shared_ptr<const bag::Bytes>& message, bool is_compressed) const;
   void take_imu(std::size_t topic, const ImuSample& imu);
   void take_pose(std::size_t topic, PoseSample pose);
   void take_fix(std::size_t topic, const std::optional<GnssSample>& fix);
   void take_joints(std::size_t topic, const bag::Joints& joints);
-  void take_image(std::size_t topic, const ImageSample& image);
+  void take_image(std::size_t topic, std::int64_t t_ns,
+                  const std::shared_ptr<const bag::Bytes>& message, bool is_compressed);
   bool is_slow(std::size_t topic) const;
   StampJump jump_of(const Topic& topic) const;
   void begin_again(std::size_t topic);
@@ -107,6 +110,7 @@ class Intake {
   LogCells log_cells_;  ///< instead, in step
   ImageOrder image_order_;
   std::vector<ImageSample> ready_;
+  std::shared_ptr<HeldBytes> held_ = std::make_shared<HeldBytes>(0);
   std::optional<Clock::time_point> last_use_;
   Rejections counts_;
 };

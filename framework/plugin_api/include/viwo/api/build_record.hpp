@@ -19,7 +19,7 @@ namespace viwo {
 
 /// Bump when any header in viwo/api changes the layout of a type, the order of virtual functions or
 /// the meaning of a value. Plugins built for another number are refused.
-inline constexpr int kApiVersion = 10;
+inline constexpr int kApiVersion = 11;
 
 inline constexpr std::string_view kBuildRecordBegin = "viwo-build-record{";
 inline constexpr char kBuildRecordEnd = '}';

@@ -169,6 +169,9 @@ class VIWO_API ImageSource {
   /// The pixels, into storage that may be used again; the same bits at every call, which may run
   /// concurrently. Throws InputError when there is no such image or it is broken.
   virtual void read(Image& out) const = 0;
+  /// The same of an image of this size. Of another one there are its size and no pixels in `out`:
+  /// who knows it before the pixels does not decode them, however many they are.
+  virtual void read_of_size(int width_px, int height_px, Image& out) const;
 };
 
 /// Images of several cameras whose stamps differ by no more are of one instant.
