@@ -20,6 +20,38 @@
 
 namespace viwo::testing {
 
+/// Has a port of this machine for itself.
+class LocalSocket {
+ public:
+  LocalSocket() : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
+    const sockaddr_in any = loopback(0);
+    bind(socket_, reinterpret_cast<const sockaddr*>(&any), sizeof(any));
+  }
+  ~LocalSocket() { close(socket_); }
+  LocalSocket(const LocalSocket&) = delete;
+  LocalSocket& operator=(const LocalSocket&) = delete;
+
+  std::uint16_t port() const {
+    sockaddr_in address{};
+    socklen_t size = sizeof(address);
+    getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size);
+    return ntohs(address.sin_port);
+  }
+  /// From now on who calls is taken, and told nothing.
+  void listen_and_say_nothing() const { listen(socket_, 16); }
+
+  static sockaddr_in loopback(std::uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(port);
+    return address;
+  }
+
+ private:
+  int socket_;
+};
+
 /// A master at a free port, and the environment that nodes find it in; a temporary folder for what
 /// ROS writes. A process belongs to one master for good, so there is one for all its tests.
 class RosSystem {
@@ -56,27 +88,12 @@ class RosSystem {
   static bool is_installed() { return std::system("command -v rosmaster > /dev/null") == 0; }
 
   /// A port that nothing listens at.
-  static std::uint16_t free_port() {
-    const int s = socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address = loopback(0);
-    socklen_t size = sizeof(address);
-    bind(s, reinterpret_cast<const sockaddr*>(&address), size);
-    getsockname(s, reinterpret_cast<sockaddr*>(&address), &size);
-    close(s);
-    return ntohs(address.sin_port);
-  }
+  static std::uint16_t free_port() { return LocalSocket().port(); }
 
  private:
-  static sockaddr_in loopback(std::uint16_t port) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    address.sin_port = htons(port);
-    return address;
-  }
   static bool listens(std::uint16_t port) {
     const int s = socket(AF_INET, SOCK_STREAM, 0);
-    const sockaddr_in address = loopback(port);
+    const sockaddr_in address = LocalSocket::loopback(port);
     const bool yes = connect(s, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
     close(s);
     return yes;

@@ -130,6 +130,17 @@ TEST_F(Ros1Topics, SaysThatThereIsNoMaster) {
   EXPECT_LT(steady_clock::now() - begin, 10s);
 }
 
+TEST_F(Ros1Topics, SaysThatWhatListensIsNoMaster) {
+  const testing::LocalSocket server;
+  server.listen_and_say_nothing();
+  const std::string uri = "http://127.0.0.1:" + std::to_string(server.port());
+  const auto begin = steady_clock::now();
+  EXPECT_EQ(
+      error_of(", imu_topic: /imu0, connect_timeout_s: 0.5, master_uri: '" + uri + "'"),
+      "test.yaml:1:1  sensor (ros1_topics): no ROS master at " + uri + ": is roscore running?");
+  EXPECT_LT(steady_clock::now() - begin, 10s);
+}
+
 TEST_F(Ros1Topics, RefusesParametersThatContradictEachOther) {
   EXPECT_THAT(error_of(""), HasSubstr("sensor.imu_topic: nothing to listen to: give one of "));
   EXPECT_THAT(error_of(", imu_topic: /a b"),

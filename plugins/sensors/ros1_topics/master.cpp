@@ -1,7 +1,9 @@
 #include "master.hpp"
 
+#include <array>
 #include <cstdlib>
 #include <regex>
+#include <string_view>
 #include <thread>
 
 #include <boost/asio/ip/tcp.hpp>
@@ -16,7 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kProbe = 500ms;
+constexpr auto kProbe = 2s;
 constexpr auto kRetry = 100ms;
 
 [[noreturn]] void fail_without_master(const MasterAddress& master) {
@@ -48,18 +50,27 @@ MasterAddress master_address(const std::string& uri) {
   throw InputError(source + " is " + log::quoted(master.uri) + ": expected http://HOST:PORT");
 }
 
-bool is_reachable(const MasterAddress& master, std::chrono::milliseconds timeout) {
+bool answers(const MasterAddress& master, std::chrono::milliseconds timeout) {
+  const std::string call =
+      "<?xml version=\"1.0\"?><methodCall><methodName>getPid</methodName><params><param>"
+      "<value><string>/viwo</string></value></param></params></methodCall>";
   boost::asio::ip::tcp::iostream connection;
   connection.expires_after(timeout);
   connection.connect(master.host, std::to_string(master.port));
-  return static_cast<bool>(connection);
+  connection << "POST /RPC2 HTTP/1.0\r\nHost: " << master.host << "\r\nContent-Type: text/xml\r\n"
+             << "Content-Length: " << call.size() << "\r\n\r\n"
+             << call << std::flush;
+  std::array<char, 12> begin{};  // HTTP/1.x 200
+  connection.read(begin.data(), begin.size());
+  const std::string_view answer(begin.data(), begin.size());
+  return connection && answer.starts_with("HTTP/") && answer.ends_with(" 200");
 }
 
 void join(const MasterAddress& master, std::chrono::milliseconds timeout) {
-  // Asked before ROS is: what listens nowhere, or at a machine that does not answer, makes roscpp
-  // wait for minutes.
+  // Asked before ROS is: what listens nowhere, at a machine that does not answer, or without ever
+  // saying anything, makes roscpp wait for minutes or for ever.
   const auto deadline = Clock::now() + timeout;
-  while (!is_reachable(master, kProbe)) {
+  while (!answers(master, kProbe)) {
     if (Clock::now() >= deadline) fail_without_master(master);
     std::this_thread::sleep_for(kRetry);
   }

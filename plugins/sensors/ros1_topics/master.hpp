@@ -17,8 +17,9 @@ struct MasterAddress {
 /// default. InputError when it is not http://HOST:PORT.
 MasterAddress master_address(const std::string& uri);
 
-/// Whether something listens at the address. Takes no longer than `timeout` (and the name service).
-bool is_reachable(const MasterAddress& master, std::chrono::milliseconds timeout);
+/// Whether a ROS master answers a call at the address. Takes no longer than `timeout` (and the name
+/// service).
+bool answers(const MasterAddress& master, std::chrono::milliseconds timeout);
 
 /// Makes this process a node of the master, once; a process belongs to one master for good, and all
 /// sensors in it share the node. Waits for a master for `timeout`. InputError when there is none,

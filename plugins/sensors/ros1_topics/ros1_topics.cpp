@@ -54,6 +54,7 @@ struct Params : live::LiveParams {
 constexpr const char* kTransformsMd5 = "94810edda583a504dfda3829e70d7eec";
 constexpr auto kSilence = 2s;  ///< without any message the master is asked for
 constexpr auto kProbe = 1000ms;
+using Event = ros::MessageEvent<const RawMessage>;
 
 std::chrono::milliseconds milliseconds(double seconds) {
   return std::chrono::milliseconds(std::llround(1e3 * seconds));
@@ -114,22 +115,27 @@ class Ros1Topics final : public live::TopicSensor {
     constexpr std::uint32_t kMostImages = 100, kMostOthers = 10'000;
     for (std::size_t i = 0; i < intake().topics().size(); ++i) {
       const live::Topic& topic = intake().topics()[i];
-      subscribers_.push_back(
-          subscribe(topic.name, topic.camera < 0 ? kMostOthers : kMostImages,
-                    [this, i](const ros::MessageEvent<const RawMessage>& event) {
-                      const ros::M_string& connection = event.getConnectionHeader();
-                      const auto message = event.getMessage();
-                      intake().take(i, connection.at("type"), connection.at("md5sum"),
-                                    {&message->bytes, [message](const bag::Bytes*) {}});
-                    }));
+      subscribers_.push_back(subscribe(
+          topic.name, topic.camera < 0 ? kMostOthers : kMostImages, [this, i](const Event& event) {
+            const ros::M_string& connection = event.getConnectionHeader();
+            const auto message = event.getMessage();
+            intake().take(i, connection.at("type"), connection.at("md5sum"),
+                          {&message->bytes, [message](const bag::Bytes*) {}});
+          }));
     }
   }
 
   template <class Callback>
   ros::Subscriber subscribe(const std::string& topic, std::uint32_t most, Callback callback) {
     ros::SubscribeOptions wanted;
-    wanted.template initByFullCallbackType<const ros::MessageEvent<const RawMessage>&>(topic, most,
-                                                                                       callback);
+    const auto guarded = [this, callback](const Event& event) {
+      try {  // roscpp's thread would end the process
+        callback(event);
+      } catch (const std::exception& error) {
+        fail(error.what());
+      }
+    };
+    wanted.template initByFullCallbackType<const Event&>(topic, most, guarded);
     wanted.transport_hints = ros::TransportHints().tcpNoDelay();
     return node_->subscribe(wanted);
   }
@@ -147,17 +153,16 @@ class Ros1Topics final : public live::TopicSensor {
   }
 
   void ask_for_mounts() {
-    tf_static_ =
-        subscribe("/tf_static", 100, [this](const ros::MessageEvent<const RawMessage>& event) {
-          if (event.getConnectionHeader().at("md5sum") != kTransformsMd5) return;
-          take_transforms(event.getMessage()->bytes);
-        });
+    tf_static_ = subscribe("/tf_static", 100, [this](const Event& event) {
+      if (event.getConnectionHeader().at("md5sum") != kTransformsMd5) return;
+      take_transforms(event.getMessage()->bytes);
+    });
   }
 
   /// A parameter that may be set later. The master is asked for nothing when it is not there.
   void ask_for_description() {
     if (description_.empty() || mounts().are_known()) return;
-    if (!is_reachable(master_, kProbe)) return;
+    if (!answers(master_, kProbe)) return;
     std::string urdf;
     if (!ros::param::get(description_, urdf)) return;
     mounts().take_description(urdf);
@@ -166,7 +171,7 @@ class Ros1Topics final : public live::TopicSensor {
 
   /// Every second.
   void watch_master() {
-    if (is_idle(kSilence) && !is_reachable(master_, kProbe)) {
+    if (is_idle(kSilence) && !answers(master_, kProbe)) {
       end(LogLevel::kWarning, "the ROS master at " + master_.uri + " is gone and nothing comes");
       return;
     }
