@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
-#include <string>
+#include <system_error>
 
 #include "viwo/config/errors.hpp"
 
@@ -29,6 +29,14 @@ void require_file_of(std::string_view command, const Node& file) {
                                                   wanted->what + ": viwo " + kind.command +
                                                   " takes it");
   }
+}
+
+void require_file_of_key(const std::string& key, const Node& node,
+                         const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::status(file, ignored).type() != std::filesystem::file_type::not_found)
+    return;
+  fail(node.mark(), key + ": no such file: " + file.lexically_normal().string());
 }
 
 }  // namespace viwo::config

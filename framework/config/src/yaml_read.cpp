@@ -1,9 +1,8 @@
-#include <cerrno>
-#include <cstring>
-#include <fstream>
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <sstream>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -25,6 +24,16 @@ constexpr std::size_t kMaxValues = 100'000;
 constexpr std::size_t kMaxCharacters = 4 * kMaxYamlBytes;
 
 constexpr std::string_view kBlanks = " \t\r\n";
+
+/// Behind the tag or the anchor that begins there, which a value in brackets may follow at once.
+std::size_t end_of_property(std::string_view text, std::size_t begin) {
+  if (text.substr(begin).starts_with("!<")) {
+    const std::size_t end = text.find('>', begin);
+    return end == std::string_view::npos ? text.size() : end + 1;
+  }
+  constexpr std::string_view kAnchorEnds = " \t\r\n,[]{}", kTagEnds = " \t\r\n,[]{}\"";
+  return text.find_first_of(text[begin] == '!' ? kTagEnds : kAnchorEnds, begin);
+}
 
 /// What a value needs, with all that is below it.
 struct Extent {
@@ -163,15 +172,18 @@ class TreeBuilder final : public YAML::EventHandler {
  private:
   /// The parser takes the end of the text for that of a quoted value, with all that is between, and
   /// half of a character for each of two escapes.
-  void require_readable_quotes(const YAML::Mark& mark) const {
+  void require_readable_quotes(const YAML::Mark& mark) {
     auto begin = static_cast<std::size_t>(std::max(mark.pos, 0));
+    std::size_t& i = looked_at_;
+    if (begin < i) return;  // no byte twice, wherever the parser says that a value is
     while (begin < text_.size() && (text_[begin] == '&' || text_[begin] == '!')) {
-      begin = text_.find_first_not_of(kBlanks, text_.find_first_of(kBlanks, begin));
+      begin = text_.find_first_not_of(kBlanks, end_of_property(text_, begin));
     }
-    if (begin >= text_.size()) return;
-    const char quote = text_[begin];
+    i = std::min(begin, text_.size());
+    if (i == text_.size()) return;
+    const char quote = text_[i];
     if (quote != '"' && quote != '\'') return;
-    for (std::size_t i = begin + 1; i < text_.size(); ++i) {
+    for (++i; i < text_.size(); ++i) {
       if (quote == '"' && text_[i] == '\\') {
         if (const auto escape = text_.substr(i++, 2); escape == "\\N" || escape == "\\_") {
           fail(mark_of(mark),
@@ -232,6 +244,7 @@ class TreeBuilder final : public YAML::EventHandler {
   std::string_view text_;
   std::string origin_;
   bool with_positions_;
+  std::size_t looked_at_ = 0;  ///< bytes of the text, for quotes
   int documents_ = 0;
   Extent total_{.values = 0};
   std::vector<Open> open_;
@@ -255,7 +268,11 @@ Node parse_text(std::string_view text, const std::string& origin, bool with_posi
                            " MiB, as no YAML that viwo reads is");
   }
   if (text.find('\0') != std::string_view::npos) fail(Mark{origin}, "is not a text file");
-  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
+  if (text.starts_with("\xfe\xff") || text.starts_with("\xff\xfe")) {
+    fail(Mark{origin}, "is UTF-16, what is read is UTF-8");
+  }
+  // All of them: the parser would leave one out, and its places were others than those of the text.
+  while (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   TreeBuilder builder(text, origin, with_positions);
   try {
     std::istringstream stream{std::string(text)};
@@ -277,14 +294,13 @@ Node parse(std::string_view text, const std::string& origin) {
 
 Node load_file(const std::filesystem::path& file) {
   const Mark mark{file.string()};
-  require_regular_file(file);
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream && errno == ENOENT) fail(mark, "no such file");
-  if (!stream) fail(mark, std::string("cannot be read: ") + std::strerror(errno));
   std::string text(kMaxYamlBytes + 1, '\0');  // no more of any file
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) fail(mark, "cannot be read");
-  text.resize(static_cast<std::size_t>(stream.gcount()));
+  try {
+    text.resize(RegularFile(file).read(text));
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::no_such_file_or_directory) fail(mark, "no such file");
+    fail(mark, "cannot be read: " + error.code().message());
+  }
   return parse(text, file.string());
 }
 

@@ -1,4 +1,5 @@
 // YAML text to trees and back, with positions.
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -99,6 +100,35 @@ TEST(Yaml, RefusesAQuoteThatIsNeverClosed) {
   EXPECT_EQ(closed.find("c")->scalar(), "two lines");
   EXPECT_EQ(closed.find("d")->scalar(), "5'");
   EXPECT_EQ(closed.find("f")->scalar(), "é");
+}
+
+TEST(Yaml, FindsTheQuoteBehindATagOrAnAnchor) {
+  const std::string why = "  not valid YAML: this quote (\") is never closed";
+  for (const std::string before :
+       {"!a ", "!", "!a", "!<tag:a,b> ", "!<tag:a,b>", "&a ", "!a &b "}) {
+    EXPECT_EQ(parse_error("k: " + before + "\"abc\nb: 1\n"), "f.yaml:1:4" + why) << before;
+  }
+  const Node list = parse("[!a,!b, &c !d , !<e>,\"f\", \"\"]", "f.yaml");
+  ASSERT_EQ(list.items().size(), 6U);
+  EXPECT_EQ(list.items()[4].scalar(), "f");
+}
+
+/// As many as there may be; each was looked for an end up to that of the text.
+TEST(Yaml, ReadsManyTagsAtOnce) {
+  std::string text = "[";
+  for (int i = 0; i < 99'000; ++i) text += "!a,";
+  const std::clock_t begin = std::clock();
+  EXPECT_EQ(parse(text + "]", "f.yaml").items().size(), 99'000U);
+  EXPECT_LT(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC, 15.);
+}
+
+TEST(Yaml, TakesEveryMarkOfUtf8OffTheBegin) {
+  const std::string mark = "\xef\xbb\xbf";
+  // Three bytes before the second value is a quote, which is none.
+  EXPECT_EQ(parse(mark + mark + "[a\"z,x]", "f.yaml").items()[1].scalar(), "x");
+  for (const std::string_view utf16 : {"\xff\xfe\x41\x42", "\xfe\xff\x41\x42"}) {
+    EXPECT_EQ(parse_error(utf16), "f.yaml  is UTF-16, what is read is UTF-8");
+  }
 }
 
 TEST(Yaml, RefusesASecondDocument) {

@@ -56,6 +56,9 @@ std::string line_of(const ExperimentSetup& setup, const ExperimentRun& run) {
 /// Above it the series of runs that are not drawn would need more memory than all the rest.
 constexpr std::size_t kManyRuns = 1000;
 
+/// The folder of what keep_runs keeps.
+constexpr const char* kRuns = "runs";
+
 /// Thrown out of a run that the user does not wait for any more.
 struct Stopped {};
 
@@ -214,15 +217,21 @@ class Runner {
     const Node run = configuration(variant, recording);
     return of_recording(setup_.recordings[recording], [&] {
       RunSetup setup = read_run(run, plugins_);
-      const std::vector<std::filesystem::path> inputs = input_files(setup.resolved);
-      for (const char* const name : kResults) {
-        if (!folder_.empty()) refuse_to_replace(folder_ / name, inputs);
-      }
+      if (!folder_.empty()) keep_inputs_of(setup);
       const bool is_new_variant = variants_read_.insert(variant).second;
       const bool is_new_recording = recordings_read_.insert(recording).second;
       if (!options_.collect && (is_new_variant || is_new_recording)) collect(setup);
       return setup;
     });
+  }
+
+  /// InputError for what is read and would be lost: to a result, or with what stood in its place.
+  void keep_inputs_of(const RunSetup& run) const {
+    std::vector<std::filesystem::path> inputs = input_files(run);
+    inputs.emplace_back(setup_.base.mark().file);
+    for (const char* const name : kResults) refuse_to_replace(folder_ / name, inputs);
+    refuse_to_empty(folder_ / files::kUnfinishedResults, inputs);
+    if (options_.keep_runs) refuse_to_empty(folder_ / kRuns, inputs);
   }
 
   /// Results that cannot be written are no fault of the run.
@@ -268,7 +277,7 @@ class Runner {
     std::string name = setup_.variants[run.variant].name;
     if (!recording.empty()) name += "_" + recording;
     if (setup_.seeds > 1) name += "_" + std::to_string(run.seed);
-    return folder_ / "runs" / name;
+    return folder_ / kRuns / name;
   }
 
   void write_run_of(const ExperimentRun& run, const RunSetup& setup) const {

@@ -1,10 +1,12 @@
 // What an experiment leaves behind: runs.csv, summary.json, report.html.
+#include <algorithm>
 #include <cmath>
 
 #include "experiment_statistics.hpp"
 #include "run_journal.hpp"
 #include "viwo/eval/json.hpp"
 #include "viwo/files/files.hpp"
+#include "viwo/log/text.hpp"
 #include "viwo/math/text_stream.hpp"
 #include "viwo/report/html.hpp"
 #include "viwo/results/run_output.hpp"
@@ -124,13 +126,18 @@ json summary_of(const ExperimentResult& result) {
           {"by", by}};
 }
 
-/// One field of a CSV line: in quotes if it needs them, on one line.
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+/// One field of a CSV line: in quotes if it needs them, on one line. Texts of files may be in it:
+/// none of them is a formula for who opens the table.
+std::string csv_field(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  text = log::printable(text);
+  if (text.find_first_of("=+-@") == 0) text.insert(0, 1, '\'');
+  if (text.find_first_of(",\"") == std::string::npos) return text;
   std::string field = "\"";
   for (const char c : text) {
     if (c == '"') field += '"';
-    field += c == '\n' || c == '\r' ? ' ' : c;
+    field += c;
   }
   return field + '"';
 }

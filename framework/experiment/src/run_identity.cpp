@@ -1,12 +1,13 @@
 #include "run_identity.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <stdexcept>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "checksum.hpp"
+#include "viwo/config/regular_file.hpp"
 #include "viwo/config/yaml.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/setup/input_files.hpp"
@@ -18,17 +19,18 @@ namespace fs = std::filesystem;
 
 /// "SIZE bytes, crc NUMBER"
 std::string checksum_of(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
   std::vector<char> buffer(std::size_t{1} << 20);
   std::uint32_t crc = 0;
   std::uintmax_t size = 0;
-  while (in) {
-    in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-    const auto count = static_cast<std::size_t>(in.gcount());
-    crc = crc_of({buffer.data(), count}, crc);
-    size += count;
+  try {
+    config::RegularFile in(file);
+    while (const std::size_t count = in.read(buffer)) {
+      crc = crc_of({buffer.data(), count}, crc);
+      size += count;
+    }
+  } catch (const std::system_error& error) {
+    throw std::runtime_error("cannot read " + file.string() + ": " + error.code().message());
   }
-  if (!in.eof()) throw std::runtime_error("cannot read " + file.string());
   return std::to_string(size) + " bytes, crc " + std::to_string(crc);
 }
 

@@ -1,14 +1,14 @@
 #include "run_journal.hpp"
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
+#include <new>
 #include <stdexcept>
 #include <system_error>
 #include <vector>
 
 #include "checksum.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/config/regular_file.hpp"
 #include "viwo/files/files.hpp"
 #include "viwo/results/run_record.hpp"
 
@@ -37,24 +37,26 @@ bool is_of_run(std::string_view name, std::string_view extension) {
 }
 
 /// Files of runs in the folder, complete or not; no folders.
-std::vector<fs::path> files_in(const fs::path& folder, bool unfinished) {
+std::vector<fs::path> files_in(const fs::path& folder, bool unfinished, std::error_code& error) {
   std::vector<fs::path> files;
-  std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     const std::string name = at->path().filename().string();
     if (!is_of_run(name, kExtension) && !(unfinished && is_of_run(name, kUnfinished))) continue;
     std::error_code ignored;
     if (!fs::is_directory(at->symlink_status(ignored))) files.push_back(at->path());
   }
+  if (error == std::errc::no_such_file_or_directory) error.clear();
   return files;
 }
 
-/// Nothing for what is no file, or too long for a run that was thinned.
-std::optional<std::string> bytes_of(const fs::path& file) {
+/// None of what is too long for a run that was thinned.
+std::string bytes_of(const fs::path& file) {
   constexpr std::uintmax_t kMostBytes = std::uintmax_t{64} << 20;
-  if (!fs::is_regular_file(file) || fs::file_size(file) > kMostBytes) return std::nullopt;
-  std::ifstream in(file, std::ios::binary);
-  return std::string{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  config::RegularFile opened(file);
+  const std::uintmax_t size = opened.size();
+  std::string bytes(size <= kMostBytes ? size : 0, '\0');
+  bytes.resize(opened.read(bytes));
+  return bytes;
 }
 
 /// Takes everything but what lies too deep, and more values than a run has: for each level the
@@ -95,7 +97,13 @@ fs::path RunJournal::file_of(const RunKey& key) const {
                     std::string(kExtension));
 }
 
-int RunJournal::size() const { return static_cast<int>(files_in(folder_, false).size()); }
+int RunJournal::size() const {
+  std::error_code error;
+  const std::size_t size = files_in(folder_, false, error).size();
+  // What cannot be seen is not taken for empty, and replaced.
+  if (error) throw std::runtime_error("cannot read " + folder_.string() + ": " + error.message());
+  return static_cast<int>(size);
+}
 
 bool RunJournal::has(const RunKey& key) const {
   std::error_code ignored;
@@ -104,10 +112,10 @@ bool RunJournal::has(const RunKey& key) const {
 
 std::optional<RunResult> RunJournal::read(const RunKey& key) const {
   try {
-    const std::optional<std::string> all = bytes_of(file_of(key));
-    if (!all || all->size() < kChecksumBytes) return std::nullopt;
-    const std::string bytes = all->substr(0, all->size() - kChecksumBytes);
-    if (checksum(bytes) != all->substr(bytes.size())) return std::nullopt;
+    const std::string all = bytes_of(file_of(key));
+    if (all.size() < kChecksumBytes) return std::nullopt;
+    const std::string bytes = all.substr(0, all.size() - kChecksumBytes);
+    if (checksum(bytes) != all.substr(bytes.size())) return std::nullopt;
     Levels levels;
     if (!nlohmann::json::sax_parse(bytes, &levels, nlohmann::json::input_format_t::cbor)) {
       return std::nullopt;
@@ -118,6 +126,8 @@ std::optional<RunResult> RunJournal::read(const RunKey& key) const {
       return std::nullopt;
     }
     return from_record(entry.at("run"));
+  } catch (const std::bad_alloc&) {  // no fault of the record
+    throw;
   } catch (const std::exception&) {
     return std::nullopt;
   }
@@ -155,7 +165,7 @@ void RunJournal::write(const RunKey& key, const RunResult& run) const {
 void RunJournal::remove() const {
   require_own_folder();
   std::error_code ignored;  // what stays is a file too many, not a wrong result
-  for (const fs::path& file : files_in(folder_, true)) fs::remove(file, ignored);
+  for (const fs::path& file : files_in(folder_, true, ignored)) fs::remove(file, ignored);
   fs::remove(folder_ / kOfShards, ignored);  // last: what is left of a crash is still theirs
   fs::remove(folder_, ignored);
 }

@@ -301,6 +301,18 @@ TEST_F(Summary, SaysWhyARunIsNotOk) {
   EXPECT_THAT(page, HasSubstr("went, as &quot;they&quot; say,"));
 }
 
+TEST_F(Summary, ReasonsOfRunsAreNeitherFormulasNorControlTheTerminal) {
+  ExperimentResult result = with_errors({1., 2., 3., 6., 1., 1., 1., 1.});
+  result.runs[0].result.doubts = {"=cmd|'/C calc'!A0.csv is late"};
+  result.runs[1].result.doubts = {"@\x1b[2J\xe2\x80\xae, a"};
+  result.runs[2].result.doubts = {"caf\xc3\xa9 = 1"};
+  summary_of(result);
+  const std::string csv = text_of(folder_ / "out" / "runs.csv");
+  EXPECT_THAT(csv, HasSubstr(",'=cmd|'/C calc'!A0.csv is late\n"));
+  EXPECT_THAT(csv, HasSubstr(",\"'@?[2J?, a\"\n"));
+  EXPECT_THAT(csv, HasSubstr(",caf\xc3\xa9 = 1\n"));
+}
+
 TEST_F(Summary, KeepsGoingWhenAPluginThrows) {
   // A plugin with one drive that throws when it is in that mood.
   const fs::path plugins = folder_ / "plugins";

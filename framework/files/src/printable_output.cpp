@@ -1,25 +1,48 @@
 #include "viwo/files/printable_output.hpp"
 
-#include <utility>
+#include "viwo/math/utf8.hpp"
 
 namespace viwo::files {
+namespace {
+
+constexpr std::string_view kNone = "\xef\xbf\xbd";
+
+/// Whether a character may begin with all of it, and have more bytes.
+bool is_begin(const std::string& text) {
+  return utf8_size(text + "\x80\x80\x80") > text.size() ||
+         utf8_size(text + "\xbf\xbf\xbf") > text.size();
+}
+
+bool is_control(std::string_view character) {
+  const auto first = static_cast<unsigned char>(character[0]);
+  const bool is_harmless = first == '\n' || first == '\t';
+  return (first < 0x20 && !is_harmless) || first == 0x7f ||
+         (character.size() == 2 && character < "\xc2\xa0");
+}
+
+}  // namespace
+
+PrintableOutput::~PrintableOutput() {
+  for (std::size_t i = 0; i < held_.size(); ++i) put(kNone);
+  stream_.rdbuf(to_);
+}
+
+bool PrintableOutput::put(std::string_view character) {
+  const auto size = static_cast<std::streamsize>(character.size());
+  return to_->sputn(character.data(), size) == size;
+}
 
 PrintableOutput::int_type PrintableOutput::overflow(int_type value) {
   if (traits_type::eq_int_type(value, traits_type::eof())) return traits_type::not_eof(value);
-  const char c = traits_type::to_char_type(value);
-  const auto byte = static_cast<unsigned char>(c);
-  constexpr char kFirst = '\xc2';
-  if (std::exchange(may_be_control_, false)) {
-    if (byte >= 0x80 && byte < 0xa0) return to_->sputc('?');
-    if (traits_type::eq_int_type(to_->sputc(kFirst), traits_type::eof())) return traits_type::eof();
+  held_ += traits_type::to_char_type(value);
+  bool is_put = true;
+  while (!held_.empty() && !is_begin(held_)) {
+    const std::size_t size = utf8_size(held_);
+    const std::string_view character = std::string_view(held_).substr(0, size);
+    is_put = put(size == 0 ? kNone : is_control(character) ? "?" : character) && is_put;
+    held_.erase(0, size == 0 ? 1 : size);
   }
-  if (c == kFirst) {
-    may_be_control_ = true;
-    return value;
-  }
-  const bool is_control = byte < 0x20 || byte == 0x7f;
-  const bool is_harmless = c == '\n' || c == '\t';
-  return to_->sputc(is_control && !is_harmless ? '?' : c);
+  return is_put ? value : traits_type::eof();
 }
 
 }  // namespace viwo::files

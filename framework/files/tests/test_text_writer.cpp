@@ -83,5 +83,23 @@ TEST(PrintableOutput, LetsNoControlCharacterThrough) {
   EXPECT_EQ(terminal.str(), "?]0;title?\tcaf\xc3\xa9 \xc2\xa0|?2J??\n");
 }
 
+TEST(PrintableOutput, LetsNothingThroughThatIsNoUtf8) {
+  const std::string none = "\xef\xbf\xbd";
+  std::ostringstream terminal;
+  {
+    const PrintableOutput guard(terminal);
+    // Characters of two, three and four bytes, in pieces; then what is none of itself, cut short,
+    // a detour and half of a pair.
+    terminal << "\xc3" << std::flush << "\xa9\xe2\x82" << std::flush << "\xac\xf0\x9f"
+             << "\x98\x80|";
+    terminal << "\x9b"
+             << "31m\xff|\xe2\x82|\xe0\x80\xaf|\xed\xa0\x80|\xf4\x90|\xe2\xc2"
+             << "\x85|\xf0\x9f";
+  }
+  EXPECT_EQ(terminal.str(), "\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80|" + none + "31m" + none + "|" +
+                                none + none + "|" + none + none + none + "|" + none + none + none +
+                                "|" + none + none + "|" + none + "?|" + none + none);
+}
+
 }  // namespace
 }  // namespace viwo::files

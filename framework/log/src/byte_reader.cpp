@@ -7,7 +7,6 @@
 #include <limits>
 #include <new>
 
-#include <fcntl.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -73,9 +72,8 @@ void ByteReader::Closer::operator()(Source* source) const {
 }
 
 ByteReader::ByteReader(const std::filesystem::path& file) : source_(new Source) {
-  config::require_regular_file(file);
   Source& source = *source_;
-  source.fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  source.fd = config::open_regular_file(file);
   source.stream.next_in = source.bytes.data();
   if (source.fd >= 0) source.is_gzip = source.begins_with_magic();
   const int error = source.fd < 0 ? errno : source.error;

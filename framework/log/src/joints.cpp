@@ -37,6 +37,13 @@ constexpr double kFastest_rad_per_s = 1e4;
 constexpr double kLeastSpacing_s = 1e-3;
 constexpr const char* kTooFast = "drive faster than 1e4 rad/s";
 
+/// Nor is a wheel steered so far, however often it has turned; what is left of an angle by 1e18 is
+/// no angle.
+constexpr double kFarthest_rad = 1e6;
+constexpr const char* kSteersTooFar = "steering beyond 1e6 rad";
+
+bool is_steered_too_far(double steer_rad) { return std::abs(steer_rad) > kFarthest_rad; }
+
 std::string channels_text(int n, const std::string& kind) {
   return std::to_string(n) + " " + kind + (n == 1 ? " channel" : " channels") + " of the log";
 }
@@ -242,6 +249,9 @@ void JointMap::restart() {
 const char* JointMap::convert(EncoderReading& reading) {
   if (!is_identity_) {
     if (const char* const why = to_model(reading)) return why;
+  }
+  if (std::any_of(reading.steer_rad.begin(), reading.steer_rad.end(), is_steered_too_far)) {
+    return kSteersTooFar;
   }
   return check_rates(reading);
 }

@@ -9,6 +9,7 @@
 #include "viwo/api/stamp_order.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/math/number_text.hpp"
+#include "viwo/math/utf8.hpp"
 
 namespace viwo::log {
 namespace {
@@ -60,26 +61,14 @@ std::optional<Decimal> take_apart(std::string_view text) {
   return out;
 }
 
-/// U+0080 to U+009F, and the ends of lines U+2028 and U+2029.
+/// U+0080 to U+009F, the ends of lines U+2028 and U+2029, and what turns the direction of a text,
+/// U+202A to U+202E and U+2066 to U+2069: what follows would be read as something else.
 bool ends_a_line_or_controls(std::string_view character) {
-  return (character.size() == 2 && character >= "\xc2\x80" && character <= "\xc2\x9f") ||
-         character == "\xe2\x80\xa8" || character == "\xe2\x80\xa9";
-}
-
-/// How many bytes the first character has; 0 where it is none.
-std::size_t utf8_size(std::string_view text) {
-  const auto first = static_cast<unsigned char>(text[0]);
-  const std::size_t size = first < 0x80   ? 1
-                           : first < 0xc2 ? 0
-                           : first < 0xe0 ? 2
-                           : first < 0xf0 ? 3
-                           : first < 0xf5 ? 4
-                                          : 0;
-  if (size > text.size()) return 0;
-  for (std::size_t i = 1; i < size; ++i) {
-    if ((static_cast<unsigned char>(text[i]) & 0xc0U) != 0x80U) return 0;
-  }
-  return size;
+  const auto is_of = [character](std::string_view first, std::string_view last) {
+    return character.size() == first.size() && character >= first && character <= last;
+  };
+  return is_of("\xc2\x80", "\xc2\x9f") || is_of("\xe2\x80\xa8", "\xe2\x80\xae") ||
+         is_of("\xe2\x81\xa6", "\xe2\x81\xa9");
 }
 
 /// "a, b, c"; of a long list the nearest to `name`, and how many more there are. Names are those of

@@ -171,6 +171,10 @@ TEST(Texts, ShowBytesThatAreNoTextAsTheirNumbers) {
   EXPECT_EQ(quoted("a\x01 \xc3\xb6 \xff\xc3"), "'a? \xc3\xb6 \\xff\\xc3'");
   EXPECT_EQ(printable("\x1b[2J\n\xc2\x9b|\xe2\x80\xa8|\xe2\x80\xa6\xff"),
             "?[2J??|?|\xe2\x80\xa6\\xff");
+  // What turns the direction of a text; half of a pair.
+  EXPECT_EQ(printable("gnp.\xe2\x80\xae|\xe2\x80\xaa|\xe2\x81\xa6|\xe2\x81\xa9|\xe2\x81\xaa"),
+            "gnp.?|?|?|?|\xe2\x81\xaa");
+  EXPECT_EQ(printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");
 }
 
 TEST_F(TableReaderTest, ReadsEitherSeparatorAndAHeaderBehindAHash) {

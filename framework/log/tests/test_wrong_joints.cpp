@@ -108,6 +108,20 @@ TEST(Joints, ThatTurnFasterThanAnyDriveAreRejected) {
   }
 }
 
+TEST(Joints, ThatAreSteeredFurtherThanAnyWheelAreRejected) {
+  for (const double scale : {1., -2.}) {  // 1 leaves the lists out
+    JointParams params;
+    if (scale != 1.) params.steer_scale = {1., scale};
+    JointMap map(params, 1, 2, false, 0.2);
+    converted(map, reading_of(0., {0.}, {0., 4e5}));
+    for (const double angle : {1e18, -1e300, 1.001e6}) {
+      EncoderReading reading = reading_of(0.1, {0.}, {0., angle});
+      EXPECT_STREQ(map.convert(reading), "steering beyond 1e6 rad") << scale << " " << angle;
+    }
+    converted(map, reading_of(0.2, {0.}, {0., -4e5}));
+  }
+}
+
 TEST(Joints, WhoseAnglesJumpAreRejectedAndStartAnewAfterIt) {
   JointMap map({}, 1, 0, true, 0.2);
   std::vector<EncoderReading> used;

@@ -140,6 +140,10 @@ class McapFile::Reading {
   /// as the file is long.
   static constexpr std::uint64_t kPlace = 150, kFree = 64 << 20, kMostRatio = 32;
 
+  /// Messages that are read: so many, and one for so many bytes of the file. Empty ones become
+  /// hundreds of times as short as they are, and what is wrong with each is found by itself.
+  static constexpr std::uint64_t kFreeMessages = 100'000, kFileBytesOfOne = 4;
+
   /// When received; of one time as in the file: the chunk, and where in it.
   using Key = std::tuple<std::int64_t, std::size_t, std::size_t>;
   struct Lost {
@@ -203,6 +207,9 @@ class McapFile::Reading {
                                " ns: before the chunk begins, or never");
     }
     if (t_ns > to_ns_) return;
+    if (++taken_ > kFreeMessages + file_.file_.size() / kFileBytesOfOne) {
+      throw mcap::BrokenRecord("there are too many messages in it for a file of this size");
+    }
     const std::size_t used =
         wanted_[topic->second].large ? std::min(data.size(), kHeadBytes) : data.size();
     waiting_bytes_ += used + kPlace;
@@ -309,6 +316,7 @@ class McapFile::Reading {
   std::vector<std::int64_t> numbers_;
   std::map<Key, Waiting> waiting_;
   std::uint64_t waiting_bytes_ = 0;
+  std::uint64_t taken_ = 0;  ///< messages
   std::vector<Lost> lost_;
   std::size_t last_large_ = std::numeric_limits<std::size_t>::max();  ///< its chunk
   std::uint64_t work_ = 0;                    ///< bytes that loading large messages decompresses

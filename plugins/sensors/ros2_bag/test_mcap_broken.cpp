@@ -145,22 +145,26 @@ TEST_F(McapBroken, CountsAChunkWithinAChunk) {
   EXPECT_THAT(rejections_of(*sensor), ::testing::Contains(HasSubstr("chunk within a chunk")));
 }
 
-/// Each message takes a place in memory until those before it have come, however short it is.
+/// Each message takes a place in memory until those before it have come, and the time of a message
+/// that is broken, however short it is.
 TEST_F(McapBroken, RefusesMoreMessagesThanAFileOfItsSizeHas) {
   Buffer fields;
   fields.number(std::uint16_t{7}).number(std::uint32_t{0}).number(kStart).number(kStart);
   Buffer one;
   one.record(kMessage, fields);
-  Buffer many;
-  many.raw(schema().bytes()).raw(channel().bytes());
-  for (int i = 0; i < 600'000; ++i) many.raw(one.bytes());
-  bag::Bytes packed(ZSTD_compressBound(many.bytes().size()));
-  packed.resize(
-      ZSTD_compress(packed.data(), packed.size(), many.bytes().data(), many.bytes().size(), 3));
-  const long before_mb = peak_mb();
-  EXPECT_THAT(error(chunk(packed, many.bytes().size(), "zstd")),
-              HasSubstr("there are too many messages in it"));
-  EXPECT_LT(peak_mb() - before_mb, 150);
+  for (const int count : {150'000, 600'000}) {
+    Buffer many;
+    many.raw(schema().bytes()).raw(channel().bytes());
+    for (int i = 0; i < count; ++i) many.raw(one.bytes());
+    bag::Bytes packed(ZSTD_compressBound(many.bytes().size()));
+    packed.resize(
+        ZSTD_compress(packed.data(), packed.size(), many.bytes().data(), many.bytes().size(), 3));
+    const long before_mb = peak_mb();
+    EXPECT_THAT(error(chunk(packed, many.bytes().size(), "zstd")),
+                HasSubstr("there are too many messages in it"))
+        << count;
+    EXPECT_LT(peak_mb() - before_mb, 150) << count;
+  }
 }
 
 TEST_F(McapBroken, RefusesChunksThatBecomeFarLongerThanTheFile) {

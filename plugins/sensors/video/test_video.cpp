@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "support.hpp"
+#include "video_frames.hpp"
 
 namespace viwo {
 namespace {
@@ -125,6 +127,15 @@ TEST_F(VideoSensor, AFrameThatIsNotThereIsAnErrorWhenItIsNeeded) {
   EXPECT_NEAR(grey_of(images[2]), grey(2, 0), kClose);  // and goes on
 }
 
+TEST(VideoFrames, TheTimeOfAFrameIsANumberOfThisCentury) {
+  using Limits = std::numeric_limits<double>;
+  EXPECT_EQ(video::frame_time_ns(12.5, "a.mp4", 3), 12'500'000);
+  for (const double t_ms : {Limits::quiet_NaN(), Limits::infinity(), -Limits::max(), 1e13}) {
+    EXPECT_EQ(testing::error_of([&] { video::frame_time_ns(t_ms, "a.mp4", 3); }),
+              "a.mp4  frame 3 has a time of another century, or none");
+  }
+}
+
 TEST_F(VideoSensor, SaysWhatIsWrong) {
   write("no.avi", "text");
   EXPECT_THAT(error_of(config(", videos: [no.avi], stamps: [stamps.csv]")),
@@ -132,6 +143,8 @@ TEST_F(VideoSensor, SaysWhatIsWrong) {
   EXPECT_THAT(error_of(config(", videos: [none.avi], stamps: [stamps.csv]")),
               HasSubstr("none.avi  cannot be read: No such file"));
   EXPECT_THAT(error_of(config(", videos: []")), HasSubstr("at least one video is needed"));
+  EXPECT_THAT(error_of(config(", videos: [cam0.avi], start_ns: 9223372036854775807")),
+              HasSubstr("start_ns"));
   EXPECT_THAT(error_of(config(", videos: [cam0.avi, cam1.mp4], stamps: [stamps.csv]")),
               HasSubstr("stamps: needs as many names as videos, 2, or none"));
   EXPECT_THAT(error_of(config(", videos: [cam0.avi], stamps: [stamps.csv], time_column: t")),

@@ -41,8 +41,10 @@ struct Params : log::LimitParams {
        {"us", log::TimeUnit::kMicrosecond},
        {"ns", log::TimeUnit::kNanosecond}},
       {.help = "of that column"});
-    b(VIWO_PARAM(start_ns),
-      {.unit = "ns", .help = "without tables: stamp of the first frame of each video"});
+    b(VIWO_PARAM(start_ns), {.unit = "ns",
+                             .min = -static_cast<double>(kMaxStampNs),
+                             .max = static_cast<double>(kMaxStampNs),
+                             .help = "without tables: stamp of the first frame of each video"});
     log::LimitParams::bind(b);
   }
 };

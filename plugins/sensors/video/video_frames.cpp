@@ -6,6 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "viwo/api/stamp_order.hpp"
 #include "viwo/api/status.hpp"
 #include "viwo/files/files.hpp"
 #include "viwo/image/silent_opencv.hpp"
@@ -16,6 +17,15 @@ namespace {
 constexpr double kMostPixels = 1 << 25;
 
 }  // namespace
+
+std::int64_t frame_time_ns(double t_ms, const std::filesystem::path& file, std::size_t frame) {
+  const double t_ns = 1e6 * t_ms;
+  if (!(std::abs(t_ns) <= static_cast<double>(kMaxStampNs))) {
+    throw InputError(file.string() + "  frame " + std::to_string(frame) +
+                     " has a time of another century, or none");
+  }
+  return std::llround(t_ns);
+}
 
 Frames::Frames(std::filesystem::path file) : file_(std::move(file)) {
   if (!std::filesystem::exists(file_)) {
@@ -52,10 +62,13 @@ std::vector<std::int64_t> Frames::times_ns() {
   open();
   std::vector<std::int64_t> times;
   double first_ms = 0.;
-  while (capture_.grab()) {
-    const double t_ms = capture_.get(cv::CAP_PROP_POS_MSEC);
-    if (times.empty()) first_ms = t_ms;
-    times.push_back(std::llround(1e6 * (t_ms - first_ms)));
+  try {
+    while (capture_.grab()) {
+      const double t_ms = capture_.get(cv::CAP_PROP_POS_MSEC);
+      if (times.empty()) first_ms = t_ms;
+      times.push_back(frame_time_ns(t_ms - first_ms, file_, times.size()));
+    }
+  } catch (const cv::Exception&) {  // damaged: it ends there
   }
   open();
   return times;

@@ -1,6 +1,7 @@
 // The frames of a video file, by their number.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -13,6 +14,9 @@
 #include "viwo/api/measurement.hpp"
 
 namespace viwo::video {
+
+/// What a container says of a frame. InputError for what is no time, or beyond kMaxStampNs.
+std::int64_t frame_time_ns(double t_ms, const std::filesystem::path& file, std::size_t frame);
 
 /// One after the other they are decoded once; going back begins at the first frame again, as no
 /// container says reliably where another one begins.

@@ -4,17 +4,15 @@
 #include <cstring>
 #include <utility>
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include "viwo/api/status.hpp"
-#include "viwo/files/files.hpp"
+#include "viwo/config/regular_file.hpp"
 
 namespace viwo::bag {
 
 FileBytes::FileBytes(std::string name) : name_(std::move(name)) {
-  files::require_regular_file(name_);
-  fd_ = ::open(name_.c_str(), O_RDONLY | O_CLOEXEC);
+  fd_ = config::open_regular_file(name_);
   if (fd_ < 0) fail(std::strerror(errno));
   const off_t end = ::lseek(fd_, 0, SEEK_END);
   size_ = end > 0 ? static_cast<std::uint64_t>(end) : 0;

@@ -7,6 +7,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "viwo/image/image_file.hpp"
+
 namespace viwo::bag {
 namespace {
 
@@ -230,9 +232,9 @@ std::string known_encodings() {
 void to_grey(const ImageHead& head, std::span<const std::uint8_t> pixels, Image& out) {
   const Encoding* const encoding = find_encoding(head.encoding);
   if (encoding == nullptr) throw BrokenMessage("encoding '" + head.encoding + "' is not read");
-  constexpr std::uint32_t kMaxSide = 1U << 15;
-  if (head.width_px == 0 || head.height_px == 0 || head.width_px > kMaxSide ||
-      head.height_px > kMaxSide) {
+  if (head.width_px == 0 || head.height_px == 0 || head.width_px > kLongestImageSide ||
+      head.height_px > kLongestImageSide ||
+      std::uint64_t{head.width_px} * head.height_px > kMostImagePixels) {
     throw BrokenMessage("an image of " + size_text(head));
   }
   const auto pixel_bytes = static_cast<std::size_t>(encoding->channels * encoding->channel_bytes);

@@ -167,6 +167,7 @@ TEST(ToGrey, RefusesSizesThatContradictEachOther) {
             "an image of 2 x 1 rgb8 in rows of 5 bytes has 10 bytes of pixels");
   EXPECT_EQ(error_of(head("mono8", 0, 1, 0), {}), "an image of 0 x 1 mono8");
   EXPECT_EQ(error_of(head("mono8", 1, 0xffffffff, 1), {1}), "an image of 1 x 4294967295 mono8");
+  EXPECT_EQ(error_of(head("mono8", 8192, 4097, 8192), {1}), "an image of 8192 x 4097 mono8");
   EXPECT_EQ(error_of(head("32FC1", 1, 1, 4), Bytes(4)), "encoding '32FC1' is not read");
 }
 

@@ -1,10 +1,10 @@
 // What is there and can be read as a file.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
-#include <string>
-
-#include "viwo/config/node.hpp"
+#include <span>
 
 namespace viwo::config {
 
@@ -12,8 +12,28 @@ namespace viwo::config {
 /// pipes, whose reader waits for ever, and devices, which may have no end.
 void require_regular_file(const std::filesystem::path& file);
 
-/// InputError at the value `node` of `key`, which names the file, where that is not there.
-void require_file_of_key(const std::string& key, const Node& node,
-                         const std::filesystem::path& file);
+/// Opens it to read: the descriptor, or -1 with errno for what cannot be opened. InputError as
+/// above, of what was opened: what is put in its place meanwhile is refused, too, and nothing is
+/// waited for.
+int open_regular_file(const std::filesystem::path& file);
+
+/// The same, which is read from its begin and closed. std::system_error for what cannot be opened
+/// or read.
+class RegularFile {
+ public:
+  explicit RegularFile(const std::filesystem::path& file);
+  ~RegularFile();
+  RegularFile(const RegularFile&) = delete;
+  RegularFile& operator=(const RegularFile&) = delete;
+
+  int descriptor() const { return fd_; }
+  /// As it is now; files of the system say 0.
+  std::uintmax_t size() const;
+  /// How many bytes there were: less than asked for at its end alone.
+  std::size_t read(std::span<char> into);
+
+ private:
+  int fd_;
+};
 
 }  // namespace viwo::config

@@ -3,25 +3,29 @@
 
 #include <ostream>
 #include <streambuf>
+#include <string>
+#include <string_view>
 
 namespace viwo::files {
 
 /// As long as it lives, control characters that are printed to `stream` (but for line ends and
-/// tabs) are '?': texts of files, which are in messages, move no cursor and name no window.
+/// tabs) are '?', and bytes that are no UTF-8 U+FFFD, as in files: texts of files, which are in
+/// messages, move no cursor and name no window.
 class PrintableOutput : private std::streambuf {
  public:
   explicit PrintableOutput(std::ostream& stream) : stream_(stream), to_(stream.rdbuf(this)) {}
-  ~PrintableOutput() override { stream_.rdbuf(to_); }
+  ~PrintableOutput() override;
   PrintableOutput(const PrintableOutput&) = delete;
   PrintableOutput& operator=(const PrintableOutput&) = delete;
 
  private:
   int_type overflow(int_type value) override;
+  bool put(std::string_view character);
   int sync() override { return to_->pubsync(); }
 
   std::ostream& stream_;
   std::streambuf* to_;
-  bool may_be_control_ = false;  ///< the first of the two bytes of U+0080 to U+00BF is held back
+  std::string held_;  ///< the first bytes of a character, of which the others have not come
 };
 
 }  // namespace viwo::files

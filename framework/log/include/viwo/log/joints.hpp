@@ -63,8 +63,8 @@ class JointMap {
            double max_gap_s);
 
   /// Makes a reading of the log, whose values are finite and whose stamp is after those before, one
-  /// of the model. nullptr, or why it cannot be used: also where a drive turns faster than any
-  /// does. Allocates nothing.
+  /// of the model. nullptr, or why it cannot be used: also where a drive turns faster, or a wheel
+  /// is steered further, than any is. Allocates nothing.
   const char* convert(EncoderReading& reading);
   /// Forgets what came before, as behind a gap.
   void restart();

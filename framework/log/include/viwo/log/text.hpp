@@ -31,7 +31,8 @@ inline std::optional<std::int64_t> parse_seconds_ns(std::string_view text) {
   return parse_time_ns(text, TimeUnit::kSecond);
 }
 
-/// For messages: control characters are '?', bytes that are no UTF-8 "\xff".
+/// For messages and tables: control characters, also those of the direction, are '?', bytes that
+/// are no UTF-8 "\xff".
 std::string printable(std::string_view text);
 /// The same in quotes, cut after 40 characters.
 std::string quoted(std::string_view text);
