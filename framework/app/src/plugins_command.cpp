@@ -19,22 +19,33 @@ void print_line(const PluginInfo& info) {
             << "\n    " << info.file.string() << "\n";
 }
 
+std::string refusal_of(const PluginListing& listing) {
+  return "refusing " + listing.file.string() + ": " + listing.refusal;
+}
+
 int list(PluginRegistry& plugins) {
+  const std::vector<PluginListing> listings = plugins.list();
   bool refused = false;
-  for (const PluginListing& listing : plugins.list()) {
+  for (const PluginListing& listing : listings) {
     if (listing.info) print_line(*listing.info);
     refused |= !listing.info;
   }
   if (!refused) return 0;
+  int code = 0;
   std::cout << "\nrefused:\n";
-  for (const PluginListing& listing : plugins.list()) {
-    if (!listing.info) std::cout << listing.file.string() << "\n    " << listing.refusal << "\n";
+  for (const PluginListing& listing : listings) {
+    if (listing.info) continue;
+    std::cout << listing.file.string() << "\n    " << listing.refusal << "\n";
+    if (!listing.is_unavailable) continue;
+    std::cerr << refusal_of(listing) << "\n";
+    code = 1;
   }
-  return 0;
+  return code;
 }
 
 int describe(PluginRegistry& plugins, const std::string& name) {
   std::vector<std::string> names;
+  std::string unavailable;
   bool found = false;
   std::vector<HostSection> sections = host_sections();
   sections.push_back({"calibration",
@@ -50,6 +61,7 @@ int describe(PluginRegistry& plugins, const std::string& name) {
               << config::describe_params(section.params);
   }
   for (const PluginListing& listing : plugins.list()) {
+    if (listing.is_unavailable) unavailable += "\n" + refusal_of(listing);
     if (!listing.info) continue;
     names.push_back(listing.info->name);
     if (listing.info->name != name) continue;
@@ -61,18 +73,23 @@ int describe(PluginRegistry& plugins, const std::string& name) {
               << config::describe_params(info.params);
   }
   if (!found) {
-    throw InputError("no plugin or section '" + name + "'" + config::did_you_mean(name, names));
+    throw InputError("no plugin or section '" + name + "'" + config::did_you_mean(name, names) +
+                     unavailable);
   }
   return 0;
 }
 
+/// With the plugins that there are; whoever writes it to a file is told of the others.
 int schema(PluginRegistry& plugins) {
   std::vector<PluginInfo> infos;
+  int code = 0;
   for (const PluginListing& listing : plugins.list()) {
     if (listing.info) infos.push_back(*listing.info);
+    if (!listing.info) std::cerr << refusal_of(listing) << "\n";
+    if (listing.is_unavailable) code = 1;
   }
   std::cout << json_text(run_schema(infos));
-  return 0;
+  return code;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <limits>
 #include <mutex>
+#include <new>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -57,8 +58,9 @@ class KeepFloatingPointMode {
   FloatingPointMode mode_;
 };
 
-void check_bytes(const std::filesystem::path& file) {
-  const std::string bytes = read_library_bytes(file);
+/// The version that was found well.
+FileVersion check_bytes(const std::filesystem::path& file) {
+  const auto [bytes, version] = read_library(file);
   const std::string record = build_record_in(bytes, file);
   const auto differences = compare_build_records(api_build_record(), record);
   if (!differences.empty()) throw PluginRefused(file, explain(differences));
@@ -72,6 +74,11 @@ void check_bytes(const std::filesystem::path& file) {
                         "is damaged, or was changed after it was linked: the digest in its build "
                         "record is that of other bytes - copy or build it again");
   }
+  return version;
+}
+
+PluginUnavailable changed(const std::filesystem::path& file) {
+  return {file, "was replaced or written into while it was loaded - try again"};
 }
 
 bool is_loaded(const std::filesystem::path& file) {
@@ -86,31 +93,33 @@ bool stays_mapped() { return std::getenv("VIWO_PLUGINS_STAY_MAPPED") != nullptr;
 }  // namespace
 
 Library::Library(const std::filesystem::path& file) {
-  check_bytes(file);
+  const FileVersion version = check_bytes(file);
   {
     // Of two registries one loads it, and has copied it when the other one may run in it.
     static std::mutex mutex;
     const std::lock_guard lock(mutex);
-    const bool is_first = load(file);
+    const bool is_first = load(file, version);
     find_descriptor(file);
     if (is_first && !stays_mapped()) keep_pages(file);
+    if (version_of(file) != version) throw changed(file);
   }
   check_descriptor(file);
   const PluginDescriptor& d = *descriptor_;
   info_ = {d.kind, d.name, d.version, d.summary, d.license, file, d.params()};
 }
 
-bool Library::load(const std::filesystem::path& file) {
+bool Library::load(const std::filesystem::path& file, const FileVersion& version) {
   const KeepFloatingPointMode keep;
   bool is_first = false;
   try {
     const std::filesystem::path real = std::filesystem::canonical(file);
     is_first = !is_loaded(real);
+    if (version_of(real) != version) throw changed(file);
     library_.load(real, boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local);
   } catch (const std::system_error& error) {
-    throw PluginRefused(file, std::string("cannot be loaded: ") + error.what() +
-                                  "\n  -> link what is missing; viwo_add_plugin() shows undefined "
-                                  "symbols when it links");
+    throw PluginUnavailable(file, std::string("cannot be loaded: ") + error.what() +
+                                      "\n  -> link what is missing; viwo_add_plugin() shows "
+                                      "undefined symbols when it links");
   }
   if (keep.is_changed()) {
     throw PluginRefused(file,
@@ -129,6 +138,7 @@ void Library::find_descriptor(const std::filesystem::path& file) {
   std::error_code error;
   const std::filesystem::path location = boost::dll::symbol_location_ptr(descriptor_, error);
   if (!error && std::filesystem::equivalent(location, file, error)) return;
+  if (error) throw PluginUnavailable(file, "cannot be looked at: " + error.message());
   throw PluginRefused(file, "registers no plugin: the symbol 'viwo_plugin' it sees is that of " +
                                 location.string() + remedy +
                                 ", and do not link one plugin to another");
@@ -138,9 +148,9 @@ void Library::keep_pages(const std::filesystem::path& file) const {
   try {
     keep_pages_of(descriptor_, file);
   } catch (const std::system_error& error) {
-    throw PluginRefused(file, std::string("cannot be copied to memory: ") + error.what() +
-                                  "\n  -> with VIWO_PLUGINS_STAY_MAPPED=1 in the environment it "
-                                  "is not, and must not be overwritten while it is used");
+    throw PluginUnavailable(file, std::string("cannot be copied to memory: ") + error.what() +
+                                      "\n  -> with VIWO_PLUGINS_STAY_MAPPED=1 in the environment "
+                                      "it is not, and must not be overwritten while it is used");
   }
 }
 
@@ -171,6 +181,8 @@ void Library::check_descriptor(const std::filesystem::path& file) const {
   }
   try {
     config::check_specs(d.params());
+  } catch (const std::bad_alloc&) {  // no fault of the plugin
+    throw;
   } catch (const std::exception& error) {
     throw PluginRefused(file, std::string("has a wrong parameter table: ") + error.what());
   }

@@ -6,6 +6,7 @@
 
 #include <boost/dll/shared_library.hpp>
 
+#include "plugin_file.hpp"
 #include "viwo/api/plugin.hpp"
 #include "viwo/plugin_host/plugin_info.hpp"
 
@@ -13,8 +14,8 @@ namespace viwo {
 
 class Library {
  public:
-  /// Compares build record and digest, loads the file, copies it to memory, checks its descriptor.
-  /// Throws PluginRefused.
+  /// Compares build record and digest, loads the file if it is still the same, copies it to memory,
+  /// checks its descriptor. Throws PluginRefused.
   explicit Library(const std::filesystem::path& file);
 
   const PluginInfo& info() const { return info_; }
@@ -22,7 +23,7 @@ class Library {
 
  private:
   /// Whether nothing else in this process has loaded it before.
-  bool load(const std::filesystem::path& file);
+  bool load(const std::filesystem::path& file, const FileVersion& version);
   void find_descriptor(const std::filesystem::path& file);
   void keep_pages(const std::filesystem::path& file) const;
   void check_descriptor(const std::filesystem::path& file) const;

@@ -6,7 +6,7 @@
 
 namespace viwo {
 
-/// Of the bytes of a shared library (read_library_bytes): eight hexadecimal digits, the CRC-32 of
+/// Of the bytes of a shared library (read_library): eight hexadecimal digits, the CRC-32 of
 /// all that the loader takes from it: header, table of segments, segments. Left out is what
 /// stripping and installing change: where the sections are, the path that libraries are searched
 /// in, and the digest itself.

@@ -3,11 +3,14 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <string_view>
 #include <system_error>
+#include <utility>
+
+#include <sys/stat.h>
 
 #include "elf.hpp"
+#include "viwo/config/regular_file.hpp"
 #include "viwo/plugin_host/plugin_info.hpp"
 
 /// Of what this code is linked into; by the linker.
@@ -21,7 +24,7 @@ constexpr std::string_view kPrefix = "libviwo_";
 constexpr std::string_view kSuffix = ".so";
 
 /// A plugin has some MB, with debug information some hundred.
-constexpr std::uint64_t kLargest = 1ULL << 30;
+constexpr std::int64_t kLargest = 1LL << 30;
 
 /// The machine that this program is built for.
 std::uint16_t own_machine() { return __ehdr_start.e_machine; }
@@ -76,6 +79,29 @@ void check_elf(const std::filesystem::path& file, const std::string& bytes) {
   }
 }
 
+config::RegularFile open_library(const std::filesystem::path& file) {
+  try {
+    return config::RegularFile(file);
+  } catch (const InputError&) {
+    throw PluginRefused(file, "is not a regular file");
+  }
+}
+
+FileVersion version_in(const struct stat& found) {
+  const auto ns = [](const timespec& time) {
+    return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+  };
+  return {found.st_dev, found.st_ino, found.st_size, ns(found.st_mtim), ns(found.st_ctim)};
+}
+
+FileVersion version_of(const config::RegularFile& opened) {
+  struct stat found {};
+  if (::fstat(opened.descriptor(), &found) != 0) {
+    throw std::system_error(errno, std::generic_category());
+  }
+  return version_in(found);
+}
+
 }  // namespace
 
 std::optional<PluginFileName> parse_file_name(const std::filesystem::path& file) {
@@ -94,36 +120,32 @@ std::string make_file_name(const std::string& kind, const std::string& name) {
   return std::string(kPrefix) + kind + "_" + name + std::string(kSuffix);
 }
 
-std::string read_library_bytes(const std::filesystem::path& file) {
-  std::error_code error;
-  const auto status = std::filesystem::status(file, error);
-  if (status.type() == std::filesystem::file_type::not_found) {
-    throw PluginRefused(file, "no such file");
-  }
-  if (status.type() == std::filesystem::file_type::none) {
-    throw PluginRefused(file, "cannot be read: " + error.message() + " - check its permissions");
-  }
-  if (std::filesystem::is_directory(status)) {
+FileVersion version_of(const std::filesystem::path& file) {
+  struct stat found {};
+  return ::stat(file.c_str(), &found) == 0 ? version_in(found) : FileVersion{};
+}
+
+LibraryBytes read_library(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
     throw PluginRefused(file, "is a folder, not a shared library");
   }
-  if (!std::filesystem::is_regular_file(status)) {
-    throw PluginRefused(file, "is not a regular file");
+  try {
+    config::RegularFile opened = open_library(file);
+    const FileVersion version = version_of(opened);
+    if (version.size > kLargest) throw PluginRefused(file, "is larger than 1 GiB, as no plugin is");
+    std::string bytes(static_cast<std::size_t>(version.size), '\0');
+    bytes.resize(opened.read(bytes));
+    check_elf(file, bytes);
+    return {std::move(bytes), version};
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::no_such_file_or_directory ||
+        error.code() == std::errc::not_a_directory) {
+      throw PluginRefused(file, "no such file");
+    }
+    throw PluginUnavailable(
+        file, "cannot be read: " + error.code().message() + " - check its permissions");
   }
-  const auto unreadable = [&file](const char* remedy) {
-    return PluginRefused(file, std::string("cannot be read: ") + std::strerror(errno) + remedy);
-  };
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw unreadable(" - check its permissions");
-  const auto size = std::filesystem::file_size(file, error);
-  if (error || size > kLargest) {
-    throw PluginRefused(file, "is larger than 1 GiB, as no plugin is");
-  }
-  std::string bytes(size, '\0');
-  stream.read(bytes.data(), static_cast<std::streamsize>(size));
-  if (stream.bad()) throw unreadable("");
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  check_elf(file, bytes);
-  return bytes;
 }
 
 }  // namespace viwo

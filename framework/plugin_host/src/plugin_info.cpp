@@ -13,6 +13,8 @@ PluginRefused::PluginRefused(std::filesystem::path file, const std::string& reas
       reason_(reason) {}
 PluginRefused::~PluginRefused() = default;
 
+PluginUnavailable::~PluginUnavailable() = default;
+
 PluginFailure::PluginFailure(const PluginInfo& info, std::string_view phase,
                              const std::string& text)
     : std::runtime_error(full_name(info) + " failed in " + std::string(phase) + ": " + text),

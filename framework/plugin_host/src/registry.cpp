@@ -17,15 +17,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The *.so in a folder, sorted by name; none if it cannot be read.
-std::vector<fs::path> libraries_in(const fs::path& folder) {
+/// The *.so in a folder, sorted by name; with `error` those before it.
+std::vector<fs::path> libraries_in(const fs::path& folder, std::error_code& error) {
   std::vector<fs::path> files;
-  std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     if (it->path().extension() == ".so") files.push_back(it->path());
   }
   std::sort(files.begin(), files.end());
   return files;
+}
+
+bool is_not_there(const std::error_code& error) {
+  return error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
 }
 
 void log_to_stderr(const PluginInfo& info, LogLevel level, std::string_view text) {
@@ -87,7 +90,8 @@ std::vector<fs::path> PluginRegistry::default_search_path(const std::vector<fs::
 std::vector<std::string> PluginRegistry::names(std::string_view kind) const {
   std::set<std::string> names;
   for (const fs::path& folder : folders_) {
-    for (const fs::path& file : libraries_in(folder)) {
+    std::error_code ignored;  // they are suggestions
+    for (const fs::path& file : libraries_in(folder, ignored)) {
       const auto parsed = parse_file_name(file);
       if (parsed && parsed->kind == kind) names.insert(parsed->name);
     }
@@ -156,7 +160,12 @@ std::vector<PluginListing> PluginRegistry::list() {
   std::vector<PluginListing> listings;
   std::set<fs::path> seen;
   for (const fs::path& folder : folders_) {
-    for (const fs::path& file : libraries_in(folder)) {
+    std::error_code error;
+    const std::vector<fs::path> files = libraries_in(folder, error);
+    if (error && !is_not_there(error)) {
+      listings.push_back({folder, std::nullopt, "cannot be read: " + error.message(), true});
+    }
+    for (const fs::path& file : files) {
       if (!seen.insert(fs::weakly_canonical(folder) / file.filename()).second) continue;
       PluginListing& listing = listings.emplace_back();
       listing.file = file;
@@ -164,6 +173,7 @@ std::vector<PluginListing> PluginRegistry::list() {
         listing.info = check(file);
       } catch (const PluginRefused& refused) {
         listing.refusal = refused.reason();
+        listing.is_unavailable = dynamic_cast<const PluginUnavailable*>(&refused) != nullptr;
       }
     }
   }

@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
   }
   try {
     const fs::path file = argv[1];
-    std::string bytes = viwo::read_library_bytes(file);
+    std::string bytes = viwo::read_library(file).bytes;
     viwo::build_record_in(bytes, file);
     replace(file, viwo::sealed(std::move(bytes)));
   } catch (const std::exception& error) {

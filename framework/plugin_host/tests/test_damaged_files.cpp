@@ -1,14 +1,17 @@
 // Files that are not what was linked, or that change while they are used: refused with a reason,
 // and never a signal.
+#include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <random>
 #include <string>
-#include <vector>
+#include <thread>
 
 #include <gtest/gtest.h>
 
+#include "plugin_file.hpp"
 #include "support.hpp"
 #include "viwo/config/errors.hpp"
 #include "viwo/config/yaml.hpp"
@@ -144,6 +147,46 @@ TEST_F(DamagedFile, OverwrittenWhileItIsUsedChangesNothing) {
   ModelDescription description;
   model.object->describe(description);
   EXPECT_EQ(description.n_drive, 1);
+}
+
+TEST_F(DamagedFile, IsAnotherVersionOnceItIsReplacedOrWritten) {
+  const fs::path file = write("a", "text"), other = write("b", "text");
+  const FileVersion version = version_of(file);
+  EXPECT_TRUE(version_of(file) == version);
+  fs::last_write_time(other, fs::last_write_time(file));
+  fs::rename(other, file);
+  const FileVersion newer = version_of(file);
+  EXPECT_FALSE(newer == version);
+  fs::last_write_time(file, fs::last_write_time(file) - std::chrono::hours(1));
+  EXPECT_FALSE(version_of(file) == newer);
+  fs::remove(file);
+  EXPECT_TRUE(version_of(file) == FileVersion{});
+}
+
+/// A link that leads elsewhere once it was looked at: what was not looked at is never accepted.
+TEST_F(DamagedFile, IsNotLoadedInThePlaceOfAnother) {
+  const std::string bytes = text_of(kMoody), name = "libviwo_kinematics_moody.so";
+  const fs::path whole = write("a/" + name, bytes),
+                 damaged = write("b/" + name, replaced(bytes, "one wheel", "0ne wheel"));
+  fs::create_symlink(whole, folder_ / name);
+  std::atomic<bool> done = false;
+  std::thread exchange([&] {
+    while (!done) {
+      for (const fs::path& target : {damaged, whole}) {
+        std::error_code ignored;
+        fs::create_symlink(target, folder_ / "next", ignored);
+        fs::rename(folder_ / "next", folder_ / name, ignored);
+      }
+    }
+  });
+  for (int i = 0; i < 100; ++i) {
+    try {
+      EXPECT_EQ(PluginRegistry({}).check(folder_ / name).summary, "one wheel");
+    } catch (const InputError&) {
+    }
+  }
+  done = true;
+  exchange.join();
 }
 
 }  // namespace

@@ -41,6 +41,14 @@ class PluginRefused : public InputError {
   std::string reason_;
 };
 
+/// The reason is the system, not what is in the file: it may well be a plugin, but could not be
+/// read, loaded or copied to memory.
+class PluginUnavailable : public PluginRefused {
+ public:
+  using PluginRefused::PluginRefused;
+  ~PluginUnavailable() override;
+};
+
 /// A plugin did what it must not: the text of whatever it threw, and where.
 class PluginFailure : public std::runtime_error {
  public:

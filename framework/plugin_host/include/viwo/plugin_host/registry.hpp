@@ -38,11 +38,12 @@ struct Loaded {
   config::Node resolved;  ///< `type` and every parameter: a valid section of a configuration
 };
 
-/// A file in the search path: its plugin, or why it is refused.
+/// A file in the search path: its plugin, or why it is refused. Or a folder that cannot be read.
 struct PluginListing {
   std::filesystem::path file;
   std::optional<PluginInfo> info;
-  std::string refusal;  ///< PluginRefused::reason(); empty with `info`
+  std::string refusal;          ///< PluginRefused::reason(); empty with `info`
+  bool is_unavailable = false;  ///< PluginUnavailable: a plugin may be missing in the list
 };
 
 /// Seed of the plugin of `kind` ("kinematics", "update") that a run with `run_seed` makes from the
@@ -75,7 +76,8 @@ class PluginRegistry {
   /// Loads a file, in the search path or not. Throws PluginRefused.
   PluginInfo check(const std::filesystem::path& file);
 
-  /// Every *.so of the search path, loaded or refused; sorted by file name within a folder.
+  /// Every *.so of the search path, loaded or refused; sorted by file name within a folder. Folders
+  /// that are not there have none; those that cannot be read are in the list themselves.
   std::vector<PluginListing> list();
 
   /// Makes a model from {type: NAME, its parameters}. `path` is where the section is, for messages;
