@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -20,6 +21,9 @@ struct Outcome {
   int code = -1;
   std::string out;
   std::string err;
+  // 0 with a sanitizer, which takes many times as much of both.
+  long peak_mb = 0;   ///< memory at most
+  double cpu_s = 0.;  ///< of all threads
 };
 
 /// A fresh folder per test, removed afterwards. In every text the program prints, the folder is
@@ -61,8 +65,16 @@ class CommandLineTest : public testing::InFolder {
       _exit(127);
     }
     int status = 0;
-    waitpid(child, &status, 0);
+    rusage usage{};
+    wait4(child, &status, 0, &usage);
     Outcome outcome;
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    const auto seconds = [](const timeval& time) {
+      return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+    };
+    outcome.peak_mb = usage.ru_maxrss / 1024;
+    outcome.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+#endif
     outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
     outcome.out = replaced(read(".stdout"), folder_.string(), "TMP");
     outcome.err = replaced(read(".stderr"), folder_.string(), "TMP");

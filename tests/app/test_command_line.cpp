@@ -171,6 +171,28 @@ TEST_F(CommandLineTest, ARefusedPluginIsListedAndTheOthersStillWork) {
   expect_done({"run", "run.yaml", "--out", "out", "--plugin-path", "plugins"});
 }
 
+TEST_F(CommandLineTest, APluginThatCannotBeLoadedIsMissingAndThatIsSaid) {
+  const std::string name = "libviwo_kinematics_undefined.so";
+  std::filesystem::create_directory(at("plugins"));
+  EXPECT_EQ(viwo({"plugins", "schema", "--plugin-path", "plugins"}).err, "");
+  write("plugins/libviwo_kinematics_text.so", "no library\n");
+  const std::string text = "refusing plugins/libviwo_kinematics_text.so: is not a shared library";
+  const Outcome refused = expect_done({"plugins", "schema", "--plugin-path", "plugins"});
+  EXPECT_EQ(refused.err.find(text), 0U) << refused.err;
+  std::filesystem::copy_file(VIWO_TEST_BINARY_DIR "/tests/plugins_bad/" + name,
+                             at("plugins/" + name));
+  const std::string unloaded = "refusing plugins/" + name + ": cannot be loaded: ";
+  for (const char* const verb : {"list", "schema"}) {
+    const Outcome outcome = viwo({"plugins", verb, "--plugin-path", "plugins"});
+    EXPECT_EQ(outcome.code, 1) << verb;
+    EXPECT_NE(outcome.err.find(unloaded), std::string::npos) << verb << "\n" << outcome.err;
+    EXPECT_NE(outcome.out.find("four_wis_wid"), std::string::npos) << verb;
+  }
+  const Outcome describe = viwo({"plugins", "describe", "undefined", "--plugin-path", "plugins"});
+  EXPECT_EQ(describe.code, 2);
+  EXPECT_NE(describe.err.find("\n" + unloaded), std::string::npos) << describe.err;
+}
+
 TEST_F(CommandLineTest, EvaluateRefusesWhatItCannotCompare) {
   write("a.tum", "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n");
   write("late.tum", "# a comment\n1000 0 0 0 0 0 0 1\n1001 1 0 0 0 0 0 1\n");

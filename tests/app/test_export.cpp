@@ -35,6 +35,13 @@ TEST_F(ExportTest, OfARunGoesToAllFormatsThatHoldIt) {
   expect_done(run({"--set", "cameras.kalibr=" + at("chain.yaml").string(), "--out", "again"}));
 }
 
+TEST_F(ExportTest, LeavesWhatAnotherOneIsWritingAlone) {
+  write("sides.yaml", kSides);
+  write("sides.csv.tmp", "half");
+  expect_done({"export", "sides.yaml", "--to", "csv", "--out", "sides.csv"});
+  EXPECT_EQ(read("sides.csv.tmp"), "half");
+}
+
 TEST_F(ExportTest, ARunStartsFromItAndDoesNotOverwriteIt) {
   expect_done(run({"--out", "first"}));
   const std::string first = read("first/calibration.yaml");

@@ -1,8 +1,10 @@
 // Configurations and texts that nobody writes by mistake: what is wrong is said, nothing is lost.
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <regex>
 
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include "support.hpp"
@@ -81,7 +83,8 @@ TEST_F(HostileTest, BytesThatAreNoTextPassThroughTheJournal) {
 
 TEST_F(HostileTest, BytesThatAreNoTextInWhatAPluginSaysLoseNothing) {
   const std::string bad = std::string(VIWO_TEST_BINARY_DIR) + "/tests/plugins_bad";
-  const Outcome schema = expect_done({"plugins", "schema", "--plugin-path", bad});
+  const Outcome schema = viwo({"plugins", "schema", "--plugin-path", bad});
+  EXPECT_EQ(schema.code, 1) << schema.err;  // one of them cannot be loaded
   EXPECT_TRUE(is_utf8(schema.out));
   EXPECT_NE(schema.out.find(kReplaced), std::string::npos);
   const std::string swerve = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/viwo_swerve.yaml";
@@ -188,6 +191,44 @@ TEST_F(HostileTest, NumbersOfRunsHaveBounds) {
                "--jobs", "1024"});
 }
 
+TEST_F(HostileTest, ALimitOfTheSizeOfFilesIsAnError) {
+  write("run.yaml", kRun);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit limit{1'000'000, before.rlim_max};  // less than the page of a run
+  setenv("VIWO_PLUGINS_STAY_MAPPED", "1", 1);      // their copies are files, too
+  setrlimit(RLIMIT_FSIZE, &limit);
+  const Outcome outcome = viwo({"run", "run.yaml", "--out", "out"});
+  setrlimit(RLIMIT_FSIZE, &before);
+  unsetenv("VIWO_PLUGINS_STAY_MAPPED");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(outcome.err, "cannot write out/unfinished.tmp/report.html: File too large\n");
+  EXPECT_TRUE(std::filesystem::is_empty(at("out")));
+}
+
+TEST_F(HostileTest, EncodersOfTwoClocksAreRefusedByTheirPlace) {
+  std::string table = "timestamp_ns,drive_1 [rad/s],drive_2 [rad/s]\n";
+  for (int i = 0; i < 300; ++i) {
+    const std::int64_t clock_ns = i < 150 ? 0 : 3'900'000'000'000'000'000;
+    table += std::to_string(clock_ns + 10'000'000LL * i) + ",1,1\n";
+  }
+  write("wheels0/data.csv", table);
+  write("run.yaml",
+        "name: two\nsensors:\n  wheels0: {type: asl_encoders, path: wheels0}\n"
+        "kinematics: {type: differential, radius_left_m: 0.1, radius_right_m: 0.1, baseline_m: "
+        "0.5}\n");
+  const Outcome outcome = viwo({"run", "run.yaml", "--out", "out"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_EQ(outcome.err,
+            "run.yaml:3:3  the encoder samples of 'wheels0' are 299 in 3.9e+09 s: their stamps are "
+            "of two clocks, or of another unit\n");
+  const Outcome inspected = viwo({"inspect", "run.yaml", "--out", "inspected"});
+  EXPECT_EQ(inspected.code, 1) << inspected.err;
+  EXPECT_NE(inspected.out.find("its stamps are of two clocks, or of another unit"),
+            std::string::npos)
+      << inspected.out;
+}
+
 TEST_F(HostileTest, AGnuplotThatFailsTakesNoResultsWithIt) {
   write("gnuplot", "#!/bin/sh\n[ \"$2\" = --version ] && exit 0\necho out of ink >&2\nexit 1\n");
   std::filesystem::permissions(at("gnuplot"), std::filesystem::perms::owner_all);
@@ -197,7 +238,8 @@ TEST_F(HostileTest, AGnuplotThatFailsTakesNoResultsWithIt) {
   const Outcome outcome = viwo({"run", "run.yaml", "--out", "out", "--figures", "svg"});
   setenv("PATH", before.c_str(), 1);
   EXPECT_EQ(outcome.code, 1);
-  EXPECT_NE(outcome.err.find("gnuplot failed on out/figures/01"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("gnuplot failed on out/figures/unfinished.tmp/01"), std::string::npos)
+      << outcome.err;
   EXPECT_NE(outcome.out.find("report: out/report.html\n"), std::string::npos) << outcome.out;
   EXPECT_EQ(summary().at("status"), "ok");
   EXPECT_NE(read("out/report.html").find("</html>"), std::string::npos);

@@ -136,6 +136,16 @@ TEST_F(ImagesTest, ThatAreBrokenOrMissingAreCountedAndTheRunGoesOn) {
     EXPECT_LT(summary("cut_out").at("accuracy").at("ate_m"), 2. * ate_m + 0.002);
   }
   {
+    const fs::path large = image(broken("large") / "cam0", 20);
+    std::fstream(large, std::ios::binary | std::ios::in | std::ios::out)
+        .seekp(16)
+        .write("\0\0\xea\x60\0\0\xea\x60", 8);
+    const Outcome outcome = expect_done(from_log("large", "large_out"));
+    const std::string text = dropped("large_out", "tracks0");
+    EXPECT_NE(text.find("an image of 60000 x 60000 pixels"), std::string::npos) << text;
+    EXPECT_LT(outcome.peak_mb, 512);
+  }
+  {
     const fs::path missing = image(broken("missing") / "cam1", 10);
     fs::remove(missing);
     expect_done(from_log("missing", "missing_out"));

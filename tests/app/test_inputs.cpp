@@ -1,4 +1,5 @@
 // What a command reads is not what it writes, nor what another one is writing.
+#include <array>
 #include <fstream>
 
 #include <fcntl.h>
@@ -10,6 +11,9 @@ namespace viwo {
 namespace {
 
 namespace fs = std::filesystem;
+
+const std::string kIsInput =
+    "  is an input, which the results would replace - write them elsewhere";
 
 class InputsTest : public CommandLineTest {
  protected:
@@ -51,10 +55,8 @@ TEST_F(InputsTest, OfASimulationAreNotEmptied) {
 
 TEST_F(InputsTest, AreNotReplaced) {
   make_log();
-  const std::string is_input =
-      "  is an input, which the results would replace - write them elsewhere";
   expect_kept({"inspect", "play.yaml", "--fix", "log/wheels0/data.csv"}, "log/wheels0/data.csv",
-              "log/wheels0/data.csv" + is_input);
+              "log/wheels0/data.csv" + kIsInput);
   fs::create_directory(at("out"));
   std::string calibration = "model: four_wis_wid\ntwist: plain\nintrinsics:\n";
   for (const std::string i : {"1", "2", "3", "4"}) {
@@ -68,9 +70,110 @@ TEST_F(InputsTest, AreNotReplaced) {
                "kinematics={calibration: " + at("out/calibration.yaml").string() +
                    ", type: four_wis_wid, x_m: [0.1, -0.1, -0.1, 0.1], y_m: [0.1, 0.1, -0.1, "
                    "-0.1], radius_m: 0.025}"},
-              "out/calibration.yaml", "out/calibration.yaml" + is_input);
+              "out/calibration.yaml", "out/calibration.yaml" + kIsInput);
   expect_kept({"export", "out/calibration.yaml", "--to", "csv", "--out", "out/calibration.yaml"},
-              "out/calibration.yaml", "out/calibration.yaml" + is_input);
+              "out/calibration.yaml", "out/calibration.yaml" + kIsInput);
+}
+
+TEST_F(InputsTest, ThatAreTheConfigurationItselfAreNotReplaced) {
+  const std::string swerve = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/";
+  const std::vector<std::array<std::string, 3>> commands = {
+      {"run", "config.resolved.yaml", kRun},
+      {"inspect", "inspection.json", kRun},
+      {"calibrate", "calibration.yaml", "calibration: c\nbase: run.yaml\nsegment_s: 0.5\n"},
+      {"experiment", "summary.json", "experiment: e\nbase: run.yaml\nvariants: {a: }\n"},
+      {"observability", "observability.json", kRun},
+      {"plan", "plan.tum", testing::text_of(swerve + "plans/swerve.yaml")}};
+  for (const auto& [command, name, text] : commands) {
+    SCOPED_TRACE(command);
+    write(name, text);
+    expect_kept({command, name, "--out", "."}, name, "./" + name + kIsInput);
+    fs::create_directory(at("link_of_" + command));
+    fs::create_symlink(at(name), at("link_of_" + command) / name);
+    expect_kept({command, name, "--out", "link_of_" + command}, name,
+                "link_of_" + command + "/" + name + kIsInput);
+    fs::create_directory(at("name_of_" + command));
+    fs::create_hard_link(at(name), at("name_of_" + command) / name);
+    expect_kept({command, name, "--out", "name_of_" + command}, name,
+                "name_of_" + command + "/" + name + kIsInput);
+  }
+}
+
+TEST_F(InputsTest, ThatAConfigurationIsMadeOfAreNotReplaced) {
+  write("report.html", kRun);
+  write("e.yaml", "experiment: e\nbase: report.html\nvariants: {a: }\n");
+  write("c.yaml", "calibration: c\nbase: report.html\nsegment_s: 0.5\n");
+  for (const char* const command : {"experiment", "observability"}) {
+    expect_kept({command, "e.yaml", "--out", "."}, "report.html", "./report.html" + kIsInput);
+  }
+  expect_kept({"calibrate", "c.yaml", "--out", "."}, "report.html", "./report.html" + kIsInput);
+  write("out/runs/a/config.resolved.yaml", kRun);
+  write("e.yaml", "experiment: e\nbase: out/runs/a/config.resolved.yaml\nvariants: {a: }\n");
+  expect_kept({"experiment", "e.yaml", "--out", "out", "--keep-runs"},
+              "out/runs/a/config.resolved.yaml",
+              "out/runs  holds the input out/runs/a/config.resolved.yaml, which would be lost - "
+              "choose another --out");
+  write("out/timing.csv",
+        testing::text_of(std::string(VIWO_TEST_SOURCE_DIR) + "/configs/plans/swerve.yaml"));
+  const std::string swerve = std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/viwo_swerve.yaml";
+  expect_kept({"run", swerve, "--out", "out", "--plan", "out/timing.csv"}, "out/timing.csv",
+              "out/timing.csv" + kIsInput);
+  write("evaluation.json", "0 0 0 0 0 0 0 1\n");
+  for (const auto& [reference, estimate] :
+       {std::pair{"evaluation.json", "b.tum"}, {"b.tum", "evaluation.json"}}) {
+    expect_kept({"evaluate", "--reference", reference, "--estimate", estimate, "--out", "."},
+                "evaluation.json", "./evaluation.json" + kIsInput);
+  }
+}
+
+/// Its numbers are what is resolved: it is named nowhere in that.
+TEST_F(InputsTest, ThatAreAKalibrFileOfAnImuAreNotReplaced) {
+  write("imu.yaml",
+        "accelerometer_noise_density: 0.02\naccelerometer_random_walk: 0.002\n"
+        "gyroscope_noise_density: 0.002\ngyroscope_random_walk: 0.0002\nrostopic: /imu0\n"
+        "update_rate: 200.0\n");
+  expect_kept({"inspect", std::string(VIWO_TEST_SOURCE_DIR) + "/configs/runs/viwo_swerve.yaml",
+               "--set", "sensors.simulator0.duration_s=3", "--set",
+               "imu={kalibr: " + at("imu.yaml").string() + "}", "--fix", "imu.yaml"},
+              "imu.yaml", "imu.yaml" + kIsInput);
+}
+
+TEST_F(InputsTest, ThatAreFoldersGetNoFiles) {
+  make_log();
+  write("play.yaml", replaced(read("play.yaml"), "/data.csv", ""));
+  fs::create_directory_symlink(at("log/wheels0"), at("link"));
+  for (const std::string folder : {"log/wheels0", "link"}) {
+    expect_kept({"inspect", "play.yaml", "--fix", folder + "/data.csv"}, "log/wheels0/data.csv",
+                folder +
+                    "/data.csv  lies in the input TMP/log/wheels0, of which it would become a part "
+                    "- write it elsewhere");
+  }
+  // Results have a folder of their own, which may lie there; those of before are no inputs.
+  for (int twice = 0; twice < 2; ++twice) {
+    expect_done({"run", "play.yaml", "--out", "log/out"});
+    expect_done({"run", "play.yaml", "--out", "log/wheels0/out"});
+    expect_done({"inspect", "play.yaml", "--out", "log/inspected", "--fix", "log/fixed.yaml"});
+  }
+}
+
+TEST_F(InputsTest, AFileBesideTheResultsIsNoneOfThem) {
+  expect_refused({"inspect", "run.yaml", "--out", "out", "--fix", "./out/inspection.json"},
+                 "--fix ./out/inspection.json: is one of the results of this command - name "
+                 "another file");
+  expect_refused({"run", "run.yaml", "--out", "out", "--mcap", "out/summary.json"},
+                 "--mcap out/summary.json: is one of the results of this command - name another "
+                 "file");
+}
+
+/// FILE.tmp may be that of another command that writes the same file.
+TEST_F(InputsTest, WhatAnotherCommandIsWritingIsLeftAlone) {
+  write("b.tum", "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n");
+  write("evaluation.json.tmp", "half");
+  write("fixed.yaml.tmp", "half");
+  expect_done({"evaluate", "--reference", "b.tum", "--estimate", "b.tum", "--out", "."});
+  expect_done({"inspect", "run.yaml", "--out", "out", "--fix", "fixed.yaml"});
+  EXPECT_EQ(read("evaluation.json.tmp"), "half");
+  EXPECT_EQ(read("fixed.yaml.tmp"), "half");
 }
 
 TEST_F(InputsTest, AFolderBelongsToOneCommandAtATime) {

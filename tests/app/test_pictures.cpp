@@ -71,6 +71,11 @@ TEST_F(PicturesTest, AreRefusedBeforeTheRunWhereTheyCannotBe) {
   expect_refused(run({"--out", "out", "--show"}),
                  "no screen to show pictures on: neither DISPLAY nor WAYLAND_DISPLAY is set; a "
                  "video file needs no screen");
+  write("recording.mp4", "of a camera");
+  expect_refused(run({"--out", "out", "--video", "recording.mp4"}),
+                 "video recording.mp4: is there already and was not written by --video (of this "
+                 "version): choose another name, or remove it");
+  EXPECT_EQ(read("recording.mp4"), "of a camera");
   write("run.yaml", kRun);
   expect_refused({"run", "run.yaml", "--out", "out", "--show"},
                  "--show shows what the filter does, but this run has none (a section 'updates')");

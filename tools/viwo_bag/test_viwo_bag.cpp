@@ -245,5 +245,18 @@ TEST_F(ViwoBag, AFullDiskIsAnError) {
   EXPECT_EQ(run(path("log") + " " + path("no/such/folder/a")), 1);
 }
 
+TEST_F(ViwoBag, ALimitOfTheSizeOfFilesIsAnError) {
+  write_log("log");
+  for (const char* const name : {"a.bag", "a.mcap"}) {
+    const std::string command = "ulimit -f 8; " VIWO_TEST_BINARY_DIR "/bin/viwo_bag " +
+                                path("log") + " " + path(name) + " 2> " + path("output.txt");
+    EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 1) << name;
+    EXPECT_THAT(testing::text_of(path("output.txt")),
+                HasSubstr(std::string(name) + ".part  cannot be written: "));
+    EXPECT_FALSE(fs::exists(path(name)));
+    EXPECT_FALSE(fs::exists(path(name) + ".part"));
+  }
+}
+
 }  // namespace
 }  // namespace viwo

@@ -1,6 +1,7 @@
 // viwo_bag: a log folder as a bag of ROS 1 or ROS 2.
 // Exit codes: 0 done; 1 writing failed; 2 the input is wrong.
 #include <algorithm>
+#include <csignal>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -26,6 +27,8 @@
 #include "viwo/asl/asl.hpp"
 #include "viwo/asl/asl_columns.hpp"
 #include "viwo/asl/asl_images.hpp"
+#include "viwo/files/delayed_signals.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/files/printable_output.hpp"
 #include "viwo/image/image_file.hpp"
 #include "viwo/log/table_reader.hpp"
@@ -301,7 +304,11 @@ void write_file(const Log& log, const std::vector<Entry>& entries, const fs::pat
   if (!in_place) check_output(part, format);
   try {
     write_messages(log, entries, *open_bag(part, format));
-    if (!in_place) fs::rename(part, whole);
+    if (!in_place) {
+      files::sync_to_disk(part);  // rosbag does not
+      fs::rename(part, whole);
+      files::sync_to_disk(whole.parent_path());
+    }
   } catch (...) {
     if (!in_place) fs::remove(part, ignored);  // half a bag is of no use
     throw;
@@ -319,12 +326,14 @@ void write_folder([[maybe_unused]] const Log& log,
   try {
     bag::Ros2Writer writer((part / file_of_folder(out)).string());
     write_messages(log, entries, writer);
-    writer.write_metadata();
+    writer.write_metadata();  // both are on the disk
+    const files::DelayedSignals until_it_is_there;
     if (fs::exists(out)) {
       fs::rename(out, before);
       is_moved = true;
     }
     fs::rename(part, out);
+    files::sync_to_disk(out.parent_path());
     if (is_moved) fs::remove_all(before);
   } catch (...) {
     std::error_code ignored;
@@ -373,6 +382,9 @@ int dispatch(const std::vector<std::string>& words) {
 }  // namespace viwo
 
 int main(int argc, char** argv) {
+  // A pipe that nobody reads and a limit of the size of files are errors of writing.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   const viwo::files::PrintableOutput out(std::cout), err(std::cerr);
   try {
     return viwo::dispatch({argv + 1, argv + argc});

@@ -11,19 +11,15 @@
 #include "forecast_output.hpp"
 #include "interrupt.hpp"
 #include "live_output.hpp"
+#include "own_inputs.hpp"
 #include "progress.hpp"
 #include "viwo/calibration/calibrate.hpp"
 #include "viwo/calibration_report/calibration_output.hpp"
 #include "viwo/config/yaml.hpp"
-#include "viwo/eval/accuracy.hpp"
-#include "viwo/eval/hints.hpp"
-#include "viwo/eval/json.hpp"
 #include "viwo/experiment/experiment.hpp"
-#include "viwo/export/export_calibration.hpp"
 #include "viwo/files/files.hpp"
 #include "viwo/files/folder_lock.hpp"
 #include "viwo/inspect/inspection.hpp"
-#include "viwo/log/tum.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/observability/observability.hpp"
 #include "viwo/plan/plan.hpp"
@@ -142,10 +138,14 @@ RunSetup read_without_drawn_start(const Arguments& arguments, PluginRegistry& pl
   return setup;
 }
 
-/// The calibration that a run starts from, and what it is compared with, must not be lost.
-void refuse_to_replace_inputs(const std::filesystem::path& folder, const config::Node& resolved) {
-  const std::vector<std::filesystem::path> inputs = input_files(resolved);
-  for (const char* const name : kResultsOfRun) refuse_to_replace(folder / name, inputs);
+/// The files of a plan, and of all else that a run reads or writes, are different ones.
+void keep_files_of_run(const Arguments& arguments, const RunSetup& setup) {
+  const std::filesystem::path folder = out_folder(arguments);
+  Files inputs = inputs_of(arguments, setup);
+  if (!arguments.plan.empty()) inputs.push_back(arguments.plan);
+  keep_inputs_of_run(folder, inputs);
+  keep_apart("--video", arguments.video, folder, kResultsOfRun, inputs);
+  keep_apart("--mcap", arguments.mcap, folder, kResultsOfRun, inputs);
 }
 
 /// The results of a shard wait for those of the others.
@@ -170,7 +170,7 @@ int shard_is_done(const ExperimentResult& result, const Shard& shard, const std:
 int run_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
-  refuse_to_replace_inputs(out_folder(arguments), setup.resolved);
+  keep_files_of_run(arguments, setup);
   std::optional<ForecastOutput> forecast;
   if (!arguments.plan.empty()) forecast.emplace(arguments.plan, setup, plugins);
   view::PictureSinks sinks = view::open_sinks(setup, arguments.show, arguments.video);
@@ -227,6 +227,7 @@ int experiment_command(const Arguments& arguments) {
   options.interrupted = [&interrupt] { return interrupt.raised(); };
   const ExperimentSetup setup = read_experiment(arguments.positional[0], options);
   const auto folder = out_folder(arguments);
+  keep_inputs(folder, kResults, {arguments.positional[0]});  // those of its runs when they are read
   std::optional<files::FolderLock> lock;
   options.folder_is_there = [&] { lock.emplace(folder, options.shard.has_value()); };
   const Figures figures(arguments, folder);
@@ -252,8 +253,9 @@ int observability_command(const Arguments& arguments) {
   ExperimentOptions options;
   options.assignments = arguments.assignments;
   const ExperimentSetup setup = observability::read_observability(arguments.positional[0], options);
-  const OutFolder out(out_folder(arguments, "observability"));
-  const std::filesystem::path& folder = out.path();
+  const std::filesystem::path folder = out_folder(arguments, "observability");
+  keep_inputs(folder, {"observability.json", "report.html"}, inputs_of(arguments, setup));
+  const OutFolder out(folder);
   const Figures figures(arguments, folder);
   const observability::ObservabilityReport report = [&] {
     Progress progress;
@@ -272,7 +274,9 @@ int calibrate_command(const Arguments& arguments) {
   calibration::CalibrationSetup setup =
       calibration::read_calibration_setup(arguments.positional[0], arguments.assignments, plugins);
   for (const calibration::CalibrationRecording& recording : setup.recordings) {
-    refuse_to_replace_inputs(out_folder(arguments, "calibrate"), recording.setup.resolved);
+    Files inputs = inputs_of(arguments, recording.setup);
+    inputs.emplace_back(recording.run.mark().file);
+    keep_inputs(out_folder(arguments, "calibrate"), calibration::kResults, inputs);
   }
   const OutFolder out(out_folder(arguments, "calibrate"));
   const std::filesystem::path& folder = out.path();
@@ -286,27 +290,13 @@ int calibrate_command(const Arguments& arguments) {
   return result.is_trusted() ? 0 : 1;
 }
 
-int export_command(const Arguments& arguments) {
-  const CalibrationFile calibration = read_calibration(arguments.positional[0]);
-  const exports::Exported exported = exports::export_calibration(calibration, arguments.to);
-  if (arguments.out) {
-    refuse_to_replace(*arguments.out, {arguments.positional[0]});
-    write_text(*arguments.out, exported.text);
-  } else {
-    std::cout << exported.text;
-  }
-  const std::string doubts = doubts_of(calibration);
-  if (!doubts.empty()) std::cerr << "warning: " << doubts << "\n";
-  for (const std::string& line : exported.lost) {
-    std::cerr << "not in " << arguments.to << ": " << line << "\n";
-  }
-  return 0;
-}
-
 int plan_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   const plan::PlanSetup setup =
       plan::read_plan_setup(arguments.positional[0], arguments.assignments, plugins);
+  Files inputs = input_files(setup.kinematics.resolved);
+  inputs.emplace_back(arguments.positional[0]);
+  keep_inputs(out_folder(arguments, "plan"), plan::kResults, inputs);
   const plan::Plan found = plan::make_plan(setup);
   const OutFolder out(out_folder(arguments, "plan"));
   const std::filesystem::path& folder = out.path();
@@ -325,14 +315,17 @@ int inspect_command(const Arguments& arguments) {
   }
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_without_drawn_start(arguments, plugins);
-  if (!arguments.fix.empty()) refuse_to_replace(arguments.fix, input_files(setup.resolved));
-  const OutFolder out(out_folder(arguments, "inspect"));
-  const std::filesystem::path& folder = out.path();
+  const std::filesystem::path folder = out_folder(arguments, "inspect");
+  const Files inputs = inputs_of(arguments, setup);
+  keep_inputs(folder, inspect::kResults, inputs);
+  keep_apart("--fix", arguments.fix, folder, inspect::kResults, inputs);
+  const OutFolder out(folder);
   const inspect::Inspection inspection = inspect::inspect(setup);
   write_inspection(folder, inspection);
   std::cout << describe(inspection) << "report: " << (folder / "report.html").string() << "\n";
   if (!arguments.fix.empty()) {
-    write_text(arguments.fix, fixed_configuration(setup, inspection, plugins));
+    write_text(arguments.fix, fixed_configuration(setup, inspection, plugins),
+               files::Appears::kWholeBesideOthers);
     std::cout << "configuration: " << arguments.fix.string() << "\n";
   }
   return inspection.has_faults() ? 1 : 0;
@@ -341,41 +334,13 @@ int inspect_command(const Arguments& arguments) {
 int simulate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
-  refuse_to_empty(*arguments.out, input_files(setup.resolved));
+  refuse_to_empty(*arguments.out, inputs_of(arguments, setup));
   if (std::filesystem::is_regular_file(*arguments.out)) {
     throw InputError(arguments.out->string() + "  is a file, not a folder");
   }
   const OutFolder out(*arguments.out);
   const SimulateResult result = write_log(setup, *arguments.out);
   std::cout << describe(result) << " in " << arguments.out->string() << "\n";
-  return 0;
-}
-
-int evaluate_command(const Arguments& arguments) {
-  eval::Options options;
-  bool known = false;
-  for (const auto mode : {eval::Alignment::kNone, eval::Alignment::kStart,
-                          eval::Alignment::kYawPosition, eval::Alignment::kSe3}) {
-    if (arguments.align != eval::name(mode)) continue;
-    options.alignment = mode;
-    known = true;
-  }
-  if (!known) {
-    throw InputError("--align " + arguments.align + ": known are none, start, yaw_position, se3");
-  }
-  options.max_reference_gap_s = arguments.max_gap_s;
-  const Trajectory reference = log::read_tum(arguments.reference);
-  const Trajectory estimate = log::read_tum(arguments.estimate);
-  const eval::Accuracy accuracy = eval::evaluate(reference, estimate, options);
-  const std::string text = json_text(eval::to_json(accuracy));
-  std::cout << text;
-  for (const std::string& line : eval::hints(reference, estimate, options, accuracy)) {
-    std::cerr << "warning: " << line << "\n";
-  }
-  if (arguments.out) {
-    make_folder(*arguments.out);
-    write_text(*arguments.out / "evaluation.json", text);
-  }
   return 0;
 }
 

@@ -123,7 +123,9 @@ bool reader_is_gone() {
 
 int main(int argc, char** argv) {
   viwo::app::end_well_without_memory();
+  // A pipe that nobody reads and a limit of the size of files are errors of writing.
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   const viwo::files::PrintableOutput out(std::cout), err(std::cerr);
   try {
     viwo::become_faster_copy(argv);

@@ -303,7 +303,7 @@ void write_calibration(const std::filesystem::path& folder, const CalibrationRes
                     calibration_text(calibration_file_of(result), "viwo calibrate"));
   files::write_text(out.file("summary.json"), json_text(summary_of(result)));
   files::write_text(out.file("report.html"), report::to_html(page_of(result)));
-  out.commit({"summary.json", "report.html"});
+  out.commit(kResults);
 }
 
 }  // namespace viwo::calibration

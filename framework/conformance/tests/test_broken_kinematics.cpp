@@ -1,4 +1,8 @@
 // Each mistake of a kinematic model fails, with a message that names it.
+#include <csignal>
+
+#include <pthread.h>
+
 #include "support.hpp"
 
 namespace viwo::conformance {
@@ -133,6 +137,21 @@ TEST(BrokenKinematics, ACallThatDoesNotReturn) {
   options.time_limit_s = 2;
   EXPECT_EQ(failures_of("kinematics", "endless", options),
             "hostile readings: took longer than 2 s: a call of the plugin does not return");
+}
+
+/// As a shell may leave it to the programs that it starts.
+TEST(BrokenKinematics, ACallThatDoesNotReturnWhereAlarmsAreIgnored) {
+  Options options;
+  options.time_limit_s = 2;
+  sigset_t alarm, mask;
+  sigemptyset(&alarm);
+  sigaddset(&alarm, SIGALRM);
+  const auto handler = std::signal(SIGALRM, SIG_IGN);
+  pthread_sigmask(SIG_BLOCK, &alarm, &mask);
+  EXPECT_EQ(failures_of("kinematics", "endless", options),
+            "hostile readings: took longer than 2 s: a call of the plugin does not return");
+  pthread_sigmask(SIG_SETMASK, &mask, nullptr);
+  std::signal(SIGALRM, handler);
 }
 
 TEST(BrokenKinematics, ANegativeNoise) {

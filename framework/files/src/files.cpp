@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "viwo/api/status.hpp"
+#include "viwo/files/delayed_signals.hpp"
 #include "viwo/math/utf8.hpp"
 
 namespace viwo::files {
@@ -22,14 +23,19 @@ namespace {
 /// Not all file systems can for folders, nor all files that are none.
 bool sync(int fd) { return ::fsync(fd) == 0 || errno == EINVAL || errno == EROFS; }
 
-bool sync_folder(const std::filesystem::path& folder) {
-  const int fd = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+/// A file, or the names in a folder.
+bool sync(const std::filesystem::path& path, int flags) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | flags);
   if (fd < 0) return false;
   const bool well = sync(fd);
   const int error = errno;
   ::close(fd);
   errno = error;
   return well;
+}
+
+bool sync_folder(const std::filesystem::path& folder) {
+  return sync(folder.empty() ? "." : folder, O_DIRECTORY);
 }
 
 [[noreturn]] void fail(const std::filesystem::path& file) {
@@ -63,6 +69,10 @@ void make_folder(const std::filesystem::path& folder) {
     throw std::runtime_error("cannot create the folder " + folder.string() + ": " +
                              std::generic_category().message(errno));
   }
+}
+
+void sync_to_disk(const std::filesystem::path& path) {
+  if (!sync(path.empty() ? "." : path, 0)) fail(path);
 }
 
 void require_no_link(const std::filesystem::path& folder) {
@@ -140,18 +150,18 @@ void FileWriter::commit() {
   if (!sync_folder(file_.parent_path())) fail();
 }
 
-void write_bytes(const std::filesystem::path& file, std::string_view bytes) {
-  FileWriter out(file);
+void write_bytes(const std::filesystem::path& file, std::string_view bytes, Appears appears) {
+  FileWriter out(file, appears);
   out.write(bytes);
   out.commit();
 }
 
-void write_text(const std::filesystem::path& file, std::string_view text) {
-  write_bytes(file, valid_utf8(text));
+void write_text(const std::filesystem::path& file, std::string_view text, Appears appears) {
+  write_bytes(file, valid_utf8(text), appears);
 }
 
 NewResults::NewResults(const std::filesystem::path& folder)
-    : folder_(folder), new_(folder / "unfinished.tmp") {
+    : folder_(folder), new_(folder / kUnfinishedResults) {
   make_folder(folder_);
   std::error_code ignored;  // of a command that was killed
   std::filesystem::remove_all(new_, ignored);
@@ -173,6 +183,7 @@ std::vector<std::string> NewResults::names_of_new() const {
 }
 
 void NewResults::commit(std::initializer_list<const char*> names) {
+  const DelayedSignals until_all_are_there;
   std::vector<std::string> files = names_of_new();
   // What cannot be replaced shows before anything is.
   for (const std::string& name : files) write_to_device(name);

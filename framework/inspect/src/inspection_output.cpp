@@ -158,7 +158,7 @@ void write_inspection(const std::filesystem::path& folder, const Inspection& ins
   files::NewResults out(folder);
   files::write_text(out.file("inspection.json"), json_text(to_json(inspection)));
   files::write_text(out.file("report.html"), report::to_html(report_of(inspection)));
-  out.commit({"inspection.json", "report.html"});
+  out.commit(kResults);
 }
 
 namespace {

@@ -172,7 +172,7 @@ void write_plan(const std::filesystem::path& folder, const PlanSetup& setup, con
   write_motion(out.folder(), plan);
   files::write_text(out.file("summary.json"), json_text(summary_of(setup, plan)));
   files::write_text(out.file("report.html"), report::to_html(page_of(setup, plan)));
-  out.commit({"summary.json", "report.html"});
+  out.commit(kResults);
 }
 
 std::string describe(const PlanSetup& setup, const Plan& plan) {

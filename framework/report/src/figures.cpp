@@ -1,13 +1,11 @@
 #include "viwo/report/figures.hpp"
 
 #include <array>
-#include <cerrno>
-#include <fstream>
-#include <stdexcept>
 #include <system_error>
 #include <vector>
 
 #include "gnuplot.hpp"
+#include "viwo/files/files.hpp"
 
 namespace viwo::report {
 namespace {
@@ -32,35 +30,12 @@ std::string slug(const std::string& title) {
   return result.empty() ? "plot" : result;
 }
 
-/// What is there goes: it may be a link to a file that is none of the figures.
-void clear(const std::filesystem::path& path) {
-  std::error_code ignored;
-  std::filesystem::remove(path, ignored);
-}
-
-void write(const std::filesystem::path& path, const std::string& text) {
-  clear(path);
-  errno = 0;
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << text;
-  file.close();
-  if (!file) {
-    throw std::runtime_error("cannot write figure '" + path.string() +
-                             "': " + std::generic_category().message(errno));
-  }
-}
-
-/// One figure, or nothing of it.
 void make_figure(const std::filesystem::path& folder, const std::string& name,
-                 const GnuplotFigure& figure) {
-  try {
-    write(folder / (name + ".dat"), figure.data);
-    write(folder / (name + ".gp"), figure.script);
-    run_gnuplot(folder, name + ".gp");
-  } catch (...) {
-    for (const char* extension : kExtensions) clear(folder / (name + extension));
-    throw;
-  }
+                 const GnuplotFigure& figure, FigureFormat format) {
+  files::write_text(folder / (name + ".dat"), figure.data);
+  files::write_text(folder / (name + ".gp"), figure.script);
+  run_gnuplot(folder, name + ".gp");
+  files::sync_to_disk(folder / (name + (format == FigureFormat::kSvg ? ".svg" : ".pdf")));
 }
 
 /// Those of a document before, by their scripts.
@@ -75,7 +50,9 @@ void clear_figures(const std::filesystem::path& folder) {
     if (is_own) scripts.push_back(entry.path());
   }
   for (std::filesystem::path file : scripts) {
-    for (const char* extension : kExtensions) clear(file.replace_extension(extension));
+    for (const char* extension : kExtensions) {
+      std::filesystem::remove(file.replace_extension(extension), ignored);
+    }
   }
 }
 
@@ -84,7 +61,9 @@ void clear_figures(const std::filesystem::path& folder) {
 void write_figures(const std::filesystem::path& folder, const Document& document,
                    FigureFormat format) {
   require_gnuplot();
-  if (!document.sections.empty()) clear_figures(folder);
+  if (document.sections.empty()) return;
+  clear_figures(folder);  // the page that they belong to is gone
+  files::NewResults results(folder);
   Colours colours;
   int n = 0;
   for (const Section& section : document.sections) {
@@ -98,9 +77,10 @@ void write_figures(const std::filesystem::path& folder, const Document& document
       const GnuplotFigure figure = plot->heat_map ? gnuplot_heat_map(*plot, name, format)
                                                   : gnuplot_curves(*plot, name, format, colours);
       if (figure.script.empty()) continue;
-      make_figure(folder, name, figure);
+      make_figure(results.folder(), name, figure, format);
     }
   }
+  results.commit({});
 }
 
 }  // namespace viwo::report

@@ -369,7 +369,8 @@ TEST(Figures, RepeatWhatGnuplotDidNotLike) {
   EXPECT_EQ(testing::error_of<std::runtime_error>(
                 [&] { write_figures(folder.path(), sample_document(), FigureFormat::kSvg); }),
             "gnuplot failed on " + folder.path().string() +
-                "/01_top_view_first_run.gp:\nline 3: no such terminal");
+                "/unfinished.tmp/01_top_view_first_run.gp:\nline 3: no such terminal");
+  EXPECT_EQ(file_names(folder.path()), std::vector<std::string>{});
 }
 
 TEST(Figures, DoNotWaitForAGnuplotThatHangs) {

@@ -26,6 +26,10 @@ std::filesystem::path piece_file(const std::filesystem::path& folder, std::size_
   return folder / ("trajectory_" + std::to_string(k + 1) + ".tum");
 }
 
+bool is_piece_file(const std::filesystem::path& file) {
+  return file.filename().string().starts_with("trajectory_") && file.extension() == ".tum";
+}
+
 void remove_piece_files(const std::filesystem::path& folder) {
   for (std::size_t k = 0; std::filesystem::remove(piece_file(folder, k)); ++k) {
   }

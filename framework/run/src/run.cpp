@@ -13,6 +13,7 @@
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
+#include "viwo/plausibility/periods.hpp"
 #include "viwo/plausibility/plausibility.hpp"
 #include "viwo/run/warnings.hpp"
 #include "viwo/wheel/held_gauge.hpp"
@@ -60,17 +61,14 @@ std::vector<std::int64_t> epoch_stamps(const RunSetup& setup, const RunData& dat
   }
   if (begin_ns >= end_ns) {
     throw InputError(
-        "the encoder samples of '" + data.wheels_name + "' " +
+        setup.sensors_mark.text() + "  the encoder samples of '" + data.wheels_name + "' " +
         (data.reference.empty() ? "last no time" : "and the reference have no time in common"));
   }
   const auto period_ns = std::max<std::int64_t>(1, to_ns(setup.epoch_s));
-  // Many more epochs than samples, and more than memory is for: two clocks.
-  constexpr std::int64_t kMost = 100'000, kMostPerSample = 100;
   const auto samples = static_cast<std::int64_t>(data.wheels().size());
-  if (const std::int64_t n = (end_ns - begin_ns) / period_ns;
-      n > kMost && n / samples > kMostPerSample) {
-    throw InputError("the encoder samples of '" + data.wheels_name + "' are " +
-                     std::to_string(samples) + " in " +
+  if (are_of_two_clocks(samples, (end_ns - begin_ns) / period_ns)) {
+    throw InputError(setup.sensors_mark.text() + "  the encoder samples of '" + data.wheels_name +
+                     "' are " + std::to_string(samples) + " in " +
                      significant(seconds_between(begin_ns, end_ns), 3) +
                      " s: their stamps are of two clocks, or of another unit");
   }

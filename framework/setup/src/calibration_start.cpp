@@ -5,7 +5,7 @@
 #include <iterator>
 #include <utility>
 
-#include "viwo/config/regular_file.hpp"
+#include "viwo/config/file_kind.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/log/text.hpp"
 #include "viwo/math/number_text.hpp"

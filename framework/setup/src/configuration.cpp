@@ -5,7 +5,6 @@
 
 #include "viwo/config/file_kind.hpp"
 #include "viwo/config/overrides.hpp"
-#include "viwo/config/regular_file.hpp"
 #include "viwo/config/suggest.hpp"
 #include "viwo/config/yaml.hpp"
 

@@ -267,6 +267,14 @@ void require_no_twist_for_wheels(const Node& run, const RunSetup& setup) {
                                    "kinematics: {type: body_twist}?");
 }
 
+/// The file of `imu.kalibr`; "" for none.
+std::filesystem::path file_of_imu(const Node& run) {
+  const Node* const file = run.at_path("imu.kalibr");
+  if (file == nullptr || !file->is_scalar() || file->scalar().empty()) return {};
+  const std::filesystem::path from = file->mark().line > 0 ? file->mark().file : "";
+  return std::filesystem::absolute(from.parent_path() / file->scalar()).lexically_normal();
+}
+
 /// What the user of a calibration.yaml should know.
 void warn_of(const CalibrationStart& start, RunSetup& setup) {
   if (const std::string doubts = doubts_of(start.file()); !doubts.empty()) {
@@ -346,6 +354,7 @@ RunSetup read_run(const Node& run, PluginRegistry& plugins, std::optional<std::u
     if (has_base) filter.wheels.front().info = setup.kinematics.info;
     if (wants_filter(run)) setup.filter = std::move(filter);
   }
+  setup.imu_file = file_of_imu(run);
   require_wheels_for_place(run, setup, errors);
   read_sensors(run, context, setup, errors);
   if (errors.empty()) setup.routes = read_routes(run, setup, std::move(measuring), errors);

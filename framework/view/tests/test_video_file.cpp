@@ -164,6 +164,29 @@ TEST_F(VideoFileTest, RefusesWhatCannotBeOne) {
             "write .mp4?)");
 }
 
+TEST_F(VideoFileTest, ReplacesNothingButVideosOfARun) {
+  const std::string why =
+      ": is there already and was not written by --video (of this version): choose another name, "
+      "or remove it";
+  for (const std::string name : {"a.mp4", "a.avi"}) {
+    cv::VideoWriter other(at(name).string(),
+                          name == "a.avi" ? cv::VideoWriter::fourcc('M', 'J', 'P', 'G')
+                                          : cv::VideoWriter::fourcc('m', 'p', '4', 'v'),
+                          10., {kWidth, kHeight});
+    other.write(cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar::all(40)));
+    other.release();
+    EXPECT_EQ(refusal_of(at(name)), "video TMP/" + name + why);
+    EXPECT_EQ(read(at(name)).means.size(), 1U);
+    std::ofstream(at(name), std::ios::trunc);  // holds nothing
+    for (const int pictures : {3, 5}) {
+      write_video(at(name), pictures, 0.1);
+      EXPECT_EQ(read(at(name)).means.size(), static_cast<std::size_t>(pictures));
+    }
+  }
+  ASSERT_EQ(::mkfifo(at("pipe.mp4").c_str(), 0600), 0);
+  EXPECT_EQ(refusal_of(at("pipe.mp4")), "video TMP/pipe.mp4" + why);
+}
+
 TEST_F(VideoFileTest, RefusesAPictureOfAnotherSize) {
   VideoFile video(at("a.mp4"));
   video.add(grey(1), 0.);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <fstream>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -56,6 +57,35 @@ bool is_whole(const fs::path& file, std::int64_t pictures) {
   return video.read(last) && !last.empty();
 }
 
+/// Ends a video that was written here, in a part of the file that its readers pass over.
+std::string mark_of(const fs::path& file) {
+  const std::string text = "viwo run --video";
+  const auto size = static_cast<char>(text.size());
+  if (file.extension() == ".avi") return std::string("JUNK") + size + std::string(3, '\0') + text;
+  const auto with_head = static_cast<char>(size + 8);
+  return std::string(3, '\0') + with_head + "free" + text;
+}
+
+bool append_mark(const fs::path& file) {
+  std::ofstream out(file, std::ios::binary | std::ios::app);
+  out << mark_of(file) << std::flush;
+  return out.good();
+}
+
+/// Nothing, or a video that a run has written.
+bool may_be_replaced(const fs::path& file) {
+  std::error_code error;
+  if (!fs::exists(file, error)) return true;
+  if (!fs::is_regular_file(file, error)) return false;
+  const std::string mark = mark_of(file);
+  const auto size = static_cast<std::streamoff>(fs::file_size(file, error));
+  std::string end(mark.size(), ' ');
+  std::ifstream in(file, std::ios::binary);
+  in.seekg(size - static_cast<std::streamoff>(mark.size()));
+  in.read(end.data(), static_cast<std::streamsize>(end.size()));
+  return size == 0 || (in && end == mark);
+}
+
 /// What is under the name of a video must be there after a loss of power, too.
 bool sync_to_disk(const fs::path& file) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
@@ -90,6 +120,11 @@ VideoFile::VideoFile(fs::path file) : file_(std::move(file)) {
   codec_of(file_);
   std::error_code error, ignored;
   if (fs::is_directory(file_, ignored)) refuse(file_, "this is a folder");
+  if (!may_be_replaced(file_)) {
+    refuse(file_,
+           "is there already and was not written by --video (of this version): choose another "
+           "name, or remove it");
+  }
   part_ = file_;
   part_.replace_filename(file_.stem().string() + ".part" + file_.extension().string());
   const fs::path folder = file_.parent_path();
@@ -147,7 +182,8 @@ void VideoFile::close() {
   if (pictures_ == 0) return;
   if (writer_ == nullptr) start();
   writer_->close();
-  if (failure_.empty() && !(is_whole(part_, pictures_) && sync_to_disk(part_))) {
+  if (failure_.empty() &&
+      !(append_mark(part_) && is_whole(part_, pictures_) && sync_to_disk(part_))) {
     failure_ = "it cannot be read back whole, or not all of it was written";
   }
   writer_.reset();

@@ -1,10 +1,12 @@
 #include "window.hpp"
 
+#include <csignal>
 #include <cstdlib>
 #include <utility>
 
 #include <fcntl.h>
 #include <opencv2/highgui.hpp>
+#include <pthread.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -24,6 +26,16 @@ bool is_set(const char* variable) {
   return value != nullptr && *value != '\0';
 }
 
+/// Whoever called may ignore or block SIGALRM, which a process inherits.
+void end_after(unsigned seconds) {
+  std::signal(SIGALRM, SIG_DFL);
+  sigset_t ends;
+  sigemptyset(&ends);
+  sigaddset(&ends, SIGALRM);
+  pthread_sigmask(SIG_UNBLOCK, &ends, nullptr);
+  alarm(seconds);
+}
+
 /// Tries it in a process of its own: a toolkit that finds no screen ends its process.
 bool window_can_be_opened() {
   // A toolkit that has its screen does not work in a process that is split off.
@@ -32,7 +44,7 @@ bool window_can_be_opened() {
   const pid_t child = fork();
   if (child < 0) return false;
   if (child == 0) {
-    alarm(kMostSecondsToOpen);
+    end_after(kMostSecondsToOpen);
     const int nowhere = ::open("/dev/null", O_WRONLY);
     dup2(nowhere, STDERR_FILENO);
     try {

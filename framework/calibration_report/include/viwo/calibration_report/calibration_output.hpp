@@ -2,13 +2,18 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
 #include <string>
 
 #include "viwo/calibration/calibrate.hpp"
 
 namespace viwo::calibration {
 
-/// Writes calibration.yaml, summary.json and report.html.
+/// What a calibration leaves behind.
+inline constexpr std::initializer_list<const char*> kResults = {"summary.json", "report.html",
+                                                                "calibration.yaml"};
+
+/// Writes them.
 void write_calibration(const std::filesystem::path& folder, const CalibrationResult& result);
 
 /// Tables for the terminal.

@@ -15,6 +15,9 @@ namespace viwo::files {
 /// And those that it lies in; they are there after a loss of power, too.
 void make_folder(const std::filesystem::path& folder);
 
+/// A file that others have written, or the names in a folder, are there after a loss of power, too.
+void sync_to_disk(const std::filesystem::path& path);
+
 /// A folder of its own in that of the results. InputError for a link: what is there may be somebody
 /// else's.
 std::filesystem::path make_folder_in(const std::filesystem::path& folder, const std::string& name);
@@ -55,10 +58,15 @@ class FileWriter {
 };
 
 /// All of it or nothing new is there under the name, also after a loss of power.
-void write_bytes(const std::filesystem::path& file, std::string_view bytes);
+void write_bytes(const std::filesystem::path& file, std::string_view bytes,
+                 Appears appears = Appears::kWhole);
 
 /// The same; what is not UTF-8 becomes U+FFFD, so that others can read every text that viwo writes.
-void write_text(const std::filesystem::path& file, std::string_view text);
+void write_text(const std::filesystem::path& file, std::string_view text,
+                Appears appears = Appears::kWhole);
+
+/// The folder of results that are not all there yet; what else is in it goes.
+inline constexpr const char* kUnfinishedResults = "unfinished.tmp";
 
 /// Results that take the place of those before: all of them, or, on a full disk, none, and those
 /// before stay. Until commit() they lie in a folder of their own, FOLDER/unfinished.tmp, which goes
@@ -75,7 +83,7 @@ class NewResults {
   const std::filesystem::path& folder() const { return new_; }
 
   /// Files of these names that are not new this time go, too. The first of them is there last: who
-  /// finds it finds all.
+  /// finds it finds all. SIGINT, SIGTERM and SIGHUP wait until then.
   void commit(std::initializer_list<const char*> names);
 
  private:

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,10 @@ std::string describe(const Inspection& inspection);
 nlohmann::json to_json(const Inspection& inspection);
 report::Document report_of(const Inspection& inspection);
 
-/// Writes inspection.json and report.html into a folder that is there.
+/// What an inspection leaves behind.
+inline constexpr std::initializer_list<const char*> kResults = {"inspection.json", "report.html"};
+
+/// Writes them into a folder that is there.
 void write_inspection(const std::filesystem::path& folder, const Inspection& inspection);
 
 /// The resolved configuration with all remedies written into it, each with its reason as a comment.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
@@ -71,7 +72,11 @@ double left_of(const std::vector<Goal>& goals, const Intrinsics& sigma);
 /// Throws InputError for goals that no motion on this floor reaches, with what stays unknown.
 Plan make_plan(const PlanSetup& setup);
 
-/// Writes plan.csv, plan.tum, summary.json and report.html.
+/// What a plan leaves behind.
+inline constexpr std::initializer_list<const char*> kResults = {"summary.json", "report.html",
+                                                                "plan.csv", "plan.tum"};
+
+/// Writes them.
 void write_plan(const std::filesystem::path& folder, const PlanSetup& setup, const Plan& plan);
 
 /// The table for the terminal.

@@ -21,6 +21,7 @@ void write_timing_row(files::TextWriter& out, const RunResult& result, std::size
 
 /// The trajectory of piece `k` (0, ...) of a run that has several, beside trajectory.tum.
 std::filesystem::path piece_file(const std::filesystem::path& folder, std::size_t k);
+bool is_piece_file(const std::filesystem::path& file);
 /// Those of a former run.
 void remove_piece_files(const std::filesystem::path& folder);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -50,6 +51,7 @@ struct RunSetup {
   std::optional<FilterSetup> filter;           ///< nothing: dead reckoning from the wheels alone
   Routes routes;                               ///< who gets what the sensors give
   config::Mark kinematics_mark, sensors_mark;  ///< where the sections are written
+  std::filesystem::path imu_file;     ///< imu.kalibr, whose numbers `resolved` has; "" for none
   config::Node resolved;              ///< all of it, with defaults: a valid run configuration
   std::vector<std::string> warnings;  ///< what is suspicious in it, for those of the result
 };

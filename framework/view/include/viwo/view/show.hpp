@@ -41,7 +41,8 @@ class Film {
 std::unique_ptr<Screen> open_screen(const std::string& title);
 
 /// `file` ends in .mp4 (MPEG-4) or .avi (Motion JPEG); its folder is made if need be. Throws
-/// InputError for other endings, and when a video cannot be written there.
+/// InputError for other endings, for what is there and is no video of a run, and when a video
+/// cannot be written there.
 std::unique_ptr<Film> open_film(const std::filesystem::path& file);
 
 }  // namespace viwo::view

@@ -1,0 +1,179 @@
+// Small files that would become large, each through the whole program: refused by name, in little
+// memory and time. What is refused and why is tested beside each reader.
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include "support.hpp"
+
+namespace viwo {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMiB = 1 << 20;
+
+/// As the format has it: little endian.
+template <class T>
+std::string bytes_of_number(T value) {
+  return {reinterpret_cast<const char*>(&value), sizeof(value)};
+}
+
+std::string behind_its_length(const std::string& text) {
+  return bytes_of_number(static_cast<std::uint32_t>(text.size())) + text;
+}
+
+std::string times(std::size_t n, const std::string& text) {
+  std::string all;
+  for (std::size_t i = 0; i < n; ++i) all += text;
+  return all;
+}
+
+class AmplifyingTest : public CommandLineTest {
+ protected:
+  /// Refused, or failed, with this among what is said.
+  void expect_bounded(const std::vector<std::string>& words, const std::string& said) const {
+    const Outcome outcome = viwo(words);
+    EXPECT_TRUE(outcome.code == 1 || outcome.code == 2) << outcome.code << outcome.out;
+    EXPECT_NE(outcome.err.find(said), std::string::npos) << outcome.err;
+    EXPECT_LT(outcome.peak_mb, 512) << outcome.err;
+    EXPECT_LT(outcome.cpu_s, 20.) << outcome.err;
+  }
+
+  /// A run of the wheels alone by one sensor.
+  void expect_sensor_bounded(const std::string& sensor, const std::string& said) const {
+    write("run.yaml", "name: a\nsensors: {wheels0: {" + sensor +
+                          "}}\nkinematics: {type: differential, radius_left_m: 0.1, "
+                          "radius_right_m: 0.1, baseline_m: 0.5}\n");
+    expect_bounded({"run", "run.yaml", "--out", "out"}, said);
+    expect_bounded({"inspect", "run.yaml", "--out", "inspected"}, said);
+  }
+
+  static bool has_sensor(const std::string& name) {
+    return fs::exists(fs::path(VIWO_TEST_PLUGIN_DIR) / ("libviwo_sensor_" + name + ".so"));
+  }
+
+  /// The bytes of a gzip file.
+  std::string zipped(const std::string& text) const {
+    const gzFile file = gzopen(at("part.gz").c_str(), "wb9");
+    EXPECT_EQ(gzwrite(file, text.data(), static_cast<unsigned>(text.size())),
+              static_cast<int>(text.size()));
+    EXPECT_EQ(gzclose(file), Z_OK);
+    return read("part.gz");
+  }
+
+  /// A file in MCAP with one chunk, of wheels.
+  std::string mcap(std::uint64_t says_to_be, const std::string& compressed) const {
+    const auto record = [](char op, const std::string& fields) {
+      return op + bytes_of_number(std::uint64_t{fields.size()}) + fields;
+    };
+    const std::string magic = "\x89MCAP0\r\n";
+    const std::string schema = bytes_of_number(std::uint16_t{1}) +
+                               behind_its_length("sensor_msgs/msg/JointState") +
+                               behind_its_length("ros2msg") + behind_its_length("");
+    const std::string channel = bytes_of_number(std::uint16_t{1}) +
+                                bytes_of_number(std::uint16_t{1}) +
+                                behind_its_length("/joint_states") + behind_its_length("cdr") +
+                                bytes_of_number(std::uint32_t{0});
+    const std::string chunk = bytes_of_number(std::uint64_t{1}) +
+                              bytes_of_number(std::uint64_t{2}) + bytes_of_number(says_to_be) +
+                              bytes_of_number(std::uint32_t{0}) + behind_its_length("zstd") +
+                              bytes_of_number(std::uint64_t{compressed.size()}) + compressed;
+    return magic + record(1, behind_its_length("ros2") + behind_its_length("")) +
+           record(3, schema) + record(4, channel) + record(6, chunk) +
+           record(2, std::string(20, '\0')) + magic;
+  }
+};
+
+TEST_F(AmplifyingTest, AMegabyteOfGzipBecomesNoGigabyte) {
+  // As many rows as there is room for, and a single line.
+  for (const std::string row : {"1,1,1\n", "1"}) {
+    const std::string member = zipped("timestamp_ns,drive_1 [rad/s],drive_2 [rad/s]\n" +
+                                      times(16 * kMiB / row.size(), row));
+    ASSERT_LT(member.size(), kMiB / 16);
+    write("wheels0/data.csv.gz", times(kMiB / member.size() + 1, member));
+    expect_sensor_bounded("type: asl_encoders, path: wheels0", "wheels0/data.csv.gz");
+  }
+}
+
+TEST_F(AmplifyingTest, AliasesOfAliasesAreCounted) {
+  std::string values = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 10; ++i) {
+    const std::string one = "*a" + std::to_string(i - 1);
+    values += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [" + times(9, one + ", ") +
+              one + "]\n";
+  }
+  const std::string texts =
+      "t: &t " + std::string(kMiB - 10'000, 'x') + "\nu: [" + times(1000, "*t, ") + "*t]\n";
+  const std::string run = VIWO_TEST_SOURCE_DIR "/configs/runs/viwo_swerve.yaml";
+  for (const auto& [text, said] : {std::pair{values, "values, with those that aliases stand for"},
+                                   {texts, "MiB of text, with that which aliases stand for"},
+                                   {"a: " + std::string(100'000, '['), "nested deeper than 100"}}) {
+    write("a.yaml", text);
+    expect_bounded({"run", "a.yaml", "--out", "out"}, said);
+    for (const std::string set :
+         {"cameras.kalibr=FILE", "imu={kalibr: FILE}", "calibration=FILE"}) {
+      expect_bounded(
+          {"run", run, "--out", "out", "--set", replaced(set, "FILE", at("a.yaml").string())},
+          said);
+    }
+  }
+}
+
+/// A frame of Zstandard can repeat one byte 131072 times by four bytes.
+TEST_F(AmplifyingTest, AChunkIsNoLargerThanItSays) {
+  if (!has_sensor("ros2_bag")) GTEST_SKIP() << "sensor ros2_bag is left out";
+  const std::string block("\x02\x00\x10\x01", 4);
+  const std::string frame =
+      std::string("\x28\xb5\x2f\xfd\x00\x38", 6) + times(kMiB / block.size(), block);
+  const std::string sensor =
+      "type: ros2_bag, path: a.mcap, joint_topic: /joint_states, drive_joints: [l, r]";
+  write("a.mcap", mcap(32ULL << 30, frame));
+  expect_sensor_bounded(sensor,
+                        "a chunk says to have 34359738368 bytes, at most 134217728 are read");
+  for (const std::uint64_t says_to_be : {100'000ULL, 120ULL << 20}) {
+    write("a.mcap", mcap(says_to_be, frame));
+    expect_sensor_bounded(sensor, "a.mcap");
+  }
+}
+
+TEST_F(AmplifyingTest, AnIndexHasAsManyMessagesAsItSays) {
+  if (!has_sensor("ros1_bag")) GTEST_SKIP() << "sensor ros1_bag is left out";
+  const auto record = [](const std::vector<std::string>& fields, const std::string& data) {
+    std::string header;
+    for (const std::string& field : fields) header += behind_its_length(field);
+    return behind_its_length(header) + behind_its_length(data);
+  };
+  const std::string one = bytes_of_number(std::uint32_t{1});
+  write(
+      "a.bag",
+      "#ROSBAG V2.0\n" +
+          record({"op=\x03", "index_pos=" + bytes_of_number(std::uint64_t{13}), "conn_count=" + one,
+                  "chunk_count=" + one},
+                 "") +
+          record({"op=\x05", "compression=none", "size=" + bytes_of_number(std::uint32_t{0})}, "") +
+          record({"op=\x04", "ver=" + one, "conn=" + one,
+                  "count=" + bytes_of_number(std::uint32_t{0xffffffff})},
+                 std::string(12, '\0')));
+  expect_sensor_bounded(
+      "type: ros1_bag, path: a.bag, joint_topic: /joint_states, drive_joints: [l, r]",
+      "a list has another length than it says");
+}
+
+TEST_F(AmplifyingTest, AnImageIsNoLargerThanACameraHas) {
+  if (!has_sensor("klt_tracker")) GTEST_SKIP() << "sensor klt_tracker is left out";
+  std::string png = testing::text_of(VIWO_TEST_SOURCE_DIR "/tests/app/data/tiny.png");
+  png.replace(16, 8, std::string("\0\0\xea\x60\0\0\xea\x60", 8));  // width and height
+  write("mask.png", png);
+  expect_bounded({"run", VIWO_TEST_SOURCE_DIR "/configs/runs/viwo_images.yaml", "--out", "out",
+                  "--set", "sensors.tracks0.mask0=" + at("mask.png").string()},
+                 "mask.png: an image of 60000 x 60000 pixels, at most 32 Mi are read");
+}
+
+}  // namespace
+}  // namespace viwo
