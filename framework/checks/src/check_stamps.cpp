@@ -1,11 +1,14 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <iterator>
 #include <string>
 #include <vector>
 
 #include "viwo/checks/checks.hpp"
 #include "viwo/eval/statistics.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/math/stamp.hpp"
 #include "viwo/math/time_text.hpp"
 #include "viwo/plausibility/periods.hpp"
 
@@ -109,6 +112,11 @@ Interval check_interval(const Recording& recording, const Stamps& stamps, double
     return {"no sensor of a robot gives a sample every " + ms(period_s) +
                 ": the unit of its stamps is another one (time_unit)",
             {}};
+  }
+  const std::int64_t span_ns = stamps.t_ns.back() - stamps.t_ns.front();
+  if (is_wheels && are_of_two_clocks(std::ssize(stamps.t_ns),
+                                     span_ns / std::max<std::int64_t>(1, to_ns(setup.epoch_s)))) {
+    return {"its stamps are of two clocks, or of another unit", {}};
   }
   return {};
 }
