@@ -1,8 +1,9 @@
 #!/bin/bash
 # check_threads.sh
-# Every kinematic model of the tree through viwo_conformance, all of it built with the thread
-# sanitizer: const calls on one object may run concurrently (folder build-tsan). A model with a race
-# that nothing else shows must fail.
+# Built with the thread sanitizer (folder build-tsan): every kinematic model of the tree through
+# viwo_conformance, as const calls on one object may run concurrently - a model with a race that
+# nothing else shows must fail -, and the tests of what hands measurements from thread to thread: the
+# sensors that are read ahead, and the queues of live sensors.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -11,12 +12,15 @@ for source in plugins/kinematics/*/model.md; do
   models+=("$(basename "$(dirname "$source")")")
 done
 
+tests=(framework/feed/test_feed plugins/shared/live/test_shared_live)
+
 echo "== Building with the thread sanitizer (folder build-tsan)"
 cmake --preset tsan -DVIWO_BUILD_BENCHMARKS=OFF > build-tsan.log 2>&1 || { cat build-tsan.log; exit 1; }
 rm build-tsan.log
 cmake --build --preset tsan --parallel "$(nproc)" \
-  --target viwo_conformance_program viwo_kinematics_broken_race "${models[@]/#/viwo_kinematics_}"
-export TSAN_OPTIONS=halt_on_error=1
+  --target viwo_conformance_program viwo_kinematics_broken_race "${models[@]/#/viwo_kinematics_}" \
+  "${tests[@]##*/}"
+export TSAN_OPTIONS="halt_on_error=1 suppressions=tests/tsan.supp"
 # A race is told by the file that code is mapped from (docs/adr/0016).
 export VIWO_PLUGINS_STAY_MAPPED=1
 
@@ -33,7 +37,7 @@ for model in "${models[@]}"; do
   else
     echo "$model: FAILED"
     echo "$output"
-    failed=1
+    failed=$((failed + 1))
   fi
 done
 
@@ -41,9 +45,20 @@ race=build-tsan/tests/conformance/libviwo_kinematics_broken_race.so
 if output=$(build-tsan/bin/viwo_conformance "$race" 2>&1) || [[ $output != *"concurrent calls"* ]]; then
   echo "the model with a race: not found"
   echo "$output"
-  failed=1
+  failed=$((failed + 1))
 else
   echo "the model with a race: found"
 fi
-echo "$((${#models[@]} + 1 - failed)) passed, $failed failed"
-exit "$failed"
+
+echo "== Tests of ${#tests[@]} parts"
+for test in "${tests[@]}"; do
+  if output=$(build-tsan/"$test" 2>&1); then
+    echo "${test##*/}: passed"
+  else
+    echo "${test##*/}: FAILED"
+    echo "$output"
+    failed=$((failed + 1))
+  fi
+done
+echo "$((${#models[@]} + 1 + ${#tests[@]} - failed)) passed, $failed failed"
+exit "$((failed > 0))"

@@ -25,6 +25,15 @@ function(viwo_for_plugins target)
     $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
 endfunction()
 
+# viwo_timeout(VARIABLE SECONDS): how long a test may take. With a sanitizer, five times as long: what
+# is instrumented is slow. (Tests that say nothing have the 1500 s of ctest.)
+function(viwo_timeout variable seconds)
+  if(VIWO_SANITIZE)
+    math(EXPR seconds "5 * ${seconds}")
+  endif()
+  set(${variable} ${seconds} PARENT_SCOPE)
+endfunction()
+
 # viwo_add_test(NAME [WHOLE] SOURCES a.cpp ... LINKS target ... LABELS label ... DEPENDS target ...)
 # A GoogleTest executable, each of its tests known to ctest, in a process of its own; with WHOLE all of
 # them are one, which share what is expensive. Temporary files are the program's own. Plugins of this
@@ -41,9 +50,7 @@ function(viwo_add_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
-  if(VIWO_SANITIZE)  # what is instrumented is slow
-    math(EXPR ARG_TIMEOUT "5 * ${ARG_TIMEOUT}")
-  endif()
+  viwo_timeout(ARG_TIMEOUT ${ARG_TIMEOUT})
   add_executable(${name} ${ARG_SOURCES})
   # What is tested is optimised; of the tests themselves a third of the compiler's time is saved.
   target_compile_options(${name} PRIVATE ${VIWO_WARNINGS} $<$<CONFIG:Release>:-O1>)

@@ -131,7 +131,7 @@ void journal(Bytes bytes) {
 /// Nothing of it is loaded: what is wrong with it must be seen before.
 void plugin(Bytes bytes) {
   const auto file = write("libviwo_sensor_fuzz.so", bytes);
-  const std::string library = read_library_bytes(file);
+  const std::string library = read_library(file).bytes;
   const std::string record = build_record_in(library, file);
   const auto differences = compare_build_records(api_build_record(), record);
   if (!differences.empty()) require(!explain(differences).empty(), "a refusal without a reason");

@@ -1,6 +1,6 @@
 // What comes while a robot runs: messages in any order.
 #include "target.hpp"
-#ifdef VIWO_FUZZ_ROS2
+#if defined(VIWO_FUZZ_ROS1) || defined(VIWO_FUZZ_ROS2)
 #include <algorithm>
 #include <chrono>
 #include <limits>
@@ -8,12 +8,17 @@
 
 #include "intake.hpp"
 #include "live_queue.hpp"
-#include "ros2_fields.hpp"
 #include "step_queue.hpp"
+#endif
+#ifdef VIWO_FUZZ_ROS1
+#include "ros1_fields.hpp"
+#endif
+#ifdef VIWO_FUZZ_ROS2
+#include "ros2_fields.hpp"
 #endif
 
 namespace viwo::fuzz {
-#ifdef VIWO_FUZZ_ROS2
+#if defined(VIWO_FUZZ_ROS1) || defined(VIWO_FUZZ_ROS2)
 namespace {
 
 /// Takes bytes off the front; what is not there is zero.
@@ -35,8 +40,9 @@ class Input {
   Bytes left_;
 };
 
+template <class Fields>
 std::unique_ptr<bag::FieldReader> fields_of(Bytes message) {
-  return std::make_unique<bag::Ros2Fields>(message);
+  return std::make_unique<Fields>(message);
 }
 
 /// All that waits. What a sensor of a running system gives must be usable; played in step, it is in
@@ -61,7 +67,7 @@ void drain(live::MeasurementQueue& queue, bool in_step, std::int64_t& last_ns) {
 
 /// The first byte says how it is played; then messages: topic, what it is said to be, size (two
 /// bytes), bytes.
-void live_messages(Bytes bytes) {
+void live_messages(Bytes bytes, live::MakeFields make_fields) {
   Input in(bytes);
   const std::uint8_t how = in.byte();
   const bool in_step = (how & 1U) != 0;
@@ -88,7 +94,7 @@ void live_messages(Bytes bytes) {
   } else {
     queue = std::make_unique<live::LiveQueue>(kMostImages, kMostOthers);
   }
-  live::Intake intake(options, services, *queue, fields_of,
+  live::Intake intake(options, services, *queue, make_fields,
                       in_step ? live::Pace::kInStep : live::Pace::kLive);
   std::int64_t last_ns = std::numeric_limits<std::int64_t>::min();
   while (!in.is_empty()) {
@@ -119,10 +125,18 @@ void live_messages(Bytes bytes) {
 }  // namespace
 
 std::vector<Target> live_targets() {
-  return {{"live", live_messages,
-           "plugins/shared/live/intake.cpp plugins/shared/live/live_cells.cpp "
-           "plugins/shared/live/live_queue.cpp "
-           "plugins/shared/live/step_queue.cpp"}};
+  constexpr const char* kSources =
+      "plugins/shared/live/intake.cpp plugins/shared/live/live_cells.cpp "
+      "plugins/shared/live/live_queue.cpp plugins/shared/live/step_queue.cpp";
+  return {
+#ifdef VIWO_FUZZ_ROS1
+      {"live_ros1", [](Bytes bytes) { live_messages(bytes, fields_of<bag::Ros1Fields>); },
+       kSources},
+#endif
+#ifdef VIWO_FUZZ_ROS2
+      {"live", [](Bytes bytes) { live_messages(bytes, fields_of<bag::Ros2Fields>); }, kSources},
+#endif
+  };
 }
 #else
 std::vector<Target> live_targets() { return {}; }

@@ -4,7 +4,9 @@
 Small files to begin fuzzing with, by target, into CORPUS: by viwo's own writers where there is one.
 """
 import gzip
+import math
 import os
+import re
 import shutil
 import sqlite3
 import struct
@@ -133,7 +135,7 @@ def live_messages(kinds):
     out = b""
     for i in range(4):
         for topic, kind, name in topics:
-            message = kinds[name][1:]  # CDR: four bytes, and then the stamp
+            message = kinds[name][1:]  # four bytes (of CDR, or a sequence number), and then the stamp
             stamp = struct.pack("<II", 100, 10_000_000 * i + 1_000_000 * kind + 5_000_000)
             message = message[:4] + stamp + message[12:]
             out += bytes([topic + (0x80 if i == 2 else 0), kind]) + struct.pack("<H", len(message)) + message
@@ -192,6 +194,31 @@ def colour_png():
     return out
 
 
+def motion_table(rows=24):
+    """From rest to rest, forwards, sideways and turning."""
+    bumps = [math.sin(math.pi * i / (rows - 1)) ** 2 if 0 < i < rows - 1 else 0 for i in range(rows)]
+    return "time_s,v_x_m_per_s,v_y_m_per_s,omega_rad_per_s\n" + "".join(
+        f"{0.01 * i:.2f},{0.1 * bump:.6g},{0.05 * bump:.6g},{0.2 * bump:.6g}\n" for i, bump in enumerate(bumps))
+
+
+def video(jpeg, width, height, frames=2, rate_hz=20):
+    """Motion JPEG in an AVI file."""
+    def chunk(name, data):
+        return name + struct.pack("<I", len(data)) + data + bytes(len(data) % 2)
+
+    def listed(name, data):
+        return chunk(b"LIST", name + data)
+    head = struct.pack("<14I", 1_000_000 // rate_hz, 0, 0, 0x10, frames, 0, 1, 0, width, height, 0, 0, 0, 0)
+    stream = struct.pack("<4s4sIHHIIIIIIII4H", b"vids", b"MJPG", 0, 0, 0, 0, 1, rate_hz, 0, frames, len(jpeg), 0, 0,
+                         0, 0, width, height)
+    form = struct.pack("<IiiHH4sIiiII", 40, width, height, 1, 24, b"MJPG", 3 * width * height, 0, 0, 0, 0)
+    step = 8 + len(jpeg) + len(jpeg) % 2
+    index = b"".join(struct.pack("<4sIII", b"00dc", 0x10, 4 + step * i, len(jpeg)) for i in range(frames))
+    return chunk(b"RIFF", b"AVI " + listed(b"hdrl", chunk(b"avih", head) + listed(
+        b"strl", chunk(b"strh", stream) + chunk(b"strf", form)))
+        + listed(b"movi", chunk(b"00dc", jpeg) * frames) + chunk(b"idx1", index))
+
+
 def main():
     if len(sys.argv) != 3 or sys.argv[1] == "--help":
         sys.exit(__doc__)
@@ -242,6 +269,10 @@ def main():
     columns = [position + c for c in "xyz"] + [orientation + c for c in "xyzw"]
     seed("ros_text_pose", "a", "time;.header.stamp.secs;.header.stamp.nsecs;" + ";".join(columns) + "\n"
          + "".join(f"2024/05/01/10:00:0{i};{i};5;1;2;3;0;0;0;1\n" for i in range(3)))
+    seed("motion_file", "a", motion_table())
+    # Its frames are there: not all that the table has.
+    (FILES / "video/cam0.avi").write_bytes(video((FILES / "grey.jpg").read_bytes(), 8, 8))
+    seed("video_stamps", "a", "frame,timestamp_ns\n0,1000000000\n1,1050000000\n2,1100000000\n")
     modules, cycles = wpilogs()
     seed("wpilog", "modules", modules)
     seed("wpilog", "modules.gz", gzip.compress(modules, mtime=0))
@@ -270,7 +301,8 @@ def main():
 
     seed("sqlite_log", "rows", killed_log(messages(True, png)["0"][1:], folder))
     for in_step in (0, 1, 2):
-        seed("live", f"all_{in_step}", bytes([in_step]) + live_messages(messages(True, png)))
+        for target, cdr in (("live_ros1", False), ("live", True)):
+            seed(target, f"all_{in_step}", bytes([in_step]) + live_messages(messages(cdr, png)))
 
     seed("urdf", "a", "<?xml version='1.0'?>\n<robot name='r'><link name='a'/>\n<joint name='j' type='fixed'>"
          "<parent link='a'/><child link='b'/><origin xyz='0.1 0 2e-1' rpy='0 0 1.5'/></joint>\n"
@@ -290,8 +322,7 @@ def main():
     seed("yaml", "all", "a: &x {b: [1, 'two', \"t\\u00e9\\n\"], c: ~}\n<<: *x\nd: |\n  text\n  more\ne: !!str 1\nf: - 1\n"
          .replace("f: - 1\n", "f:\n  - 1\n  - {g: *x}\n"))
     for name in ("robot", "camera"):  # to simulate takes longer than to read
-        seed("run", name, (FILES / f"{name}.yaml").read_bytes().replace(b"    features: 15", b"    duration_s: 0.5\n    features: 15")
-             .replace(b"    duration_s: 4\n", b""))
+        seed("run", name, re.sub(rb"duration_s: .*", b"duration_s: 0.5", (FILES / f"{name}.yaml").read_bytes()))
     seed("run", "log", "sensors: {imu: {type: asl_imu, path: imu0}, wheels: {type: asl_encoders, path: wheels0}}\n"
          "kinematics: {type: differential, radius_left_m: 0.05, radius_right_m: 0.05, baseline_m: 0.3}\n"
          "estimator: {start: moving, clones: 4}\nupdates: {wheel_odometry: {}}\n")
@@ -318,6 +349,7 @@ def main():
     for start in range(8):
         seed("filter", f"clean_{start}", bytes([start, 0, 63, 0, 63, 0, 63]))
         seed("filter_run", f"clean_{start}", bytes([start]) + bytes([0, 63]) * 8)
+    seed("filter", "relative", bytes([0x24, 0, 63, 0, 63, 0, 63]))
     for target in ("filter", "filter_run"):
         for i in range(4):
             give = bytes([0, 40])

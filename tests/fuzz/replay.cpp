@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include <malloc.h>
 #include <sys/resource.h>
 
 #include "target.hpp"
@@ -70,6 +71,7 @@ void limit_memory() {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
   const rlimit limit{rlim_t{2} << 30, rlim_t{2} << 30};
   setrlimit(RLIMIT_AS, &limit);
+  mallopt(M_ARENA_MAX, 2);  // or each thread of a decoder of videos, one per core, reserves 64 MiB
 #endif
 }
 

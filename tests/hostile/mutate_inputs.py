@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """mutate_inputs.py BIN SOURCE WORK [--count N] [--formats A,B]: the whole program on broken inputs.
 
-Small recordings of every format that is read, and a plugin's file, N mutations of each (200). Each
-run must end with exit code 0, 1 or 2, say why where it is not 0, and stay within 20 s of CPU, two
+Small recordings of every format that is read, configurations of a recording, and a plugin's file, N
+mutations of each (200). (A robot description is read from live topics alone: tests/fuzz.) Each run
+must end with exit code 0, 1 or 2, say why where it is not 0, and stay within 20 s of CPU, two
 minutes and 512 MB. Formats whose programs or sensors are not built are left out, and said.
 """
 
@@ -72,8 +73,8 @@ class Inputs:
              self.whole / out] + sets, stderr=subprocess.DEVNULL)
         return self.whole / out
 
-    def has_sensor(self, name):
-        return any(self.bin.parent.glob(f'lib/viwo/plugins/*/libviwo_sensor_{name}.so'))
+    def has_plugin(self, kind, name):
+        return any(self.bin.parent.glob(f'lib/viwo/plugins/*/libviwo_{kind}_{name}.so'))
 
     def config(self, name, text):
         file = self.work / f'{name}.yaml'
@@ -122,6 +123,33 @@ def ros_text(inputs):
     sensor = (f'{{type: ros_text_encoders, path: {file}, drive: [{", ".join(DRIVES)}], '
               f'steer: [{", ".join(STEERS)}], drive_input: velocity}}')
     return inputs.wheels_run('ros_text', sensor), [file]
+
+
+def run_yaml(inputs):
+    """On a recording, which bounds what even a wrong configuration can ask for."""
+    file = inputs.work / 'run.yaml'
+    text = (inputs.source / 'configs/runs/viwo_log.yaml').read_text()
+    file.write_text(text.replace('../cameras', f'{inputs.source}/configs/cameras'))
+    return ([inputs.viwo, 'run', file, '--set', f'placeholders.log={inputs.log}', '--out',
+             inputs.work / 'out/run_yaml'], [file])
+
+
+def experiment_yaml(inputs):
+    """Likewise, without a number of seeds, which would be one of runs."""
+    base = inputs.config('experiment_base', 'sensors: {wheels0: {type: asl_encoders, path: '
+                         f'{inputs.log}/wheels0}}}}\n{WHEELS}odometry: {{epoch_s: 0.1}}\n')
+    file = inputs.work / 'experiment_of_two.yaml'
+    file.write_text(f'''\
+experiment: two
+base: {base}
+set: {{odometry.epoch_s: 0.05}}
+baseline: plain
+variants:
+  plain: {{}}
+  weighted: {{odometry.twist: noise_weighted}}
+''')
+    return [inputs.viwo, 'experiment', file, '--jobs', '1', '--out',
+            inputs.work / 'out/experiment_yaml'], [file]
 
 
 def kalibr(inputs):
@@ -207,7 +235,7 @@ def tum(inputs):
 
 
 def bag(inputs, name, sensor):
-    if not inputs.has_sensor(sensor) or not (inputs.bin / 'viwo_bag').exists():
+    if not inputs.has_plugin('sensor', sensor) or not (inputs.bin / 'viwo_bag').exists():
         return None
     file = inputs.work / name
     run([inputs.bin / 'viwo_bag', inputs.log, file])
@@ -221,6 +249,11 @@ def ros1(inputs):
 
 def mcap(inputs):
     return bag(inputs, 'robot.mcap', 'ros2_bag')
+
+
+def ros2_metadata(inputs):
+    made = bag(inputs, 'robot_folder', 'ros2_bag')
+    return made and (made[0], [made[1][0] / 'metadata.yaml'])
 
 
 def cdr_joints(row):
@@ -250,7 +283,7 @@ def cdr_joints(row):
 
 
 def sqlite(inputs):
-    if not inputs.has_sensor('ros2_bag'):
+    if not inputs.has_plugin('sensor', 'ros2_bag'):
         return None
     file = inputs.work / 'robot.db3'
     database = sqlite3.connect(file)
@@ -297,6 +330,49 @@ def png(inputs):
             sorted(copy.rglob('*.png')) + sorted(copy.glob('cam*/data.csv')))
 
 
+def grey_jpeg(width, height):
+    """Of one grey: each of its blocks is two bits."""
+    def segment(marker, data):
+        return struct.pack('>BBH', 0xff, marker, len(data) + 2) + data
+    blocks = -(-width // 8) * -(-height // 8)
+    code = bytes([1]) + bytes(15) + b'\0'
+    return (b'\xff\xd8' + segment(0xdb, b'\0' + b'\1' * 64) +
+            segment(0xc0, struct.pack('>BHHBBBB', 8, height, width, 1, 1, 0x11, 0)) +
+            segment(0xc4, b'\0' + code) + segment(0xc4, b'\x10' + code) +
+            segment(0xda, b'\1\1\0\0\x3f\0') + bytes(-(-blocks // 4)) + b'\xff\xd9')
+
+
+def jpeg(inputs):
+    """One of each camera among images of a log: a file is known by what is in it."""
+    log = inputs.simulate('viwo_images', 'jpegs', 'duration_s=0.5')
+    files = [max((log / camera / 'data').glob('*.png')) for camera in ('cam0', 'cam1')]
+    for file in files:
+        width, height = struct.unpack('>II', file.read_bytes()[16:24])
+        file.write_bytes(grey_jpeg(width, height))
+    return ([inputs.viwo, 'run', inputs.source / 'configs/runs/viwo_images_log.yaml', '--set',
+             f'placeholders.log={log}', '--out', inputs.work / 'out/jpeg'], files)
+
+
+def gnss(inputs):
+    """Fixes of a receiver beside a log, whose origin is somewhere on the Earth."""
+    if not inputs.has_plugin('update', 'gnss'):
+        return None
+    file = inputs.work / 'gnss0/data.csv'
+    file.parent.mkdir()
+    truth = (inputs.log / 'state_groundtruth_estimate0/data.csv').read_text().splitlines()[1::4]
+    lines = ['timestamp_ns,latitude [deg],longitude [deg],altitude [m],cov_EE [m^2],cov_EN,cov_EU,'
+             'cov_NE,cov_NN,cov_NU,cov_UE,cov_UN,cov_UU']
+    for row in truth:
+        stamp, x, y, z = row.split(',')[:4]
+        lines.append(f'{stamp},{48 + float(y) / 111e3:.9f},{11 + float(x) / 74.5e3:.9f},'
+                     f'{500 + float(z)},1e-4,0,0,0,1e-4,0,0,0,1e-4')
+    file.write_text('\n'.join(lines) + '\n')
+    return ([inputs.viwo, 'run', inputs.source / 'configs/runs/viwo_log.yaml', '--set',
+             f'placeholders.log={inputs.log}', '--set',
+             f'sensors.gnss0={{type: asl_gnss, path: {file.parent}}}', '--set', 'updates.gnss={}',
+             '--out', inputs.work / 'out/gnss'], [file])
+
+
 def calibration(inputs):
     """What a run has found, and another one starts from."""
     log = inputs.source / 'configs/runs/viwo_log.yaml'
@@ -318,9 +394,9 @@ def plugin(inputs):
     return [inputs.viwo, 'plugins', 'check', file], [file]
 
 
-FORMATS = {f.__name__: f for f in (asl, gz, csv_table, ros_text, vio_csv, kaist_urban, kalibr,
-                                   tum, ros1, mcap, sqlite, wpilog, png, calibration, journal,
-                                   plugin)}
+FORMATS = {f.__name__: f for f in (asl, gz, csv_table, ros_text, vio_csv, kaist_urban, run_yaml,
+                                   experiment_yaml, kalibr, tum, ros1, mcap, ros2_metadata, sqlite,
+                                   wpilog, png, jpeg, gnss, calibration, journal, plugin)}
 
 
 def mutated(whole, rng):
@@ -379,7 +455,7 @@ def observe(command, errors_file):
 def try_format(name, inputs, count):
     made = FORMATS[name](inputs)
     if made is None:
-        print(f'{name:11} left out: its programs are not built')
+        print(f'{name:15} left out: its programs are not built')
         return []
     command, files = made
     errors = inputs.work / f'{name}.stderr'
@@ -402,7 +478,7 @@ def try_format(name, inputs, count):
             failures.append(f'{name} {seed}: exit {code}, {mb:.0f} MB, {cpu_s:.1f} s: {kept}')
         file.write_bytes(whole[file])
     said = ', '.join(f'{code}: {n}' for code, n in sorted(codes.items()))
-    print(f'{name:11} {count} mutations; exit codes {said}; at most {most_mb:.0f} MB, '
+    print(f'{name:15} {count} mutations; exit codes {said}; at most {most_mb:.0f} MB, '
           f'{most_s:.1f} s of CPU', flush=True)
     return failures
 

@@ -144,6 +144,7 @@ TEST(MotionFile, IsRefusedWhereItIsNone) {
   EXPECT_EQ(refusal(rows), "");
   EXPECT_THAT(refusal(rows + "0.3,0,0,0\n"), HasSubstr("motion.csv:43"));
   EXPECT_THAT(refusal(rows + "0.41,nan,0,0\n"), HasSubstr("is not finite"));
+  EXPECT_THAT(refusal(rows + "0.41,1e200,0,0\n0.42,0,0,0\n"), HasSubstr("faster than any robot"));
   EXPECT_THAT(refusal(rows + "0.41,1,0,0\n"), HasSubstr("ends at rest"));
   EXPECT_THAT(refusal(rows + "9,0,0,0\n"), HasSubstr("evenly spaced"));
   EXPECT_THAT(refusal(header + "0,0,0,0\n"), HasSubstr("at least 20 rows"));

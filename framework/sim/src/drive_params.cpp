@@ -12,6 +12,8 @@ namespace viwo::sim {
 namespace {
 
 constexpr double kMargin = 0.5;  // s
+/// Beyond this a motion is of other units: m/s and rad/s.
+constexpr double kFastest = 100.;
 
 /// The table as a spline whose intervals have four rows each.
 PlanarMotion read_motion(const std::filesystem::path& file) {
@@ -32,6 +34,7 @@ PlanarMotion read_motion(const std::filesystem::path& file) {
     for (int i = 0; i < 3; ++i) {
       twist[i] = table.number(columns[i]);
       if (!std::isfinite(twist[i])) table.fail(columns[i], "is not finite");
+      if (std::abs(twist[i]) > kFastest) table.fail(columns[i], "is faster than any robot");
     }
   }
   constexpr std::size_t kFewest = 20;

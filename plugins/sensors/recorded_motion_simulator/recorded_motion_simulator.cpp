@@ -11,6 +11,7 @@
 #include "viwo/log/ros_text.hpp"
 #include "viwo/log/sensor_params.hpp"
 #include "viwo/math/stamp.hpp"
+#include "viwo/math/time_text.hpp"
 #include "viwo/sim/body_trajectory.hpp"
 #include "viwo/sim/rig_simulator.hpp"
 #include "viwo/sim/true_cameras.hpp"
@@ -47,6 +48,19 @@ double duration_within(double recorded_s, double imu_rate_hz) {
   return std::floor(recorded_s * imu_rate_hz - 1e-6) / imu_rate_hz;
 }
 
+/// What a spline makes of it is no motion of anybody's, and its knots are without end.
+void require_no_gap(const std::vector<PoseSample>& poses) {
+  constexpr double kLongestGapS = 10.;
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    const double gap_s = seconds_between(poses[k - 1].t_ns, poses[k].t_ns);
+    if (gap_s <= kLongestGapS) continue;
+    std::array<char, 100> text{};
+    std::snprintf(text.data(), text.size(), "no poses for %.1f s after %s: cut the recording there",
+                  gap_s, time_text(poses[k - 1].t_ns).c_str());
+    throw ParamError("path", text.data());
+  }
+}
+
 void report(const HostServices& services, const sim::FitResidual& residual) {
   std::array<char, 120> text{};
   std::snprintf(text.data(), text.size(),
@@ -57,6 +71,7 @@ void report(const HostServices& services, const sim::FitResidual& residual) {
 
 log::Recording<Measurement> simulate(const Params& params, const HostServices& services) {
   auto recorded = log::read_ros_poses(params.path, params.ros_clock(), params.limits());
+  require_no_gap(recorded.samples);
   const std::int64_t offset_ns = to_ns(params.time_offset_s);
   for (PoseSample& pose : recorded.samples) pose.t_ns += offset_ns;
   // The spline is poor at its ends, where it has samples on one side only.

@@ -12,8 +12,8 @@ const std::string kCameras =
     std::string("cameras: ") + VIWO_TEST_SOURCE_DIR + "/configs/cameras/pinhole.yaml";
 
 /// A circle of 1 m radius at 0.2 rad/s, at 50 Hz for `duration_s`, tilted by 10 mrad about x and
-/// rising: what planar mode leaves out.
-std::filesystem::path write_circle(double duration_s) {
+/// rising: what planar mode leaves out. After a second there is none for `gap_s`.
+std::filesystem::path write_circle(double duration_s, int gap_s = 0) {
   const auto file = std::filesystem::path(::testing::TempDir()) /
                     ("viwo_circle_" + std::to_string(::getpid()) + ".csv");
   std::ofstream out(file);
@@ -26,9 +26,10 @@ std::filesystem::path write_circle(double duration_s) {
     std::snprintf(row, sizeof row,
                   "2024/05/03/12:34:34.000000;%d;%d;%d;world;%.9f;%.9f;%.9f;%.12f;%.12f;%.12f;"
                   "%.12f\n",
-                  k, 1000 + k / 50, (k % 50) * 20000000, std::sin(a), 1. - std::cos(a), 0.1 * a,
-                  std::cos(0.5 * a) * std::sin(0.005), std::sin(0.5 * a) * std::sin(0.005),
-                  std::sin(0.5 * a) * std::cos(0.005), std::cos(0.5 * a) * std::cos(0.005));
+                  k, 1000 + k / 50 + (k < 50 ? 0 : gap_s), (k % 50) * 20000000, std::sin(a),
+                  1. - std::cos(a), 0.1 * a, std::cos(0.5 * a) * std::sin(0.005),
+                  std::sin(0.5 * a) * std::sin(0.005), std::sin(0.5 * a) * std::cos(0.005),
+                  std::cos(0.5 * a) * std::cos(0.005));
     out << row;
   }
   return file;
@@ -109,6 +110,10 @@ TEST(RecordedMotionSimulator, RefusesWhatItCannotRead) {
   EXPECT_NE(error_of(config("/nonexistent.csv", "features: 0")).find("/nonexistent.csv"),
             std::string::npos);
   EXPECT_NE(error_of(config(write_circle(0.), "features: 0")).find("at least two poses"),
+            std::string::npos);
+  EXPECT_EQ(error_of(config(write_circle(2., 5), "features: 0")), "");
+  EXPECT_NE(error_of(config(write_circle(2., 1000000000), "features: 0"))
+                .find("no poses for 1000000000.0 s after"),
             std::string::npos);
 }
 
