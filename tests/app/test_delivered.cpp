@@ -83,6 +83,8 @@ TEST_F(DeliveredTest, ConfigurationsOfTheFilter) {
                "--out", "far", "--set", "sensors.simulator0.duration_s=5"});
   expect_done({"experiment", kConfigFolder + "experiments/long_runs.yaml", "--seeds", "1", "--out",
                "long", "--set", "sensors.simulator0.duration_s=5"});
+  expect_done({"experiment", kConfigFolder + "experiments/rough_starts.yaml", "--seeds", "1",
+               "--out", "rough", "--set", "sensors.simulator0.duration_s=5"});
   EXPECT_TRUE(summary("long").at("by").at("motion").contains("mixed"));
   const nlohmann::json variants = summary("paper").at("variants");
   for (const char* variant : {"true_init_calib_on", "true_init_calib_off", "bad_init_calib_on",
@@ -290,7 +292,8 @@ TEST_F(DeliveredTest, AllConfigurationsAreTriedHere) {
                 "experiments/nominal_dead_reckoning.yaml", "experiments/openvins_cameras.yaml",
                 "experiments/paper_accuracy.yaml", "experiments/paper_exact.yaml",
                 "experiments/plane_and_gnss.yaml", "experiments/rolling_shutter.yaml",
-                "experiments/simulated_dead_reckoning.yaml", "experiments/three_models.yaml",
+                "experiments/rough_starts.yaml", "experiments/simulated_dead_reckoning.yaml",
+                "experiments/three_models.yaml",
                 // by the commands of docs/getting_started.md
                 "getting_started/camera_imu.yaml", "getting_started/frc.yaml",
                 "getting_started/frc_calibration.yaml", "getting_started/own_base.yaml",

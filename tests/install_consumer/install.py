@@ -43,12 +43,12 @@ class Install(unittest.TestCase):
             self.assertGreater(len(paths), 15)
             for name, path in paths.items():
                 self.assertEqual(entries(prefix / name), [path], name)
-                self.assertIn('[libviwo_api.so.10]', dynamic_section(prefix / name), name)
+                self.assertIn('[libviwo_api.so.11]', dynamic_section(prefix / name), name)
         with self.subTest('no program or library looks for libraries elsewhere'):
             self.assertGreater(len(linked_files(prefix)), 17)
             self.assertEqual(wrong_entries(prefix), [])
         with self.subTest('the library has its name and version'):
-            self.assertIn('soname: [libviwo_api.so.10]',
+            self.assertIn('soname: [libviwo_api.so.11]',
                           dynamic_section(prefix / 'lib/libviwo_api.so'))
         with self.subTest('what people read is there'):
             for name in ('share/doc/viwo/LICENSE', 'share/doc/viwo/NOTICE',

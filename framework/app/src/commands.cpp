@@ -334,10 +334,10 @@ int inspect_command(const Arguments& arguments) {
 int simulate_command(const Arguments& arguments) {
   PluginRegistry plugins = make_registry(arguments);
   RunSetup setup = read_run_of(arguments, plugins);
-  refuse_to_empty(*arguments.out, inputs_of(arguments, setup));
   if (std::filesystem::is_regular_file(*arguments.out)) {
     throw InputError(arguments.out->string() + "  is a file, not a folder");
   }
+  refuse_to_empty(*arguments.out, inputs_of(arguments, setup));
   const OutFolder out(*arguments.out);
   const SimulateResult result = write_log(setup, *arguments.out);
   std::cout << describe(result) << " in " << arguments.out->string() << "\n";
