@@ -343,7 +343,7 @@ TEST(VisualRuns, RoughStartsAmongNearPointsAreConsistentIfTheCovarianceGoesWithT
 }
 
 TEST(VisualRuns, AWindowThatGrowsIsNotSoShortThatOneCameraIsTooSureOfItsScale) {
-  EXPECT_EQ(inconsistency({.sigma_velocity_m_per_s = 0.3,
+  EXPECT_EQ(inconsistency({.sigma_velocity_m_per_s = 0.2,
                            .far = 0.1,
                            .sigma_orientation_rad = 0.017,
                            .growing_window = true},
