@@ -165,6 +165,30 @@ TEST_F(AmplifyingTest, AnIndexHasAsManyMessagesAsItSays) {
       "a list has another length than it says");
 }
 
+/// Of two streams rates are compared in cells of 10 ms.
+TEST_F(AmplifyingTest, AGapOfADayIsNotFilledWithCells) {
+  std::string imu =
+      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+      "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+  std::string wheels = "timestamp_ns,drive_1 [rad/s],drive_2 [rad/s]\n";
+  for (std::int64_t k = 0; k < 2000; ++k) {
+    const std::string t = std::to_string(10'000'000 * k + (k < 1000 ? 0 : 86'000'000'000'000));
+    const std::string turns = k / 100 % 2 == 0 ? "1" : "-1";
+    imu += t + ",0,0," + turns + ",0,0,9.81\n";
+    wheels += t + ",0," + turns + "\n";
+  }
+  write("imu0/data.csv", imu);
+  write("wheels0/data.csv", wheels);
+  write("run.yaml",
+        "name: a\nsensors: {imu0: {type: asl_imu, path: imu0}, wheels0: {type: asl_encoders, path: "
+        "wheels0}}\nkinematics: {type: differential, radius_left_m: 0.25, radius_right_m: 0.25, "
+        "baseline_m: 0.25}\n");
+  const Outcome outcome = viwo({"inspect", "run.yaml", "--out", "inspected"});
+  EXPECT_NE(outcome.out.find("8.6e+07 ms"), std::string::npos) << outcome.out << outcome.err;
+  EXPECT_LT(outcome.peak_mb, 512);
+  EXPECT_LT(outcome.cpu_s, 20.);
+}
+
 TEST_F(AmplifyingTest, AnImageIsNoLargerThanACameraHas) {
   if (!has_sensor("klt_tracker")) GTEST_SKIP() << "sensor klt_tracker is left out";
   std::string png = testing::text_of(VIWO_TEST_SOURCE_DIR "/tests/app/data/tiny.png");

@@ -15,7 +15,7 @@ namespace viwo::series {
 namespace {
 
 std::size_t cells_between(std::int64_t begin_ns, std::int64_t end_ns) {
-  constexpr std::int64_t kMostCells = 8'640'000;  // a day
+  constexpr std::int64_t kMostCells = 2'880'000;  // eight hours; each takes tens of bytes
   const std::int64_t cells = (end_ns - begin_ns) / RateGrid::kCellNs;
   return static_cast<std::size_t>(std::clamp<std::int64_t>(cells, 0, kMostCells));
 }
