@@ -16,7 +16,7 @@
 namespace viwo {
 namespace {
 
-constexpr std::size_t kFirstWindow = 5;
+constexpr std::size_t kFirstWindow = 3;
 constexpr std::size_t kEpochsPerClone = 3;
 /// Over which the filter goes on without the IMU. Whoever is silent for longer, or begins to speak
 /// so long after the start, leaves nothing that an estimate could be made of, epoch after epoch.

@@ -150,18 +150,19 @@ TEST(Estimator, DropsTheOldestCloneWhenTheWindowIsFull) {
   EXPECT_EQ(bench.estimator.filter().clones().size(), 3u);
 }
 
-TEST(Estimator, BeginsWithFiveClonesAndAddsOneEveryThirdEpoch) {
+TEST(Estimator, BeginsWithThreeClonesAndAddsOneEveryThirdEpoch) {
   EstimatorOptions options;
-  options.filter.clones = 7;
+  options.filter.clones = 5;
   Bench bench = Bench::started({}, {}, options);
   bench.imu(-10, 1600);
   for (std::int64_t t = 100; t <= 1500; t += 100) bench.tick(t);
   ASSERT_EQ(bench.steps(), 15);
-  const std::vector<std::size_t> expected{1, 2, 3, 4, 5, 6, 6, 7, 7, 7, 8, 8, 8, 8, 8};
+  const std::vector<std::size_t> expected{1, 2, 3, 3, 4, 4, 4, 5, 5, 5, 6, 6, 6, 6, 6};
   for (std::size_t k = 0; k < 15; ++k) {
     const Seen& seen = bench.update->seen[k];
     EXPECT_EQ(seen.clones.size(), expected[k]) << k;
-    EXPECT_EQ(seen.oldest_leaves, expected[k] == std::min<std::size_t>(5 + k / 3, 8)) << k;
+    EXPECT_EQ(seen.oldest_leaves, k >= 2 && expected[k] == std::min<std::size_t>(3 + k / 3, 6))
+        << k;
   }
 }
 

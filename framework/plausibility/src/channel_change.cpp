@@ -12,7 +12,7 @@
 namespace viwo {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180., kTurn = 2. * std::numbers::pi;
+constexpr double kDegree = std::numbers::pi / 180., kRevolution = 2. * std::numbers::pi;
 
 /// What angles are in, and what they have been taken for.
 struct SteerUnit {
@@ -21,11 +21,11 @@ struct SteerUnit {
 };
 constexpr std::array<SteerUnit, 6> kSteerUnits = {{
     {kDegree, "in degrees"},
-    {kTurn, "in turns"},
+    {kRevolution, "in turns"},
     {1. / kDegree, "in radians, and are taken for degrees"},
-    {1. / kTurn, "in radians, and are taken for turns"},
-    {kDegree / kTurn, "in degrees, and are taken for turns"},
-    {kTurn / kDegree, "in turns, and are taken for degrees"},
+    {1. / kRevolution, "in radians, and are taken for turns"},
+    {kDegree / kRevolution, "in degrees, and are taken for turns"},
+    {kRevolution / kDegree, "in turns, and are taken for degrees"},
 }};
 
 using Order = ChannelChange::Order;

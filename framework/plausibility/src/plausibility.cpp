@@ -70,8 +70,8 @@ struct Plausibility::Checks {
   void add(WheelsCheck& check, const EncoderSample& sample) {
     try {
       const std::optional<Twist> xi = check.encoders.add(sample);
-      constexpr double kLeast = 0.05;  // m/s, rad/s
-      moves = xi && xi->norm() > kLeast;
+      constexpr double kSlowest = 0.05;  // m/s, rad/s
+      moves = xi && xi->norm() > kSlowest;
       if (xi) {
         const double dt_s = seconds_between(sample.begin_ns, sample.end_ns);
         check.way.duration_s += dt_s;

@@ -130,7 +130,7 @@ struct EstimatorParams {
                "correction of the poses; Jacobians are at first estimates (FEJ); nothing, as in a "
                "plain extended Kalman filter"});
     b(VIWO_PARAM(growing_window),
-      {.help = "begin with five clones, one more every third epoch: for a start that may be "
+      {.help = "begin with three clones, one more every third epoch: for a start that may be "
                "wrong; false: for one that is right"});
     b(VIWO_PARAM(gravity_m_per_s2),
       {.unit = "m/s^2", .min = 0., .help = "magnitude of gravity; it points to -z of G"});

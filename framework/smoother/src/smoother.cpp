@@ -85,6 +85,14 @@ void hold_noises(const RunResult& result, const Node& resolved, Node& run) {
   }
 }
 
+/// Whose passes are about linearising again: factors are those of the path that it gives.
+void linearise_at_the_path(const Node& resolved, Node& run) {
+  for (const Node::Entry& update : resolved.find("updates")->entries()) {
+    if (update.value.find("linearise_twice") == nullptr) continue;
+    config::set_path(run, "updates." + update.key + ".linearise_twice", Node::scalar_of("false"));
+  }
+}
+
 /// The filter as it is configured: where the smoother begins.
 void run_filter_of(Recording& recording, PluginRegistry& plugins) {
   RunSetup setup = set_up(recording, plugins);
@@ -92,6 +100,7 @@ void run_filter_of(Recording& recording, PluginRegistry& plugins) {
   hooks.on_start = [&](const Estimator& estimator) { return &recording.filter.emplace(estimator); };
   recording.result = run(recording, setup, hooks);
   hold_noises(recording.result, setup.resolved, recording.run);
+  linearise_at_the_path(setup.resolved, recording.run);
   recording.start = recording.filter->start().state;
   recording.path = std::make_shared<GivenPath>(recording.filter->path());
   recording.blocks = recording.filter->blocks();

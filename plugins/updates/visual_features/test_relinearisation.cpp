@@ -30,9 +30,8 @@ double off_after_a_rough_start(bool linearises_once) {
     Params params = testing::default_params();
     params.sigma_px = 0.2;
     params.gate_probability = 0.;
-    HostServices services;
-    services.exact = linearises_once;
-    VisualFeatures update(params, services);
+    params.linearise_twice = !linearises_once;
+    VisualFeatures update(params, HostServices{});
     FactorSink sink{1, static_cast<int>(truth.P.cols())};
     testing::show_all(update, truth, estimate, params.sigma_px, random, sink);
     EXPECT_GT(sink.applied(), 10);

@@ -50,7 +50,6 @@ struct RunOptions {
   double far = 1.;                       ///< times as far as they are usually
   double sigma_orientation_rad = 2e-3;   ///< of the start
   Consistency consistency = Consistency::kTransform;
-  bool growing_window = false;
 };
 
 /// Takes from new anchors what depends on their clones.
@@ -98,7 +97,7 @@ class FilterRun {
     std::shared_ptr<Update> update = visual_;
     if (options.breaks_anchors) update = std::make_shared<BreaksAnchors>(visual_);
     EstimatorOptions estimator;
-    estimator.growing_window = options.growing_window;
+    estimator.growing_window = false;
     estimator.filter.imu_noise = imu_options().densities;
     estimator.filter.consistency = options.consistency;
     estimator_ = std::make_unique<Estimator>(
@@ -340,15 +339,6 @@ TEST(VisualRuns, RoughStartsAmongNearPointsAreConsistentIfTheCovarianceGoesWithT
     options.consistency = Consistency::kNone;
     EXPECT_NE(inconsistency(options, 12), "") << n_cameras;
   }
-}
-
-TEST(VisualRuns, AWindowThatGrowsIsNotSoShortThatOneCameraIsTooSureOfItsScale) {
-  EXPECT_EQ(inconsistency({.sigma_velocity_m_per_s = 0.2,
-                           .far = 0.1,
-                           .sigma_orientation_rad = 0.017,
-                           .growing_window = true},
-                          24),
-            "");
 }
 
 TEST(VisualRuns, PointsThatAreTooFarForParallaxDoNoHarm) {

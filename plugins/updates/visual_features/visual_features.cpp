@@ -161,8 +161,8 @@ void VisualFeatures::update(const FilterView& filter, const EpochData& data, Fac
   const bool sees_landmarks = landmarks_.look(tracks_, images_now_);
   if (sees_landmarks) landmarks_.use_sights(window_, tracks_, factor(sink), sink);
   if (factor_ != nullptr) equations_.finish(window_, *factor_);
-  const bool has_tracks_alone = !sees_landmarks && sink.added().empty();
-  if (second_order_ > kRough && has_tracks_alone) linearise_again(filter);
+  const bool may_be_again = params_.linearise_twice && !sees_landmarks && sink.added().empty();
+  if (may_be_again && second_order_ > kRough) linearise_again(filter);
   for (const Used& used : used_) tracks_.remove(used.track);
 }
 

@@ -8,6 +8,7 @@ namespace viwo::visual {
 struct Params {
   double sigma_px = 1.;
   bool find_noise = true;
+  bool linearise_twice = true;
   int max_features = 100;
   double gate_probability = 0.001;
   int min_observations = 2;
@@ -23,6 +24,9 @@ struct Params {
     b(VIWO_PARAM(find_noise),
       {.help = "sigma_px is scaled up where the residuals are larger, and what they tell is "
                "reported; false: as configured"});
+    b(VIWO_PARAM(linearise_twice),
+      {.help = "an epoch whose rows leave out more than sigma_px by being linear is linearised "
+               "once more where it puts the window; false: at the estimate alone"});
     b(VIWO_PARAM(max_features),
       {.min = 1.,
        .max = 100000.,

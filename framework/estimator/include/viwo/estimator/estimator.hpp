@@ -54,7 +54,7 @@ struct EstimatorOptions {
   ScheduleOptions schedule;
   RunnerOptions runner;
   MonitorOptions monitor;
-  /// Begin with a window of five clones that grows by one every third epoch. Were the window full
+  /// Begin with a window of three clones that grows by one every third epoch. Were the window full
   /// before the first tracks are used, the IMU alone would have carried a start that is a little
   /// wrong for more than a second, and tracks of near points would be linearised centimetres off.
   /// A start that is right is better off with the whole window: short ones lose yaw for good.
