@@ -22,6 +22,31 @@ Eigen::MatrixXd outside(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a - b * (b.transpose() * a);
 }
 
+/// Of A = U diag(values) V^T, with as many values as A has columns, the largest first.
+struct Svd {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd U, V;
+};
+
+/// JacobiSVD makes matrices square by a QR decomposition of its own, which it destroys twice where
+/// memory ends meanwhile (Eigen 3.4): here it is given square ones.
+Svd svd_of(const Eigen::MatrixXd& A) {
+  const auto n = A.cols(), rows = A.rows();
+  Eigen::MatrixXd tall = Eigen::MatrixXd::Zero(std::max(n, rows), n);
+  tall.topRows(rows) = A;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(tall);
+  const Eigen::MatrixXd R = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+  const Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner> svd(
+      R, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Svd out{svd.singularValues(), Eigen::MatrixXd::Zero(tall.rows(), n), {}};
+  if (rows < n) out.values.tail(n - rows).setZero();
+  out.U.topRows(n) = svd.matrixU();
+  out.U.applyOnTheLeft(qr.householderQ());
+  out.U.conservativeResize(rows, n);
+  out.V = qr.colsPermutation() * svd.matrixV();
+  return out;
+}
+
 double gap_at(const Eigen::VectorXd& values, Eigen::Index rank) {
   if (rank == 0 || rank == values.size() || values[rank] == 0.) {
     return std::numeric_limits<double>::infinity();
@@ -58,14 +83,13 @@ NullSpace null_space(const Eigen::MatrixXd& M, double tolerance) {
     if (!(length[i] > kZeroColumn * longest)) length[i] = std::numeric_limits<double>::infinity();
   }
   const Eigen::MatrixXd scaled = M * length.cwiseInverse().asDiagonal();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(scaled, Eigen::ComputeFullV);
-  out.singular_values = Eigen::VectorXd::Zero(n);
-  out.singular_values.head(svd.singularValues().size()) = svd.singularValues();
+  const Svd svd = svd_of(scaled);
+  out.singular_values = svd.values;
   const double threshold = tolerance * out.singular_values[0];
   out.rank = rank_of(out.singular_values, threshold);
   out.gap = gap_at(out.singular_values, out.rank);
   // Back to the columns as they were. Zero columns are in the null space by themselves.
-  Eigen::MatrixXd basis = svd.matrixV().rightCols(n - out.rank);
+  Eigen::MatrixXd basis = svd.V.rightCols(n - out.rank);
   for (Eigen::Index i = 0; i < n; ++i) {
     if (std::isfinite(length[i])) basis.row(i) /= length[i] / longest;
   }
@@ -76,27 +100,26 @@ NullSpace null_space(const Eigen::MatrixXd& M, double tolerance) {
 
 double largest_angle(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   if (a.cols() == 0) return 0.;
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(outside(a, b));
-  return std::asin(std::min(svd.singularValues()[0], 1.));
+  return std::asin(std::min(svd_of(outside(a, b)).values[0], 1.));
 }
 
 Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& A, double tolerance) {
   if (A.cols() == 0) return A;
   const Eigen::MatrixXd unit = A.colwise().normalized();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(unit, Eigen::ComputeThinU);
+  const Svd svd = svd_of(unit);
   Eigen::Index rank = 0;
-  while (rank < svd.singularValues().size() && svd.singularValues()[rank] > tolerance) ++rank;
-  return svd.matrixU().leftCols(rank);
+  while (rank < svd.values.size() && svd.values[rank] > tolerance) ++rank;
+  return svd.U.leftCols(rank);
 }
 
 Eigen::MatrixXd intersection(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double angle_rad) {
   if (a.cols() == 0 || b.cols() == 0) return Eigen::MatrixXd(a.rows(), 0);
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(outside(a, b), Eigen::ComputeFullV);
+  const Svd svd = svd_of(outside(a, b));
   Eigen::Index kept = 0;
   const auto n = a.cols();
   const double limit = std::sin(angle_rad);
-  while (kept < n && !(svd.singularValues()[n - 1 - kept] > limit)) ++kept;
-  return a * svd.matrixV().rightCols(kept);
+  while (kept < n && !(svd.values[n - 1 - kept] > limit)) ++kept;
+  return a * svd.V.rightCols(kept);
 }
 
 Eigen::MatrixXd readable(const Eigen::MatrixXd& a) {
