@@ -66,6 +66,7 @@ std::string late_start(const RunData& data, const Estimator& estimator, const Ru
   constexpr double kPart = 0.5;
   const auto imu = data.imu();
   if (imu.empty() || result.pieces.size() != 1) return "";
+  if (!is_stamp(imu.front().t_ns) || !is_stamp(imu.back().t_ns)) return "";
   const double log_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
   const double late_s = seconds_between(imu.front().t_ns, result.pieces.front().begin_ns);
   const std::string obstacles = obstacles_of(estimator);
