@@ -6,9 +6,10 @@
 #include <exception>
 #include <stdexcept>
 
-#include <pthread.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include "viwo/files/time_limit.hpp"
 
 namespace viwo::conformance {
 namespace {
@@ -69,19 +70,9 @@ std::string read_all(int file) {
   }
 }
 
-/// Whoever called may ignore or block it, which a process inherits.
-void end_after(int time_limit_s) {
-  std::signal(SIGALRM, SIG_DFL);
-  sigset_t ends;
-  sigemptyset(&ends);
-  sigaddset(&ends, SIGALRM);
-  pthread_sigmask(SIG_UNBLOCK, &ends, nullptr);
-  ::alarm(static_cast<unsigned>(time_limit_s));
-}
-
 /// The child's whole life. No destructors and no exit handlers: they are the parent's.
 [[noreturn]] void run_child(int out, int time_limit_s, const Check& check) {
-  end_after(time_limit_s);
+  files::end_after(static_cast<unsigned>(time_limit_s));
   Findings findings;
   try {
     check(findings);

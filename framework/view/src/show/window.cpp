@@ -1,17 +1,16 @@
 #include "window.hpp"
 
-#include <csignal>
 #include <cstdlib>
 #include <utility>
 
 #include <fcntl.h>
 #include <opencv2/highgui.hpp>
-#include <pthread.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "canvas.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/files/time_limit.hpp"
 
 namespace viwo::view {
 namespace {
@@ -26,16 +25,6 @@ bool is_set(const char* variable) {
   return value != nullptr && *value != '\0';
 }
 
-/// Whoever called may ignore or block SIGALRM, which a process inherits.
-void end_after(unsigned seconds) {
-  std::signal(SIGALRM, SIG_DFL);
-  sigset_t ends;
-  sigemptyset(&ends);
-  sigaddset(&ends, SIGALRM);
-  pthread_sigmask(SIG_UNBLOCK, &ends, nullptr);
-  alarm(seconds);
-}
-
 /// Tries it in a process of its own: a toolkit that finds no screen ends its process.
 bool window_can_be_opened() {
   // A toolkit that has its screen does not work in a process that is split off.
@@ -44,7 +33,7 @@ bool window_can_be_opened() {
   const pid_t child = fork();
   if (child < 0) return false;
   if (child == 0) {
-    end_after(kMostSecondsToOpen);
+    files::end_after(kMostSecondsToOpen);
     const int nowhere = ::open("/dev/null", O_WRONLY);
     dup2(nowhere, STDERR_FILENO);
     try {
