@@ -3,7 +3,6 @@
 #include <system_error>
 
 #include "viwo/api/status.hpp"
-#include "viwo/files/files.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/results/run_stream.hpp"
 #include "viwo/setup/input_files.hpp"
@@ -47,11 +46,6 @@ Files inputs_of(const Arguments& arguments, const RunSetup& setup) {
   Files inputs = input_files(setup);
   inputs.emplace_back(arguments.positional[0]);
   return inputs;
-}
-
-void keep_inputs(const fs::path& folder, Names results, const Files& inputs) {
-  for (const char* const name : results) refuse_to_replace(folder / name, inputs);
-  refuse_to_empty(folder / files::kUnfinishedResults, inputs);
 }
 
 void keep_inputs_of_run(const fs::path& folder, const Files& inputs) {

@@ -8,6 +8,7 @@
 
 #include "command_line.hpp"
 #include "viwo/experiment/experiment.hpp"
+#include "viwo/results/keep_inputs.hpp"
 #include "viwo/setup/run_setup.hpp"
 
 namespace viwo::app {
@@ -21,9 +22,7 @@ Files inputs_of(const Arguments& arguments, const RunSetup& setup);
 /// The same of all runs of an experiment, but for folders: by what is written, without reading it.
 Files inputs_of(const Arguments& arguments, const experiment::ExperimentSetup& setup);
 
-/// InputError where results of these names in `folder` would replace one of the inputs.
-void keep_inputs(const std::filesystem::path& folder, Names results, const Files& inputs);
-/// The same for all that a run leaves.
+/// keep_inputs() for all that a run leaves.
 void keep_inputs_of_run(const std::filesystem::path& folder, const Files& inputs);
 
 /// InputError where the file of `option` ("" for none), which is written beside the results, would

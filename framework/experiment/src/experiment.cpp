@@ -15,6 +15,7 @@
 #include "run_journal.hpp"
 #include "viwo/files/files.hpp"
 #include "viwo/math/significant.hpp"
+#include "viwo/results/keep_inputs.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/run/parallel_for.hpp"
 #include "viwo/run/thin.hpp"
@@ -229,8 +230,7 @@ class Runner {
   void keep_inputs_of(const RunSetup& run) const {
     std::vector<std::filesystem::path> inputs = input_files(run);
     inputs.emplace_back(setup_.base.mark().file);
-    for (const char* const name : kResults) refuse_to_replace(folder_ / name, inputs);
-    refuse_to_empty(folder_ / files::kUnfinishedResults, inputs);
+    keep_inputs(folder_, kResults, inputs);
     if (options_.keep_runs) refuse_to_empty(folder_ / kRuns, inputs);
   }
 
