@@ -61,14 +61,19 @@ std::string obstacles_of(const Estimator& estimator) {
   return text;
 }
 
+/// From the first IMU sample to the last, s; 0 where one of them has a stamp of no clock.
+double imu_length_s(const RunData& data) {
+  const auto imu = data.imu();
+  if (imu.empty() || !is_stamp(imu.front().t_ns) || !is_stamp(imu.back().t_ns)) return 0.;
+  return seconds_between(imu.front().t_ns, imu.back().t_ns);
+}
+
 /// A filter that has found its start in the second half of what there is.
 std::string late_start(const RunData& data, const Estimator& estimator, const RunResult& result) {
   constexpr double kPart = 0.5;
-  const auto imu = data.imu();
-  if (imu.empty() || result.pieces.size() != 1) return "";
-  if (!is_stamp(imu.front().t_ns) || !is_stamp(imu.back().t_ns)) return "";
-  const double log_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
-  const double late_s = seconds_between(imu.front().t_ns, result.pieces.front().begin_ns);
+  const double log_s = imu_length_s(data);
+  if (!(log_s > 0.) || result.pieces.size() != 1) return "";
+  const double late_s = seconds_between(data.imu().front().t_ns, result.pieces.front().begin_ns);
   const std::string obstacles = obstacles_of(estimator);
   if (obstacles.empty() || late_s < kPart * log_s) return "";
   return "a state to start from was found only after " + significant(late_s, 3) + " of " +
@@ -268,10 +273,10 @@ class FilterRun {
 
   void tell_progress() {
     if (!hooks_.progress || live_ || data_.lockstep) return;
-    const auto imu = data_.imu();
-    const double log_s = seconds_between(imu.front().t_ns, imu.back().t_ns);
+    const double log_s = imu_length_s(data_);
     if (!(log_s > 0.)) return;
-    hooks_.progress(seconds_between(imu.front().t_ns, estimator_->filter().t_ns()) / log_s);
+    const std::int64_t begin_ns = data_.imu().front().t_ns;
+    hooks_.progress(seconds_between(begin_ns, estimator_->filter().t_ns()) / log_s);
   }
 
   /// The estimator has failed. False where the run is to end with that.
