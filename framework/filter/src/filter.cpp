@@ -88,10 +88,12 @@ void Filter::rebase() {
   }
   if (options_.consistency == Consistency::kTransform) {  // (F-45)
     moves_.clear();
-    const auto move = [this](int column, const auto& pose) -> ErrorMove& {
+    const Eigen::Vector3d shift = imu_.p_IinG - imu_.p_IinG_fej;
+    const auto move = [&](int column, const auto& pose) -> ErrorMove& {
       const Eigen::Matrix3d R_ItoG = pose.R_GtoI_fej.transpose();
       return moves_.emplace_back(
-          ErrorMove{column, pose.R_GtoI * R_ItoG, -skew(pose.p_IinG - pose.p_IinG_fej) * R_ItoG});
+          ErrorMove{column, pose.R_GtoI * R_ItoG,
+                    -skew(pose.p_IinG - pose.p_IinG_fej - shift) * R_ItoG});
     };
     move(kThetaColumn, imu_).velocity_by_theta =
         -skew(imu_.v_IinG - imu_.v_IinG_fej) * imu_.R_GtoI_fej.transpose();

@@ -154,24 +154,30 @@ TEST(Filter, WithoutFirstEstimatesTheyFollowTheEstimateOnceAllFactorsAreApplied)
   EXPECT_EQ(imu_block(filter), imu_block(fresh));
 }
 
-/// What a turn of the world about the vertical does to the errors about an estimate.
-VectorXd world_turn(const Filter& filter) {
+/// What a turn of the world about the vertical through `axis` does to the errors about an estimate.
+VectorXd world_turn(const Filter& filter, const Vector3d& axis = Vector3d::Zero()) {
   const Vector3d up = Vector3d::UnitZ();
   VectorXd turn = VectorXd::Zero(filter.size());
   turn.segment<3>(kThetaColumn) = filter.imu().R_GtoI * up;
-  turn.segment<3>(kPositionColumn) = up.cross(filter.imu().p_IinG);
+  turn.segment<3>(kPositionColumn) = up.cross(filter.imu().p_IinG - axis);
   turn.segment<3>(kVelocityColumn) = up.cross(filter.imu().v_IinG);
   for (const CloneState& clone : filter.clones()) {
     turn.segment<3>(clone.column) = clone.R_GtoI * up;
-    turn.segment<3>(clone.column + 3) = up.cross(clone.p_IinG);
+    turn.segment<3>(clone.column + 3) = up.cross(clone.p_IinG - axis);
   }
   return turn;
 }
 
+struct CorrectedFilter {
+  Filter filter;
+  Vector3d correction_m;  ///< of the newest place, all of them
+};
+
 /// A filter that knows the yaw of the world to `sigma_rad`, after factors at its estimates that do
-/// not see it.
-Filter after_factors_blind_for_the_yaw(Consistency consistency, double sigma_rad) {
+/// not see the world turn or move.
+CorrectedFilter after_factors_blind_for_the_world(Consistency consistency, double sigma_rad) {
   Random random(5);
+  Vector3d correction = Vector3d::Zero();
   Filter filter = make_filter(with(consistency));
   ImuPrior prior = imu_prior(random);
   filter.initialize(prior);
@@ -180,36 +186,70 @@ Filter after_factors_blind_for_the_yaw(Consistency consistency, double sigma_rad
   filter.initialize(prior);
   for (int epoch = 0; epoch < 3; ++epoch) {
     step(filter, random);
-    const VectorXd unseen = world_turn(filter);
+    MatrixXd unseen = MatrixXd::Zero(filter.size(), 4);
+    unseen.col(0) = world_turn(filter);
+    unseen.block<3, 3>(kPositionColumn, 1).setIdentity();
+    for (const CloneState& clone : filter.clones()) {
+      unseen.block<3, 3>(clone.column + 3, 1).setIdentity();
+    }
+    const Eigen::HouseholderQR<MatrixXd> qr(unseen);
+    const MatrixXd basis = qr.householderQ() * MatrixXd::Identity(filter.size(), 4);
+    const Vector3d before = filter.imu().p_IinG;
     for (int k = 0; k < 2; ++k) {  // of one linearisation
       const MatrixXd H = random.matrix(3, filter.size());
       ResidualFactor factor;
       factor.columns.add(0, filter.size());
       factor.set_rows(3);
-      factor.H = H - H * unseen * unseen.transpose() / unseen.squaredNorm();
+      factor.H = H - H * basis * basis.transpose();
       factor.residual = 0.5 * random.matrix(3, 1);
       factor.R.setIdentity();
       EXPECT_EQ(filter.apply(factor), FactorResult::kApplied);
     }
     filter.rebase();
     EXPECT_EQ(filter.covariance(), filter.covariance().transpose());
+    correction += filter.imu().p_IinG - before;
   }
-  return filter;
+  return {std::move(filter), correction};
 }
 
 /// How far from that of a yaw at the estimate what another yaw at the start adds to the covariance
 /// is then.
 double what_is_seen_of_the_yaw(Consistency consistency) {
   constexpr double kSigma = 0.3;
-  const Filter sure = after_factors_blind_for_the_yaw(consistency, 0.);
-  const Filter unsure = after_factors_blind_for_the_yaw(consistency, kSigma);
-  const VectorXd turn = kSigma * world_turn(unsure);
-  return (unsure.covariance() - sure.covariance() - turn * turn.transpose()).norm();
+  const auto sure = after_factors_blind_for_the_world(consistency, 0.);
+  const auto unsure = after_factors_blind_for_the_world(consistency, kSigma);
+  const VectorXd turn = kSigma * world_turn(unsure.filter, unsure.correction_m);
+  return (unsure.filter.covariance() - sure.filter.covariance() - turn * turn.transpose()).norm();
 }
 
 TEST(Filter, ItsCovarianceGoesWithTheEstimateAndDoesNotSeeTheYawOfTheWorld) {
   EXPECT_LT(what_is_seen_of_the_yaw(Consistency::kTransform), 1e-9);
   EXPECT_GT(what_is_seen_of_the_yaw(Consistency::kNone), 1e-2) << "a plain Kalman filter does";
+}
+
+/// A place that is measured is known as well as that, wherever it was taken to be.
+TEST(Filter, APlaceThatIsMeasuredFarAwayTellsNothingOfTheOrientation) {
+  constexpr double kFarM = 100.;
+  constexpr double kSigmaM = 0.01;
+  Random random(7);
+  Filter filter = make_filter(with(Consistency::kTransform));
+  ImuPrior prior = imu_prior(random);
+  prior.P = 0.01 * ImuMatrix::Identity();
+  prior.P.block<3, 3>(kPositionColumn, kPositionColumn) *= 1e4;
+  filter.initialize(prior);
+  ResidualFactor fix;
+  fix.columns.add(kPositionColumn, 3);
+  fix.set_rows(3);
+  fix.H.setIdentity();
+  fix.R = kSigmaM * kSigmaM * Eigen::Matrix3d::Identity();
+  fix.residual << kFarM, 0., 0.;
+  ASSERT_EQ(filter.apply(fix), FactorResult::kApplied);
+  filter.rebase();
+  fix.residual.setZero();
+  ASSERT_EQ(filter.apply(fix), FactorResult::kApplied);
+  const auto covariance = filter.covariance();
+  EXPECT_NEAR(covariance(kPositionColumn, kPositionColumn), kSigmaM * kSigmaM / 2., 1e-8);
+  EXPECT_NEAR(covariance.topLeftCorner(3, 3).trace(), prior.P.topLeftCorner(3, 3).trace(), 1e-6);
 }
 
 /// The rotation that a filter must have after an error dtheta is found in `R`.
