@@ -31,6 +31,11 @@ endif()
 if(VIWO_SANITIZE)
   list(APPEND VIWO_ABI_FLAGS -fsanitize=${VIWO_SANITIZE} -fno-sanitize-recover=all
        -fno-omit-frame-pointer)
+  if(VIWO_SANITIZE STREQUAL "address,undefined" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # A branch at each member of each object, and half of the compiler's time: a null pointer is
+    # found by `address`, too, and alignment by clang's build (preset fuzz).
+    list(APPEND VIWO_ABI_FLAGS -fno-sanitize=null,alignment)
+  endif()
   add_link_options(-fsanitize=${VIWO_SANITIZE})
 endif()
 
