@@ -20,10 +20,15 @@ FolderLock::FolderLock(const std::filesystem::path& folder, bool shared)
                              std::generic_category().message(errno));
   }
   if (::flock(fd_, (shared ? LOCK_SH : LOCK_EX) | LOCK_NB) == 0) return;
-  if (errno != EWOULDBLOCK) return;
+  const int error = errno;
+  if (error == ENOLCK || error == ENOSYS || error == EOPNOTSUPP) return;
   ::close(fd_);
-  throw InputError("another viwo is at work in " + folder.string() +
-                   (shared ? ", and not as a shard" : "") + ": wait until it is done");
+  if (error == EWOULDBLOCK) {
+    throw InputError("another viwo is at work in " + folder.string() +
+                     (shared ? ", and not as a shard" : "") + ": wait until it is done");
+  }
+  throw std::runtime_error("cannot lock the folder " + folder.string() + ": " +
+                           std::generic_category().message(error));
 }
 
 FolderLock::~FolderLock() { ::close(fd_); }

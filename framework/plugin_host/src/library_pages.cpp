@@ -20,7 +20,10 @@ struct Pages {
   std::uintptr_t begin = 0;
   std::size_t size = 0;
   int protection = PROT_NONE;
-  void* data() const { return reinterpret_cast<void*>(begin); }
+  /// What /proc/self/maps says is a number.
+  void* data() const {
+    return reinterpret_cast<void*>(begin);  // NOLINT(performance-no-int-to-ptr)
+  }
 };
 
 struct MappedLibrary {
