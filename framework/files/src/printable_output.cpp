@@ -32,9 +32,8 @@ bool PrintableOutput::put(std::string_view character) {
   return to_->sputn(character.data(), size) == size;
 }
 
-PrintableOutput::int_type PrintableOutput::overflow(int_type value) {
-  if (traits_type::eq_int_type(value, traits_type::eof())) return traits_type::not_eof(value);
-  held_ += traits_type::to_char_type(value);
+bool PrintableOutput::take(char byte) {
+  held_ += byte;
   bool is_put = true;
   while (!held_.empty() && !is_begin(held_)) {
     const std::size_t size = utf8_size(held_);
@@ -42,7 +41,26 @@ PrintableOutput::int_type PrintableOutput::overflow(int_type value) {
     is_put = put(size == 0 ? kNone : is_control(character) ? "?" : character) && is_put;
     held_.erase(0, size == 0 ? 1 : size);
   }
-  return is_put ? value : traits_type::eof();
+  return is_put;
+}
+
+PrintableOutput::int_type PrintableOutput::overflow(int_type value) {
+  if (traits_type::eq_int_type(value, traits_type::eof())) return traits_type::not_eof(value);
+  const std::lock_guard lock(mutex_);
+  return take(traits_type::to_char_type(value)) ? value : traits_type::eof();
+}
+
+std::streamsize PrintableOutput::xsputn(const char* text, std::streamsize size) {
+  const std::lock_guard lock(mutex_);
+  for (std::streamsize i = 0; i < size; ++i) {
+    if (!take(text[i])) return i;
+  }
+  return size;
+}
+
+int PrintableOutput::sync() {
+  const std::lock_guard lock(mutex_);
+  return to_->pubsync();
 }
 
 }  // namespace viwo::files

@@ -1,6 +1,9 @@
 #include <filesystem>
 #include <sstream>
 #include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -81,6 +84,26 @@ TEST(PrintableOutput, LetsNoControlCharacterThrough) {
              << "2J\r\x7f\n";
   }
   EXPECT_EQ(terminal.str(), "?]0;title?\tcaf\xc3\xa9 \xc2\xa0|?2J??\n");
+}
+
+TEST(PrintableOutput, LosesNothingOfThreadsThatPrintAtOnce) {
+  constexpr int kThreads = 4;
+  constexpr int kTimes = 5000;
+  std::ostringstream terminal;
+  {
+    const PrintableOutput guard(terminal);
+    std::streambuf* const out = static_cast<std::ostream&>(terminal).rdbuf();  // not the string's
+    std::vector<std::thread> threads;
+    for (int k = 0; k < kThreads; ++k) {
+      threads.emplace_back([out] {
+        for (int i = 0; i < kTimes; ++i) out->sputn("\xc3\xa9\n", 3);
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+  }
+  std::string all;
+  for (int i = 0; i < kThreads * kTimes; ++i) all += "\xc3\xa9\n";
+  EXPECT_TRUE(terminal.str() == all);
 }
 
 TEST(PrintableOutput, LetsNothingThroughThatIsNoUtf8) {
