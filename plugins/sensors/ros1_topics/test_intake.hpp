@@ -48,11 +48,12 @@ class IntakeTest : public ::testing::Test {
     static_cast<IntakeTest*>(host)->warnings_.emplace_back(text, size);
   }
 
-  live::Intake make(const bag::TopicOptions& options) {
+  live::Intake make(const bag::TopicOptions& options, live::Pace pace = live::Pace::kLive) {
     return {options, services_, queue_,
             [](std::span<const std::uint8_t> message) -> std::unique_ptr<bag::FieldReader> {
               return std::make_unique<bag::Ros1Fields>(message);
-            }};
+            },
+            pace};
   }
 
   template <class Message>

@@ -113,6 +113,27 @@ TEST_F(IntakeTest, ImagesThatWaitTakeSoManyBytesAndNoMore) {
   EXPECT_THAT(rejections_of(intake).back(), HasSubstr("/cam0: message of more than 128 MiB | 1"));
 }
 
+TEST_F(IntakeTest, InStepImagesThatFillTheMemoryWaitAndNoneIsLost) {
+  TopicOptions options;
+  options.image_topics = {"/cam0"};
+  options.imu_topic = "/imu";
+  Intake intake = make(options, live::Pace::kInStep);
+  const auto camera = static_cast<std::size_t>(intake.topics()[0].camera < 0 ? 1 : 0);
+  msg::CompressedImage image;
+  image.format = "png";
+  image.data.resize(120 << 20);
+  for (std::int64_t k = 1; k <= 5; ++k) {
+    EXPECT_FALSE(intake.is_full(camera)) << k;
+    image.header.stamp = time_of(k * kSecond / 10);
+    take(intake, camera, image);
+  }
+  EXPECT_TRUE(intake.is_full(camera));
+  EXPECT_FALSE(intake.is_full(1 - camera)) << "the IMU";
+  EXPECT_EQ(taken().size(), 5U);
+  EXPECT_THAT(rejections_of(intake), ::testing::IsEmpty());
+  EXPECT_FALSE(intake.is_full(camera));
+}
+
 TEST_F(IntakeTest, SaysWhichImagesAreNotRead) {
   TopicOptions options;
   options.image_topics = {"/cam0"};

@@ -235,7 +235,7 @@ class Ros2Topics final : public live::TopicSensor {
       if (inlet.reader == nullptr) continue;
       const int before = count_publishers(i);
       bool is_empty = false;
-      while (!is_empty && (steps() == nullptr || steps()->has_room(i))) is_empty = !take_one(i);
+      while (!is_empty && has_room(i)) is_empty = !take_one(i);
       is_all = is_all && is_empty;
       if (steps() != nullptr && is_empty && before == 0 && inlet.met &&
           !std::exchange(inlet.finished, true)) {
@@ -244,6 +244,10 @@ class Ros2Topics final : public live::TopicSensor {
       }
     }
     return is_all;
+  }
+
+  bool has_room(std::size_t i) {
+    return steps() == nullptr || steps()->has_room(i, intake().is_full(i));
   }
 
   /// How many there are now; said when they are too many, none, or back.

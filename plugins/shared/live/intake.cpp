@@ -204,10 +204,14 @@ void Intake::take_joints(std::size_t topic, const bag::Joints& joints) {
   if (cell) queue_.push(*cell, topic);
 }
 
+bool Intake::is_full(std::size_t topic) const {
+  return topics_[topic].camera >= 0 && *held_ >= kMostHeldBytes;
+}
+
 void Intake::take_image(std::size_t topic, std::int64_t t_ns,
                         const std::shared_ptr<const bag::Bytes>& message, bool is_compressed) {
   if (!accept(topic, t_ns)) return;
-  if (*held_ + message->size() > kMostHeldBytes) {
+  if (pace_ == Pace::kLive && *held_ + message->size() > kMostHeldBytes) {
     return drop(topic, "image beyond the 512 MiB that images may take while they wait", t_ns);
   }
   const std::string where =

@@ -64,6 +64,10 @@ class Intake {
   /// Counts what was wrong with `n` messages of a topic before they got here.
   void reject(std::size_t topic, const std::string& reason, std::int64_t t_ns, std::int64_t n = 1);
 
+  /// Whether no more images of a topic should come, for what those that there are take of memory.
+  /// Not in step they are left out then.
+  bool is_full(std::size_t topic) const;
+
   /// When something came last that could be used; of all topics.
   std::optional<Clock::time_point> last_use() const;
   /// The newest stamp of all topics.

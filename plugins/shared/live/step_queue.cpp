@@ -107,10 +107,10 @@ std::size_t StepQueue::limit(const Waiting& waiting) const {
   return awaited() != nullptr ? kWhileWaiting * waiting.most : waiting.most;
 }
 
-bool StepQueue::has_room(std::size_t topic) const {
+bool StepQueue::has_room(std::size_t topic, bool is_full) const {
   const std::scoped_lock lock(mutex_);
   const Waiting& waiting = waiting_[topic];
-  return waiting.measurements.size() < limit(waiting);
+  return waiting.measurements.size() < (is_full ? 1 : limit(waiting));
 }
 
 std::string StepQueue::deadlock() const {

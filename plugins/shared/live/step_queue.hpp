@@ -35,8 +35,9 @@ class StepQueue final : public MeasurementQueue {
 
   /// Nothing more comes on a topic.
   void finish(std::size_t topic);
-  /// Whether another message of the topic should be received now.
-  bool has_room(std::size_t topic) const;
+  /// Whether another message of the topic should be received now; `is_full`: only if none waits,
+  /// as others may wait for it.
+  bool has_room(std::size_t topic, bool is_full = false) const;
   /// "topic '/a' waits for '/b'" when there is no room although nothing can be given.
   std::string deadlock() const;
 

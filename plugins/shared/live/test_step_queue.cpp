@@ -101,6 +101,14 @@ TEST(StepQueue, HasRoomAsFarAsNothingWaits) {
   EXPECT_TRUE(queue.has_room(kImu));
 }
 
+TEST(StepQueue, HasRoomForOneWhereImagesFillTheMemory) {
+  StepQueue queue(wanted_topics(topics()), 2);
+  EXPECT_TRUE(queue.has_room(kCam0, true)) << "another may wait for it";
+  queue.push(ImageSample{1, 0, nullptr}, kCam0);
+  EXPECT_FALSE(queue.has_room(kCam0, true));
+  EXPECT_TRUE(queue.has_room(kCam0));
+}
+
 log::EncoderReading reading(std::int64_t t_ms, double drive) {
   log::EncoderReading reading;
   reading.t_ns = 1'000'000 * t_ms;
