@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -58,6 +59,8 @@ class Feature {
 
   /// All observations of a track whose clones are in the window; returns how many.
   int collect(const TrackStore& tracks, int track, const Window& window);
+  /// Sights that were collected before, from the same window.
+  void take(std::span<const Sight> sights) { sights_.assign(sights.begin(), sights.end()); }
 
   /// Least squares of the pixel residuals, and what is known of distances besides; anything but
   /// kOk: no use to linearise.

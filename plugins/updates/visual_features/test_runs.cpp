@@ -312,7 +312,8 @@ TEST(VisualRuns, PoseAndLandmarksAreConsistent) {
 }
 
 TEST(VisualRuns, LandmarksWhoseNewAnchorsForgetTheirClonesAreNotConsistent) {
-  EXPECT_NE(inconsistency({.max_landmarks = 10, .breaks_anchors = true}, 8), "");
+  EXPECT_NE(inconsistency({.max_landmarks = 10, .breaks_anchors = true}, 8).find("outside of"),
+            std::string::npos);
 }
 
 TEST(VisualRuns, CalibrationThatStartsWrongIsFoundConsistently) {
@@ -337,7 +338,7 @@ TEST(VisualRuns, RoughStartsAmongNearPointsAreConsistentIfTheCovarianceGoesWithT
                        .sigma_orientation_rad = 0.03};
     EXPECT_EQ(inconsistency(options, 12), "") << n_cameras;
     options.consistency = Consistency::kNone;
-    EXPECT_NE(inconsistency(options, 12), "") << n_cameras;
+    EXPECT_NE(inconsistency(options, 12).find("outside of"), std::string::npos) << n_cameras;
   }
 }
 

@@ -89,7 +89,10 @@ void VisualFeatures::start(const UpdateSetup& setup) {
   equations_.start(setup.max_clones, n_cameras);
   gate_.start(setup.max_clones, n_cameras);
   candidates_.reserve(static_cast<std::size_t>(params_.max_tracks));
-  used_.reserve(static_cast<std::size_t>(params_.max_features));
+  const auto most_used =
+      static_cast<std::size_t>(std::min(params_.max_features, params_.max_tracks));
+  used_.reserve(most_used);
+  used_sights_.reserve(most_used * static_cast<std::size_t>(max_sights));
   seconds_.reserve(static_cast<std::size_t>(params_.max_tracks));
   seen_epoch_.assign(static_cast<std::size_t>(params_.max_tracks), -1);
   const auto thresholds = [&](double probability) {
@@ -137,6 +140,7 @@ void VisualFeatures::update(const FilterView& filter, const EpochData& data, Fac
   window_.set(filter);
   gate_.begin();
   used_.clear();
+  used_sights_.clear();
   second_order_ = 0.;
   weighed_ = 0;
   feature_.set_sigma(noise_.scale() * params_.sigma_px);
@@ -166,34 +170,39 @@ void VisualFeatures::update(const FilterView& filter, const EpochData& data, Fac
   for (const Used& used : used_) tracks_.remove(used.track);
 }
 
-/// A track that cannot be linearised there is left as it is, and so are all: they are one factor.
+/// A track that has no point there is left out.
 void VisualFeatures::linearise_again(const FilterView& prior) {
   const InformationFactor first = *factor_;
   const Relinearisation there(prior, window_, first);
   window_.set(there.view());
   window_.set_poses();
   equations_.begin(window_, *factor_);
+  bool is_any = false;
+  std::span<const Sight> sights = used_sights_;
   for (const Used& used : used_) {
-    feature_.collect(tracks_, used.track, window_);
-    bool is_fit = feature_.triangulate(window_) == FeatureStatus::kOk;
-    if (is_fit && used.has_strays && feature_.leave_out_strays() > 0) {
-      is_fit = feature_.triangulate(window_) == FeatureStatus::kOk;
-    }
-    if (!is_fit || feature_.linearize(window_) != FeatureStatus::kOk ||
-        !equations_.prepare(feature_)) {
-      *factor_ = first;
-      return;
+    feature_.take(sights.first(used.n_sights));
+    sights = sights.subspan(used.n_sights);
+    if (feature_.triangulate(window_) != FeatureStatus::kOk ||
+        feature_.linearize(window_) != FeatureStatus::kOk || !equations_.prepare(feature_)) {
+      continue;
     }
     equations_.add(feature_, window_, *factor_);
+    is_any = true;
+  }
+  if (!is_any) {
+    *factor_ = first;
+    return;
   }
   equations_.finish(window_, *factor_);
   there.move_back(*factor_);
 }
 
-void VisualFeatures::add(const Candidate& candidate, bool has_strays, FactorSink& sink) {
+void VisualFeatures::add(const Candidate& candidate, FactorSink& sink) {
   equations_.add(feature_, window_, factor(sink));
   sink.count(1, 0);
-  used_.push_back({candidate.track, has_strays});
+  const std::vector<Sight>& sights = feature_.sights();
+  used_.push_back({candidate.track, sights.size()});
+  used_sights_.insert(used_sights_.end(), sights.begin(), sights.end());
   second_order_ = std::max(second_order_, feature_.second_order());
 }
 
@@ -364,7 +373,7 @@ bool VisualFeatures::use(const Candidate& candidate, FactorSink& sink) {
         landmarks_.add(candidate.track, feature_, window_, tracks_, sink)) {
       return true;
     }
-    add(candidate, strays > 0, sink);
+    add(candidate, sink);
     return true;
   }
   reject(moves_ ? kMoves : kGate, candidate.id);

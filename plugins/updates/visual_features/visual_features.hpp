@@ -61,7 +61,7 @@ class VisualFeatures final : public Update {
   /// Whether it had a point, and was taken or left to the gate.
   bool use(const Candidate& candidate, FactorSink& sink);
   /// Puts the prepared track into the factor.
-  void add(const Candidate& candidate, bool has_strays, FactorSink& sink);
+  void add(const Candidate& candidate, FactorSink& sink);
   bool passes_gate();
   void tell_noise();
   /// Of the gate.
@@ -100,10 +100,11 @@ class VisualFeatures final : public Update {
   InformationFactor* factor_ = nullptr;  ///< of this epoch, once there is a feature
   struct Used {
     int track;
-    bool has_strays;
+    std::size_t n_sights;
   };
-  std::vector<Used> used_;    ///< tracks that are in the factor, still in the store
-  double second_order_ = 0.;  ///< largest of them
+  std::vector<Used> used_;          ///< tracks that are in the factor, still in the store
+  std::vector<Sight> used_sights_;  ///< of these, without strays
+  double second_order_ = 0.;        ///< largest of them
   std::vector<Candidate> candidates_;
   std::vector<double> seconds_;           ///< in sight, of candidates
   std::vector<std::int64_t> seen_epoch_;  ///< per track

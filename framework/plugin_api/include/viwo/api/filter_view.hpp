@@ -25,8 +25,9 @@ inline constexpr int kGyroBiasColumn = 9;
 inline constexpr int kAccelBiasColumn = 12;
 inline constexpr int kImuSize = 15;
 
-/// Pose and velocity of the IMU. `_fej`: as it was before the first update that saw it; Jacobians
-/// are taken there (equal to the estimate when first estimates are turned off).
+/// Pose and velocity of the IMU. `_fej`: where its errors are counted from, and Jacobians are
+/// taken; the estimate, or with `estimator.consistency: first_estimates` as it was before the first
+/// update that saw it.
 struct ImuState {
   Eigen::Matrix3d R_GtoI = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_IinG = Eigen::Vector3d::Zero();
