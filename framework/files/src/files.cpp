@@ -43,14 +43,13 @@ bool sync_folder(const std::filesystem::path& folder) {
                            std::generic_category().message(errno));
 }
 
-/// ".PROCESS@HOST", of processes on all machines that share a file system.
+}  // namespace
+
 std::string this_process() {
   std::array<char, 256> host{};
   if (::gethostname(host.data(), host.size() - 1) != 0) host[0] = '\0';
   return "." + std::to_string(::getpid()) + "@" + host.data();
 }
-
-}  // namespace
 
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error, ignored;
@@ -193,7 +192,13 @@ void NewResults::commit(std::initializer_list<const char*> names) {
   };
   std::stable_sort(files.begin(), files.end(),
                    [&](const std::string& a, const std::string& b) { return rank(a) > rank(b); });
-  remove_results(folder_, names);  // nothing of before is beside what is new
+  for (const char* const name : names) {  // nothing of before is beside what is new
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(folder_ / name, error)) continue;
+    if (std::filesystem::remove(folder_ / name, error)) continue;
+    errno = error.value();
+    fail(folder_ / name);
+  }
   for (const std::string& name : files) {
     if (name == files.back() && !sync_folder(folder_)) fail(folder_);
     if (::rename((new_ / name).c_str(), (folder_ / name).c_str()) != 0) fail(folder_ / name);

@@ -81,6 +81,25 @@ TEST_F(NewResultsTest, LeaveThoseBeforeIfOneCannotTakeItsPlace) {
   }
 }
 
+/// In a folder like /tmp nobody removes what is of others.
+TEST_F(NewResultsTest, LeaveThoseBeforeIfTheyAreOfSomebodyElse) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root may become somebody else";
+  constexpr uid_t kNobody = 65534;
+  fs::permissions(folder_, fs::perms::all | fs::perms::sticky_bit);
+  ASSERT_EQ(::seteuid(kNobody), 0);
+  const std::string text = error_of<std::runtime_error>([&] {
+    NewResults results(folder_);
+    write_text(results.file("summary.json"), "new");
+    write_text(results.file("trajectory.tum"), "new");
+    results.commit({"summary.json", "report.html"});
+  });
+  ASSERT_EQ(::seteuid(0), 0);
+  EXPECT_EQ(text,
+            "cannot write " + (folder_ / "summary.json").string() + ": Operation not permitted");
+  EXPECT_THAT(there(), ElementsAre("old.csv: before", "report.html: before", "summary.json: before",
+                                   "table.csv: before"));
+}
+
 TEST_F(NewResultsTest, OfACommandThatWasKilledAreNotTakenForNew) {
   write_text(make_folder_in(folder_, "unfinished.tmp") / "table.csv", "half");
   NewResults results(folder_);

@@ -70,7 +70,7 @@ std::optional<int> end_until(pid_t child, Clock::time_point deadline) {
     if (Clock::now() >= deadline) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  kill(child, SIGKILL);
+  kill(-child, SIGKILL);  // and what it has begun itself
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   return std::nullopt;
@@ -97,10 +97,16 @@ int spawn(const std::filesystem::path& folder, const std::string& argument, int 
   posix_spawn_file_actions_addopen(actions.get(), STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(actions.get(), pipe_write, STDERR_FILENO);
   posix_spawn_file_actions_addchdir_np(actions.get(), folder.c_str());
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   // -d: without the settings of the user, or figures would differ between machines.
   std::string program = "gnuplot", defaults = "-d", last = argument;
   std::array<char*, 4> arguments{program.data(), defaults.data(), last.data(), nullptr};
-  return posix_spawnp(&child, "gnuplot", actions.get(), nullptr, arguments.data(), environ);
+  const int error =
+      posix_spawnp(&child, "gnuplot", actions.get(), &attributes, arguments.data(), environ);
+  posix_spawnattr_destroy(&attributes);
+  return error;
 }
 
 }  // namespace

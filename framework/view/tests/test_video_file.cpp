@@ -19,6 +19,7 @@
 #include "message_of.hpp"
 #include "show/video_file.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/files/files.hpp"
 
 namespace viwo::view {
 namespace {
@@ -91,12 +92,16 @@ TEST_F(VideoFileTest, HasEveryPictureAtTheRateOfTheRun) {
   EXPECT_EQ(files(), 2U) << "nothing else is left";
 }
 
-TEST_F(VideoFileTest, DoesNotWriteThroughALinkNorIntoAPipe) {
-  const fs::path mine = folder_ / "mine", part = folder_ / "a.part.mp4";
+TEST_F(VideoFileTest, LeavesOtherFilesWhateverTheyAreCalled) {
+  const fs::path mine = folder_ / "mine";
+  const fs::path part = folder_ / ("a" + files::this_process() + ".mp4");
   std::ofstream(mine) << "of somebody";
   fs::create_symlink(mine, part);
+  std::ofstream(folder_ / "a.part.mp4") << "of somebody";
   write_video(folder_ / "a.mp4", 3, 0.1);
-  EXPECT_EQ(fs::file_size(mine), 11U);
+  EXPECT_EQ(fs::file_size(mine), 11U) << "a link of the name that is written to";
+  EXPECT_EQ(fs::file_size(folder_ / "a.part.mp4"), 11U);
+  EXPECT_EQ(files(), 3U);
   ASSERT_EQ(::mkfifo(part.c_str(), 0600), 0);
   write_video(folder_ / "a.mp4", 3, 0.1);
   EXPECT_EQ(read(folder_ / "a.mp4").means.size(), 3U);

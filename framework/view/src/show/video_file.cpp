@@ -14,6 +14,7 @@
 
 #include "canvas.hpp"
 #include "viwo/api/status.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/image/silent_opencv.hpp"
 #include "viwo/math/median.hpp"
 
@@ -126,7 +127,8 @@ VideoFile::VideoFile(fs::path file) : file_(std::move(file)) {
            "name, or remove it");
   }
   part_ = file_;
-  part_.replace_filename(file_.stem().string() + ".part" + file_.extension().string());
+  part_.replace_filename(file_.stem().string() + files::this_process() +
+                         file_.extension().string());
   const fs::path folder = file_.parent_path();
   if (!folder.empty()) fs::create_directories(folder, error);
   if (error) refuse(file_, "cannot create the folder: " + error.message());

@@ -36,6 +36,9 @@ enum class Appears {
   kAtOnce,             ///< as it is written: what has been stays when the process is killed
 };
 
+/// ".PROCESS@HOST", of processes on all machines that share a file system.
+std::string this_process();
+
 /// A file that is written, in place of what was there; a link is replaced, not followed, unless it
 /// leads to a device or a pipe. One that appears whole is FILE.tmp until commit(), beside others
 /// FILE.PROCESS@HOST.tmp, and goes if nobody commits.
