@@ -54,9 +54,8 @@ bool goes_straight_on(const Trajectory& poses) {
 /// all the time, as positions alone do; 0 where it gives orientations, or goes straight on.
 double turn_unseen_by_poses(const RunSetup& setup, const RunData& data) {
   if (are_turned(data.reference) || goes_straight_on(data.reference)) return 0.;
-  RunSetup wheels_alone = setup;
   double turn_rad = 0.;
-  for (const StampedPose& pose : run_odometry(wheels_alone, data).estimate) {
+  for (const StampedPose& pose : run_odometry(setup, data).estimate) {
     turn_rad = std::max(turn_rad, std::abs(yaw(pose)));
   }
   return turn_rad;

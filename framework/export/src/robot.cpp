@@ -156,9 +156,9 @@ void recognise(const CalibrationFile& file, Robot& robot) {
   int n = 0;
   while (intrinsics.has("r_" + std::to_string(n + 1))) ++n;
   const auto has_each = [&](const char* stem) { return intrinsics.has_each(stem, n); };
-  if (has_each("x_") && has_each("y_") && has_each("delta_o")) {
-    add_numbered_wheels(intrinsics, n, robot);
-  } else if (has_each("gamma_") && has_each("k_")) {
+  const bool is_swerve = has_each("x_") && has_each("y_") && has_each("delta_o");
+  const bool is_mecanum = has_each("gamma_") && has_each("k_");
+  if (is_swerve || is_mecanum) {
     add_numbered_wheels(intrinsics, n, robot);
   } else if (intrinsics.has_all({"r_left", "r_right", "baseline"}) ||
              intrinsics.has_all({"r_left", "r_right", "y_icr_left", "y_icr_right", "x_icr"})) {

@@ -91,9 +91,8 @@ void Filter::rebase() {
     const Eigen::Vector3d shift = imu_.p_IinG - imu_.p_IinG_fej;
     const auto move = [&](int column, const auto& pose) -> ErrorMove& {
       const Eigen::Matrix3d R_ItoG = pose.R_GtoI_fej.transpose();
-      return moves_.emplace_back(
-          ErrorMove{column, pose.R_GtoI * R_ItoG,
-                    -skew(pose.p_IinG - pose.p_IinG_fej - shift) * R_ItoG});
+      return moves_.emplace_back(ErrorMove{column, pose.R_GtoI * R_ItoG,
+                                           -skew(pose.p_IinG - pose.p_IinG_fej - shift) * R_ItoG});
     };
     move(kThetaColumn, imu_).velocity_by_theta =
         -skew(imu_.v_IinG - imu_.v_IinG_fej) * imu_.R_GtoI_fej.transpose();
@@ -121,7 +120,7 @@ ImuTransition Filter::propagate(std::span<const ImuSample> samples,
                                 std::span<const double> gaps_s) {
   if (samples.empty()) return {ImuMatrix::Identity(), ImuMatrix::Zero()};
   rebase();
-  const ImuTransition transition =
+  ImuTransition transition =
       viwo::propagate(samples, options_.imu_noise, options_.gravity_m_per_s2, imu_, gaps_s);
   covariance_.propagate(transition);
   blocks_.propagate(seconds_between(samples.front().t_ns, samples.back().t_ns), covariance_);

@@ -107,7 +107,7 @@ void Search::require_reachable() const {
       significant(worst.ratio, 3) + " x its goal, however long the drive. What no motion tells: " +
       unknown_direction(*setup_.model, wheels_.covariance(all)) + " (in prior sigmas).";
   if (!setup_.params.gyro) text += " There is no gyro (gyro: true).";
-  KnowledgeParams measured = setup_.params;
+  KnowledgeParams measured = static_cast<const KnowledgeParams&>(setup_.params);
   measured.distance = true;
   if (!setup_.params.distance &&
       worst_goal(setup_.goals, WheelInformation(setup_.model, measured).sigma(all)).ratio <= 1.) {

@@ -6,10 +6,10 @@
 namespace viwo {
 
 ChangeTrial::ChangeTrial(const std::shared_ptr<const WheelModel>& model, const Intrinsics& x_WI,
-                         std::vector<ChannelChange> changes)
+                         const std::vector<ChannelChange>& changes)
     : solver_(model, {}) {
   solver_.set_intrinsics(x_WI);
-  for (ChannelChange& change : changes) changes_.push_back({change});
+  for (const ChannelChange& change : changes) changes_.push_back({change});
   no_steering_.change.kind = ChannelChange::kNoSteering;
 }
 

@@ -16,7 +16,7 @@ class ChangeTrial {
   /// `changes`: the first is none. Nothing is tried of models whose rows cannot contradict each
   /// other.
   ChangeTrial(const std::shared_ptr<const WheelModel>& model, const Intrinsics& x_WI,
-              std::vector<ChannelChange> changes);
+              const std::vector<ChannelChange>& changes);
 
   void add(const EncoderSample& sample);
   /// Changes that make the contradictions vanish, to a tenth of what they are; the best is first,
