@@ -1,5 +1,6 @@
 // Small files that would become large, each through the whole program: refused by name, in little
 // memory and time. What is refused and why is tested beside each reader.
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -187,6 +188,77 @@ TEST_F(AmplifyingTest, AGapOfADayIsNotFilledWithCells) {
   EXPECT_NE(outcome.out.find("8.6e+07 ms"), std::string::npos) << outcome.out << outcome.err;
   EXPECT_LT(outcome.peak_mb, 512);
   EXPECT_LT(outcome.cpu_s, 20.);
+}
+
+/// What is made of a log is bounded by its rows, however long they are apart.
+class LongTimesTest : public AmplifyingTest {
+ protected:
+  /// Rows of wheels and IMU, `gap_s` apart after five seconds of rest.
+  void write_log(int rows, double gap_s) const {
+    std::string imu =
+        "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+        "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+    std::string wheels = "timestamp_ns,drive_1 [rad/s],drive_2 [rad/s]\n";
+    const std::int64_t gap_ns = std::llround(1e9 * gap_s), rest_ns = 5'000'000'000;
+    const auto add = [&](std::int64_t t_ns, const char* turn) {
+      imu += std::to_string(t_ns) + ",0,0," + turn + ",0,0,9.81\n";
+      wheels += std::to_string(t_ns) + "," + turn + "," + turn + "\n";
+    };
+    for (std::int64_t t_ns = 0; t_ns < rest_ns; t_ns += 10'000'000) add(t_ns, "0");
+    for (int k = 0; k < rows; ++k) add(rest_ns + k * gap_ns, k % 2 == 0 ? "0.1" : "0.2");
+    write("imu0/data.csv", imu);
+    write("wheels0/data.csv", wheels);
+  }
+
+  const std::string sensors_ =
+      "sensors: {imu0: {type: asl_imu, path: imu0}, wheels0: {type: asl_encoders, path: "
+      "wheels0}}\nkinematics: {type: differential, radius_left_m: 0.1, radius_right_m: 0.1, "
+      "baseline_m: 0.5}\n";
+  const std::string imu_ =
+      "imu: {sigma_gyro_rad_per_s_sqrt_hz: 1e-3, sigma_accel_m_per_s2_sqrt_hz: 1e-2, "
+      "sigma_gyro_walk_rad_per_s2_sqrt_hz: 1e-5, sigma_accel_walk_m_per_s3_sqrt_hz: 1e-3}\n";
+};
+
+TEST_F(LongTimesTest, OfWheelsAreRefused) {
+  write("run.yaml", "name: a\n" + sensors_);
+  write("calibrate.yaml", "calibration: a\nbase: run.yaml\nrecordings: [{name: a}]\n");
+  for (const auto& [rows, gap_s] : {std::pair{50, 1e5}, {2000, 1000.}, {20000, 9.}}) {
+    write_log(rows, gap_s);
+    expect_bounded({"run", "run.yaml", "--out", "out"}, "");
+    expect_bounded({"calibrate", "calibrate.yaml", "--out", "out"}, "the encoder samples ");
+  }
+}
+
+TEST_F(LongTimesTest, BetweenReadingsOfTheImuEndTheRun) {
+  write("run.yaml", "name: a\n" + sensors_ + imu_ +
+                        "estimator: {start: standstill}\nupdates: {wheel_odometry: {}}\n");
+  write_log(10000, 9.);
+  const Outcome outcome = viwo({"run", "run.yaml", "--out", "out"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_NE(outcome.out.find("diverged: the IMU was silent for "), std::string::npos)
+      << outcome.out;
+  EXPECT_LT(outcome.peak_mb, 512);
+  EXPECT_LT(outcome.cpu_s, 20.);
+}
+
+TEST_F(LongTimesTest, OfPosesAreNotSimulated) {
+  if (!has_sensor("recorded_motion_simulator")) {
+    GTEST_SKIP() << "sensor recorded_motion_simulator is left out";
+  }
+  std::string poses =
+      "time;.header.stamp.secs;.header.stamp.nsecs;.pose.position.x;.pose.position.y;"
+      ".pose.position.z;.pose.orientation.x;.pose.orientation.y;.pose.orientation.z;"
+      ".pose.orientation.w\n";
+  for (int k = 0; k < 3000; ++k) {
+    poses += "2024/05/01/10:00:00;" + std::to_string(1000 + 9 * k) + ";0;" +
+             std::to_string(0.1 * k) + ";0;0;0;0;0;1\n";
+  }
+  write("poses.csv", poses);
+  write("run.yaml",
+        "name: a\nsensors: {rig0: {type: recorded_motion_simulator, path: poses.csv, features: 0, "
+        "max_gap_s: 100, max_rejected_fraction: 1}}\n" +
+            imu_ + "estimator: {start: reference}\nupdates: {visual_features: {}}\n");
+  expect_bounded({"run", "run.yaml", "--out", "out"}, "at most 7200 s are simulated");
 }
 
 TEST_F(AmplifyingTest, AnImageIsNoLargerThanACameraHas) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <numbers>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "viwo/math/se2.hpp"
 #include "viwo/math/significant.hpp"
 #include "viwo/math/stamp.hpp"
+#include "viwo/plausibility/periods.hpp"
 
 namespace viwo::calibration {
 namespace {
@@ -74,7 +76,10 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
   if (!(seconds_between(begin_ns, end_ns) > 0.)) {
     fail(recording.label, ": wheels and reference have no time in common");
   }
-  require_one_clock(begin_ns, end_ns);
+  constexpr double kPiece_s = 0.1;  // that is looked at
+  if (const std::string fault = fault_of_times(wheels, kPiece_s); !fault.empty()) {
+    fail(recording.label, ": the encoder samples " + fault);
+  }
   for (const StampedPose& pose : poses) {
     const double before = yaw_.empty() ? 0. : yaw_.back();
     yaw_.push_back(before + wrap_angle(yaw(pose) - before));
@@ -93,20 +98,6 @@ RecordingProblem::RecordingProblem(const CalibrationRecording& recording,
     kinds_.insert(kinds_.end(), static_cast<std::size_t>(n_), ResidualKind::kParity);
   if (recording.motion.distance_m) kinds_.push_back(ResidualKind::kDistance);
   if (recording.motion.turn_rad) kinds_.push_back(ResidualKind::kTurn);
-}
-
-/// Nearly all of the time without samples, in more segments than memory is for.
-void RecordingProblem::require_one_clock(std::int64_t begin_ns, std::int64_t end_ns) const {
-  constexpr double kLeast = 0.01;
-  double covered_s = 0.;
-  for (const EncoderSample& sample : recording_.data.wheels()) {
-    covered_s += seconds_between(sample.begin_ns, sample.end_ns);
-  }
-  const double duration_s = seconds_between(begin_ns, end_ns);
-  if (covered_s >= kLeast * duration_s) return;
-  fail(recording_.label, ": " + significant(covered_s, 3) + " s of encoder samples are in " +
-                             significant(duration_s, 3) +
-                             " s: their stamps are of two clocks, or of another unit");
 }
 
 /// Where the segments end.

@@ -87,7 +87,6 @@ class RecordingProblem {
   std::size_t begin_of(std::size_t segment) const { return from_start() ? 0 : segment; }
   void cut(std::int64_t begin_ns, std::int64_t end_ns);
   void move_to_poses(std::int64_t begin_ns, std::int64_t end_ns);
-  void require_one_clock(std::int64_t begin_ns, std::int64_t end_ns) const;
   void compare_with_reference();
   void leave_out_holes();
   std::optional<Eigen::Vector3d> reference_at(std::int64_t t_ns) const;

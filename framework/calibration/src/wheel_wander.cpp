@@ -1,40 +1,87 @@
 #include "wheel_wander.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace viwo::calibration {
 namespace {
 
 /// Pieces of the recordings, and the longest time between two that are compared.
 constexpr double kPiece_s = 0.1;
-constexpr int kMostLags = 100;
+constexpr std::size_t kMostLags = 100;
 /// Pairs of pieces that tell something.
 constexpr int kFewestPairs = 50;
 /// Of its own sigma where none wanders, over all time constants that are tried: once in some
 /// thousand calibrations.
 constexpr double kSurely = 4.;
 
-/// Parity information of the pieces, in units of the prior sigmas.
-std::vector<ParityInformation> pieces_of(const CalibrationRecording& recording,
-                                         const Intrinsics& x_WI) {
+/// What pieces have in common with those before, by how many pieces they are later.
+class PairSums {
+ public:
+  /// Later than the one before.
+  void add(std::int64_t piece, const ParityInformation& now) {
+    for (std::size_t k = 2; k <= kMostLags; ++k) {
+      const std::int64_t earlier = piece - static_cast<std::int64_t>(k);
+      const Kept& before = kept_[place(earlier)];
+      if (earlier < 0 || before.piece != earlier) continue;
+      const double product = before.parity.eta.dot(now.eta);
+      products[k] += product;
+      squares[k] += product * product;
+      expected[k] += before.parity.Lambda.cwiseProduct(now.Lambda).sum();
+      ++pairs[k];
+    }
+    kept_[place(piece)] = {piece, now};
+  }
+  void begin_recording() {
+    for (Kept& kept : kept_) kept.piece = -1;
+  }
+
+  std::vector<double> products = std::vector<double>(kMostLags + 1, 0.), squares = products,
+                      expected = products;
+  std::vector<int> pairs = std::vector<int>(kMostLags + 1, 0);
+
+ private:
+  struct Kept {
+    std::int64_t piece = -1;
+    ParityInformation parity;
+  };
+
+  static std::size_t place(std::int64_t piece) {
+    return static_cast<std::size_t>(std::max<std::int64_t>(0, piece)) % (kMostLags + 1);
+  }
+
+  std::vector<Kept> kept_ = std::vector<Kept>(kMostLags + 1);
+};
+
+/// Adds the pieces in which a sample begins, in units of the prior sigmas.
+void add_pieces(const CalibrationRecording& recording, const Intrinsics& x_WI, PairSums& sums) {
   PreintegrationOptions options = recording.setup.preintegration;
   options.parity = true;
   Preintegrator preintegrator(recording.setup.model, options);
   preintegrator.set_intrinsics(x_WI);
   const Intrinsics sigma = recording.setup.model->prior_sigma();
   const auto& wheels = recording.data.wheels();
+  const std::int64_t begin_ns = wheels.front().begin_ns;
   const auto piece_ns = static_cast<std::int64_t>(1e9 * kPiece_s);
-  std::vector<ParityInformation> out;
+  sums.begin_recording();
   PreintegratedPose pose;
-  for (std::int64_t t_ns = wheels.front().begin_ns; t_ns + piece_ns <= wheels.back().end_ns;
-       t_ns += piece_ns) {
+  std::int64_t next = 0;
+  for (const EncoderSample& sample : wheels) {
+    const std::int64_t piece = (sample.begin_ns - begin_ns) / piece_ns;
+    const std::int64_t t_ns = begin_ns + piece * piece_ns;
+    if (piece < next || t_ns + piece_ns > wheels.back().end_ns) continue;
+    next = piece + 1;
     guarded(recording.setup.kinematics.info, "preintegration",
             [&] { preintegrator.integrate(wheels, t_ns, t_ns + piece_ns, pose); });
-    ParityInformation& parity = out.emplace_back(pose.parity);
+    ParityInformation parity = pose.parity;
+    if (parity.dof == 0.) continue;
     parity.eta = sigma.cwiseProduct(parity.eta).eval();
     parity.Lambda = (sigma.asDiagonal() * parity.Lambda * sigma.asDiagonal()).eval();
+    sums.add(piece, parity);
   }
-  return out;
 }
 
 /// The exponential through the covariances (CAL-7): over time constants, the best sigma; none that
@@ -63,30 +110,15 @@ void fit_exponential(WheelWander& wander) {
 }  // namespace
 
 WheelWander find_wander(const CalibrationSetup& setup, const Intrinsics& x_WI) {
-  std::vector<double> products(kMostLags + 1, 0.), squares = products, expected = products;
-  std::vector<int> pairs(kMostLags + 1, 0);
-  for (const CalibrationRecording& recording : setup.recordings) {
-    const std::vector<ParityInformation> pieces = pieces_of(recording, x_WI);
-    for (std::size_t k = 2; k <= kMostLags; ++k) {
-      for (std::size_t i = 0; i + k < pieces.size(); ++i) {
-        const ParityInformation& now = pieces[i];
-        const ParityInformation& later = pieces[i + k];
-        if (now.dof == 0. || later.dof == 0.) continue;
-        const double product = now.eta.dot(later.eta);
-        products[k] += product;
-        squares[k] += product * product;
-        expected[k] += now.Lambda.cwiseProduct(later.Lambda).sum();
-        ++pairs[k];
-      }
-    }
-  }
+  PairSums sums;
+  for (const CalibrationRecording& recording : setup.recordings) add_pieces(recording, x_WI, sums);
   WheelWander out;
   for (std::size_t k = 2; k <= kMostLags; ++k) {
-    if (pairs[k] < kFewestPairs || !(expected[k] > 0.)) continue;
+    if (sums.pairs[k] < kFewestPairs || !(sums.expected[k] > 0.)) continue;
     out.lag_s.push_back(kPiece_s * static_cast<double>(k));
-    out.covariance.push_back(products[k] / expected[k]);
-    out.variance.push_back(squares[k] / (expected[k] * expected[k]));
-    out.weight.push_back(static_cast<double>(pairs[k]));
+    out.covariance.push_back(sums.products[k] / sums.expected[k]);
+    out.variance.push_back(sums.squares[k] / (sums.expected[k] * sums.expected[k]));
+    out.weight.push_back(static_cast<double>(sums.pairs[k]));
   }
   fit_exponential(out);
   return out;

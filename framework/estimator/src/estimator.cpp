@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <stdexcept>
 #include <utility>
 
 #include <Eigen/Geometry>
-#include <time.h>
 
 #include "viwo/filter/health.hpp"
 #include "viwo/math/arrays.hpp"
@@ -21,6 +21,8 @@ constexpr std::size_t kEpochsPerClone = 3;
 /// Over which the filter goes on without the IMU. Whoever is silent for longer, or begins to speak
 /// so long after the start, leaves nothing that an estimate could be made of, epoch after epoch.
 constexpr double kLongestSilenceS = 60.;
+/// Nor does who says next to nothing, however often: of silences longer than a second.
+constexpr double kLongSilencesS = 300., kMostlyS = 0.9;
 /// A failure soon after a silence of the IMU that was bridged is most likely its consequence.
 constexpr double kSilenceToNameS = 1., kSoonAfterS = 10.;
 
@@ -135,6 +137,7 @@ std::vector<std::string> Estimator::stage_names() const {
 }
 
 void Estimator::start(const ImuPrior& prior) {
+  start_ns_ = prior.t_ns;
   filter_.initialize(prior);
   if (runner_.observer() != nullptr) runner_.observer()->on_start(filter_, prior);
   intake_.start_at(prior.t_ns, filter_.blocks());
@@ -156,14 +159,7 @@ bool Estimator::step() {
     return false;
   }
   if (!filter_.initialized() && !find_start()) return false;
-  const double silent_s = intake_.silent_s(filter_.t_ns());
-  if (silent_s > kLongestSilenceS) {
-    failure_ = "the IMU was silent for " + std::to_string(silent_s) + " s";
-    return false;
-  }
-  if (silent_s > kSilenceToNameS && filter_.t_ns() >= silence_.end_ns) {
-    silence_ = {silent_s, filter_.t_ns() + to_ns(silent_s)};
-  }
+  if (listen(); !failure_.empty()) return false;
   const auto t_ns = intake_.next_epoch_ns(options_.schedule, filter_.t_ns(), filter_.blocks());
   if (!t_ns) return false;
   StageClock clock(stage_ms_);
@@ -185,6 +181,20 @@ bool Estimator::step() {
   ++epochs_;
   clock.done();
   return true;
+}
+
+void Estimator::listen() {
+  const double silent_s = intake_.silent_s(filter_.t_ns());
+  if (silent_s > kLongestSilenceS) {
+    failure_ = "the IMU was silent for " + std::to_string(silent_s) + " s";
+    return;
+  }
+  if (silent_s <= kSilenceToNameS || filter_.t_ns() < silence_.end_ns) return;
+  silence_ = {silent_s, filter_.t_ns() + to_ns(silent_s), silence_.in_all_s + silent_s};
+  const double since_start_s = seconds_between(start_ns_, silence_.end_ns);
+  if (silence_.in_all_s < kLongSilencesS || silence_.in_all_s < kMostlyS * since_start_s) return;
+  failure_ = "the IMU was silent for " + std::to_string(silence_.in_all_s) + " s of " +
+             std::to_string(since_start_s) + " s";
 }
 
 std::string Estimator::cause_of_failure() const {

@@ -65,12 +65,9 @@ std::vector<std::int64_t> epoch_stamps(const RunSetup& setup, const RunData& dat
         (data.reference.empty() ? "last no time" : "and the reference have no time in common"));
   }
   const auto period_ns = std::max<std::int64_t>(1, to_ns(setup.epoch_s));
-  const auto samples = static_cast<std::int64_t>(data.wheels().size());
-  if (are_of_two_clocks(samples, (end_ns - begin_ns) / period_ns)) {
+  if (const std::string fault = fault_of_times(data.wheels(), setup.epoch_s); !fault.empty()) {
     throw InputError(setup.sensors_mark.text() + "  the encoder samples of '" + data.wheels_name +
-                     "' are " + std::to_string(samples) + " in " +
-                     significant(seconds_between(begin_ns, end_ns), 3) +
-                     " s: their stamps are of two clocks, or of another unit");
+                     "' " + fault);
   }
   std::vector<std::int64_t> stamps;
   for (std::int64_t t_ns = begin_ns; t_ns < end_ns; t_ns += period_ns) {

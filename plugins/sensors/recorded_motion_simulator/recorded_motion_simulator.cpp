@@ -48,9 +48,9 @@ double duration_within(double recorded_s, double imu_rate_hz) {
   return std::floor(recorded_s * imu_rate_hz - 1e-6) / imu_rate_hz;
 }
 
-/// What a spline makes of it is no motion of anybody's, and its knots are without end.
-void require_no_gap(const std::vector<PoseSample>& poses) {
-  constexpr double kLongestGapS = 10.;
+/// What a spline makes of a gap is no motion of anybody's, and its knots are without end.
+void require_motion(const std::vector<PoseSample>& poses) {
+  constexpr double kLongestGapS = 10., kLongestS = 7200.;
   for (std::size_t k = 1; k < poses.size(); ++k) {
     const double gap_s = seconds_between(poses[k - 1].t_ns, poses[k].t_ns);
     if (gap_s <= kLongestGapS) continue;
@@ -59,6 +59,12 @@ void require_no_gap(const std::vector<PoseSample>& poses) {
                   gap_s, time_text(poses[k - 1].t_ns).c_str());
     throw ParamError("path", text.data());
   }
+  const double duration_s = seconds_between(poses.front().t_ns, poses.back().t_ns);
+  if (duration_s <= kLongestS) return;
+  std::array<char, 100> text{};
+  std::snprintf(text.data(), text.size(), "poses of %.0f s, at most %.0f s are simulated: cut them",
+                duration_s, kLongestS);
+  throw ParamError("path", text.data());
 }
 
 void report(const HostServices& services, const sim::FitResidual& residual) {
@@ -71,7 +77,7 @@ void report(const HostServices& services, const sim::FitResidual& residual) {
 
 log::Recording<Measurement> simulate(const Params& params, const HostServices& services) {
   auto recorded = log::read_ros_poses(params.path, params.ros_clock(), params.limits());
-  require_no_gap(recorded.samples);
+  require_motion(recorded.samples);
   const std::int64_t offset_ns = to_ns(params.time_offset_s);
   for (PoseSample& pose : recorded.samples) pose.t_ns += offset_ns;
   // The spline is poor at its ends, where it has samples on one side only.

@@ -139,9 +139,11 @@ class Estimator {
   struct Silence {
     double duration_s = 0.;
     std::int64_t end_ns = std::numeric_limits<std::int64_t>::min();
+    double in_all_s = 0.;  ///< with those before
   };
 
   bool find_start();
+  void listen();
   std::string cause_of_failure() const;
   void propagate(const EpochData& data);
   void follow(const GivenPath& path, const ImuSample& sample);
@@ -158,6 +160,7 @@ class Estimator {
   Contact contact_;
   std::string failure_;
   Silence silence_;
+  std::int64_t start_ns_ = 0;
   std::int64_t epochs_ = 0;
   std::vector<double> stage_ms_;
 };
