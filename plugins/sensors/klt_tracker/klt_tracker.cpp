@@ -23,6 +23,7 @@ constexpr double kContradictingShare = 0.7;
 constexpr const char* kContradicts = "stereo pair that contradicts the extrinsics";
 constexpr const char* kBlank = "image without contrast: dark, overexposed or covered";
 constexpr const char* kRepeats = "image that repeats the one before to the last bit";
+constexpr const char* kUnreadable = "image that cannot be read";
 constexpr const char* kAlone = "right image without its left one";
 constexpr const char* kShowsNothing = "stereo pair whose second image shows nothing of the first";
 /// Pairs in a row that contradict the extrinsics before it is said.
@@ -169,12 +170,12 @@ void KltTracker::check(const ImageGroup& group) {
     if (eye.failure) std::rethrow_exception(eye.failure);
     const std::string where = place(static_cast<int>(i), group.images[i].t_ns);
     if (!eye.unreadable.empty()) {
-      rejections_.add("image that cannot be read", [&] { return where + ": " + eye.unreadable; });
+      rejections_.add(kUnreadable, [&] { return where + ": " + eye.unreadable; });
     }
     check_size(i, where);
     const auto refuse = [&](const char* why) { rejections_.add(why, [&where] { return where; }); };
     if (eye.repeats) refuse(kRepeats);
-    if (eye.is_read || eye.repeats) ++images_;
+    if (eye.is_read || eye.repeats || !eye.unreadable.empty()) ++images_;
     if (eye.is_read && eye.now.blank) refuse(kBlank);
     if (!eye.matcher || !eye.is_read) continue;
     ++right_images_;
@@ -362,7 +363,9 @@ Status KltTracker::next(Measurement& out) {
 void KltTracker::rejections(std::vector<RejectionCount>& out) const {
   for (const RejectionCount& one : rejections_.counts()) {
     out.push_back(one);
-    if (one.reason == kBlank || one.reason == kRepeats) out.back().of = images_;
+    const bool is_of_all =
+        one.reason == kBlank || one.reason == kRepeats || one.reason == kUnreadable;
+    if (is_of_all) out.back().of = images_;
     if (one.reason == kAlone) out.back().of = right_images_;
     if (one.reason == kContradicts) out.back().of = pairs_with_matches_;
     if (one.reason == kShowsNothing) out.back().of = pairs_with_points_;

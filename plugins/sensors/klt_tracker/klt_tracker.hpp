@@ -88,7 +88,7 @@ class KltTracker final : public Sensor {
   Sensor* input_ = nullptr;
   std::optional<ImageGroups> groups_;
   Rejections rejections_;
-  std::int64_t images_ = 0, right_images_ = 0;  ///< that could be read
+  std::int64_t images_ = 0, right_images_ = 0;  ///< that came; right ones that could be read
   /// Stereo pairs whose first image has points, and those of them with matches.
   std::int64_t pairs_with_points_ = 0, pairs_with_matches_ = 0;
   std::int64_t next_id_ = 0;
