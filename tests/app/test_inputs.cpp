@@ -163,6 +163,11 @@ TEST_F(InputsTest, AFileBesideTheResultsIsNoneOfThem) {
   expect_refused({"run", "run.yaml", "--out", "out", "--mcap", "out/summary.json"},
                  "--mcap out/summary.json: is one of the results of this command - name another "
                  "file");
+  expect_refused({"run", "run.yaml", "--out", "out", "--mcap", "x.avi", "--video", "./x.avi"},
+                 "--mcap x.avi: is another result of this command, too - name another file");
+  expect_refused({"run", "run.yaml", "--out", "out", "--mcap", "out/unfinished.tmp/x.mcap"},
+                 "--mcap out/unfinished.tmp/x.mcap: is in a folder that this command removes - "
+                 "name another file");
 }
 
 /// FILE.tmp may be that of another command that writes the same file.

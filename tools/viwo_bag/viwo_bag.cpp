@@ -337,7 +337,10 @@ void write_folder([[maybe_unused]] const Log& log,
     if (is_moved) fs::remove_all(before);
   } catch (...) {
     std::error_code ignored;
-    if (is_moved && !fs::exists(out, ignored)) fs::rename(before, out, ignored);
+    if (is_moved) {
+      fs::exists(out, ignored) ? void(fs::remove_all(before, ignored))
+                               : fs::rename(before, out, ignored);
+    }
     fs::remove_all(part, ignored);
     throw;
   }
@@ -387,7 +390,11 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);
   const viwo::files::PrintableOutput out(std::cout), err(std::cerr);
   try {
-    return viwo::dispatch({argv + 1, argv + argc});
+    const int code = viwo::dispatch({argv + 1, argv + argc});
+    if (!std::cout.flush()) {
+      throw std::runtime_error("viwo_bag: the standard output cannot be written");
+    }
+    return code;
   } catch (const viwo::InputError& error) {
     std::cerr << error.what() << "\n";
     return 2;

@@ -145,7 +145,7 @@ void keep_files_of_run(const Arguments& arguments, const RunSetup& setup) {
   if (!arguments.plan.empty()) inputs.push_back(arguments.plan);
   keep_inputs_of_run(folder, inputs);
   keep_apart("--video", arguments.video, folder, kResultsOfRun, inputs);
-  keep_apart("--mcap", arguments.mcap, folder, kResultsOfRun, inputs);
+  keep_apart("--mcap", arguments.mcap, folder, kResultsOfRun, inputs, arguments.video);
 }
 
 /// The results of a shard wait for those of the others.

@@ -3,6 +3,7 @@
 #include <system_error>
 
 #include "viwo/api/status.hpp"
+#include "viwo/files/files.hpp"
 #include "viwo/results/run_output.hpp"
 #include "viwo/results/run_stream.hpp"
 #include "viwo/setup/input_files.hpp"
@@ -57,14 +58,19 @@ void keep_inputs_of_run(const fs::path& folder, const Files& inputs) {
 }
 
 void keep_apart(const std::string& option, const fs::path& file, const fs::path& folder,
-                Names results, const Files& inputs) {
+                Names results, const Files& inputs, const fs::path& other) {
   if (file.empty()) return;
   refuse_to_write_into(file, inputs);
+  const auto refuse = [&](const std::string& why) {
+    throw InputError(option + " " + file.string() + ": " + why + " - name another file");
+  };
   for (const char* const name : results) {
-    if (!are_one(file, folder / name)) continue;
-    throw InputError(option + " " + file.string() +
-                     ": is one of the results of this command - name another file");
+    if (are_one(file, folder / name)) refuse("is one of the results of this command");
   }
+  if (are_one(file.parent_path(), folder / files::kUnfinishedResults)) {
+    refuse("is in a folder that this command removes");
+  }
+  if (!other.empty() && are_one(file, other)) refuse("is another result of this command, too");
 }
 
 }  // namespace viwo::app

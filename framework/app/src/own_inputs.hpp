@@ -26,8 +26,9 @@ Files inputs_of(const Arguments& arguments, const experiment::ExperimentSetup& s
 void keep_inputs_of_run(const std::filesystem::path& folder, const Files& inputs);
 
 /// InputError where the file of `option` ("" for none), which is written beside the results, would
-/// replace one of them, or an input.
+/// replace one of them, an input, or `other`, which is written, too.
 void keep_apart(const std::string& option, const std::filesystem::path& file,
-                const std::filesystem::path& folder, Names results, const Files& inputs);
+                const std::filesystem::path& folder, Names results, const Files& inputs,
+                const std::filesystem::path& other = {});
 
 }  // namespace viwo::app

@@ -7,6 +7,7 @@
 #include "parse_text.hpp"
 #include "path.hpp"
 #include "viwo/config/suggest.hpp"
+#include "viwo/config/yaml.hpp"
 
 namespace viwo::config {
 namespace {
@@ -89,12 +90,20 @@ std::string replaced(const std::string& text, const ValueOf& value_of) {
   return out + text.substr(from);
 }
 
+/// `made`: characters that placeholders have become.
 std::string substituted(const Node& scalar, const std::map<std::string, std::string>& values,
-                        Errors& errors) {
+                        std::size_t& made, Errors& errors) {
   const std::string& text = scalar.scalar();
   return replaced(text, [&](const std::string& name) {
     const auto value = values.find(name);
-    if (value != values.end()) return value->second;
+    if (value != values.end()) {
+      made += value->second.size();
+      if (made > kMaxYamlBytes) {
+        fail(scalar.mark(), "placeholders become more than " + std::to_string(kMaxYamlBytes >> 20) +
+                                " MiB of text, as in no configuration that viwo reads");
+      }
+      return value->second;
+    }
     std::vector<std::string> known;
     for (const auto& entry : values) known.push_back(entry.first);
     errors.add(scalar.mark(), "unknown placeholder '{" + name + "}' in '" + text + "'" +
@@ -165,11 +174,15 @@ void find_placeholders(const Node& node, std::set<std::string>& names) {
 }
 
 void substitute(Node& node, const std::map<std::string, std::string>& values, Errors& errors) {
-  if (node.is_scalar()) {
-    node = Node::scalar_of(substituted(node, values, errors), node.mark(), node.quoted());
-  }
-  for (Node& item : node.items()) substitute(item, values, errors);
-  for (Node::Entry& entry : node.entries()) substitute(entry.value, values, errors);
+  std::size_t made = 0;
+  const auto visit = [&](const auto& self, Node& part) -> void {
+    if (part.is_scalar()) {
+      part = Node::scalar_of(substituted(part, values, made, errors), part.mark(), part.quoted());
+    }
+    for (Node& item : part.items()) self(self, item);
+    for (Node::Entry& entry : part.entries()) self(self, entry.value);
+  };
+  visit(visit, node);
 }
 
 }  // namespace viwo::config

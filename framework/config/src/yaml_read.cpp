@@ -267,10 +267,10 @@ Node parse_text(std::string_view text, const std::string& origin, bool with_posi
     fail(Mark{origin}, "is larger than " + std::to_string(kMaxYamlBytes >> 20) +
                            " MiB, as no YAML that viwo reads is");
   }
-  if (text.find('\0') != std::string_view::npos) fail(Mark{origin}, "is not a text file");
   if (text.starts_with("\xfe\xff") || text.starts_with("\xff\xfe")) {
     fail(Mark{origin}, "is UTF-16, what is read is UTF-8");
   }
+  if (text.find('\0') != std::string_view::npos) fail(Mark{origin}, "is not a text file");
   // All of them: the parser would leave one out, and its places were others than those of the text.
   while (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   TreeBuilder builder(text, origin, with_positions);

@@ -102,6 +102,21 @@ TEST(Overrides, SubstitutePlaceholders) {
   EXPECT_EQ(root, parse("a: /d/x_77\nb: [\"{ data }\", \"{}\", \"{7}\", \"{0}\"]\n", ""));
 }
 
+TEST(Overrides, PlaceholdersBecomeNoMoreTextThanAConfigurationHas) {
+  std::string names;
+  for (int i = 0; i < 50; ++i) names += "{long}";
+  Node root = parse("a: \"" + names + "\"\nb: [\"" + names + "\"]\n", "f.yaml");
+  Errors errors;
+  substitute(root, {{"long", std::string(10'000, 'x')}}, errors);
+  EXPECT_EQ(root.find("a")->scalar().size(), 500'000U);
+  root = parse("a: \"" + names + "\"\nb: [\"" + names + names + "\"]\n", "f.yaml");
+  EXPECT_EQ(error_of([&] {
+              substitute(root, {{"long", std::string(10'000, 'x')}}, errors);
+            }),
+            "f.yaml:2:5  placeholders become more than 1 MiB of text, as in no configuration that "
+            "viwo reads");
+}
+
 TEST(Overrides, ReportUnknownPlaceholders) {
   Node root = parse("a: \"{dta}/x\"\nb: \"{elsewhere}\"\n", "f.yaml");
   Errors errors;

@@ -123,10 +123,14 @@ TEST(Yaml, ReadsManyTagsAtOnce) {
 }
 
 TEST(Yaml, TakesEveryMarkOfUtf8OffTheBegin) {
+  using namespace std::string_view_literals;
   const std::string mark = "\xef\xbb\xbf";
   // Three bytes before the second value is a quote, which is none.
   EXPECT_EQ(parse(mark + mark + "[a\"z,x]", "f.yaml").items()[1].scalar(), "x");
-  for (const std::string_view utf16 : {"\xff\xfe\x41\x42", "\xfe\xff\x41\x42"}) {
+  for (const std::string_view utf16 : {"\xff\xfe"
+                                       "a\0:\0"sv,
+                                       "\xfe\xff"
+                                       "\0a\0:"sv}) {
     EXPECT_EQ(parse_error(utf16), "f.yaml  is UTF-16, what is read is UTF-8");
   }
 }

@@ -69,8 +69,12 @@ class Section {
       return std::nullopt;
     }
     const auto value = parse_number(node.scalar());
-    if (value && std::isfinite(*value)) return value;
-    error(node, key, log::quoted(node.scalar()) + (value ? " is not finite" : " is not a number"));
+    constexpr double kMost = 1e9;  // of a line delay in ns, too
+    if (value && std::abs(*value) <= kMost) return value;
+    error(node, key,
+          log::quoted(node.scalar()) + (!value                  ? " is not a number"
+                                        : std::isfinite(*value) ? " is beyond 1e9"
+                                                                : " is not finite"));
     return std::nullopt;
   }
 

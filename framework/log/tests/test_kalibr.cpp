@@ -73,6 +73,8 @@ TEST_F(Kalibr, ReadsTheClockOfTheCamera) {
   EXPECT_EQ(read_kalibr_cameras(write("b.yaml", camera(place)))[0].t_CtoI_s, 0.);
   EXPECT_EQ(refusal(camera(place + "  timeshift_cam_imu: soon\n")),
             "F:7:22  cam0.timeshift_cam_imu: 'soon' is not a number");
+  EXPECT_EQ(refusal(camera(place + "  timeshift_cam_imu: 1e18\n")),
+            "F:7:22  cam0.timeshift_cam_imu: '1e18' is beyond 1e9");
 }
 
 TEST_F(Kalibr, ReadsTheRowsOfARollingShutter) {

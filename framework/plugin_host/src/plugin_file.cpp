@@ -14,8 +14,8 @@
 #include "viwo/plugin_host/plugin_info.hpp"
 
 /// Of what this code is linked into; by the linker.
-extern "C" __attribute__((visibility("hidden")))
-const ElfW(Ehdr) __ehdr_start;  // NOLINT(bugprone-reserved-identifier)
+// NOLINTNEXTLINE(bugprone-reserved-identifier,readability-identifier-naming)
+extern "C" __attribute__((visibility("hidden"))) const ElfW(Ehdr) __ehdr_start;
 
 namespace viwo {
 namespace {
@@ -24,7 +24,7 @@ constexpr std::string_view kPrefix = "libviwo_";
 constexpr std::string_view kSuffix = ".so";
 
 /// A plugin has some MB, with debug information some hundred.
-constexpr std::int64_t kLargest = 1LL << 30;
+constexpr std::int64_t kLargest = 200LL << 20;
 
 /// The machine that this program is built for.
 std::uint16_t own_machine() { return __ehdr_start.e_machine; }
@@ -133,7 +133,8 @@ LibraryBytes read_library(const std::filesystem::path& file) {
   try {
     config::RegularFile opened = open_library(file);
     const FileVersion version = version_of(opened);
-    if (version.size > kLargest) throw PluginRefused(file, "is larger than 1 GiB, as no plugin is");
+    if (version.size > kLargest)
+      throw PluginRefused(file, "is larger than 200 MiB, as no plugin is");
     std::string bytes(static_cast<std::size_t>(version.size), '\0');
     bytes.resize(opened.read(bytes));
     check_elf(file, bytes);
@@ -143,8 +144,9 @@ LibraryBytes read_library(const std::filesystem::path& file) {
         error.code() == std::errc::not_a_directory) {
       throw PluginRefused(file, "no such file");
     }
-    throw PluginUnavailable(
-        file, "cannot be read: " + error.code().message() + " - check its permissions");
+    const bool is_forbidden = error.code() == std::errc::permission_denied;
+    throw PluginUnavailable(file, "cannot be read: " + error.code().message() +
+                                      (is_forbidden ? " - check its permissions" : ""));
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <exception>
+#include <string>
+#include <string_view>
 
 namespace viwo {
 
@@ -27,7 +29,10 @@ std::filesystem::path piece_file(const std::filesystem::path& folder, std::size_
 }
 
 bool is_piece_file(const std::filesystem::path& file) {
-  return file.filename().string().starts_with("trajectory_") && file.extension() == ".tum";
+  constexpr std::string_view kBegin = "trajectory_";
+  const std::string name = file.stem().string();
+  return file.extension() == ".tum" && name.starts_with(kBegin) && name.size() > kBegin.size() &&
+         name.find_first_not_of("0123456789", kBegin.size()) == std::string::npos;
 }
 
 void remove_piece_files(const std::filesystem::path& folder) {
