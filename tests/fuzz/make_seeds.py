@@ -243,6 +243,11 @@ def main():
         seed(target, "euroc", head(path).replace("timestamp_ns", "#timestamp [ns]").replace(", ", ","))
     seed("asl_angles", "angles", "timestamp_ns,drive_1 [rad],drive_2 [rad],steer_1 [rad],steer_2 [rad]\n"
          + "".join(f"{10**9 + 10**7 * i},{0.3 * i},{6.2 - 0.3 * i},{0.1 * i},6.2\n" for i in range(6)))
+    turning = "timestamp_ns,drive_1 [rad/s],drive_2 [rad/s]\n" + "".join(
+        f"{10**9 + 50 * 10**6 * k},{v - w:.2f},{v + w:.2f}\n"
+        for k, v, w in ((k, 5 * math.sin(0.04 * k) + 3, 2 * math.sin(0.1 * k)) for k in range(80)))
+    seed("odometry", "turning", turning)
+    seed("calibrate_wheels", "turning", turning)
     seed("asl_gnss", "fixes", (FILES / "gnss0/data.csv").read_bytes())
     seed("asl_images", "images", "timestamp_ns,filename\n1,1.png\n2,2.png\n")
     seed("gz", "one", gzip.compress(head(log / "imu0/data.csv", 20).encode(), mtime=0))

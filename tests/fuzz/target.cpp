@@ -31,7 +31,8 @@ class Folder {
 
 std::vector<Target> all_targets() {
   std::vector<Target> all;
-  for (auto&& some : {sensor_targets(), file_targets(), live_targets(), filter_targets()}) {
+  for (auto&& some :
+       {sensor_targets(), file_targets(), live_targets(), filter_targets(), wheel_targets()}) {
     all.insert(all.end(), some.begin(), some.end());
   }
   return all;

@@ -28,6 +28,7 @@ std::vector<Target> sensor_targets();
 std::vector<Target> file_targets();
 std::vector<Target> live_targets();
 std::vector<Target> filter_targets();
+std::vector<Target> wheel_targets();
 
 /// Text of the InputError that the bytes are answered with; empty where they are taken. Whatever
 /// else is thrown is a finding, and so is what require() is told.
