@@ -105,13 +105,12 @@ Plot nees_plot(const PoseNees& nees) {
 
 /// Columns of equal width in time with the mean of what falls into them.
 struct Bins {
-  double begin_s = 0.;
+  double begin_s;
   double width_s = 1.;
   std::size_t count = 0;
 
-  explicit Bins(const std::vector<double>& t_s) {
+  explicit Bins(const std::vector<double>& t_s) : begin_s(t_s.front()) {
     constexpr double kMaxBins = 300.;
-    begin_s = t_s.front();
     const double duration_s = t_s.back() - begin_s;
     width_s = std::max(1., std::ceil(duration_s / kMaxBins));
     count = static_cast<std::size_t>(duration_s / width_s) + 1;

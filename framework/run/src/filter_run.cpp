@@ -178,6 +178,7 @@ class FilterRun {
     result_.warnings = setup.warnings;
     result_.live = live_;
     // Made where it stays: those who watch it keep references.
+    // NOLINTNEXTLINE(modernize-make-unique)
     estimator_.reset(new Estimator(make_estimator(*setup.filter, live_)));
     start(*estimator_, setup, data);
     if (hooks.on_start) observer_ = hooks.on_start(*estimator_);
@@ -287,6 +288,7 @@ class FilterRun {
     try {
       const std::optional<FilterSetup> setup = again(*setup_.filter, healthy_->after_failure());
       if (!setup) return false;
+      // NOLINTNEXTLINE(modernize-make-unique)
       next.reset(new Estimator(make_estimator(*setup, live_)));
       constexpr std::int64_t kLaterNs = 1'000'000'000;  // than what it has been given already
       start(*next, setup_, data_, estimator_->filter().t_ns() + kLaterNs);

@@ -186,7 +186,7 @@ std::optional<Lag> near_lag(const RateGrid& a, const RateGrid& b, double most_s)
 }  // namespace
 
 std::optional<Lag> find_lag(const RateGrid& a, const RateGrid& b, double most_s) {
-  const std::optional<Lag> near = near_lag(a, b, most_s);
+  std::optional<Lag> near = near_lag(a, b, most_s);
   const double r = near ? std::abs(near->correlation) : 0.;
   if (r >= kAlike) return near;
   const std::optional<Lag> far = far_lag(a, b);

@@ -197,7 +197,7 @@ FilterSetup read_filter(const Node& run, const std::shared_ptr<const WheelModel>
   FilterSetup setup;
   const auto read = [&]<class T>(const char* key, std::type_identity<T>) {
     Node section = Node::empty_map();
-    const auto params = read_section<T>(section_or_empty(run, key), key, section, errors);
+    auto params = read_section<T>(section_or_empty(run, key), key, section, errors);
     if (params) resolved.set(key, section);
     return params;
   };

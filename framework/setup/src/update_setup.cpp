@@ -70,7 +70,7 @@ std::string read_sensor(const Node& run, const Node& section, const std::string&
   if (sensors != nullptr && sensors->is_map()) {
     for (const auto& entry : sensors->entries()) names.push_back(entry.key);
   }
-  const std::string name = sensor->is_scalar() ? sensor->scalar() : "";
+  std::string name = sensor->is_scalar() ? sensor->scalar() : "";
   if (std::find(names.begin(), names.end(), name) != names.end()) return name;
   errors.add(sensor->mark(),
              path + ".sensor: no sensor '" + name + "'" + config::did_you_mean(name, names));
@@ -196,7 +196,8 @@ class UpdateReader {
   }
 
   /// One instance, or one for each wheel set if it asks for one.
-  void add_instances(FilterSetup::Entry entry, const Node& section, const std::string& path) {
+  void add_instances(const FilterSetup::Entry& entry, const Node& section,
+                     const std::string& path) {
     FilterSetup::Entry first = entry;
     first.update = make(section, path, entry.name);
     const auto& sets = setup_.wheels;
