@@ -52,7 +52,7 @@ void ArrowSystem::gather() {
   more.setFromTriplets(triplets_.begin(), triplets_.end());
   triplets_.clear();
   if (own_.size() == 0) {
-    own_ = std::move(more);
+    own_.swap(more);
     return;
   }
   own_.conservativeResize(n_own_, n_own_);

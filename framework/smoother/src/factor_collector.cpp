@@ -33,11 +33,13 @@ ImuMatrix information_of(const ImuMatrix& covariance) {
 
 FactorCollector::FactorCollector(const PathRecorder& run, const ImuState& start, std::size_t epochs,
                                  const BlockColumns& columns, int n_shared)
-    : system_(n_shared), blocks_(columns), prior_(run.prior().P) {
+    : system_(n_shared),
+      blocks_(columns),
+      first_moving_(kImuSize * (static_cast<int>(epochs) + 1) + columns.own),
+      next_in_room_(first_moving_ + static_cast<int>(columns.moving.size() * epochs)),
+      prior_(run.prior().P) {
   // Behind the path, where blocks of the recording itself stand.
-  const int behind = kImuSize * (static_cast<int>(epochs) + 1);
-  first_moving_ = behind + blocks_.own;
-  next_in_room_ = first_moving_ + static_cast<int>(blocks_.moving.size() * epochs);
+  const int behind = first_moving_ - blocks_.own;
   for (int& unknown : blocks_.unknown) {
     if (unknown >= 0) unknown += behind;
   }

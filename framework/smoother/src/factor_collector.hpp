@@ -56,8 +56,8 @@ class FactorCollector final : public EstimatorObserver {
 
   ArrowSystem system_;
   BlockColumns blocks_;
-  int first_moving_ = 0;
-  int next_in_room_ = 0;
+  int first_moving_;
+  int next_in_room_;
   const Eigen::MatrixXd& prior_;
   GivenPath path_;
   std::vector<std::size_t> epoch_in_slot_;

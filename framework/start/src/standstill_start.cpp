@@ -106,8 +106,8 @@ Wheels wheels_of(std::span<const std::span<const EncoderSample>> encoders,
   return wheels;
 }
 
-constexpr auto gyro_of = [](const ImuSample& s) { return s.gyro_rad_per_s; };
-constexpr auto accel_of = [](const ImuSample& s) { return s.accel_m_per_s2; };
+constexpr auto kGyroOf = [](const ImuSample& s) { return s.gyro_rad_per_s; };
+constexpr auto kAccelOf = [](const ImuSample& s) { return s.accel_m_per_s2; };
 
 /// What of the readings is no rest, or nothing; vibration is one only where `strict`.
 std::string_view not_at_rest(const Means& gyro, const Means& accel, double dt, bool strict,
@@ -176,11 +176,11 @@ ImuMatrix covariance_at_rest(std::span<const ImuSample> window, const Means& gyr
   P.diagonal().segment<3>(kGyroBiasColumn) = gyro_variance;
   if (gyro.scatter > kChance * squared(noise.gyro_rad_per_s_sqrt_hz) / dt) {
     P.diagonal().segment<3>(kThetaColumn).array() +=
-        mean_square_of_integral(window, gyro.mean, gyro_of);
+        mean_square_of_integral(window, gyro.mean, kGyroOf);
   }
   if (accel.scatter > kChance * squared(noise.accel_m_per_s2_sqrt_hz) / dt) {
     P.diagonal().segment<3>(kVelocityColumn).array() +=
-        mean_square_of_integral(window, accel.mean, accel_of);
+        mean_square_of_integral(window, accel.mean, kAccelOf);
   }
   return P;
 }
@@ -210,8 +210,8 @@ StartAttempt start_from_standstill(std::span<const ImuSample> imu,
   if (images == Stillness::kTooEarly) return no_start("the images do not reach back far enough");
   const bool strict = wheels != Wheels::kStand && images != Stillness::kStill;
   const double dt = span_s / static_cast<double>(window.size() - 1);
-  const Means gyro = means_of(window, options.noise.gyro_rad_per_s_sqrt_hz, gyro_of);
-  const Means accel = means_of(window, options.noise.accel_m_per_s2_sqrt_hz, accel_of);
+  const Means gyro = means_of(window, options.noise.gyro_rad_per_s_sqrt_hz, kGyroOf);
+  const Means accel = means_of(window, options.noise.accel_m_per_s2_sqrt_hz, kAccelOf);
   const std::string_view obstacle = not_at_rest(gyro, accel, dt, strict, options);
   if (!obstacle.empty()) return no_start(obstacle);
 

@@ -110,9 +110,9 @@ StartAttempt attempt(std::span<const ImuSample> imu, std::span<const FeatureSamp
 StartAttempt start_from_images(std::span<const ImuSample> imu,
                                std::span<const FeatureSample> tracks,
                                const VisualStartOptions& options) {
-  const StartAttempt first = attempt(imu, tracks, options.window_s, options);
+  StartAttempt first = attempt(imu, tracks, options.window_s, options);
   if (first.prior) return first;
-  const StartAttempt longer = attempt(imu, tracks, 2. * options.window_s, options);
+  StartAttempt longer = attempt(imu, tracks, 2. * options.window_s, options);
   return longer.prior ? longer : first;
 }
 
