@@ -337,9 +337,10 @@ void write_folder([[maybe_unused]] const Log& log,
     if (is_moved) fs::remove_all(before);
   } catch (...) {
     std::error_code ignored;
-    if (is_moved) {
-      fs::exists(out, ignored) ? void(fs::remove_all(before, ignored))
-                               : fs::rename(before, out, ignored);
+    if (is_moved && fs::exists(out, ignored)) {
+      fs::remove_all(before, ignored);
+    } else if (is_moved) {
+      fs::rename(before, out, ignored);
     }
     fs::remove_all(part, ignored);
     throw;
@@ -391,9 +392,7 @@ int main(int argc, char** argv) {
   const viwo::files::PrintableOutput out(std::cout), err(std::cerr);
   try {
     const int code = viwo::dispatch({argv + 1, argv + argc});
-    if (!std::cout.flush()) {
-      throw std::runtime_error("viwo_bag: the standard output cannot be written");
-    }
+    viwo::files::flush_output("viwo_bag");
     return code;
   } catch (const viwo::InputError& error) {
     std::cerr << error.what() << "\n";

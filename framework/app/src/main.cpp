@@ -5,12 +5,8 @@
 #include <exception>
 #include <iostream>
 #include <new>
-#include <stdexcept>
 #include <string>
 #include <vector>
-
-#include <poll.h>
-#include <unistd.h>
 
 #include "command_line.hpp"
 #include "out_of_memory.hpp"
@@ -111,13 +107,6 @@ int dispatch(const std::vector<std::string>& words) {
   throw InputError("viwo: unknown command '" + words[0] + "'" +
                    config::did_you_mean(words[0], names));
 }
-
-/// Who reads a pipe may go when he has seen enough (head): no reason to lose results.
-bool reader_is_gone() {
-  pollfd out{STDOUT_FILENO, POLLOUT, 0};
-  return ::poll(&out, 1, 0) > 0 && (out.revents & POLLERR) != 0;
-}
-
 }  // namespace
 }  // namespace viwo::app
 
@@ -134,9 +123,7 @@ int main(int argc, char** argv) {
       return 1;
     }
     const int code = viwo::app::dispatch({argv + 1, argv + argc});
-    if (!std::cout.flush() && !viwo::app::reader_is_gone()) {
-      throw std::runtime_error("viwo: the standard output cannot be written");
-    }
+    viwo::files::flush_output("viwo");
     return code;
   } catch (const viwo::InputError& error) {
     std::cerr << error.what() << "\n";

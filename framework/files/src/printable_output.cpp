@@ -1,5 +1,11 @@
 #include "viwo/files/printable_output.hpp"
 
+#include <iostream>
+#include <stdexcept>
+
+#include <poll.h>
+#include <unistd.h>
+
 #include "viwo/math/utf8.hpp"
 
 namespace viwo::files {
@@ -61,6 +67,15 @@ std::streamsize PrintableOutput::xsputn(const char* text, std::streamsize size) 
 int PrintableOutput::sync() {
   const std::lock_guard lock(mutex_);
   return to_->pubsync();
+}
+
+void flush_output(const std::string& program) {
+  if (std::cout.flush()) return;
+  pollfd out{STDOUT_FILENO, POLLOUT, 0};
+  const bool reader_is_gone = ::poll(&out, 1, 0) > 0 && (out.revents & POLLERR) != 0;
+  if (!reader_is_gone) {
+    throw std::runtime_error(program + ": the standard output cannot be written");
+  }
 }
 
 }  // namespace viwo::files

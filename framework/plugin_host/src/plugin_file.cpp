@@ -23,7 +23,7 @@ namespace {
 constexpr std::string_view kPrefix = "libviwo_";
 constexpr std::string_view kSuffix = ".so";
 
-/// A plugin has some MB, with debug information some hundred.
+/// A plugin has some MB, with debug information less than a hundred. It is held twice.
 constexpr std::int64_t kLargest = 200LL << 20;
 
 /// The machine that this program is built for.

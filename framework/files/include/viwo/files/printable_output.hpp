@@ -32,4 +32,8 @@ class PrintableOutput : private std::streambuf {
   std::string held_;  ///< the first bytes of a character, of which the others have not come
 };
 
+/// At the end of `program`: all of the standard output is written. std::runtime_error if it is not,
+/// but for a reader that has gone (`| head`).
+void flush_output(const std::string& program);
+
 }  // namespace viwo::files
