@@ -24,7 +24,6 @@
 #include "viwo/plan/plan.hpp"
 #include "viwo/plugin_host/build_record_check.hpp"
 #include "viwo/results/run_record.hpp"
-#include "viwo/setup/configuration.hpp"
 #include "viwo/setup/run_setup.hpp"
 #ifdef VIWO_FUZZ_ROS1
 #include "ros1_fields.hpp"
@@ -75,8 +74,7 @@ void yaml(Bytes bytes) {
 /// A run that has been read is written so that it reads back.
 void run_configuration(Bytes bytes) {
   const fs::path file = write("run.yaml", bytes);
-  const RunSetup setup =
-      read_run(resolve_placeholders(load_run_configuration(file, {})), registry());
+  const RunSetup setup = read_run(configuration("run.yaml"), registry());
   const std::string resolved = config::to_yaml(setup.resolved);
   try {
     read_run(config::parse(resolved, file.string()), registry());

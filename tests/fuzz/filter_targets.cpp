@@ -14,7 +14,6 @@
 #include "target.hpp"
 #include "viwo/math/arrays.hpp"
 #include "viwo/run/run.hpp"
-#include "viwo/setup/configuration.hpp"
 
 namespace viwo::fuzz {
 namespace {
@@ -198,10 +197,6 @@ GnssSample fix_at(const PoseSample& pose) {
   return fix;
 }
 
-config::Node configuration(const char* file, const std::vector<std::string>& set = {}) {
-  return resolve_placeholders(load_run_configuration(folder() / file, set));
-}
-
 /// What the robot measures when nothing is wrong, in time order; `set`: otherwise than configured.
 std::vector<Measurement> measured(const std::vector<std::string>& set) {
   const RunSetup setup = read_run(configuration("robot.yaml", set), registry());
@@ -369,13 +364,8 @@ void whole_run(Bytes bytes) {
   const RunData data = collect(setup);
   const RunResult result = run_filter(setup, data);
   require(result.epochs < 20'000, "epochs without end");
-  if (result.status != RunStatus::kOk) {
-    return require(!result.cause.empty(), "a run that is not well, without a cause");
-  }
-  for (const StampedPose& pose : result.estimate) {
-    require(pose.p_BinW.allFinite() && pose.q_BtoW.coeffs().allFinite(),
-            "a trajectory that is not finite, and the run says that it is well");
-  }
+  require_well(result);
+  if (result.status != RunStatus::kOk) return;
   for (const CalibrationTrack& track : result.calibration) {
     const auto is_finite = [](double value) { return std::isfinite(value); };
     require(std::all_of(track.estimate.begin(), track.estimate.end(), is_finite) &&

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "viwo/api/status.hpp"
+#include "viwo/setup/configuration.hpp"
 
 namespace viwo::fuzz {
 namespace {
@@ -88,6 +89,20 @@ fs::path write(const std::string& name, Bytes bytes) {
 PluginRegistry& registry() {
   static PluginRegistry plugins({VIWO_TEST_PLUGIN_DIR}, [](auto&&...) {});
   return plugins;
+}
+
+config::Node configuration(const std::string& file, const std::vector<std::string>& set) {
+  return resolve_placeholders(load_run_configuration(folder() / file, set));
+}
+
+void require_well(const RunResult& result) {
+  if (result.status != RunStatus::kOk) {
+    return require(!result.cause.empty(), "a run that is not well, without a cause");
+  }
+  for (const StampedPose& pose : result.estimate) {
+    require(pose.p_BinW.allFinite() && pose.q_BtoW.coeffs().allFinite(),
+            "a trajectory that is not finite, and the run says that it is well");
+  }
 }
 
 }  // namespace viwo::fuzz

@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "viwo/config/node.hpp"
 #include "viwo/plugin_host/registry.hpp"
+#include "viwo/run/run_result.hpp"
 
 namespace viwo::fuzz {
 
@@ -45,5 +47,11 @@ std::filesystem::path write(const std::string& name, Bytes bytes);
 
 /// The plugins that are built for fuzzing.
 PluginRegistry& registry();
+
+/// A file of a run in folder(), resolved.
+config::Node configuration(const std::string& file, const std::vector<std::string>& set = {});
+
+/// A run that is well has a finite trajectory, one that is not has a cause.
+void require_well(const RunResult& result);
 
 }  // namespace viwo::fuzz
