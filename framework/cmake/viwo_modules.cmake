@@ -26,7 +26,8 @@ function(viwo_for_plugins target)
 endfunction()
 
 # viwo_timeout(VARIABLE SECONDS): how long a test may take. With a sanitizer, five times as long: what
-# is instrumented is slow. (Tests that say nothing have the 1500 s of ctest.)
+# is instrumented is slow. (Tests that say nothing have the 1500 s of ctest, and the 7200 s of the
+# presets of sanitizers.)
 function(viwo_timeout variable seconds)
   if(VIWO_SANITIZE)
     math(EXPR seconds "5 * ${seconds}")

@@ -99,10 +99,11 @@ TEST_F(CalibrationStartTest, ARunBeginsWhereTheOneBeforeHasEndedInValueAndCovari
   }
   // The wheels' part of the file by the key of the wheels.
   const CalibrationFile wheels = start_of(setup({"kinematics.calibration=" + file.string()}));
+  const CalibrationFile configured = start_of(setup());
+  const CalibrationFile::Entries ends = all_of(end_);
   for (const CalibrationEntry& entry : all_of(wheels)) {
     const bool is_camera = entry.name.starts_with("cam");
-    const CalibrationEntry& expected =
-        *find(is_camera ? start_of(setup()).cameras : all_of(end_), entry.name);
+    const CalibrationEntry& expected = *find(is_camera ? configured.cameras : ends, entry.name);
     EXPECT_NEAR(entry.estimate, expected.estimate, kRounding) << entry.name;
     EXPECT_NEAR(entry.sigma, expected.sigma, kRounding) << entry.name;
   }
