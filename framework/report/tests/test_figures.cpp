@@ -1,8 +1,6 @@
-// Figures for a paper: what gnuplot drew, read back from the SVG; and what happens without it.
+// Figures for a paper: what gnuplot drew, read back from the SVG.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -19,10 +17,8 @@
 #include <zlib.h>
 
 #include "browser.hpp"
-#include "gnuplot.hpp"
 #include "gnuplot_format.hpp"
 #include "in_folder.hpp"
-#include "message_of.hpp"
 #include "sample.hpp"
 #include "viwo/report/figures.hpp"
 
@@ -333,71 +329,6 @@ TEST(Figures, OfAPlotWithoutPointsAreNone) {
   plot.series[0].x = {0., 1.};
   EXPECT_THROW(write_figures(folder.path(), with_plot(plot), FigureFormat::kSvg),
                std::invalid_argument);
-}
-
-/// PATH for as long as it lives.
-class PathVariable {
- public:
-  explicit PathVariable(const std::string& value) : before_(std::getenv("PATH")) {
-    setenv("PATH", value.c_str(), 1);
-  }
-  ~PathVariable() { setenv("PATH", before_.c_str(), 1); }
-  PathVariable(const PathVariable&) = delete;
-  PathVariable& operator=(const PathVariable&) = delete;
-
- private:
-  std::string before_;
-};
-
-TEST(Figures, WithoutGnuplotSayWhatToInstall) {
-  const TemporaryFolder folder;
-  const PathVariable path(folder.path().string());
-  EXPECT_EQ(testing::error_of(
-                [&] { write_figures(folder.path(), sample_document(), FigureFormat::kSvg); }),
-            "--figures needs gnuplot, which is not in PATH: install it (apt-get install "
-            "gnuplot-nox) or leave --figures out");
-  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
-}
-
-TEST(Figures, RepeatWhatGnuplotDidNotLike) {
-  const TemporaryFolder programs, folder;
-  const auto program = programs.path() / "gnuplot";
-  std::ofstream(program) << "#!/bin/sh\n[ \"$2\" = --version ] && exit 0\n"
-                            "echo \"line 3: no such terminal\" >&2\nexit 1\n";
-  std::filesystem::permissions(program, std::filesystem::perms::owner_all);
-  const PathVariable path(programs.path().string());
-  EXPECT_EQ(testing::error_of<std::runtime_error>(
-                [&] { write_figures(folder.path(), sample_document(), FigureFormat::kSvg); }),
-            "gnuplot failed on " + folder.path().string() +
-                "/unfinished.tmp/01_top_view_first_run.gp:\nline 3: no such terminal");
-  EXPECT_EQ(file_names(folder.path()), std::vector<std::string>{});
-}
-
-TEST(Figures, DoNotWaitForAGnuplotThatHangs) {
-  using namespace std::chrono_literals;
-  const TemporaryFolder programs;
-  const auto program = programs.path() / "gnuplot";
-  const PathVariable path(programs.path().string() + ":" + std::getenv("PATH"));
-  const auto error_of = [&](const std::string& body) {
-    std::ofstream(program) << "#!/bin/sh\n" << body << "\n";
-    std::filesystem::permissions(program, std::filesystem::perms::owner_all);
-    return testing::error_of<std::runtime_error>(
-        [&] { run_gnuplot(programs.path(), "a.gp", 200ms); });
-  };
-  const std::string stopped = "gnuplot was stopped: it had not finished " +
-                              (programs.path() / "a.gp").string() + " after 0.2 s";
-  EXPECT_EQ(error_of("exec sleep 100"), stopped);
-  // Whoever holds its standard error is not waited for either, nor is one that has closed it.
-  const auto child = programs.path() / "child";
-  EXPECT_EQ(error_of("echo waiting >&2; sleep 100 & echo $! > " + child.string() + "; wait"),
-            stopped + ":\nwaiting");
-  // What it has begun itself ends with it; nobody may have waited for that yet.
-  std::ifstream stat("/proc/" + text_of(child).substr(0, text_of(child).size() - 1) + "/stat");
-  std::string pid, name, state;
-  EXPECT_TRUE(!(stat >> pid >> name >> state) || state == "Z") << state;
-  EXPECT_EQ(error_of("exec 2>/dev/null; exec sleep 100"), stopped);
-  EXPECT_EQ(error_of("while :; do echo much >&2; done").substr(0, stopped.size()), stopped);
-  EXPECT_EQ(error_of("exit 0"), "");
 }
 
 }  // namespace
