@@ -25,12 +25,12 @@ function(viwo_for_plugins target)
     $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
 endfunction()
 
-# viwo_timeout(VARIABLE SECONDS): how long a test may take. With a sanitizer, five times as long: what
-# is instrumented is slow. (Tests that say nothing have the 1500 s of ctest, and the 7200 s of the
-# presets of sanitizers.)
+# viwo_timeout(VARIABLE SECONDS): how long a test may take. With a sanitizer, 24 times as long: what
+# is instrumented was up to twenty times as slow. (Tests that say nothing have the 1500 s of ctest, and
+# the 7200 s of the presets of sanitizers.)
 function(viwo_timeout variable seconds)
   if(VIWO_SANITIZE)
-    math(EXPR seconds "5 * ${seconds}")
+    math(EXPR seconds "24 * ${seconds}")
   endif()
   set(${variable} ${seconds} PARENT_SCOPE)
 endfunction()
