@@ -4,9 +4,8 @@
 #include <cstddef>
 #include <utility>
 
-#include <opencv2/core/utility.hpp>
-
 #include "flow.hpp"
+#include "parallel_for.hpp"
 #include "ray_ransac.hpp"
 #include "viwo/camera/camera_model.hpp"
 
@@ -116,11 +115,9 @@ void CameraTracker::keep(double dt_s) {
 }
 
 void CameraTracker::find_those(const Frame& from, const Frame& to, double dt_s) {
-  cv::parallel_for_(cv::Range(0, static_cast<int>(which_.size())), [&](const cv::Range& range) {
-    for (int k = range.start; k < range.end; ++k) {
-      const std::size_t i = which_[static_cast<std::size_t>(k)];
-      status_[i] = find(from, to, dt_s, i) ? 1 : 0;
-    }
+  parallel_for(which_.size(), [&](std::size_t k) {
+    const std::size_t i = which_[k];
+    status_[i] = find(from, to, dt_s, i) ? 1 : 0;
   });
 }
 

@@ -7,10 +7,10 @@
 #include <tuple>
 #include <utility>
 
-#include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "parallel_for.hpp"
 #include "viwo/camera/camera_model.hpp"
 
 namespace viwo::klt {
@@ -240,11 +240,7 @@ void Detector::detect(const Frame& frame, std::vector<cv::Point2f>& points) cons
     }
     const std::span<Lacking> cells = rest.first(n);
     rest = rest.subspan(n);
-    cv::parallel_for_(cv::Range(0, static_cast<int>(n)), [&](const cv::Range& range) {
-      for (int i = range.start; i < range.end; ++i) {
-        look_in(frame, cells[static_cast<std::size_t>(i)]);
-      }
-    });
+    parallel_for(n, [&](std::size_t i) { look_in(frame, cells[i]); });
     const std::vector<cv::Point2f> chosen = choose(cells, missing, spacing);
     missing -= static_cast<int>(chosen.size());
     fresh.insert(fresh.end(), chosen.begin(), chosen.end());

@@ -7,8 +7,7 @@
 #include <cstdio>
 #include <utility>
 
-#include <opencv2/core/utility.hpp>
-
+#include "parallel_for.hpp"
 #include "params.hpp"
 #include "viwo/image/image_file.hpp"
 #include "viwo/log/kalibr.hpp"
@@ -156,11 +155,8 @@ void KltTracker::read_one(const ImageSource* source, std::size_t camera, Eye& ey
 }
 
 void KltTracker::read(const ImageGroup& group) {
-  cv::parallel_for_(cv::Range(0, static_cast<int>(eyes_.size())), [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i) {
-      const auto camera = static_cast<std::size_t>(i);
-      read_one(group.images[camera].source.get(), camera, eyes_[camera]);
-    }
+  parallel_for(eyes_.size(), [&](std::size_t camera) {
+    read_one(group.images[camera].source.get(), camera, eyes_[camera]);
   });
 }
 
@@ -313,12 +309,7 @@ void KltTracker::process(const ImageGroup& group) {
   if (followed_.size() == 1) {
     follow(followed_.front());  // parallel inside
   } else {
-    cv::parallel_for_(cv::Range(0, static_cast<int>(followed_.size())),
-                      [&](const cv::Range& range) {
-                        for (int i = range.start; i < range.end; ++i) {
-                          follow(followed_[static_cast<std::size_t>(i)]);
-                        }
-                      });
+    parallel_for(followed_.size(), [&](std::size_t i) { follow(followed_[i]); });
   }
   for (const std::size_t camera : followed_) give_ids(eyes_[camera].tracker->tracks());
   for (std::size_t i = 0; i < eyes_.size(); ++i) {

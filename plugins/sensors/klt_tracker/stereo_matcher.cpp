@@ -5,8 +5,8 @@
 #include <utility>
 
 #include <Eigen/Geometry>
-#include <opencv2/core/utility.hpp>
 
+#include "parallel_for.hpp"
 #include "viwo/camera/camera_model.hpp"
 
 namespace viwo::klt {
@@ -72,16 +72,14 @@ bool StereoMatcher::find(const Frame& left, const Frame& right, const Track& tra
 
 void StereoMatcher::find_those(const Frame& left, const Frame& right,
                                const std::vector<Track>& tracks) {
-  cv::parallel_for_(cv::Range(0, static_cast<int>(which_.size())), [&](const cv::Range& range) {
-    for (int k = range.start; k < range.end; ++k) {
-      const std::size_t i = which_[static_cast<std::size_t>(k)];
-      Match& match = matches_[i];
-      if (!find(left, right, tracks[i], match.expected_per_m, match.to)) continue;
-      const auto ray = detector_.ray_at(match.to);
-      match.found = ray.has_value();
-      match.agrees = ray && inverse_distance(tracks[i].ray, *ray, match.per_m);
-      match.per_m = match.agrees ? std::max(match.per_m, 0.) : -1.;
-    }
+  parallel_for(which_.size(), [&](std::size_t k) {
+    const std::size_t i = which_[k];
+    Match& match = matches_[i];
+    if (!find(left, right, tracks[i], match.expected_per_m, match.to)) return;
+    const auto ray = detector_.ray_at(match.to);
+    match.found = ray.has_value();
+    match.agrees = ray && inverse_distance(tracks[i].ray, *ray, match.per_m);
+    match.per_m = match.agrees ? std::max(match.per_m, 0.) : -1.;
   });
 }
 
