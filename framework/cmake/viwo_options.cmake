@@ -54,6 +54,10 @@ if(NOT CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   # How GCC before 10.1 passed arguments on arm64, told at length for each that Boost passes so.
   list(APPEND VIWO_NO_FALSE_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>)
 endif()
+if(VIWO_SANITIZE STREQUAL "thread")
+  # Of the fences of Boost.Asio.
+  list(APPEND VIWO_NO_FALSE_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>)
+endif()
 set(VIWO_WARNINGS -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
     ${VIWO_NO_FALSE_WARNINGS})
 if(VIWO_WERROR)
